@@ -1,0 +1,321 @@
+//! Address-event words: what leaves the pixel array.
+//!
+//! One depth event is one 128-bit word, sent as 16 bytes, least significant
+//! first. The layout, its golden vectors and what will not change are in
+//! `docs/aer-format.md`. A word carries the low 20 bits of its laser cycle; a
+//! time word carries the rest and precedes the first event and every event
+//! whose upper bits differ from those of the event before. It is absolute, so
+//! that a receiver which joins late, or has lost words, is right again at the
+//! next.
+//!
+//! ```
+//! use dtof_core::*;
+//!
+//! let event = DepthEvent {
+//!     pixel: PixelAddress(2047),
+//!     cycle: LaserCycle(5_000_000),
+//!     exposure: 110,
+//!     peak_bin: BinIndex::saturating(40),
+//!     offset: SubBinOffset::CENTRE,
+//!     peak_count: Count::saturating(37),
+//!     background: Count::saturating(4),
+//!     flags: Flags::NONE,
+//! };
+//! let (time, word) = AerEncoder::new().encode(&event);
+//!
+//! let mut decoder = AerDecoder::new();
+//! assert_eq!(decoder.decode(word), Err(AerError::MissingTime));
+//! decoder.decode(time.unwrap())?;
+//! assert_eq!(decoder.decode(word), Ok(AerRecord::Event(event)));
+//! # Ok::<(), AerError>(())
+//! ```
+
+use core::fmt;
+
+use crate::event::DepthEvent;
+use crate::flags::Flags;
+use crate::units::{BinIndex, Count, LaserCycle, PixelAddress, SubBinOffset};
+
+/// The version of the word layout, which file headers and links announce.
+pub const AER_VERSION: u16 = 1;
+
+/// A bit field of one 64-bit half of a word.
+#[derive(Clone, Copy)]
+struct Field {
+    shift: u32,
+    bits: u32,
+}
+
+impl Field {
+    const fn mask(self) -> u64 {
+        (1 << self.bits) - 1
+    }
+
+    const fn put(self, value: u64) -> u64 {
+        (value & self.mask()) << self.shift
+    }
+
+    const fn get(self, half: u64) -> u64 {
+        (half >> self.shift) & self.mask()
+    }
+}
+
+// The low half of every word.
+const KIND: Field = Field { shift: 62, bits: 2 };
+// The low half of an event.
+const PIXEL: Field = Field { shift: 0, bits: 16 };
+const EXPOSURE: Field = Field {
+    shift: 16,
+    bits: 16,
+};
+const CYCLE_LOW: Field = Field {
+    shift: 32,
+    bits: 20,
+};
+const PEAK_BIN: Field = Field {
+    shift: 52,
+    bits: 10,
+};
+// The high half of an event.
+const PEAK_COUNT: Field = Field { shift: 0, bits: 24 };
+const BACKGROUND: Field = Field {
+    shift: 24,
+    bits: 24,
+};
+const OFFSET: Field = Field {
+    shift: 48,
+    bits: 10,
+};
+const FLAGS: Field = Field { shift: 58, bits: 6 };
+// The low half of a control word.
+const CONTROL: Field = Field {
+    shift: 52,
+    bits: 10,
+};
+const CHECKSUM: Field = Field { shift: 0, bits: 32 };
+// The high half of a time word.
+const CYCLE_HIGH: Field = Field { shift: 0, bits: 44 };
+
+const KIND_CONTROL: u64 = 0;
+const KIND_DEPTH_EVENT: u64 = 1;
+const CONTROL_TIME: u64 = 1;
+const CONTROL_END: u64 = 2;
+
+/// One packed word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct AerWord {
+    low: u64,
+    high: u64,
+}
+
+impl AerWord {
+    /// Bytes of a word.
+    pub const BYTES: usize = 16;
+
+    /// The word as it is sent: least significant byte first.
+    #[inline]
+    #[must_use]
+    pub const fn to_le_bytes(self) -> [u8; Self::BYTES] {
+        ((self.high as u128) << 64 | self.low as u128).to_le_bytes()
+    }
+
+    /// A word as it was received. Any bytes make a word; whether it means
+    /// anything is for [`AerDecoder::decode`] to say.
+    #[inline]
+    #[must_use]
+    pub const fn from_le_bytes(bytes: [u8; Self::BYTES]) -> Self {
+        let word = u128::from_le_bytes(bytes);
+        #[allow(clippy::cast_possible_truncation, reason = "split in two halves")]
+        Self {
+            low: word as u64,
+            high: (word >> 64) as u64,
+        }
+    }
+
+    /// The depth event without the upper bits of its laser cycle. Exact: every
+    /// field fits by its type.
+    #[inline]
+    #[must_use]
+    pub const fn depth_event(event: &DepthEvent) -> Self {
+        Self {
+            low: KIND.put(KIND_DEPTH_EVENT)
+                | PIXEL.put(event.pixel.0 as u64)
+                | EXPOSURE.put(event.exposure as u64)
+                | CYCLE_LOW.put(event.cycle.0)
+                | PEAK_BIN.put(event.peak_bin.raw() as u64),
+            high: PEAK_COUNT.put(event.peak_count.raw() as u64)
+                | BACKGROUND.put(event.background.raw() as u64)
+                | OFFSET.put(event.offset.raw().cast_unsigned() as u64)
+                | FLAGS.put(event.flags.bits() as u64),
+        }
+    }
+
+    /// The upper bits of the laser cycle of the events that follow.
+    #[inline]
+    #[must_use]
+    pub const fn time(cycle: LaserCycle) -> Self {
+        Self {
+            low: KIND.put(KIND_CONTROL) | CONTROL.put(CONTROL_TIME),
+            high: CYCLE_HIGH.put(cycle.0 >> CYCLE_LOW.bits),
+        }
+    }
+
+    /// The last word of a recording: how many events it holds and the CRC-32
+    /// of all bytes before this word.
+    #[must_use]
+    pub const fn end(events: u64, checksum: u32) -> Self {
+        Self {
+            low: KIND.put(KIND_CONTROL) | CONTROL.put(CONTROL_END) | CHECKSUM.put(checksum as u64),
+            high: events,
+        }
+    }
+}
+
+/// Packs events in the order they leave, with the time words they need.
+#[derive(Clone, Debug, Default)]
+pub struct AerEncoder {
+    cycle_high: Option<u64>,
+}
+
+impl AerEncoder {
+    /// At the start of a stream.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { cycle_high: None }
+    }
+
+    /// The word of an event, and the time word to send before it if one is
+    /// due. Events need not be in order of time.
+    #[inline]
+    pub const fn encode(&mut self, event: &DepthEvent) -> (Option<AerWord>, AerWord) {
+        let high = event.cycle.0 >> CYCLE_LOW.bits;
+        let time = match self.cycle_high {
+            Some(sent) if sent == high => None,
+            _ => Some(AerWord::time(event.cycle)),
+        };
+        self.cycle_high = Some(high);
+        (time, AerWord::depth_event(event))
+    }
+}
+
+/// What a word means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum AerRecord {
+    /// A depth event with its whole laser cycle.
+    Event(DepthEvent),
+    /// A time word: the events that follow lie in this laser cycle or in the
+    /// 2²⁰ − 1 after it.
+    Time(LaserCycle),
+    /// The end of a recording.
+    End {
+        /// Depth events in the recording.
+        events: u64,
+        /// CRC-32 of all bytes before this word.
+        checksum: u32,
+    },
+}
+
+/// A word that means nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum AerError {
+    /// The kind is none of this version.
+    UnknownKind,
+    /// The control code is none of this version.
+    UnknownControl,
+    /// Bits that are zero in this version are set.
+    ReservedBits,
+    /// An event before any time word, so that its laser cycle is unknown.
+    MissingTime,
+}
+
+impl fmt::Display for AerError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::UnknownKind => "unknown kind of word",
+            Self::UnknownControl => "unknown control word",
+            Self::ReservedBits => "reserved bits are set",
+            Self::MissingTime => "an event before any time word",
+        })
+    }
+}
+
+impl core::error::Error for AerError {}
+
+/// Reads words in the order they were sent.
+#[derive(Clone, Debug, Default)]
+pub struct AerDecoder {
+    cycle_high: Option<u64>,
+}
+
+impl AerDecoder {
+    /// At the start of a stream, or joining one.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { cycle_high: None }
+    }
+
+    /// What the next word means.
+    ///
+    /// # Errors
+    /// [`AerError`] if it means nothing. The decoder stays as it was and may be
+    /// given the next word.
+    #[inline]
+    pub fn decode(&mut self, word: AerWord) -> Result<AerRecord, AerError> {
+        match KIND.get(word.low) {
+            KIND_DEPTH_EVENT => {
+                let high = self.cycle_high.ok_or(AerError::MissingTime)?;
+                Ok(AerRecord::Event(unpack(word, high)))
+            }
+            KIND_CONTROL => self.control(word),
+            _ => Err(AerError::UnknownKind),
+        }
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "a 32-bit field")]
+    fn control(&mut self, word: AerWord) -> Result<AerRecord, AerError> {
+        match CONTROL.get(word.low) {
+            CONTROL_TIME => {
+                let time = AerWord::time(LaserCycle(word.high << CYCLE_LOW.bits));
+                if word != time {
+                    return Err(AerError::ReservedBits);
+                }
+                self.cycle_high = Some(word.high);
+                Ok(AerRecord::Time(LaserCycle(word.high << CYCLE_LOW.bits)))
+            }
+            CONTROL_END => {
+                let checksum = CHECKSUM.get(word.low) as u32;
+                if word != AerWord::end(word.high, checksum) {
+                    return Err(AerError::ReservedBits);
+                }
+                Ok(AerRecord::End {
+                    events: word.high,
+                    checksum,
+                })
+            }
+            _ => Err(AerError::UnknownControl),
+        }
+    }
+}
+
+/// An event from its word and the upper bits of its laser cycle.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "each field is as wide as its type"
+)]
+fn unpack(word: AerWord, cycle_high: u64) -> DepthEvent {
+    // The sign of the offset's ten bits is moved to the top and drawn down.
+    let offset = ((OFFSET.get(word.high) << 6) as u16).cast_signed() >> 6;
+    DepthEvent {
+        pixel: PixelAddress(PIXEL.get(word.low) as u16),
+        cycle: LaserCycle(cycle_high << CYCLE_LOW.bits | CYCLE_LOW.get(word.low)),
+        exposure: EXPOSURE.get(word.low) as u16,
+        peak_bin: BinIndex::saturating(PEAK_BIN.get(word.low) as u16),
+        offset: SubBinOffset::new(offset).unwrap_or(SubBinOffset::CENTRE),
+        peak_count: Count::saturating(PEAK_COUNT.get(word.high) as u32),
+        background: Count::saturating(BACKGROUND.get(word.high) as u32),
+        flags: Flags::from_bits(FLAGS.get(word.high) as u8).unwrap_or(Flags::NONE),
+    }
+}

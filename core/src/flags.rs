@@ -1,0 +1,61 @@
+//! Flags: every wrong answer that could be known is marked.
+
+use core::fmt;
+use core::ops::{BitOr, BitOrAssign};
+
+/// What is to be said against an event. Six bits; unknown ones are kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Flags(u8);
+
+impl Flags {
+    /// Nothing.
+    pub const NONE: Self = Self(0);
+    /// Bit 0: the peak's counter is full. The peak may lie in another full
+    /// bin, and the depth is drawn towards the middle of the bin.
+    pub const SATURATED: Self = Self(1);
+    /// Bit 1: the depth window reaches past the range gate, so that the depth
+    /// is drawn into the gate.
+    pub const CLIPPED: Self = Self(1 << 1);
+    /// Bit 2: the decision was put off while the slot was full, so that the
+    /// exposure is longer than the photons asked for.
+    pub const DEFERRED: Self = Self(1 << 2);
+
+    /// From bits, or `None` above six bits.
+    #[must_use]
+    pub const fn from_bits(bits: u8) -> Option<Self> {
+        if bits < 64 { Some(Self(bits)) } else { None }
+    }
+
+    /// The bits.
+    #[must_use]
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+
+    /// Whether all of `other` is set.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+}
+
+impl BitOr for Flags {
+    type Output = Self;
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+impl BitOrAssign for Flags {
+    fn bitor_assign(&mut self, other: Self) {
+        *self = *self | other;
+    }
+}
+
+/// The bits as a decimal number.
+impl fmt::Display for Flags {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.0, f)
+    }
+}

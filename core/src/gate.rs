@@ -1,0 +1,116 @@
+//! The range gate: the bins that may hold the peak.
+//!
+//! Real sensors see their own cover glass, in recorded histograms as a peak up
+//! to a hundred times the target's. A gate leaves it out: photons in gated-out
+//! bins never enter a pixel's histogram, and the gated bins play the part the
+//! whole histogram plays in the paper, for the peak, the background and the
+//! depth alike. The halves and quadrants of the background rule are those of
+//! the gate; without a gate they are exactly the paper's.
+//!
+//! ```
+//! use dtof_core::{BinIndex, RangeGate};
+//!
+//! let gate = RangeGate::<128>::new(20, 119)?;
+//! assert!(!gate.contains(19) && gate.contains(20) && gate.contains(119));
+//! assert_eq!(gate.quadrant_starts(), [20, 45, 70, 95, 120]);
+//! assert_eq!(RangeGate::<128>::full().quadrant_starts(), [0, 32, 64, 96, 128]);
+//! # Ok::<(), dtof_core::GateError>(())
+//! ```
+
+use core::fmt;
+
+/// First and last bin that may hold the peak, both inclusive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RangeGate<const BINS: usize> {
+    first: u16,
+    /// One past the last bin.
+    end: u16,
+}
+
+/// A gate that cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum GateError {
+    /// The last bin lies past the histogram's last.
+    PastLastBin,
+    /// Fewer than [`RangeGate::MIN_BINS`] bins are left.
+    TooNarrow,
+}
+
+impl fmt::Display for GateError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::PastLastBin => "the range gate ends past the last bin of the histogram",
+            Self::TooNarrow => "the range gate leaves fewer than 8 bins",
+        })
+    }
+}
+
+impl core::error::Error for GateError {}
+
+impl<const BINS: usize> RangeGate<BINS> {
+    /// The fewest bins a gate may leave, as many as the smallest histogram has.
+    pub const MIN_BINS: u16 = 8;
+
+    /// All bins.
+    #[must_use]
+    pub const fn full() -> Self {
+        const { assert!(BINS >= Self::MIN_BINS as usize && BINS <= 1024) };
+        #[allow(clippy::cast_possible_truncation)] // at most 1024
+        Self {
+            first: 0,
+            end: BINS as u16,
+        }
+    }
+
+    /// From bin `first` to bin `last`, both inclusive.
+    ///
+    /// # Errors
+    /// [`GateError`] if `last` is not a bin, or fewer than
+    /// [`Self::MIN_BINS`] bins are left.
+    pub const fn new(first: u16, last: u16) -> Result<Self, GateError> {
+        if last >= Self::full().end {
+            return Err(GateError::PastLastBin);
+        }
+        let end = last + 1;
+        if first > last || end - first < Self::MIN_BINS {
+            return Err(GateError::TooNarrow);
+        }
+        Ok(Self { first, end })
+    }
+
+    /// The first bin that may hold the peak.
+    #[must_use]
+    pub const fn first(&self) -> u16 {
+        self.first
+    }
+
+    /// The last bin that may hold the peak.
+    #[must_use]
+    pub const fn last(&self) -> u16 {
+        self.end - 1
+    }
+
+    /// Whether `bin` may hold the peak.
+    #[inline]
+    #[must_use]
+    pub const fn contains(&self, bin: u16) -> bool {
+        self.first <= bin && bin < self.end
+    }
+
+    /// Where the four quadrants of the gated bins start, and where the last one
+    /// ends: `first + k·n/4` for `n` gated bins, rounded down.
+    #[inline]
+    #[must_use]
+    pub const fn quadrant_starts(&self) -> [u16; 5] {
+        let bins = self.end - self.first;
+        [
+            self.first,
+            self.first + bins / 4,
+            self.first + bins / 2,
+            self.first + bins * 3 / 4,
+            self.end,
+        ]
+    }
+}

@@ -1,0 +1,255 @@
+//! The histogram of one macropixel.
+//!
+//! Counters saturate, as in the paper's FPGA (10 bits, section IV-B), and
+//! never wrap: what a full counter cannot take is counted as *saturated*, a TDC
+//! code beyond the last bin as *rejected*, so that
+//! `photons offered = total + saturated + rejected` always holds.
+//!
+//! The highest bin is kept while counting. Counts only grow, so the maximum of
+//! the key `(count << log2(BINS)) - bin` over all photons *is* the key of the
+//! highest bin, the lowest index winning a tie; no comparator tree has to run
+//! when the peak is asked for.
+//!
+//! ```
+//! use dtof_core::Histogram;
+//!
+//! let mut histogram = Histogram::<128>::new();
+//! histogram.add_batch(&[40, 41, 40, 7, 300]);
+//! assert_eq!(histogram.peak().bin.raw(), 40);
+//! assert_eq!(histogram.peak().count.raw(), 2);
+//! assert_eq!((histogram.total(), histogram.rejected()), (4, 1));
+//! ```
+
+use crate::gate::RangeGate;
+use crate::isqrt::isqrt;
+use crate::peak::Peak;
+use crate::units::{BinIndex, Count};
+
+mod sealed {
+    pub trait Sealed {}
+}
+
+/// How wide the counters of a histogram are.
+///
+/// The decision path is the same for all; only the square root needs more
+/// iterations for wider counts.
+pub trait CounterWidth: sealed::Sealed {
+    /// The integer that holds one counter.
+    type Counter: Copy + Default + Ord + Into<u32> + core::fmt::Debug;
+    /// Bits a counter uses; it saturates at `2^BITS - 1`.
+    const BITS: u32;
+    /// The count at which a counter is full.
+    const MAX: u32 = (1 << Self::BITS) - 1;
+
+    /// `count`, which is at most [`Self::MAX`], as a counter.
+    fn counter(count: u32) -> Self::Counter;
+
+    /// The floor of the square root of any count, with as many iterations as
+    /// the width needs: 5 for 10 bits, 8 for 16, 12 for 24.
+    fn square_root(count: u32) -> u32;
+}
+
+/// 10-bit counters (0..=1023), those of the paper's FPGA and the default.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count10 {}
+/// 16-bit counters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count16 {}
+/// 24-bit counters, those of commercial sensors that send whole histograms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count24 {}
+
+macro_rules! counter_width {
+    ($name:ident, $counter:ty, $bits:literal) => {
+        impl sealed::Sealed for $name {}
+        impl CounterWidth for $name {
+            type Counter = $counter;
+            const BITS: u32 = $bits;
+            #[inline]
+            #[allow(clippy::cast_possible_truncation)] // at most 2^BITS - 1, which fits
+            fn counter(count: u32) -> $counter {
+                count as $counter
+            }
+            #[inline]
+            fn square_root(count: u32) -> u32 {
+                isqrt::<{ <$name as CounterWidth>::BITS.div_ceil(2) }>(count)
+            }
+        }
+    };
+}
+counter_width!(Count10, u16, 10);
+counter_width!(Count16, u16, 16);
+counter_width!(Count24, u32, 24);
+
+/// Photon counts of one macropixel over `BINS` bins, a power of two from 8 to
+/// 1024 (checked when compiled).
+///
+/// 2 bytes a bin for [`Count10`] and [`Count16`], 4 for [`Count24`], and 16
+/// bytes more.
+#[derive(Clone, Debug)]
+pub struct Histogram<const BINS: usize, W: CounterWidth = Count10> {
+    counts: [W::Counter; BINS],
+    peak_key: u32,
+    total: u32,
+    rejected: u32,
+    saturated: u32,
+}
+
+impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
+    const LOG2_BINS: u32 = {
+        assert!(BINS.is_power_of_two(), "BINS must be a power of two");
+        assert!(BINS >= 8 && BINS <= 1024, "BINS must be from 8 to 1024");
+        assert!(
+            BINS.ilog2() + W::BITS <= 32,
+            "a peak key must fit 32 bits: fewer bins or narrower counters"
+        );
+        BINS.ilog2()
+    };
+
+    /// An empty histogram.
+    #[must_use]
+    pub fn new() -> Self {
+        const { assert!(Self::LOG2_BINS >= 3) };
+        Self {
+            counts: [W::Counter::default(); BINS],
+            peak_key: 0,
+            total: 0,
+            rejected: 0,
+            saturated: 0,
+        }
+    }
+
+    /// Counts one photon with the TDC code `code`.
+    ///
+    /// A code of `BINS` or more is rejected and counted, never wrapped; a full
+    /// counter stays full and the photon is counted as saturated.
+    #[inline]
+    pub fn add(&mut self, code: u16) {
+        let Some(counter) = self.counts.get_mut(usize::from(code)) else {
+            self.rejected = self.rejected.saturating_add(1);
+            return;
+        };
+        let count: u32 = (*counter).into();
+        if count >= W::MAX {
+            self.saturated = self.saturated.saturating_add(1);
+            return;
+        }
+        *counter = W::counter(count + 1);
+        self.total = self.total.wrapping_add(1);
+        self.peak_key = self.peak_key.max(Self::key(count + 1, code.into()));
+    }
+
+    /// Counts one photon for each TDC code, as [`Self::add`] does.
+    #[inline]
+    pub fn add_batch(&mut self, codes: &[u16]) {
+        for &code in codes {
+            self.add(code);
+        }
+    }
+
+    /// Adds the gated bins of a whole mini-frame, such as the 5-laser-cycle
+    /// histograms of the paper's sensor (section III-A) or a complete histogram
+    /// from another sensor. Counters saturate bin by bin; what they cannot take
+    /// is added to [`Self::saturated`].
+    ///
+    /// Returns the photons left out by the gate; sticks at `u32::MAX`.
+    pub fn add_frame<C: Copy + Into<u32>>(
+        &mut self,
+        frame: &[C; BINS],
+        gate: &RangeGate<BINS>,
+    ) -> u32 {
+        let mut gated_out = 0u32;
+        for (bin, (counter, &photons)) in (0..).zip(self.counts.iter_mut().zip(frame)) {
+            let photons: u32 = photons.into();
+            if !gate.contains(bin) {
+                gated_out = gated_out.saturating_add(photons);
+                continue;
+            }
+            let before: u32 = (*counter).into();
+            let taken = photons.min(W::MAX.saturating_sub(before));
+            let count = before + taken;
+            *counter = W::counter(count);
+            self.saturated = self.saturated.saturating_add(photons - taken);
+            self.total = self.total.wrapping_add(taken);
+            if count > 0 {
+                self.peak_key = self.peak_key.max(Self::key(count, bin.into()));
+            }
+        }
+        gated_out
+    }
+
+    /// The highest bin; the lowest index wins a tie. Bin 0 with a count of 0
+    /// while the histogram is empty.
+    #[inline]
+    #[must_use]
+    pub fn peak(&self) -> Peak {
+        // The inverse of `key`: the count rounds up, the bin is what is missing.
+        let count = (self.peak_key >> Self::LOG2_BINS)
+            + u32::from(self.peak_key & ((1 << Self::LOG2_BINS) - 1) != 0);
+        let bin = (count << Self::LOG2_BINS).wrapping_sub(self.peak_key);
+        Peak {
+            bin: BinIndex::saturating((bin & 0x3ff) as u16),
+            count: Count::saturating(count),
+        }
+    }
+
+    /// The counters, bin 0 first.
+    #[inline]
+    #[must_use]
+    pub const fn counts(&self) -> &[W::Counter; BINS] {
+        &self.counts
+    }
+
+    /// The count of one bin, or `None` past the last.
+    #[inline]
+    #[must_use]
+    pub fn count(&self, bin: usize) -> Option<u32> {
+        self.counts.get(bin).map(|&count| count.into())
+    }
+
+    /// Photons counted since the last [`Self::clear`]: the sum of all bins.
+    #[inline]
+    #[must_use]
+    pub const fn total(&self) -> u32 {
+        self.total
+    }
+
+    /// Photons with a TDC code past the last bin, since the last
+    /// [`Self::clear`]. Sticks at `u32::MAX`.
+    #[inline]
+    #[must_use]
+    pub const fn rejected(&self) -> u32 {
+        self.rejected
+    }
+
+    /// Photons that met a full counter, since the last [`Self::clear`]. Sticks
+    /// at `u32::MAX`.
+    #[inline]
+    #[must_use]
+    pub const fn saturated(&self) -> u32 {
+        self.saturated
+    }
+
+    /// Empties the histogram for the next exposure.
+    #[inline]
+    pub fn clear(&mut self) {
+        self.counts.fill(W::Counter::default());
+        self.peak_key = 0;
+        self.total = 0;
+        self.rejected = 0;
+        self.saturated = 0;
+    }
+
+    /// Orders bins by count, the lower bin first among equals. `count` is at
+    /// least 1 and `bin` less than `BINS`, so nothing goes below zero.
+    #[inline]
+    const fn key(count: u32, bin: u32) -> u32 {
+        (count << Self::LOG2_BINS).wrapping_sub(bin)
+    }
+}
+
+impl<const BINS: usize, W: CounterWidth> Default for Histogram<BINS, W> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

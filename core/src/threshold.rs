@@ -1,0 +1,80 @@
+//! The threshold a peak must exceed: `background + α·√background` (Eq. 5).
+//!
+//! α is an unsigned fixed-point number with 8 fractional bits, 0 to
+//! 255.996. The root is the integer one of [`isqrt`](crate::isqrt()), so the
+//! threshold lies below the real-valued one by less than α counts, as in the
+//! paper's hardware.
+//!
+//! With a background of 0 the threshold is 0 and one stray photon would exceed
+//! it: the peak must also hold a minimum count.
+//!
+//! ```
+//! use dtof_core::{Count, Count10, Threshold, fixed::types::U8F8};
+//!
+//! let threshold = Threshold::new(U8F8::lit("2.5"), Count::saturating(5));
+//! let background = Count::saturating(20); // root 4
+//! assert_eq!(threshold.level::<Count10>(background), 30u16);
+//! assert!(!threshold.is_exceeded::<Count10>(Count::saturating(30), background));
+//! assert!(threshold.is_exceeded::<Count10>(Count::saturating(31), background));
+//! // Background 0: only the minimum count holds a stray photon back.
+//! assert!(!threshold.is_exceeded::<Count10>(Count::saturating(4), Count::saturating(0)));
+//! ```
+
+use fixed::types::{U8F8, U24F8};
+
+use crate::histogram::CounterWidth;
+use crate::units::Count;
+
+/// α and the minimum peak count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Threshold {
+    alpha: U8F8,
+    minimum_count: Count,
+}
+
+impl Threshold {
+    /// `alpha` standard deviations above the background, and at least
+    /// `minimum_count` photons in the peak.
+    #[must_use]
+    pub const fn new(alpha: U8F8, minimum_count: Count) -> Self {
+        Self {
+            alpha,
+            minimum_count,
+        }
+    }
+
+    /// How many standard deviations above the background.
+    #[must_use]
+    pub const fn alpha(&self) -> U8F8 {
+        self.alpha
+    }
+
+    /// The fewest photons a reported peak holds.
+    #[must_use]
+    pub const fn minimum_count(&self) -> Count {
+        self.minimum_count
+    }
+
+    /// `background + α·⌊√background⌋`, exact in 1/256 counts.
+    ///
+    /// `W` is the width of the counters the background comes from. Past the
+    /// largest `U24F8` the level stays
+    /// there, which no [`Count`] exceeds, as none would exceed the true level.
+    #[inline]
+    #[must_use]
+    pub fn level<W: CounterWidth>(&self, background: Count) -> U24F8 {
+        // 16 bits of α times at most 12 bits of root: no overflow.
+        let above = u32::from(self.alpha.to_bits()) * W::square_root(background.raw());
+        U24F8::from_bits((background.raw() << 8).saturating_add(above))
+    }
+
+    /// Whether a peak of `peak` photons stands clear: strictly above the level,
+    /// and not below the minimum count.
+    #[inline]
+    #[must_use]
+    pub fn is_exceeded<W: CounterWidth>(&self, peak: Count, background: Count) -> bool {
+        (peak.raw() << 8) > self.level::<W>(background).to_bits()
+            && peak.raw() >= self.minimum_count.raw()
+    }
+}

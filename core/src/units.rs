@@ -1,0 +1,145 @@
+//! The quantities of the pipeline, as types: what holds a [`Count`] cannot be
+//! mistaken for a [`BinIndex`].
+//!
+//! Every type keeps its raw integer private and in range, so that a
+//! [`DepthEvent`](crate::DepthEvent) always fits its
+//! [`AerWord`](crate::AerWord). Where a conversion rounds, its name or its
+//! documentation says how.
+//!
+//! | type | unit | range | in the AER word |
+//! |---|---|---|---|
+//! | [`PixelAddress`] | macropixel | 0..=65,535 | 16 bits |
+//! | [`LaserCycle`] | laser cycles since the start | 0..=2⁶⁴−1 | 20 bits + time word |
+//! | [`BinIndex`] | histogram bin | 0..=1,023 | 10 bits |
+//! | [`Count`] | photons | 0..=16,777,215 | 24 bits |
+//! | [`SubBinOffset`] | 1/256 bin from the start of the peak bin | −2..+2 bins | 10 bits |
+//! | [`BinPosition`] | 1/256 bin from the start of bin 0 | −2..1,025 bins | derived |
+
+use core::fmt;
+
+/// A bounded unsigned newtype: `new` is checked, `raw` gives the integer back.
+macro_rules! bounded {
+    ($(#[$doc:meta])* $name:ident($raw:ty), max $max:expr) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        pub struct $name($raw);
+
+        impl $name {
+            /// The largest value.
+            pub const MAX: Self = Self($max);
+
+            /// The quantity, or `None` above [`Self::MAX`].
+            #[inline]
+            #[must_use]
+            pub const fn new(raw: $raw) -> Option<Self> {
+                if raw <= $max { Some(Self(raw)) } else { None }
+            }
+
+            /// The quantity, limited to [`Self::MAX`].
+            #[inline]
+            #[must_use]
+            pub const fn saturating(raw: $raw) -> Self {
+                if raw <= $max { Self(raw) } else { Self::MAX }
+            }
+
+            /// The plain integer.
+            #[inline]
+            #[must_use]
+            pub const fn raw(self) -> $raw {
+                self.0
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                fmt::Display::fmt(&self.0, f)
+            }
+        }
+    };
+}
+
+bounded! {
+    /// A bin of a histogram, counted from 0.
+    BinIndex(u16), max 1023
+}
+
+bounded! {
+    /// Photons in one bin: 10 bits in the paper's FPGA, up to 24 bits in
+    /// recorded histograms.
+    Count(u32), max 0x00ff_ffff
+}
+
+/// Which macropixel an event comes from; row-major in an array.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PixelAddress(pub u16);
+
+/// When: laser cycles since the sensor was started, the first being 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct LaserCycle(pub u64);
+
+/// Distance from the **start of the peak bin**, in 1/256 bin: −2 bins
+/// inclusive to +2 bins exclusive. A photon spread evenly over the peak bin
+/// averages +0.5 bin, [`SubBinOffset::CENTRE`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SubBinOffset(i16);
+
+impl SubBinOffset {
+    /// Two bins before the start of the peak bin.
+    pub const MIN: Self = Self(-512);
+    /// The middle of the peak bin.
+    pub const CENTRE: Self = Self(128);
+    /// 1/256 bin before the end of the bin that follows the peak bin.
+    pub const MAX: Self = Self(511);
+
+    /// From 1/256 bins, or `None` outside [`Self::MIN`]..=[`Self::MAX`].
+    #[inline]
+    #[must_use]
+    pub const fn new(raw: i16) -> Option<Self> {
+        if Self::MIN.0 <= raw && raw <= Self::MAX.0 {
+            Some(Self(raw))
+        } else {
+            None
+        }
+    }
+
+    /// In 1/256 bins.
+    #[inline]
+    #[must_use]
+    pub const fn raw(self) -> i16 {
+        self.0
+    }
+}
+
+/// Distance from the **start of bin 0**, in 1/256 bin (signed: an estimator may
+/// place a pulse up to two bins before bin 0).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct BinPosition(i32);
+
+impl BinPosition {
+    /// How many fractional bits [`Self::raw`] has.
+    pub const FRACTIONAL_BITS: u32 = 8;
+    /// 1,025 bins and 255/256: the farthest an event can lie.
+    pub const MAX: Self = Self::of(BinIndex::MAX, SubBinOffset::MAX);
+    /// Two bins before bin 0: the nearest.
+    pub const MIN: Self = Self::of(BinIndex(0), SubBinOffset::MIN);
+
+    /// Where `offset` from the start of `bin` lies. Exact.
+    #[inline]
+    #[must_use]
+    pub const fn of(bin: BinIndex, offset: SubBinOffset) -> Self {
+        // 10 + 8 bits, plus or minus 9: far from overflow.
+        Self(((bin.0 as i32) << Self::FRACTIONAL_BITS) + offset.0 as i32)
+    }
+
+    /// In 1/256 bins.
+    #[inline]
+    #[must_use]
+    pub const fn raw(self) -> i32 {
+        self.0
+    }
+}

@@ -1,0 +1,4 @@
+//! What the integer code answers to: the paper in floating point, written from
+//! the paper and not from `dtof-core`.
+
+pub mod reference;

@@ -1,0 +1,34 @@
+//! The algorithm of the paper in plain floating point.
+//!
+//! Y. Liu et al., "An on-chip Pixel Processing Approach with 2.4 µs latency for
+//! Asynchronous Read-out of SPAD-based dToF Flash `LiDARs`". Every module is
+//! written from the text of the paper and shares nothing with the integer
+//! implementation, so that the two can be held against each other.
+//!
+//! | Module         | What it holds                                  | Paper                |
+//! |----------------|------------------------------------------------|----------------------|
+//! | `histogram`    | photon counts per bin, saturating counters     | sec. II-A, sec. IV-B |
+//! | `peak`         | the bin with the largest count                 | sec. II-A            |
+//! | `background`   | the background level next to a peak            | sec. IV-B            |
+//! | `threshold`    | whether a peak is significant                  | Eq. 5                |
+//! | `depth`        | sub-bin position of a peak, and its range      | sec. III-A           |
+//! | `pixel`        | the asynchronous operation of a pixel          | sec. II-B            |
+//! | `square_root`  | the integer square root of the background      | sec. IV-B, Alg. 1    |
+//!
+//! Windows of bins are inclusive at both ends: `first..=last`.
+
+mod background;
+mod depth;
+mod histogram;
+mod peak;
+mod pixel;
+mod square_root;
+mod threshold;
+
+pub use background::{mean_background, quadrant_background};
+pub use depth::{centre_of_mass, range_mm};
+pub use histogram::Histogram;
+pub use peak::peak;
+pub use pixel::{Config, Event, Look, Pixel};
+pub use square_root::floor_square_root;
+pub use threshold::{stands_clear, threshold};
