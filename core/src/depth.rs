@@ -44,7 +44,7 @@ use crate::units::{BinPosition, Count, SubBinOffset};
 pub struct Depth {
     /// From the start of the peak bin: 0 to 1 bin inclusive.
     pub offset: SubBinOffset,
-    /// [`Flags::SATURATED`] if a counter in the window is full,
+    /// [`Flags::SATURATED`] if the counter of the peak bin is full,
     /// [`Flags::CLIPPED`] if the window reaches past the gate.
     pub flags: Flags,
 }
@@ -80,12 +80,15 @@ pub fn centre_of_mass<const BINS: usize, W: CounterWidth>(
         flags |= Flags::CLIPPED;
     }
 
-    // Only their ratio counts, so that 24-bit counts may lose two bits to keep
-    // the 256-fold numerator within 32 bits.
-    let above = |count: u32| count.saturating_sub(background.raw()) >> W::BITS.saturating_sub(22);
+    let above = |count: u32| count.saturating_sub(background.raw());
     let left = above(left.unwrap_or(0));
     let centre = above(peak.count.raw());
     let right = above(right.unwrap_or(0));
+    // Only their ratio counts, so that counts past 22 bits, which only 24-bit
+    // counters hold, may lose two bits to keep the 256-fold numerator within 32.
+    let excess = 10u32.saturating_sub((left | centre | right).leading_zeros());
+    let excess = excess.min(W::BITS.saturating_sub(22));
+    let (left, centre, right) = (left >> excess, centre >> excess, right >> excess);
     let sum = left + centre + right;
     let numerator = (right.abs_diff(left) << 8) + sum / 2;
     // At most 128 when `peak` is the highest bin; limited to what the offset
@@ -131,7 +134,7 @@ impl fmt::Display for RangeScaleError {
 impl core::error::Error for RangeScaleError {}
 
 impl RangeScale {
-    /// Half the speed of light in µm/s: 0.149896229 mm a picosecond, exactly.
+    /// Half the speed of light in m/s: 0.149896229 mm a picosecond, exactly.
     const HALF_C: u64 = 149_896_229;
 
     /// `bin_width` in picoseconds, `offset` in millimetres, which is added to

@@ -6,7 +6,7 @@
 //! the moment its peak stands clear of the background; then it starts over.
 //! The method is that of Y. Liu et al., *An on-chip Pixel Processing Approach
 //! with 2.4 µs latency for Asynchronous Read-out of SPAD-based dToF Flash
-//! `LiDARs`*; sections, equations and algorithms cited in this crate are that
+//! LiDARs*; sections, equations and algorithms cited in this crate are that
 //! paper's.
 //!
 //! ```text

@@ -30,6 +30,7 @@
 //! ```
 
 use core::fmt;
+use core::ops::AddAssign;
 
 use crate::depth::{Depth, centre_of_mass};
 use crate::event::{DepthEvent, EventSlot};
@@ -217,6 +218,19 @@ pub struct Statistics {
     pub deferred: u64,
     /// Exposures that reached L2 without an event.
     pub expired: u64,
+}
+
+impl AddAssign for Statistics {
+    /// Those of one more pixel.
+    fn add_assign(&mut self, other: Self) {
+        self.counted += other.counted;
+        self.saturated += other.saturated;
+        self.rejected += other.rejected;
+        self.gated_out += other.gated_out;
+        self.events += other.events;
+        self.deferred += other.deferred;
+        self.expired += other.expired;
+    }
 }
 
 /// One macropixel: histogram, exposure and event slot.

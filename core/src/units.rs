@@ -123,7 +123,7 @@ pub struct BinPosition(i32);
 impl BinPosition {
     /// How many fractional bits [`Self::raw`] has.
     pub const FRACTIONAL_BITS: u32 = 8;
-    /// 1,025 bins and 255/256: the farthest an event can lie.
+    /// 1,024 bins and 255/256: the farthest an event can lie.
     pub const MAX: Self = Self::of(BinIndex::MAX, SubBinOffset::MAX);
     /// Two bins before bin 0: the nearest.
     pub const MIN: Self = Self::of(BinIndex(0), SubBinOffset::MIN);

@@ -1,1 +1,28 @@
-//! placeholder
+//! Photons in, depth events out, on the host: simulated and recorded photons,
+//! the engine that turns them into events, and the files they are written to.
+//!
+//! ```text
+//! simulation, recorded histograms, photon list   PhotonSource
+//!   → Slice          some hundred laser cycles of photons, pixel by pixel
+//!   → Engine         dtof-core, on this computer
+//!   → DepthEvent
+//!   → Output         events.csv, events.aer, summary.json, pictures, report
+//! ```
+
+pub mod aer_file;
+pub mod engine;
+pub mod events_csv;
+pub mod maps;
+pub mod npy;
+pub mod output;
+pub mod photon_csv;
+pub mod picture;
+pub mod recorded;
+pub mod report;
+pub mod run;
+pub mod scene;
+pub mod settings;
+pub mod simulation;
+pub mod source;
+pub mod summary;
+pub mod tmf8820;

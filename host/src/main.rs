@@ -1,1 +1,64 @@
-fn main() {}
+//! The command line.
+
+mod command;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Asynchronous depth events from single photons.
+///
+/// Without a command: the demo.
+#[derive(Parser)]
+#[command(version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Simulate a static scene and show its events.
+    Demo(command::demo::Demo),
+    /// Turn recorded photons into events.
+    Replay(Box<command::replay::Replay>),
+    /// Print the events of an AER file as CSV.
+    Decode(command::decode::Decode),
+}
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return refuse(&error),
+    };
+    let done = match cli.command {
+        None => command::demo::Demo::default().run(),
+        Some(Command::Demo(demo)) => demo.run(),
+        Some(Command::Replay(replay)) => replay.run(),
+        Some(Command::Decode(decode)) => decode.run(),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Help is printed whole; of an error only its first paragraph, as one line.
+fn refuse(error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        return error
+            .print()
+            .map_or(ExitCode::FAILURE, |()| ExitCode::SUCCESS);
+    }
+    let text = error.to_string();
+    let reason: Vec<&str> = text
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.is_empty())
+        .collect();
+    eprintln!("{}", reason.join(" "));
+    ExitCode::from(2)
+}

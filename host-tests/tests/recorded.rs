@@ -1,0 +1,152 @@
+//! Recorded photons with ground truth: the public TMF8820 capture log, when it
+//! lies at `../shared/data/tmf8820_plane_gt/distance_data.json` beside the
+//! workspace or where `TMF8820_LOG` says. Prints what comes out for each zone.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use dtof::engine::host_engine;
+use dtof::recorded::{RecordedHistograms, RecordingLength};
+use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use dtof::source::PhotonSource;
+use dtof::tmf8820;
+use dtof_core::fixed::types::U8F8;
+
+const ZONES: usize = 9;
+const CENTRE: usize = 4;
+
+/// Writes past the test harness, which hides what passing tests print.
+fn tell(line: &str) {
+    let mut out = std::io::stderr().lock();
+    writeln!(out, "{line}").unwrap();
+}
+
+fn log() -> Option<PathBuf> {
+    let beside = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../shared/data/tmf8820_plane_gt/distance_data.json"
+    );
+    let path = std::env::var_os("TMF8820_LOG").map_or_else(|| beside.into(), PathBuf::from);
+    path.exists().then_some(path)
+}
+
+/// Distance to the plane of each capture in millimetres.
+fn ground_truth(log: &PathBuf) -> Vec<f64> {
+    let text = std::fs::read_to_string(log).unwrap();
+    let captures: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let captures = captures.as_array().unwrap().iter();
+    captures
+        .map(|capture| capture["dist_to_plane"].as_f64().unwrap() * 1000.0)
+        .collect()
+}
+
+/// What one zone reports over all captures from 30 to 400 mm.
+struct Zone {
+    events: usize,
+    distances: usize,
+    offset: f64,
+    median: f64,
+    within_95: f64,
+    beyond_50: usize,
+}
+
+fn replay(log: &PathBuf, photons_per_cycle: f64) -> [Zone; ZONES] {
+    let settings = Settings {
+        bins: tmf8820::BINS,
+        bin_width_ps: U16F16Number(tmf8820::BIN_WIDTH_PS),
+        offset_mm: I24F8Number(tmf8820::OFFSET_MM),
+        gate: None,
+        alpha: U8F8Number(U8F8::lit("4")),
+        min_count: 5,
+        l1: 40,
+        l2: 2000,
+        x: 4,
+        seed: 1,
+    };
+    let truth = ground_truth(log);
+    let recorded = tmf8820::read(log).unwrap();
+    let length = RecordingLength::PhotonsPerCycle(photons_per_cycle);
+    let mut photons =
+        RecordedHistograms::new(recorded.geometry, &recorded.captures, length, 10_000, 1).unwrap();
+    let mut engine = host_engine(&settings, &photons.addresses()).unwrap();
+    let events = engine.run(&photons.next_slice(10_000).unwrap()).unwrap();
+    let scale = settings.range_scale().unwrap();
+
+    std::array::from_fn(|zone| {
+        // Capture and range less truth of every event of this zone.
+        let errors: Vec<(usize, f64)> = events
+            .iter()
+            .map(|event| (usize::from(event.pixel.0), scale.range(event.position())))
+            .map(|(pixel, range)| (pixel % ZONES, pixel / ZONES, range.to_num::<f64>()))
+            .filter(|&(of, capture, _)| of == zone && truth[capture] > 29.9)
+            .map(|(_, capture, range)| (capture, range - truth[capture]))
+            .collect();
+        let mut captures: Vec<usize> = errors.iter().map(|error| error.0).collect();
+        captures.sort_unstable();
+        captures.dedup();
+        // One constant offset a zone is allowed for.
+        let mut signed: Vec<f64> = errors.iter().map(|error| error.1).collect();
+        signed.sort_by(f64::total_cmp);
+        let offset = signed[signed.len() / 2];
+        let mut absolute: Vec<f64> = signed.iter().map(|error| (error - offset).abs()).collect();
+        absolute.sort_by(f64::total_cmp);
+        Zone {
+            events: absolute.len(),
+            distances: captures.len(),
+            offset,
+            median: absolute[absolute.len() / 2],
+            within_95: absolute[absolute.len() * 95 / 100],
+            beyond_50: absolute.iter().filter(|&&error| error > 50.0).count(),
+        }
+    })
+}
+
+#[test]
+fn recorded_photons_give_every_distance_within_bounds() {
+    let Some(log) = log() else {
+        tell(
+            "SKIPPED: recorded photons: no TMF8820 capture log beside the workspace, nor in TMF8820_LOG",
+        );
+        return;
+    };
+    let all = ground_truth(&log)
+        .iter()
+        .filter(|&&distance| distance > 29.9)
+        .count();
+    assert_eq!(all, 149);
+    for photons_per_cycle in [0.5, 1.0] {
+        tell(&format!(
+            "recorded photons, {photons_per_cycle} a laser cycle in the brightest zone; alpha 4, L1 40, \
+             L2 2000, X 4, minimum 5; {all} distances from 30 to 400 mm"
+        ));
+        tell("zone  events  distances  offset mm  median mm  95 % mm  beyond 50 mm");
+        for (zone, result) in replay(&log, photons_per_cycle).iter().enumerate() {
+            let Zone {
+                events,
+                distances,
+                offset,
+                median,
+                within_95,
+                beyond_50,
+            } = result;
+            tell(&format!(
+                "{zone:>4} {events:>7} {distances:>10} {offset:>10.2} {median:>10.2} {within_95:>8.2} \
+                 {beyond_50:>13}"
+            ));
+            // The other zones have no ground truth of their own, but see the
+            // same plane.
+            assert_eq!(*distances, all, "zone {zone}: a distance without an event");
+            if zone == CENTRE {
+                assert!(
+                    offset.abs() < 1.0,
+                    "the default offset is the centre zone's"
+                );
+                assert!(*median <= 4.0);
+                assert!(
+                    beyond_50 * 1000 <= *events,
+                    "{beyond_50} of {events} beyond 50 mm"
+                );
+            }
+        }
+    }
+}

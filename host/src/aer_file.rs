@@ -1,0 +1,231 @@
+//! AER files: a header, words, and an end word with their number and checksum.
+//! The format is `docs/aer-format.md`, section "Files".
+
+use std::io::{self, Read, Write};
+
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use crc::{CRC_32_ISO_HDLC, Crc, Digest};
+use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_core::{AER_VERSION, AerDecoder, AerEncoder, AerRecord, AerWord, DepthEvent};
+
+use crate::source::Geometry;
+
+const MAGIC: [u8; 8] = *b"DTOF-AER";
+const HEADER_BYTES: u16 = 64;
+static CRC_32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// What a reader must know to turn words into ranges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Header {
+    /// Bins of a histogram.
+    pub bins: u32,
+    /// The array.
+    pub geometry: Geometry,
+    /// Picoseconds a bin.
+    pub bin_width_ps: U16F16,
+    /// Millimetres added to every range.
+    pub offset_mm: I24F8,
+}
+
+impl Header {
+    fn to_bytes(self) -> [u8; HEADER_BYTES as usize] {
+        let mut bytes = [0; HEADER_BYTES as usize];
+        let fields = [
+            &MAGIC[..],
+            &AER_VERSION.to_le_bytes(),
+            &HEADER_BYTES.to_le_bytes(),
+            &self.bins.to_le_bytes(),
+            &self.geometry.columns.to_le_bytes(),
+            &self.geometry.rows.to_le_bytes(),
+            &self.bin_width_ps.to_le_bytes(),
+            &self.offset_mm.to_le_bytes(),
+        ]
+        .concat();
+        bytes[..fields.len()].copy_from_slice(&fields);
+        bytes
+    }
+
+    fn from_bytes(bytes: &[u8; HEADER_BYTES as usize]) -> Result<Self> {
+        let u16_at = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        let four_at = |at: usize| [bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]];
+        let u32_at = |at: usize| u32::from_le_bytes(four_at(at));
+        ensure!(bytes[..8] == MAGIC, "not an AER file");
+        let version = u16_at(8);
+        ensure!(
+            version == AER_VERSION,
+            "AER version {version}; this program reads {AER_VERSION}"
+        );
+        ensure!(
+            u16_at(10) == HEADER_BYTES && bytes[32..].iter().all(|&byte| byte == 0),
+            "the header is damaged"
+        );
+        Ok(Self {
+            bins: u32_at(12),
+            geometry: Geometry {
+                columns: u32_at(16),
+                rows: u32_at(20),
+            },
+            bin_width_ps: U16F16::from_le_bytes(four_at(24)),
+            offset_mm: I24F8::from_le_bytes(four_at(28)),
+        })
+    }
+}
+
+/// Writes a file; it is complete once [`Writer::finish`] has returned.
+pub struct Writer<W: Write> {
+    out: W,
+    digest: Digest<'static, u32>,
+    encoder: AerEncoder,
+    events: u64,
+}
+
+impl<W: Write> Writer<W> {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn new(out: W, header: &Header) -> io::Result<Self> {
+        let mut writer = Self {
+            out,
+            digest: CRC_32.digest(),
+            encoder: AerEncoder::new(),
+            events: 0,
+        };
+        writer.put(&header.to_bytes())?;
+        Ok(writer)
+    }
+
+    /// Writes one event, and the time word before it if one is due.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write(&mut self, event: &DepthEvent) -> io::Result<()> {
+        let (time, word) = self.encoder.encode(event);
+        if let Some(time) = time {
+            self.put(&time.to_le_bytes())?;
+        }
+        self.events += 1;
+        self.put(&word.to_le_bytes())
+    }
+
+    /// Ends the file and gives the writer back.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn finish(mut self) -> io::Result<W> {
+        let end = AerWord::end(self.events, self.digest.finalize());
+        self.out.write_all(&end.to_le_bytes())?;
+        Ok(self.out)
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.digest.update(bytes);
+        self.out.write_all(bytes)
+    }
+}
+
+/// Reads a file, event by event.
+pub struct Reader<R: Read> {
+    input: R,
+    digest: Digest<'static, u32>,
+    decoder: AerDecoder,
+    header: Header,
+    offset: u64,
+    events: u64,
+    ended: bool,
+}
+
+impl<R: Read> Reader<R> {
+    /// Reads the header.
+    ///
+    /// # Errors
+    /// If there is none, or one of another format.
+    pub fn new(mut input: R) -> Result<Self> {
+        let mut bytes = [0; HEADER_BYTES as usize];
+        input
+            .read_exact(&mut bytes)
+            .context("not an AER file: shorter than its header")?;
+        let mut digest = CRC_32.digest();
+        digest.update(&bytes);
+        Ok(Self {
+            input,
+            digest,
+            decoder: AerDecoder::new(),
+            header: Header::from_bytes(&bytes)?,
+            offset: HEADER_BYTES.into(),
+            events: 0,
+            ended: false,
+        })
+    }
+
+    /// The header.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The next event, or `None` after the end word.
+    ///
+    /// # Errors
+    /// What is wrong and at which byte of the file.
+    pub fn next_event(&mut self) -> Result<Option<DepthEvent>> {
+        while !self.ended {
+            let offset = self.offset;
+            if let Some(event) = self.next_word().with_context(|| format!("byte {offset}"))? {
+                return Ok(Some(event));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Reads one word; gives the event if it is one.
+    fn next_word(&mut self) -> Result<Option<DepthEvent>> {
+        let Some(bytes) = self.read_word()? else {
+            bail!("the file ends without an end word");
+        };
+        match self.decoder.decode(AerWord::from_le_bytes(bytes))? {
+            AerRecord::Event(event) => {
+                self.accept(&bytes);
+                self.events += 1;
+                Ok(Some(event))
+            }
+            AerRecord::Time(_) => {
+                self.accept(&bytes);
+                Ok(None)
+            }
+            AerRecord::End { events, checksum } => {
+                self.ended = true;
+                ensure!(
+                    events == self.events,
+                    "the end word counts {events} events, the file holds {}",
+                    self.events
+                );
+                ensure!(
+                    checksum == self.digest.clone().finalize(),
+                    "the checksum does not match: a word before this one is damaged"
+                );
+                ensure!(self.input.read(&mut [0])? == 0, "bytes follow the end word");
+                Ok(None)
+            }
+        }
+    }
+
+    /// The bytes of the next word, or `None` at the end of the file.
+    fn read_word(&mut self) -> Result<Option<[u8; AerWord::BYTES]>> {
+        let mut bytes = Vec::with_capacity(AerWord::BYTES);
+        self.input
+            .by_ref()
+            .take(AerWord::BYTES as u64)
+            .read_to_end(&mut bytes)?;
+        if bytes.is_empty() {
+            return Ok(None);
+        }
+        let word = <[u8; AerWord::BYTES]>::try_from(bytes);
+        word.map(Some)
+            .map_err(|_| anyhow!("the file ends inside a word"))
+    }
+
+    fn accept(&mut self, bytes: &[u8; AerWord::BYTES]) {
+        self.digest.update(bytes);
+        self.offset += AerWord::BYTES as u64;
+    }
+}

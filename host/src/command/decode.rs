@@ -1,0 +1,48 @@
+//! `dtof decode`: the events of an AER file as CSV.
+
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Write};
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use dtof::{aer_file, events_csv};
+use dtof_core::RangeScale;
+
+#[derive(Args)]
+pub struct Decode {
+    /// The file.
+    file: PathBuf,
+}
+
+impl Decode {
+    pub fn run(&self) -> Result<()> {
+        let mut out = BufWriter::new(io::stdout().lock());
+        let printed = self.print(&mut out);
+        // What was read before the damage is printed before the damage is named.
+        let flushed = out.flush().map_err(anyhow::Error::from);
+        match printed.and(flushed) {
+            // Whoever reads has seen enough.
+            Err(error) if is_broken_pipe(&error) => Ok(()),
+            done => done,
+        }
+    }
+
+    fn print(&self, out: &mut impl Write) -> Result<()> {
+        let name = || self.file.display().to_string();
+        let file = File::open(&self.file).with_context(name)?;
+        let mut reader = aer_file::Reader::new(BufReader::new(file)).with_context(name)?;
+        let header = *reader.header();
+        let scale = RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?;
+        writeln!(out, "{}", events_csv::HEADER)?;
+        while let Some(event) = reader.next_event().with_context(name)? {
+            events_csv::write(out, &event, &scale)?;
+        }
+        Ok(())
+    }
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    let io = error.downcast_ref::<io::Error>();
+    io.is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+}

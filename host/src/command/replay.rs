@@ -1,0 +1,209 @@
+//! `dtof replay`: recorded photons or histograms through the engine.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use anyhow::{Context, Result, bail, ensure};
+use clap::Args;
+use dtof::engine::host_engine;
+use dtof::output::Output;
+use dtof::photon_csv::PhotonCsv;
+use dtof::recorded::{Capture, RecordedHistograms, RecordingLength};
+use dtof::run::run;
+use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use dtof::source::{Geometry, PhotonSource};
+use dtof::{npy, tmf8820};
+use dtof_core::fixed::traits::Fixed;
+use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+
+use super::print_summary;
+
+#[derive(Args)]
+pub struct Replay {
+    /// Histograms (.npy, or a TMF8820 capture log .json) or photons (.csv with the header
+    /// pixel,cycle,bin)
+    #[arg(long, value_name = "FILE")]
+    input: PathBuf,
+    /// Where the results go
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Bins of a histogram, a power of two from 8 to 1024 [default: the file's; 128 for .csv]
+    #[arg(long, value_name = "N")]
+    bins: Option<usize>,
+    /// Picoseconds a bin, rounded to 1/65536 [default: 250; 92.1 for .json]
+    #[arg(long, value_name = "PS", value_parser = number::<U16F16>)]
+    bin_width_ps: Option<U16F16>,
+    /// Millimetres added to every range, rounded to 1/256 [default: 0; -179.5 for .json]
+    #[arg(long, value_name = "MM", value_parser = number::<I24F8>, allow_hyphen_values = true)]
+    offset_mm: Option<I24F8>,
+    /// Only these bins may hold the peak, both inclusive [default: all]
+    #[arg(long, value_name = "FIRST..LAST", value_parser = gate)]
+    gate: Option<(u16, u16)>,
+    /// Standard deviations of the background a peak must exceed it by, 0 to 255.996, rounded to
+    /// 1/256
+    #[arg(long, value_parser = number::<U8F8>, default_value = "4")]
+    alpha: U8F8,
+    /// Photons a reported peak holds at least
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1023))]
+    min_count: u16,
+    /// The exposure a decision must exceed, in laser cycles
+    #[arg(long, value_name = "N", default_value_t = 40)]
+    l1: u16,
+    /// The exposure at which a pixel starts over without an event, in laser cycles
+    #[arg(long, value_name = "N", default_value_t = 2000)]
+    l2: u16,
+    /// Laser cycles between looks
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    x: u16,
+    /// Histograms: photons a laser cycle in the brightest pixel of each capture [default: 1]
+    #[arg(long, value_name = "R", value_parser = rate, conflicts_with = "recorded_cycles")]
+    photons_per_cycle: Option<f64>,
+    /// Histograms: laser cycles the recording lasted
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    recorded_cycles: Option<u64>,
+    /// Replay only the first N laser cycles
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..))]
+    cycles: u64,
+    /// Seed of the laser cycles that recorded photons are given
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Print nothing but errors
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// An opened recording and the settings its format stands for.
+struct Recording {
+    photons: Box<dyn PhotonSource>,
+    bins: usize,
+    bin_width_ps: U16F16,
+    offset_mm: I24F8,
+}
+
+impl Replay {
+    pub fn run(&self) -> Result<()> {
+        let Recording {
+            mut photons,
+            bins,
+            bin_width_ps,
+            offset_mm,
+        } = self.open()?;
+        let settings = Settings {
+            bins,
+            bin_width_ps: U16F16Number(self.bin_width_ps.unwrap_or(bin_width_ps)),
+            offset_mm: I24F8Number(self.offset_mm.unwrap_or(offset_mm)),
+            gate: self.gate,
+            alpha: U8F8Number(self.alpha),
+            min_count: self.min_count,
+            l1: self.l1,
+            l2: self.l2,
+            x: self.x,
+            seed: self.seed,
+        };
+        let mut engine = host_engine(&settings, &photons.addresses())?;
+        let mut output = Output::create(&self.out, &settings, photons.geometry())?;
+        let summary = run(
+            photons.as_mut(),
+            engine.as_mut(),
+            &mut output,
+            &settings,
+            self.quiet,
+        )?;
+        let lead = format!("Recorded photons of {}.", self.input.display());
+        output.finish(&summary, "Asynchronous depth events", &lead, &[])?;
+        if !self.quiet {
+            print_summary(&summary.rows(), &self.out);
+        }
+        Ok(())
+    }
+
+    /// Reads or checks the whole file, by its extension.
+    fn open(&self) -> Result<Recording> {
+        let path = &self.input;
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("npy") => {
+                let npy = npy::read(path)?;
+                self.expect_bins(npy.bins)?;
+                let photons = self.histograms(npy.geometry, &[npy.capture])?;
+                Ok(Recording::new(photons, npy.bins))
+            }
+            Some("json") => {
+                let log = tmf8820::read(path)?;
+                self.expect_bins(tmf8820::BINS)?;
+                let photons = self.histograms(log.geometry, &log.captures)?;
+                Ok(Recording {
+                    bin_width_ps: tmf8820::BIN_WIDTH_PS,
+                    offset_mm: tmf8820::OFFSET_MM,
+                    ..Recording::new(photons, tmf8820::BINS)
+                })
+            }
+            Some("csv") => {
+                ensure!(
+                    self.photons_per_cycle.is_none() && self.recorded_cycles.is_none(),
+                    "--photons-per-cycle and --recorded-cycles are for histograms; {} holds photons",
+                    path.display()
+                );
+                let bins = self.bins.unwrap_or(128);
+                Ok(Recording::new(
+                    PhotonCsv::open(path, bins, self.cycles)?,
+                    bins,
+                ))
+            }
+            _ => bail!(
+                "{}: the name must end in .npy, .json or .csv",
+                path.display()
+            ),
+        }
+    }
+
+    fn histograms(&self, geometry: Geometry, captures: &[Capture]) -> Result<RecordedHistograms> {
+        let length = match (self.recorded_cycles, self.photons_per_cycle) {
+            (Some(cycles), _) => RecordingLength::Cycles(cycles),
+            (None, rate) => RecordingLength::PhotonsPerCycle(rate.unwrap_or(1.0)),
+        };
+        let name = || self.input.display().to_string();
+        RecordedHistograms::new(geometry, captures, length, self.cycles, self.seed)
+            .with_context(name)
+    }
+
+    /// A file that says how many bins it has is not read as another.
+    fn expect_bins(&self, bins: usize) -> Result<()> {
+        let name = self.input.display();
+        let wanted = self.bins.unwrap_or(bins);
+        ensure!(
+            wanted == bins,
+            "{name}: --bins {wanted}, but the file has {bins}"
+        );
+        Ok(())
+    }
+}
+
+impl Recording {
+    fn new(photons: impl PhotonSource + 'static, bins: usize) -> Self {
+        Self {
+            photons: Box::new(photons),
+            bins,
+            bin_width_ps: U16F16::lit("250"),
+            offset_mm: I24F8::ZERO,
+        }
+    }
+}
+
+/// A fixed-point number, rounded to the nearest.
+fn number<T: FromStr + Fixed>(text: &str) -> Result<T, String> {
+    text.parse()
+        .map_err(|_| format!("must be a number from {} to {}", T::MIN, T::MAX))
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse::<f64>().ok();
+    rate.filter(|rate| rate.is_finite() && *rate > 0.0)
+        .ok_or("must be a number above 0".to_owned())
+}
+
+fn gate(text: &str) -> Result<(u16, u16), String> {
+    let bins = text
+        .split_once("..")
+        .and_then(|(first, last)| Some((first.parse().ok()?, last.parse().ok()?)));
+    bins.ok_or("must be FIRST..LAST, as 20..119".to_owned())
+}

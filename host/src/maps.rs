@@ -1,0 +1,76 @@
+//! What the events of a run look like, pixel by pixel.
+
+use std::collections::VecDeque;
+
+use dtof_core::{DepthEvent, RangeScale};
+
+use crate::events_csv::range_mm;
+use crate::source::Geometry;
+
+/// How many events the mean map averages, as in the paper's figure.
+pub const MEAN_OF: usize = 10;
+
+/// The ranges of one pixel.
+#[derive(Clone, Debug, Default)]
+pub struct PixelHistory {
+    /// The last [`MEAN_OF`] ranges, or fewer, oldest first; in millimetres.
+    recent: VecDeque<f64>,
+    /// All events.
+    pub events: u64,
+    /// The laser cycle of the first.
+    pub first_cycle: Option<u64>,
+}
+
+impl PixelHistory {
+    /// The range of the last event.
+    #[must_use]
+    pub fn last_mm(&self) -> Option<f64> {
+        self.recent.back().copied()
+    }
+
+    /// The mean range of the last [`MEAN_OF`] events, or of as many as there
+    /// are.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss, reason = "at most ten")]
+    pub fn mean_mm(&self) -> Option<f64> {
+        let count = self.recent.len();
+        (count > 0).then(|| self.recent.iter().sum::<f64>() / count as f64)
+    }
+}
+
+/// All pixels of an array, row by row.
+#[derive(Clone, Debug)]
+pub struct Maps {
+    /// The array.
+    pub geometry: Geometry,
+    /// One for each address.
+    pub pixels: Vec<PixelHistory>,
+}
+
+impl Maps {
+    /// Nothing yet.
+    #[must_use]
+    pub fn new(geometry: Geometry) -> Self {
+        Self {
+            geometry,
+            pixels: vec![PixelHistory::default(); geometry.addresses()],
+        }
+    }
+
+    /// Takes one event into account.
+    pub fn add(&mut self, event: &DepthEvent, scale: &RangeScale) {
+        let pixel = &mut self.pixels[usize::from(event.pixel.0)];
+        if pixel.recent.len() == MEAN_OF {
+            pixel.recent.pop_front();
+        }
+        pixel.recent.push_back(range_mm(event, scale));
+        pixel.events += 1;
+        pixel.first_cycle.get_or_insert(event.cycle.0);
+    }
+
+    /// Pixels with at least one event.
+    #[must_use]
+    pub fn reporting(&self) -> usize {
+        self.pixels.iter().filter(|pixel| pixel.events > 0).count()
+    }
+}

@@ -1,0 +1,209 @@
+//! The output folder: `events.csv`, `events.aer`, `summary.json`, the maps as
+//! SVG, and `report.html` that shows them.
+//!
+//! Every file is written beside its place and moved there when it is whole, the
+//! summary last: what is cut short never looks complete.
+
+use std::fs;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use dtof_core::{DepthEvent, RangeScale};
+use tempfile::NamedTempFile;
+
+use crate::aer_file;
+use crate::events_csv;
+use crate::maps::Maps;
+use crate::picture::{Map, heat_map};
+use crate::report::{self, Figure, Section};
+use crate::settings::Settings;
+use crate::source::Geometry;
+use crate::summary::Summary;
+
+/// Files on their way into the output folder.
+pub struct Output {
+    folder: PathBuf,
+    csv: BufWriter<NamedTempFile>,
+    aer: aer_file::Writer<BufWriter<NamedTempFile>>,
+    scale: RangeScale,
+    maps: Maps,
+}
+
+impl Output {
+    /// Makes the folder if it is not there and begins the event files.
+    ///
+    /// # Errors
+    /// If nothing can be written there, or the settings do not give a range.
+    pub fn create(folder: &Path, settings: &Settings, geometry: Geometry) -> Result<Self> {
+        let scale = settings.range_scale()?;
+        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        let mut csv = BufWriter::new(aside(folder)?);
+        writeln!(csv, "{}", events_csv::HEADER)?;
+        let header = aer_file::Header {
+            bins: u32::try_from(settings.bins)?,
+            geometry,
+            bin_width_ps: settings.bin_width_ps.0,
+            offset_mm: settings.offset_mm.0,
+        };
+        let aer = aer_file::Writer::new(BufWriter::new(aside(folder)?), &header)?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            csv,
+            aer,
+            scale,
+            maps: Maps::new(geometry),
+        })
+    }
+
+    /// Writes events in the order they come.
+    ///
+    /// # Errors
+    /// If the disk does not take them.
+    pub fn write(&mut self, events: &[DepthEvent]) -> Result<()> {
+        for event in events {
+            events_csv::write(&mut self.csv, event, &self.scale)
+                .and_then(|()| self.aer.write(event))
+                .with_context(|| self.folder.display().to_string())?;
+            self.maps.add(event, &self.scale);
+        }
+        Ok(())
+    }
+
+    /// The events so far, pixel by pixel.
+    #[must_use]
+    pub fn maps(&self) -> &Maps {
+        &self.maps
+    }
+
+    /// Draws the maps and puts every file in its place. `sections` stand in the
+    /// report beside the totals.
+    ///
+    /// # Errors
+    /// If the folder cannot be written.
+    pub fn finish(
+        self,
+        summary: &Summary,
+        title: &str,
+        lead: &str,
+        sections: &[Section],
+    ) -> Result<()> {
+        let pictures = pictures(&self.maps)?;
+        let figures: Vec<Figure> = pictures
+            .iter()
+            .map(|picture| Figure {
+                svg: &picture.svg,
+                caption: picture.caption,
+            })
+            .collect();
+        let totals = summary.rows();
+        let settings = summary.settings.rows();
+        let mut all = vec![Section {
+            heading: "Totals",
+            rows: &totals,
+        }];
+        all.extend(sections.iter().map(|section| Section {
+            heading: section.heading,
+            rows: section.rows,
+        }));
+        all.push(Section {
+            heading: "Settings",
+            rows: &settings,
+        });
+        let report = report::html(title, lead, &all, &figures);
+
+        let keep = |file: NamedTempFile, name: &str| -> Result<()> {
+            let place = self.folder.join(name);
+            file.persist(&place)
+                .map(drop)
+                .with_context(|| place.display().to_string())
+        };
+        let whole = |text: &str, name: &str| -> Result<()> {
+            let mut file = aside(&self.folder)?;
+            file.write_all(text.as_bytes())
+                .with_context(|| self.folder.display().to_string())?;
+            keep(file, name)
+        };
+        keep(flushed(self.csv)?, "events.csv")?;
+        keep(flushed(self.aer.finish()?)?, "events.aer")?;
+        for picture in &pictures {
+            whole(&picture.svg, picture.name)?;
+        }
+        whole(&report, "report.html")?;
+        whole(
+            &(serde_json::to_string_pretty(summary)? + "\n"),
+            "summary.json",
+        )
+    }
+}
+
+/// A file in `folder` that vanishes unless it is moved to its place.
+fn aside(folder: &Path) -> Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".dtof-").suffix(".partial");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // As any other new file: the umask takes away what it should.
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder
+        .tempfile_in(folder)
+        .with_context(|| folder.display().to_string())
+}
+
+/// What was buffered is on disk, or an error says that it is not.
+fn flushed(file: BufWriter<NamedTempFile>) -> Result<NamedTempFile> {
+    let file = file
+        .into_inner()
+        .map_err(std::io::IntoInnerError::into_error)?;
+    file.as_file().sync_all()?;
+    Ok(file)
+}
+
+struct Picture {
+    name: &'static str,
+    svg: String,
+    caption: &'static str,
+}
+
+/// The three maps of a run.
+#[allow(clippy::cast_precision_loss, reason = "a picture")]
+fn pictures(maps: &Maps) -> Result<[Picture; 3]> {
+    let draw = |name, title, unit, caption, values: Vec<Option<f64>>| -> Result<Picture> {
+        let Geometry { columns, rows } = maps.geometry;
+        let (columns, rows) = (columns as usize, rows as usize);
+        let svg = heat_map(&Map {
+            title,
+            unit,
+            columns,
+            rows,
+            values: &values,
+        })?;
+        Ok(Picture { name, svg, caption })
+    };
+    let pixels = || maps.pixels.iter();
+    Ok([
+        draw(
+            "depth-last.svg",
+            "Range, last event",
+            "mm",
+            "The range of the last event of each pixel.",
+            pixels().map(|pixel| pixel.last_mm()).collect(),
+        )?,
+        draw(
+            "depth-mean.svg",
+            "Range, mean of the last ten events",
+            "mm",
+            "The mean range of the last ten events of each pixel, or of as many as it has.",
+            pixels().map(|pixel| pixel.mean_mm()).collect(),
+        )?,
+        draw(
+            "event-counts.svg",
+            "Events",
+            "events",
+            "How many events each pixel reported. Near and bright surfaces report more often.",
+            pixels().map(|pixel| Some(pixel.events as f64)).collect(),
+        )?,
+    ])
+}

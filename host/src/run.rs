@@ -1,0 +1,79 @@
+//! One run: photons through an engine into an output folder.
+
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::engine::Engine;
+use crate::output::Output;
+use crate::settings::Settings;
+use crate::source::PhotonSource;
+use crate::summary::Summary;
+
+/// Laser cycles produced and decided at a time. Bounds the memory; changes
+/// nothing in the events.
+const SLICE: u16 = 256;
+
+/// Runs all of `source` and writes its events into `output`. A progress bar
+/// shows after a second, unless `quiet`, and only on a terminal.
+///
+/// # Errors
+/// What is wrong with the recording, the engine or the folder.
+pub fn run(
+    source: &mut dyn PhotonSource,
+    engine: &mut dyn Engine,
+    output: &mut Output,
+    settings: &Settings,
+    quiet: bool,
+) -> Result<Summary> {
+    let cycles = source.cycles();
+    let progress = Progress::new(cycles, quiet);
+    let mut done = 0;
+    while done < cycles {
+        let next = u16::try_from(cycles - done).map_or(SLICE, |left| left.min(SLICE));
+        let slice = source.next_slice(next)?;
+        output.write(&engine.run(&slice)?)?;
+        done += u64::from(next);
+        progress.at(done);
+    }
+    progress.bar.finish_and_clear();
+    let reporting = output.maps().reporting();
+    Ok(Summary::new(
+        &engine.statistics(),
+        source,
+        reporting,
+        settings,
+    ))
+}
+
+/// A progress bar that is not worth showing for short work.
+struct Progress {
+    bar: ProgressBar,
+    since: Instant,
+    quiet: bool,
+}
+
+impl Progress {
+    fn new(cycles: u64, quiet: bool) -> Self {
+        let bar = ProgressBar::with_draw_target(Some(cycles), ProgressDrawTarget::hidden());
+        let style = ProgressStyle::with_template(
+            "{bar:40} {human_pos} of {human_len} laser cycles, {eta} left",
+        );
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Self {
+            bar,
+            since: Instant::now(),
+            quiet,
+        }
+    }
+
+    fn at(&self, cycle: u64) {
+        let long = self.since.elapsed() > Duration::from_secs(1);
+        if self.bar.is_hidden() && long && !self.quiet {
+            // Stays hidden where standard error is not a terminal.
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+        self.bar.set_position(cycle);
+    }
+}

@@ -1,0 +1,82 @@
+//! Where photons come from: a simulation, recorded histograms, a photon list.
+
+use anyhow::Result;
+use dtof_core::PixelAddress;
+use rand_core::SeedableRng;
+use rand_pcg::Pcg64;
+
+/// How pixel addresses lie in the array: `address = row * columns + column`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Geometry {
+    /// Pixels in a row.
+    pub columns: u32,
+    /// Rows.
+    pub rows: u32,
+}
+
+impl Geometry {
+    /// How many addresses the array has.
+    #[must_use]
+    pub fn addresses(&self) -> usize {
+        self.columns as usize * self.rows as usize
+    }
+}
+
+/// One photon of one pixel in one slice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Photon {
+    /// Laser cycles after the slice's first.
+    pub cycle: u16,
+    /// The bin, as a TDC would give it.
+    pub code: u16,
+}
+
+/// What one pixel received in one slice.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PixelPhotons {
+    /// Laser cycles of the slice that were recorded: all of them, or fewer
+    /// where the pixel's recording ends.
+    pub cycles: u16,
+    /// In non-decreasing laser cycle.
+    pub photons: Vec<Photon>,
+}
+
+/// Consecutive laser cycles of all pixels.
+#[derive(Clone, Debug)]
+pub struct Slice {
+    /// The first laser cycle.
+    pub first_cycle: u64,
+    /// One for each of [`PhotonSource::addresses`], in that order.
+    pub pixels: Vec<PixelPhotons>,
+}
+
+/// Produces photons as they are needed, so that memory does not grow with their
+/// number.
+pub trait PhotonSource {
+    /// The array.
+    fn geometry(&self) -> Geometry;
+
+    /// The pixels that are there, ascending.
+    fn addresses(&self) -> Vec<PixelAddress>;
+
+    /// Laser cycles there are, from 0.
+    fn cycles(&self) -> u64;
+
+    /// Recorded photons that lie after those laser cycles.
+    fn not_replayed(&self) -> u64 {
+        0
+    }
+
+    /// The photons of the next `cycles` laser cycles.
+    ///
+    /// # Errors
+    /// What went wrong with the recording, naming file and place.
+    fn next_slice(&mut self, cycles: u16) -> Result<Slice>;
+}
+
+/// The random numbers of one pixel. They depend on the seed and the address
+/// alone, so that the order in which threads serve pixels changes nothing.
+#[must_use]
+pub fn pixel_rng(seed: u64, pixel: PixelAddress) -> Pcg64 {
+    Pcg64::seed_from_u64(seed ^ u64::from(pixel.0).rotate_left(48))
+}

@@ -1,0 +1,162 @@
+//! What came out of a run: `summary.json`, and the same on the terminal and in
+//! the report.
+
+use dtof_core::Statistics;
+use serde::Serialize;
+
+use crate::settings::Settings;
+use crate::source::PhotonSource;
+
+/// What came out, as `summary.json` has it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// Laser cycles replayed.
+    pub cycles: u64,
+    /// Photons offered to the pixels: counted, saturated, rejected or gated out.
+    pub photons: u64,
+    /// Depth events.
+    pub events: u64,
+    /// Pixels that were there.
+    pub pixels: usize,
+    /// Pixels with at least one event.
+    pub pixels_reporting: usize,
+    /// Photons with a TDC code past the last bin.
+    pub rejected: u64,
+    /// Photons that met a full counter.
+    pub saturated: u64,
+    /// Photons outside the range gate.
+    pub gated_out: u64,
+    /// Decisions put off because the event before was not taken yet.
+    pub deferred: u64,
+    /// Exposures that reached L2 without an event.
+    pub expired: u64,
+    /// Recorded photons after the last laser cycle replayed.
+    pub not_replayed: u64,
+    /// How the pixels operated.
+    pub settings: Settings,
+}
+
+/// A name and a value, for people.
+pub type Row = (String, String);
+
+impl Summary {
+    /// Puts together what the pixels counted and where it came from.
+    #[must_use]
+    pub fn new(
+        statistics: &Statistics,
+        source: &dyn PhotonSource,
+        pixels_reporting: usize,
+        settings: &Settings,
+    ) -> Self {
+        let Statistics {
+            counted,
+            saturated,
+            rejected,
+            gated_out,
+            events,
+            deferred,
+            expired,
+        } = *statistics;
+        Self {
+            cycles: source.cycles(),
+            photons: counted + saturated + rejected + gated_out,
+            events,
+            pixels: source.addresses().len(),
+            pixels_reporting,
+            rejected,
+            saturated,
+            gated_out,
+            deferred,
+            expired,
+            not_replayed: source.not_replayed(),
+            settings: settings.clone(),
+        }
+    }
+
+    /// The totals.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Row> {
+        let row = |name: &str, value: u64| (name.to_owned(), grouped(value));
+        let mut rows = vec![
+            row("laser cycles", self.cycles),
+            row("photons", self.photons),
+            row("depth events", self.events),
+            (
+                "pixels reporting".to_owned(),
+                format!("{} of {}", self.pixels_reporting, self.pixels),
+            ),
+            row("exposures without an event", self.expired),
+        ];
+        // Losses are named where there are any.
+        let losses = [
+            ("photons outside the range gate", self.gated_out),
+            ("photons lost to full counters", self.saturated),
+            ("photons with a code past the last bin", self.rejected),
+            ("decisions put off", self.deferred),
+            (
+                "recorded photons after the last laser cycle replayed",
+                self.not_replayed,
+            ),
+        ];
+        rows.extend(
+            losses
+                .iter()
+                .filter(|loss| loss.1 > 0)
+                .map(|&(name, value)| row(name, value)),
+        );
+        rows
+    }
+}
+
+impl Settings {
+    /// The settings.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Row> {
+        let row = |name: &str, value: String| (name.to_owned(), value);
+        let gate = self.gate.map_or("none".to_owned(), |(first, last)| {
+            format!("{first}..{last}")
+        });
+        vec![
+            row(
+                "bins",
+                format!("{} of {} ps", self.bins, self.bin_width_ps.0),
+            ),
+            row("range offset", format!("{} mm", self.offset_mm.0)),
+            row("range gate", gate),
+            row("α", self.alpha.0.to_string()),
+            row("minimum peak count", self.min_count.to_string()),
+            row(
+                "L1, L2, X",
+                format!("{}, {}, {} laser cycles", self.l1, self.l2, self.x),
+            ),
+            row("seed", self.seed.to_string()),
+        ]
+    }
+}
+
+/// A number with its thousands apart: 12,345.
+#[must_use]
+pub fn grouped(value: u64) -> String {
+    let digits = value.to_string();
+    let mut text = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// Rows as lines of text, names to the left, values aligned.
+#[must_use]
+pub fn aligned(rows: &[Row]) -> String {
+    let width = rows
+        .iter()
+        .map(|(name, _)| name.chars().count())
+        .max()
+        .unwrap_or(0);
+    rows.iter()
+        .map(|(name, value)| format!("  {name:width$}  {value}\n"))
+        .collect()
+}

@@ -1,0 +1,297 @@
+//! Replays that must succeed, end to end.
+
+mod common;
+
+use std::fmt::Write;
+
+use common::Scratch;
+
+const HEADER: &str =
+    "cycle,pixel,exposure,peak_bin,depth_bins,range_mm,peak_count,background,flags\n";
+
+/// One photon a laser cycle, all in the same bin.
+fn steady(pixel: u16, bin: u16, cycles: u64) -> String {
+    let mut text = "pixel,cycle,bin\n".to_owned();
+    for cycle in 0..cycles {
+        writeln!(text, "{pixel},{cycle},{bin}").unwrap();
+    }
+    text
+}
+
+#[test]
+fn a_steady_pixel_reports_when_the_flow_chart_says() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", steady(7, 60, 100));
+    let summary = scratch.replayed(
+        &input,
+        &["--alpha", "8", "--x", "4", "--l1", "40", "--l2", "2000"],
+    );
+    // N = 44 is the first multiple of 4 above 40; cycles count from 0. All in
+    // bin 60 puts the centre of mass at 60.5 bins of 37.474 mm.
+    let expected = "43,7,44,60,60.5000,2267.180,44,0,0\n87,7,44,60,60.5000,2267.180,44,0,0\n";
+    assert_eq!(
+        scratch.read("out/events.csv"),
+        format!("{HEADER}{expected}")
+    );
+    for (name, value) in [
+        ("photons", 100),
+        ("events", 2),
+        ("pixels", 1),
+        ("pixels_reporting", 1),
+        ("rejected", 0),
+        ("saturated", 0),
+        ("deferred", 0),
+        ("cycles", 100),
+        ("not_replayed", 0),
+    ] {
+        assert_eq!(summary[name], value, "{name}");
+    }
+}
+
+#[test]
+fn decode_prints_what_replay_wrote() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", steady(7, 60, 1000));
+    let more = ["--bin-width-ps", "92.1", "--offset-mm", "-179.5"];
+    scratch.replayed(&input, &more);
+    let decoded = scratch.dtof(&["decode", "out/events.aer"]);
+    assert!(decoded.status.success());
+    assert_eq!(
+        String::from_utf8(decoded.stdout).unwrap(),
+        scratch.read("out/events.csv")
+    );
+    assert!(scratch.read("out/events.csv").lines().count() > 10);
+}
+
+#[test]
+fn a_damaged_aer_file_is_named_with_its_offset() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", steady(7, 60, 1000));
+    scratch.replayed(&input, &[]);
+    let whole = std::fs::read(scratch.path("out/events.aer")).unwrap();
+    std::fs::remove_dir_all(scratch.path("out")).unwrap();
+    // Header 64 bytes, a time word, then the events, then the end word.
+    let events = (whole.len() - 64 - 32) / 16;
+    let decode = |bytes: &[u8]| {
+        scratch.file("damaged.aer", bytes);
+        scratch.dtof(&["decode", "damaged.aer"])
+    };
+    let rows =
+        |output: &std::process::Output| String::from_utf8_lossy(&output.stdout).lines().count();
+
+    let cut = decode(&whole[..64 + 16 + 3 * 16 + 5]);
+    scratch.refused(&cut, &["damaged.aer", "byte 128", "ends inside a word"]);
+    assert_eq!(rows(&cut), 1 + 3);
+    let cut = decode(&whole[..whole.len() - 16]);
+    scratch.refused(&cut, &["damaged.aer", "ends without an end word"]);
+    assert_eq!(rows(&cut), 1 + events);
+    scratch.refused(
+        &decode(&[&whole[..], b"x"].concat()),
+        &["bytes follow the end word"],
+    );
+    scratch.refused(
+        &decode(&whole[..63]),
+        &["damaged.aer", "shorter than its header"],
+    );
+    scratch.refused(
+        &decode(&[&whole[..64], &[0; 16]].concat()),
+        &["byte 64", "unknown control word"],
+    );
+    scratch.refused(
+        &scratch.dtof(&["decode", "none.aer"]),
+        &["none.aer", "No such file"],
+    );
+    // Whatever bit is flipped, the file is never taken for whole.
+    for bit in (0..whole.len() * 8).step_by(37) {
+        let mut damaged = whole.clone();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        scratch.refused(&decode(&damaged), &["damaged.aer"]);
+    }
+}
+
+#[test]
+fn only_the_first_cycles_are_replayed_and_the_rest_is_counted() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", steady(0, 60, 500));
+    let summary = scratch.replayed(&input, &["--cycles", "100"]);
+    assert_eq!(
+        (&summary["cycles"], &summary["photons"]),
+        (&100.into(), &100.into())
+    );
+    assert_eq!(summary["not_replayed"], 400);
+}
+
+/// Histograms as NumPy writes them.
+fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    let mut header =
+        format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}").into_bytes();
+    header.resize(117, b' ');
+    header.push(b'\n');
+    [b"\x93NUMPY\x01\x00\x76\x00", &header[..], data].concat()
+}
+
+#[test]
+fn histograms_of_every_integer_type_give_the_same_events() {
+    // Two rows of three pixels with 8 bins; all of a pixel's photons are in the
+    // bin with the pixel's number, but for one in bin 7.
+    let counts: Vec<u8> = (0..6)
+        .flat_map(|pixel| {
+            (0..8).map(move |bin| {
+                if bin == pixel {
+                    100
+                } else {
+                    u8::from(bin == 7)
+                }
+            })
+        })
+        .collect();
+    let mut results = Vec::new();
+    for descr in [
+        "|u1", "|i1", "<u2", ">u2", "<i2", ">i2", "<u4", ">u4", "<i4", ">i4", "<u8", ">u8", "<i8",
+        ">i8",
+    ] {
+        let scratch = Scratch::new();
+        let size: usize = descr[2..].parse().unwrap();
+        let data: Vec<u8> = counts
+            .iter()
+            .flat_map(|&count| {
+                let mut element = u64::from(count).to_le_bytes()[..size].to_vec();
+                if descr.starts_with('>') {
+                    element.reverse();
+                }
+                element
+            })
+            .collect();
+        let input = scratch.file("recorded.npy", npy(descr, "(2, 3, 8)", &data));
+        let summary = scratch.replayed(&input, &["--recorded-cycles", "100"]);
+        assert_eq!(
+            (&summary["pixels"], &summary["photons"]),
+            (&6.into(), &606.into()),
+            "{descr}"
+        );
+        results.push((descr, scratch.read("out/events.csv")));
+    }
+    for (descr, events) in &results {
+        assert_eq!(events, &results[0].1, "{descr}");
+    }
+    // Row-major: the peak bin is the pixel's number.
+    let rows: Vec<Vec<&str>> = results[0]
+        .1
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').collect())
+        .collect();
+    assert!(
+        rows.len() >= 6 && rows.iter().all(|row| row[1] == row[3]),
+        "{rows:?}"
+    );
+}
+
+#[test]
+fn the_brightest_pixel_of_a_capture_sets_the_pace() {
+    let scratch = Scratch::new();
+    let mut data = [0; 16];
+    data[3] = 200;
+    data[12] = 50;
+    let input = scratch.file("recorded.npy", npy("|u1", "(2, 8)", &data));
+    // 200 photons at half a photon a laser cycle: 400 laser cycles.
+    let summary = scratch.replayed(&input, &["--photons-per-cycle", "0.5"]);
+    assert_eq!(
+        (&summary["cycles"], &summary["photons"]),
+        (&400.into(), &250.into())
+    );
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
+    let scratch = Scratch::new();
+    let mut data = vec![1; 64 * 16];
+    data.iter_mut()
+        .skip(5)
+        .step_by(16)
+        .for_each(|peak| *peak = 90);
+    scratch.file("recorded.npy", npy("|u1", "(8, 8, 16)", &data));
+    let run = |threads: &str, seed: &str, out: &str| {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_dtof"))
+            .current_dir(scratch.path("."))
+            .env("RAYON_NUM_THREADS", threads)
+            .args([
+                "replay",
+                "--input",
+                "recorded.npy",
+                "--out",
+                out,
+                "--seed",
+                seed,
+            ])
+            .output()
+            .unwrap();
+        assert!(output.status.success());
+        [
+            "events.csv",
+            "events.aer",
+            "summary.json",
+            "report.html",
+            "depth-last.svg",
+        ]
+        .map(|name| std::fs::read(scratch.path(out).join(name)).unwrap())
+    };
+    let one = run("1", "5", "a");
+    assert!(one == run("2", "5", "b") && one == run("7", "5", "c"));
+    assert!(one[0] != run("1", "6", "d")[0]);
+}
+
+#[test]
+fn a_gate_leaves_the_cover_glass_out() {
+    let scratch = Scratch::new();
+    // A hundred times more photons in bin 5 than in the target's bin 40.
+    let mut text = "pixel,cycle,bin\n".to_owned();
+    for cycle in 0..400 {
+        for _ in 0..10 {
+            writeln!(text, "0,{cycle},5").unwrap();
+        }
+        if cycle % 10 == 0 {
+            writeln!(text, "0,{cycle},40").unwrap();
+        }
+    }
+    let input = scratch.file("photons.csv", text);
+    let summary = scratch.replayed(&input, &["--gate", "10..127"]);
+    assert_eq!(
+        (&summary["photons"], &summary["gated_out"]),
+        (&4040.into(), &4000.into())
+    );
+    let events = scratch.read("out/events.csv");
+    assert!(events.lines().count() > 1);
+    assert!(
+        events
+            .lines()
+            .skip(1)
+            .all(|event| event.split(',').nth(3) == Some("40")),
+        "{events}"
+    );
+}
+
+#[test]
+fn the_demo_reports_every_pixel_and_is_silent_when_asked() {
+    let scratch = Scratch::new();
+    let output = scratch.dtof(&["demo", "--quiet"]);
+    assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
+    let summary: serde_json::Value =
+        serde_json::from_str(&scratch.read("out/demo/summary.json")).unwrap();
+    assert_eq!(
+        (&summary["pixels"], &summary["pixels_reporting"]),
+        (&2048.into(), &2048.into())
+    );
+    let first = scratch
+        .read("out/demo/events.csv")
+        .lines()
+        .nth(1)
+        .map(str::to_owned)
+        .unwrap();
+    assert!(
+        first.starts_with("109,"),
+        "no event before N = 110, the first look above L1: {first}"
+    );
+    let report = scratch.read("out/demo/report.html");
+    assert!(report.contains("</html>") && report.matches("<svg").count() == 3);
+}
