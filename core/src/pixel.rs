@@ -164,6 +164,9 @@ pub struct Detection {
 
 /// One decision on one histogram: peak, background, threshold, depth. What a
 /// pixel does at each look, on its own for histograms that arrive whole.
+///
+/// `histogram` holds gated bins only, as [`Histogram::add_frame`] with the same
+/// gate and [`AsyncPixel::count`] see to.
 #[inline]
 pub fn detect<const BINS: usize, W: CounterWidth, R: DetectionRule>(
     histogram: &Histogram<BINS, W>,
@@ -199,8 +202,9 @@ pub enum Look {
     Expired,
 }
 
-/// What a pixel has done since it was made. Photons offered are always
-/// `counted + saturated + rejected + gated_out`.
+/// What a pixel has done since it was made. Photons offered are
+/// `counted + saturated + rejected + gated_out` (short of 2³² losses of one
+/// kind within one exposure).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Statistics {

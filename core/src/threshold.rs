@@ -2,7 +2,7 @@
 //!
 //! α is an unsigned fixed-point number with 8 fractional bits, 0 to
 //! 255.996. The root is the integer one of [`isqrt`](crate::isqrt()), so the
-//! threshold lies below the real-valued one by less than α counts, as in the
+//! threshold lies no more than α counts below the real-valued one, as in the
 //! paper's hardware.
 //!
 //! With a background of 0 the threshold is 0 and one stray photon would exceed

@@ -1,0 +1,75 @@
+//! The range gate: which gates there are, and which bins they let through.
+
+use dtof_core::{GateError, RangeGate};
+
+fn every_gate<const BINS: usize>() {
+    let bins = u16::try_from(BINS).unwrap();
+    for first in 0..bins + 20 {
+        for last in 0..bins + 20 {
+            let gate = RangeGate::<BINS>::new(first, last);
+            // Counted one by one.
+            let inside = (0..bins).filter(|&bin| first <= bin && bin <= last).count();
+            if last >= bins {
+                assert_eq!(gate, Err(GateError::PastLastBin), "{first}..={last}");
+            } else if inside < 8 {
+                assert_eq!(gate, Err(GateError::TooNarrow), "{first}..={last}");
+            } else {
+                check_gate(gate.unwrap(), first, last, inside);
+            }
+        }
+    }
+    for (first, last) in [(0, u16::MAX), (u16::MAX, u16::MAX), (0, bins)] {
+        let gate = RangeGate::<BINS>::new(first, last);
+        assert_eq!(gate, Err(GateError::PastLastBin));
+    }
+    assert_eq!(
+        RangeGate::<BINS>::new(u16::MAX, bins - 1),
+        Err(GateError::TooNarrow)
+    );
+    assert_eq!(RangeGate::<BINS>::new(0, bins - 1), Ok(RangeGate::full()));
+    check_gate(RangeGate::<BINS>::full(), 0, bins - 1, BINS);
+}
+
+fn check_gate<const BINS: usize>(gate: RangeGate<BINS>, first: u16, last: u16, inside: usize) {
+    assert_eq!((gate.first(), gate.last()), (first, last));
+    for bin in [0, first, last, u16::MAX]
+        .into_iter()
+        .flat_map(|bin| [bin.wrapping_sub(1), bin, bin.wrapping_add(1)])
+    {
+        assert_eq!(gate.contains(bin), first <= bin && bin <= last, "{bin}");
+    }
+    let starts = gate.quadrant_starts().map(usize::from);
+    for (k, start) in starts.into_iter().enumerate() {
+        assert_eq!(start, usize::from(first) + k * inside / 4);
+    }
+}
+
+#[test]
+fn every_gate_of_8_bins() {
+    every_gate::<8>();
+}
+
+#[test]
+fn every_gate_of_128_bins() {
+    every_gate::<128>();
+}
+
+#[test]
+fn every_gate_of_1024_bins() {
+    every_gate::<1024>();
+}
+
+#[test]
+fn every_bin_is_asked_for_once() {
+    let gate = RangeGate::<128>::new(20, 119).unwrap();
+    let inside: Vec<u16> = (0..=u16::MAX).filter(|&bin| gate.contains(bin)).collect();
+    assert_eq!(inside, (20..120).collect::<Vec<_>>());
+}
+
+#[test]
+fn the_quadrants_of_the_whole_histogram_are_the_paper_s() {
+    let starts = RangeGate::<128>::full().quadrant_starts();
+    assert_eq!(starts, [0, 32, 64, 96, 128]);
+    let starts = RangeGate::<8>::full().quadrant_starts();
+    assert_eq!(starts, [0, 2, 4, 6, 8]);
+}
