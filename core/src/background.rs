@@ -27,7 +27,7 @@ use crate::units::{BinIndex, Count};
 /// are taken as [`Count::MAX`].
 #[inline]
 #[must_use]
-pub fn quadrant<C: Copy + Ord + Into<u32>, const BINS: usize>(
+pub fn quadrant<C: Copy + Into<u32>, const BINS: usize>(
     counts: &[C; BINS],
     gate: &RangeGate<BINS>,
     peak: BinIndex,
@@ -43,8 +43,9 @@ pub fn quadrant<C: Copy + Ord + Into<u32>, const BINS: usize>(
 
 /// The highest count from bin `from` up to, not including, bin `to`.
 #[inline]
-fn highest<C: Copy + Ord + Into<u32>>(counts: &[C], from: u16, to: u16) -> Count {
+fn highest<C: Copy + Into<u32>>(counts: &[C], from: u16, to: u16) -> Count {
     let bins = counts.get(usize::from(from)..usize::from(to));
-    let highest = bins.and_then(|bins| bins.iter().max());
-    Count::saturating(highest.map_or(0, |&count| count.into()))
+    let counts = bins.unwrap_or_default().iter();
+    // Not `max()`, which carries a reference along with each count.
+    Count::saturating(counts.fold(0, |highest, &count| count.into().max(highest)))
 }

@@ -60,18 +60,17 @@ impl ComparatorTree {
         const {
             assert!(BINS.is_power_of_two() && BINS >= WAYS && BINS <= 1024);
         }
-        let mut bins = (0..).zip(counts).map(|(bin, &count)| Peak {
-            bin: BinIndex::saturating(bin),
-            count: Count::saturating(count.into()),
-        });
-        Self {
-            // Runs from the first group to the last, so that each takes the
-            // bins which follow those of the group before.
-            groups: core::array::from_fn(|_| {
-                let group = bins.by_ref().take(BINS / WAYS);
-                group.reduce(Peak::or_higher).unwrap_or_default()
-            }),
+        let mut groups = [Peak::default(); WAYS];
+        let mut bins = 0..;
+        for (winner, group) in groups.iter_mut().zip(counts.chunks(BINS / WAYS)) {
+            for (&count, bin) in group.iter().zip(&mut bins) {
+                *winner = winner.or_higher(Peak {
+                    bin: BinIndex::saturating(bin),
+                    count: Count::saturating(count.into()),
+                });
+            }
         }
+        Self { groups }
     }
 
     /// The winner of the eight group winners: the peak.

@@ -1,0 +1,381 @@
+//! The proof that `dtof-core` runs on a microcontroller as it says: an image
+//! that uses all of it and links only if nothing in it can panic.
+//!
+//! The panic handler calls a function that exists nowhere, so one reachable
+//! panic anywhere makes the linker refuse the image. What links is then searched
+//! for floating point and allocation: `cargo xtask check-image` does both, for
+//! every target and profile.
+//!
+//! Every value comes from [`word`], about which the optimiser knows nothing, and
+//! ends in [`keep`], so that nothing is worked out while compiling and nothing
+//! is dropped. Each part below is a function of its own, whose name
+//! `check-image` looks for in the image.
+//!
+//! The image is there to be linked and looked at, not to be run.
+
+#![no_std]
+#![no_main]
+
+#[cfg(not(target_os = "none"))]
+compile_error!("core-image is for targets without an operating system: cargo xtask check-image");
+
+use core::array;
+use core::fmt::{self, Write};
+use core::hint::black_box;
+use core::panic::PanicInfo;
+use core::ptr;
+use core::sync::atomic::AtomicU32;
+
+use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::peak::ComparatorTree;
+use dtof_core::{
+    AerDecoder, AerEncoder, AerWord, AsyncPixel, BinIndex, BinPosition, Count, Count10, Count16,
+    Count24, CounterWidth, DepthEvent, EventSlot, Flags, Histogram, LaserCycle, Macropixel,
+    PaperRule, Peak, PixelAddress, PixelConfig, ProcessingElement, RangeGate, RangeScale,
+    Statistics, SubBinOffset, Threshold, background, centre_of_mass, detect, isqrt,
+};
+
+#[allow(unsafe_code, reason = "the linker knows the entry by this name")]
+#[unsafe(no_mangle)]
+extern "C" fn _start() -> ! {
+    loop {
+        units();
+        roots();
+        ranges();
+        words();
+        slot();
+        texts();
+        for_bins::<8>();
+        for_bins::<128>();
+    }
+}
+
+fn for_bins<const BINS: usize>() {
+    gates::<BINS>();
+    trees::<BINS>();
+    for_width::<BINS, Count10>();
+    for_width::<BINS, Count16>();
+    for_width::<BINS, Count24>();
+}
+
+fn for_width<const BINS: usize, W: CounterWidth>() {
+    thresholds::<W>();
+    histograms::<BINS, W>();
+    pixels::<BINS, W>();
+    elements::<BINS, W>();
+}
+
+#[inline(never)]
+fn units() {
+    keep((Count::new(word()), count()));
+    keep((BinIndex::new(half()), bin()));
+    keep(SubBinOffset::new(half().cast_signed()));
+    keep(Flags::from_bits(byte()));
+    keep(flags().contains(flags()));
+    keep(position().raw());
+}
+
+#[inline(never)]
+fn roots() {
+    keep(isqrt::<5>(word()));
+    keep(isqrt::<8>(word()));
+    keep(isqrt::<12>(word()));
+    keep(isqrt::<16>(word()));
+}
+
+#[inline(never)]
+fn ranges() {
+    match RangeScale::new(U16F16::from_bits(word()), millimetres()) {
+        Ok(scale) => keep((scale.range(position()), scale.range(event().position()))),
+        Err(error) => keep(error),
+    }
+}
+
+/// The way out and the way back, the latter from bytes as a line may bring
+/// them.
+#[inline(never)]
+fn words() {
+    let mut encoder = AerEncoder::new();
+    let mut decoder = AerDecoder::new();
+    while more() {
+        let (time, word) = encoder.encode(&event());
+        keep((time.map(AerWord::to_le_bytes), word.to_le_bytes()));
+        keep(decoder.decode(AerWord::from_le_bytes(values(byte))));
+    }
+    keep(AerWord::end(double(), word()).to_le_bytes());
+}
+
+#[inline(never)]
+fn slot() {
+    let mut slot = EventSlot::new();
+    while more() {
+        keep(slot.offer(event()));
+        keep(slot.request());
+        keep(slot.acknowledge());
+    }
+}
+
+/// Every error and unit can be written out.
+#[inline(never)]
+fn texts() {
+    keep(write!(Link, "{}", bin()));
+    keep(write!(Link, "{}", count()));
+    keep(write!(Link, "{}", flags()));
+    if let Err(error) = RangeGate::<8>::new(half(), half()) {
+        keep(write!(Link, "{error}"));
+    }
+    if let Err(error) = PixelConfig::<8>::new(half(), half(), half(), gate(), rule()) {
+        keep(write!(Link, "{error}"));
+    }
+    if let Err(error) = RangeScale::new(U16F16::from_bits(word()), millimetres()) {
+        keep(write!(Link, "{error}"));
+    }
+    if let Err(error) = AerDecoder::new().decode(AerWord::from_le_bytes(values(byte))) {
+        keep(write!(Link, "{error}"));
+    }
+}
+
+/// Takes text, or not.
+struct Link;
+
+impl Write for Link {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        keep(text);
+        if more() { Ok(()) } else { Err(fmt::Error) }
+    }
+}
+
+#[inline(never)]
+fn gates<const BINS: usize>() {
+    match RangeGate::<BINS>::new(half(), half()) {
+        Ok(gate) => keep((
+            (gate.first(), gate.last(), gate.contains(half())),
+            gate.quadrant_starts(),
+        )),
+        Err(error) => keep(error),
+    }
+}
+
+#[inline(never)]
+fn trees<const BINS: usize>() {
+    let tree = ComparatorTree::of(&values::<u16, BINS>(half));
+    keep((tree.peak(), tree.quadrant_maxima()));
+    let tree = ComparatorTree::of(&values::<u32, BINS>(word));
+    keep((tree.peak(), tree.quadrant_maxima()));
+}
+
+#[inline(never)]
+fn thresholds<W: CounterWidth>() {
+    let threshold = Threshold::new(alpha(), count());
+    keep((threshold.alpha(), threshold.minimum_count()));
+    keep(threshold.level::<W>(count()));
+    keep(threshold.is_exceeded::<W>(count(), count()));
+}
+
+#[inline(never)]
+fn histograms<const BINS: usize, W: CounterWidth>() {
+    let gate = gate();
+    let mut histogram = Histogram::<BINS, W>::new();
+    while more() {
+        histogram.add(half());
+        histogram.add_batch(some(&values::<u16, 16>(half)));
+        keep(histogram.add_frame(&values::<u16, BINS>(half), &gate));
+        keep(histogram.add_frame(&values::<u32, BINS>(word), &gate));
+        keep((histogram.peak(), histogram.count(usize::from(half()))));
+        keep(detect(&histogram, &gate, &rule()));
+
+        // As another detection rule may ask: about a peak of its own.
+        let peak = Peak {
+            bin: bin(),
+            count: count(),
+        };
+        keep(background::quadrant(histogram.counts(), &gate, peak.bin));
+        keep(centre_of_mass(&histogram, &gate, peak, count()));
+        if more() {
+            histogram.clear();
+        }
+    }
+    keep((histogram.total(), histogram.rejected()));
+    keep((histogram.saturated(), histogram));
+}
+
+#[inline(never)]
+fn pixels<const BINS: usize, W: CounterWidth>() {
+    let Some(config) = config::<BINS>() else {
+        return;
+    };
+    let mut pixel = AsyncPixel::<BINS, W>::new(address());
+    while more() {
+        pixel.count(&config, half());
+        pixel.count_batch(&config, some(&values::<u16, 16>(half)));
+        pixel.count_frame(&config, &values::<u16, BINS>(half));
+        pixel.count_frame(&config, &values::<u32, BINS>(word));
+        keep(pixel.end_laser_cycle(&config, cycle()));
+        keep(pixel.end_laser_cycles(&config, cycle(), half()));
+        keep((pixel.request(), pixel.exposure()));
+        if more() {
+            keep(pixel.acknowledge());
+        }
+    }
+    keep((pixel.address(), pixel.statistics()));
+    keep(pixel.histogram().peak());
+}
+
+#[inline(never)]
+fn elements<const BINS: usize, W: CounterWidth>() {
+    let Some(config) = config::<BINS>() else {
+        return;
+    };
+    let addresses = values(address);
+    let mut element = match ProcessingElement::<BINS, PaperRule, W>::new(config, addresses) {
+        Ok(element) => element,
+        Err(error) => return keep(error),
+    };
+    let mut statistics = Statistics::default();
+    while more() {
+        element.count(macropixel(), half());
+        keep(element.end_laser_cycle(cycle()));
+        keep(element.acknowledge(macropixel()));
+        statistics += element.pixel(macropixel()).statistics();
+    }
+    keep(statistics);
+}
+
+fn gate<const BINS: usize>() -> RangeGate<BINS> {
+    RangeGate::new(half(), half()).unwrap_or(RangeGate::full())
+}
+
+fn rule() -> PaperRule {
+    PaperRule::new(alpha(), count())
+}
+
+fn config<const BINS: usize>() -> Option<PixelConfig<BINS>> {
+    match PixelConfig::new(half(), half(), half(), gate(), rule()) {
+        Ok(config) => {
+            keep((config.x(), config.l1(), config.l2()));
+            keep((*config.gate(), *config.rule().threshold()));
+            Some(config)
+        }
+        Err(error) => {
+            keep(error);
+            None
+        }
+    }
+}
+
+fn event() -> DepthEvent {
+    DepthEvent {
+        pixel: address(),
+        cycle: cycle(),
+        exposure: half(),
+        peak_bin: bin(),
+        offset: offset(),
+        peak_count: count(),
+        background: count(),
+        flags: flags(),
+    }
+}
+
+fn macropixel() -> Macropixel {
+    match byte() {
+        0 => Macropixel::A,
+        1 => Macropixel::B,
+        2 => Macropixel::C,
+        _ => Macropixel::D,
+    }
+}
+
+fn alpha() -> U8F8 {
+    U8F8::from_bits(half())
+}
+
+fn millimetres() -> I24F8 {
+    I24F8::from_bits(word().cast_signed())
+}
+
+fn position() -> BinPosition {
+    BinPosition::of(bin(), offset())
+}
+
+fn offset() -> SubBinOffset {
+    SubBinOffset::new(half().cast_signed()).unwrap_or(SubBinOffset::CENTRE)
+}
+
+fn flags() -> Flags {
+    Flags::from_bits(byte()).unwrap_or(Flags::NONE) | Flags::CLIPPED
+}
+
+fn count() -> Count {
+    Count::saturating(word())
+}
+
+fn bin() -> BinIndex {
+    BinIndex::saturating(half())
+}
+
+fn address() -> PixelAddress {
+    PixelAddress(half())
+}
+
+fn cycle() -> LaserCycle {
+    LaserCycle(double())
+}
+
+/// Whether to go round again.
+fn more() -> bool {
+    word() != 0
+}
+
+/// The first of `all`: how many, the optimiser does not know either.
+fn some<T>(all: &[T]) -> &[T] {
+    all.get(..usize::from(half())).unwrap_or(all)
+}
+
+fn values<T, const N: usize>(one: fn() -> T) -> [T; N] {
+    array::from_fn(|_| one())
+}
+
+fn byte() -> u8 {
+    let [byte, ..] = word().to_le_bytes();
+    byte
+}
+
+fn half() -> u16 {
+    let [low, high, ..] = word().to_le_bytes();
+    u16::from_le_bytes([low, high])
+}
+
+fn double() -> u64 {
+    u64::from(word()) << 32 | u64::from(word())
+}
+
+/// Where values come from.
+static INPUT: AtomicU32 = AtomicU32::new(0);
+
+/// Any value: a volatile read, as from a register that the hardware changes.
+#[inline(never)]
+fn word() -> u32 {
+    #[allow(unsafe_code, reason = "only a volatile read is never optimised away")]
+    // SAFETY: the pointer is to a static of this type, which nothing writes.
+    unsafe {
+        INPUT.as_ptr().read_volatile()
+    }
+}
+
+/// Where values go: all of `value` has to be there, as something may look.
+fn keep<T>(value: T) {
+    black_box(value);
+}
+
+#[allow(unsafe_code, reason = "what is declared here is never linked")]
+// SAFETY: it exists nowhere, so that nothing calls it.
+unsafe extern "C" {
+    safe fn dtof_core_has_a_reachable_panic(info: *const ()) -> !;
+}
+
+/// Hands on what it is given, so that the place of a panic is still in the
+/// image when `check-image` looks for it.
+#[panic_handler]
+fn panic(info: &PanicInfo) -> ! {
+    dtof_core_has_a_reachable_panic(ptr::from_ref(info).cast())
+}

@@ -1,0 +1,234 @@
+//! `cargo xtask check-image`: builds `core-image` for every target and looks at
+//! what the linker made of it.
+//!
+//! The linker itself refuses an image in which a panic is reachable. The rest is
+//! read off the symbols. On the targets without a floating-point unit (all but
+//! thumbv7em) any floating-point operation is a call of a library routine,
+//! which has a name; that the same source makes none there says as much as a
+//! search through the instructions of thumbv7em would, and needs no
+//! disassembler.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail, ensure};
+use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
+
+use crate::panics;
+use crate::symbols;
+use crate::toolchain::{self, Toolchain};
+
+const PROFILES: [&str; 2] = ["firmware", "firmware-small"];
+
+/// What the panic handler of the image calls and nobody defines.
+const UNDEFINED: &str = "dtof_core_has_a_reachable_panic";
+
+/// The functions of `core_image.rs` that between them use all of dtof-core.
+const PARTS: [&str; 12] = [
+    "units",
+    "roots",
+    "ranges",
+    "words",
+    "slot",
+    "texts",
+    "gates",
+    "trees",
+    "thresholds",
+    "histograms",
+    "pixels",
+    "elements",
+];
+
+/// Bytes of code below which something has been optimised away: half of the
+/// smallest image there was when this was written.
+const MIN_TEXT: u64 = 16 * 1024;
+
+/// Builds and looks at all images, and fails if anything is wrong with any.
+pub fn check(root: &Path) -> Result<()> {
+    let targets = Toolchain::read(root)?.targets;
+    let mut bad = 0;
+    println!(
+        "{:<28} {:<14} {:>7} {:>8} {:>11}  verdict",
+        "target", "profile", ".text", ".rodata", ".data+.bss"
+    );
+    for target in &targets {
+        toolchain::ensure_target(target)?;
+        for profile in PROFILES {
+            let (image, mut problems) = match build(root, target, profile, &[])? {
+                Build::Done(path) => (Image::read(&path)?, vec![]),
+                // Link it all the same, to say what can panic.
+                Build::CanPanic => {
+                    let defined = format!("link-arg=--defsym={UNDEFINED}=0");
+                    let Build::Done(path) = build(root, target, profile, &["-C", &defined])? else {
+                        bail!("{target}, {profile}: does not link even with {UNDEFINED} defined");
+                    };
+                    let places = panics::places(&fs::read(&path)?)?;
+                    let places = places
+                        .into_iter()
+                        .map(|place| format!("can panic at {place}"));
+                    (Image::read(&path)?, places.collect())
+                }
+            };
+            problems.extend(image.problems());
+            let verdict = if problems.is_empty() { "ok" } else { "BAD" };
+            println!(
+                "{target:<28} {profile:<14} {:>7} {:>8} {:>11}  {verdict}",
+                image.text, image.constants, image.memory
+            );
+            for problem in &problems {
+                println!("    {problem}");
+            }
+            bad += usize::from(!problems.is_empty());
+        }
+    }
+    ensure!(bad == 0, "core-image: {bad} bad images, see above");
+    Ok(())
+}
+
+enum Build {
+    /// Here.
+    Done(PathBuf),
+    /// The linker misses what the panic handler calls.
+    CanPanic,
+}
+
+/// Builds one image, with these arguments more for the compiler.
+fn build(root: &Path, target: &str, profile: &str, compiler: &[&str]) -> Result<Build> {
+    // Given to cargo as well, so that there is no doubt where the image is.
+    let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
+    let folder = root.join(folder);
+    let output = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .current_dir(root)
+        .args(["rustc", "--quiet", "--locked"])
+        .args(["--package", "dtof-firmware", "--bin", "core-image"])
+        .args(["--features", "core-image"])
+        .args(["--target", target, "--profile", profile, "--target-dir"])
+        .arg(&folder)
+        .arg("--")
+        .args(compiler)
+        .output()
+        .context("cargo does not start")?;
+    if output.status.success() {
+        let path = folder.join(target).join(profile).join("core-image");
+        return Ok(Build::Done(path));
+    }
+    let errors = String::from_utf8_lossy(&output.stderr);
+    if errors.contains(&format!("undefined symbol: {UNDEFINED}")) {
+        return Ok(Build::CanPanic);
+    }
+    eprintln!("{errors}");
+    bail!("{target}, {profile}: core-image does not build, see above");
+}
+
+/// What is looked at in an image.
+#[derive(Clone, Default)]
+struct Image {
+    /// Names as the linker has them.
+    symbols: Vec<String>,
+    /// Bytes of code.
+    text: u64,
+    /// Bytes of constants.
+    constants: u64,
+    /// Bytes of RAM.
+    memory: u64,
+}
+
+impl Image {
+    fn read(path: &Path) -> Result<Self> {
+        let bytes = fs::read(path).with_context(|| path.display().to_string())?;
+        let file = object::File::parse(&*bytes)?;
+        let mut image = Self::default();
+        for symbol in file.symbols() {
+            image.symbols.push(symbol.name()?.into());
+        }
+        for section in file.sections() {
+            // Tables for unwinding, which the library brings along.
+            if section.name()?.starts_with(".eh_frame") {
+                continue;
+            }
+            match section.kind() {
+                SectionKind::Text => image.text += section.size(),
+                SectionKind::ReadOnlyData | SectionKind::ReadOnlyString => {
+                    image.constants += section.size();
+                }
+                SectionKind::Data | SectionKind::UninitializedData => {
+                    image.memory += section.size();
+                }
+                _ => {}
+            }
+        }
+        Ok(image)
+    }
+
+    /// What is wrong, one line each.
+    fn problems(&self) -> Vec<String> {
+        let mut problems = Vec::new();
+        for name in &self.symbols {
+            if let Some(why) = symbols::forbidden(name) {
+                problems.push(format!("{why}: {name}"));
+            }
+        }
+        if !self.symbols.iter().any(|name| name == "_start") {
+            problems.push("the entry `_start` is missing".into());
+        }
+        for part in PARTS {
+            // Either mangling writes a name's length before it.
+            let mangled = format!("10core_image{}{part}", part.len());
+            if !self.symbols.iter().any(|name| name.contains(&mangled)) {
+                problems.push(format!("the part `{part}` of core_image.rs is missing"));
+            }
+        }
+        if self.text < MIN_TEXT {
+            problems.push(format!("less than {MIN_TEXT} bytes of code"));
+        }
+        problems
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn good() -> Image {
+        let parts = PARTS.map(|part| format!("_ZN10core_image{}{part}17h0123E", part.len()));
+        let mut symbols = vec!["_start".to_owned(), "__aeabi_memcpy".to_owned()];
+        symbols.extend(parts);
+        Image {
+            symbols,
+            text: MIN_TEXT,
+            ..Image::default()
+        }
+    }
+
+    #[test]
+    fn a_good_image_passes() {
+        assert_eq!(good().problems(), [""; 0]);
+    }
+
+    #[test]
+    fn an_image_from_which_something_was_dropped_fails() {
+        let mut image = good();
+        image.text -= 1;
+        assert_eq!(image.problems(), ["less than 16384 bytes of code"]);
+
+        for (index, missing) in [(0, "the entry `_start`"), (2, "the part `units`")] {
+            let mut image = good();
+            image.symbols.remove(index);
+            let problems = image.problems();
+            assert!(
+                problems.len() == 1 && problems[0].starts_with(missing),
+                "{problems:?}"
+            );
+        }
+        assert_eq!(Image::default().problems().len(), PARTS.len() + 2);
+    }
+
+    #[test]
+    fn an_image_with_a_forbidden_symbol_fails() {
+        let mut image = good();
+        image.symbols.push("__mulsf3".into());
+        assert_eq!(image.problems(), ["calculates in floating point: __mulsf3"]);
+    }
+}

@@ -1,0 +1,192 @@
+//! `cargo xtask setup`: the pinned toolchain with its targets and components.
+//!
+//! rustup does this by itself when cargo is first called, unless that is
+//! switched off (`RUSTUP_AUTO_INSTALL=0`); and it does not add a target to a
+//! toolchain that is already there.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, anyhow, bail, ensure};
+
+/// What `rust-toolchain.toml` names.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Toolchain {
+    pub channel: String,
+    pub components: Vec<String>,
+    pub targets: Vec<String>,
+}
+
+impl Toolchain {
+    pub fn read(root: &Path) -> Result<Self> {
+        let path = root.join("rust-toolchain.toml");
+        let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        Self::parse(&text).with_context(|| path.display().to_string())
+    }
+
+    /// Reads the little of TOML that this file uses: strings, and lists of them
+    /// over one or more lines.
+    fn parse(text: &str) -> Result<Self> {
+        let lines: Vec<&str> = text
+            .lines()
+            .map(|line| line.split('#').next().unwrap_or(line))
+            .collect();
+        let strings = |key: &str| -> Result<Vec<String>> {
+            let found = lines.iter().enumerate().find_map(|(index, line)| {
+                let (name, value) = line.split_once('=')?;
+                (name.trim() == key).then(|| (value.trim(), &lines[index + 1..]))
+            });
+            let (first, rest) = found.with_context(|| format!("no `{key}`"))?;
+            let mut value = first.to_owned();
+            if first.starts_with('[') {
+                value.push_str(&rest.concat());
+                value.truncate(
+                    value
+                        .find(']')
+                        .with_context(|| format!("no end of `{key}`"))?,
+                );
+            }
+            Ok(value
+                .split('"')
+                .skip(1)
+                .step_by(2)
+                .map(Into::into)
+                .collect())
+        };
+        let channel = strings("channel")?.pop().context("an empty `channel`")?;
+        Ok(Self {
+            channel,
+            components: strings("components")?,
+            targets: strings("targets")?,
+        })
+    }
+
+    /// What `installed`, a list of rustup's, lacks of `wanted`. Most components
+    /// are listed with the name of the host after theirs.
+    fn missing<'a>(wanted: &'a [String], installed: &str) -> Vec<&'a str> {
+        let is_there = |name: &str| {
+            installed.lines().any(|line| {
+                let rest = line.trim().strip_prefix(name);
+                rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
+            })
+        };
+        let wanted = wanted.iter().map(String::as_str);
+        wanted.filter(|name| !is_there(name)).collect()
+    }
+}
+
+/// Installs what is missing; calls nothing that needs a network when nothing
+/// is.
+pub fn set_up(root: &Path) -> Result<()> {
+    let toolchain = Toolchain::read(root)?;
+    let channel = &toolchain.channel;
+
+    // Either list fails if the toolchain itself is missing, and then all is.
+    let list = |what: &str| rustup(&[what, "list", "--installed", "--toolchain", channel]);
+    let components = list("component")?.unwrap_or_default();
+    let targets = list("target")?.unwrap_or_default();
+    let mut missing = Toolchain::missing(&toolchain.components, &components);
+    missing.extend(Toolchain::missing(&toolchain.targets, &targets));
+    if missing.is_empty() {
+        println!("{channel}: every component and target is there");
+        return Ok(());
+    }
+
+    println!("{channel}: installing {}", missing.join(", "));
+    let mut install = vec!["toolchain", "install", channel, "--no-self-update"];
+    install.extend(["--profile", "minimal"]);
+    for component in &toolchain.components {
+        install.extend(["--component", component]);
+    }
+    for target in &toolchain.targets {
+        install.extend(["--target", target]);
+    }
+    match rustup(&install)? {
+        Some(_) => Ok(()),
+        None => bail!("rustup could not install {}", missing.join(", ")),
+    }
+}
+
+/// What rustup prints, or `None` if it fails. Never asks.
+fn rustup(arguments: &[&str]) -> Result<Option<String>> {
+    let output = Command::new("rustup")
+        .args(arguments)
+        // Set by the cargo that runs this program; the file is to decide.
+        .env_remove("RUSTUP_TOOLCHAIN")
+        .stdin(Stdio::null())
+        .stderr(Stdio::inherit())
+        .output()
+        .map_err(|error| match error.kind() {
+            ErrorKind::NotFound => anyhow!("rustup is missing: install it from https://rustup.rs"),
+            _ => anyhow!("rustup does not start: {error}"),
+        })?;
+    Ok(output
+        .status
+        .success()
+        .then(|| String::from_utf8_lossy(&output.stdout).into_owned()))
+}
+
+/// Whether the running toolchain can build for `target`.
+pub fn ensure_target(target: &str) -> Result<()> {
+    let output = Command::new("rustc")
+        .args(["--print", "target-libdir", "--target", target])
+        .output()
+        .context("rustc does not start")?;
+    let folder = String::from_utf8_lossy(&output.stdout);
+    ensure!(
+        output.status.success() && Path::new(folder.trim()).is_dir(),
+        "target {target} is not installed: run `cargo xtask setup`"
+    );
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::root;
+
+    #[test]
+    fn reads_lists_over_one_and_more_lines() {
+        let text = "\
+[toolchain] # \"no\"
+channel = \"1.2.3\"
+components = [\"rustfmt\", \"clippy\"]
+targets = [
+    \"thumbv6m-none-eabi\", # why
+    # \"left-out\",
+    \"riscv32i-unknown-none-elf\",
+]
+profile = \"minimal\"
+";
+        let expected = Toolchain {
+            channel: "1.2.3".into(),
+            components: vec!["rustfmt".into(), "clippy".into()],
+            targets: vec![
+                "thumbv6m-none-eabi".into(),
+                "riscv32i-unknown-none-elf".into(),
+            ],
+        };
+        assert_eq!(Toolchain::parse(text).unwrap(), expected);
+        assert!(Toolchain::parse("channel = \"1.2.3\"").is_err());
+    }
+
+    #[test]
+    fn reads_the_file_of_this_workspace() {
+        let toolchain = Toolchain::read(root().unwrap()).unwrap();
+        assert!(toolchain.channel.starts_with("1."));
+        assert!(toolchain.components.contains(&"clippy".into()));
+        assert!(toolchain.targets.contains(&"thumbv6m-none-eabi".into()));
+    }
+
+    #[test]
+    fn finds_what_is_missing() {
+        let installed = "clippy-x86_64-unknown-linux-gnu\nrust-src\nriscv32imc-unknown-none-elf\n";
+        let wanted = ["clippy", "rustfmt", "rust-src", "riscv32i-unknown-none-elf"];
+        assert_eq!(
+            Toolchain::missing(&wanted.map(Into::into), installed),
+            ["rustfmt", "riscv32i-unknown-none-elf"]
+        );
+    }
+}
