@@ -1,0 +1,103 @@
+//! Frames on the wire: a CRC-32 at the end, COBS around all of it, a zero byte
+//! after it.
+//!
+//! COBS makes a frame of at most 254 bytes one byte longer and leaves no zero
+//! byte in it. Whatever happened to the bytes before, a receiver is in step
+//! again after the next zero byte.
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+
+/// Bytes of a frame before COBS, checksum included.
+pub const FRAME_BYTES: usize = 254;
+/// Bytes of a frame on the wire, the zero byte included.
+pub const WIRE_BYTES: usize = FRAME_BYTES + 2;
+/// What a frame carries at most.
+pub const PAYLOAD_BYTES: usize = FRAME_BYTES - CHECKSUM_BYTES;
+
+const CHECKSUM_BYTES: usize = 4;
+static CRC_32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// Puts `parts`, one after the other and at most [`PAYLOAD_BYTES`] together,
+/// into `wire`; gives the number of bytes to send. What is beyond
+/// [`PAYLOAD_BYTES`] is a mistake of the caller and left out.
+#[must_use]
+pub fn encode(parts: [&[u8]; 2], wire: &mut [u8; WIRE_BYTES]) -> usize {
+    let mut frame = heapless::Vec::<u8, FRAME_BYTES>::new();
+    for part in parts {
+        let room = PAYLOAD_BYTES.saturating_sub(frame.len());
+        let _ = frame.extend_from_slice(part.get(..part.len().min(room)).unwrap_or_default());
+    }
+    let checksum = CRC_32.checksum(&frame);
+    let _ = frame.extend_from_slice(&checksum.to_le_bytes());
+    let Some((end, body)) = wire.split_last_mut() else {
+        return 0;
+    };
+    *end = 0;
+    let length = cobs::try_encode(&frame, body).unwrap_or(0);
+    if let Some(end) = wire.get_mut(length) {
+        *end = 0;
+    }
+    length + 1
+}
+
+/// Why bytes between two zero bytes are no frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum FrameError {
+    /// More bytes than a frame can have.
+    Oversized,
+    /// Not COBS, too short for a checksum, or the checksum does not match.
+    Corrupt,
+}
+
+/// Finds frames in a stream of bytes.
+#[derive(Clone, Debug, Default)]
+pub struct Deframer {
+    bytes: heapless::Vec<u8, WIRE_BYTES>,
+    oversized: bool,
+    ended: bool,
+}
+
+impl Deframer {
+    /// Before the first byte.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            bytes: heapless::Vec::new(),
+            oversized: false,
+            ended: false,
+        }
+    }
+
+    /// Takes the next byte. If it ends a frame, what the frame carries; if it
+    /// ends something that is no frame, why.
+    pub fn push(&mut self, byte: u8) -> Option<Result<&[u8], FrameError>> {
+        if core::mem::take(&mut self.ended) {
+            self.bytes.clear();
+            self.oversized = false;
+        }
+        if byte != 0 {
+            self.oversized |= self.bytes.push(byte).is_err();
+            return None;
+        }
+        self.ended = true;
+        if self.oversized {
+            return Some(Err(FrameError::Oversized));
+        }
+        if self.bytes.is_empty() {
+            return None; // zero bytes one after the other
+        }
+        Some(open(&mut self.bytes))
+    }
+}
+
+/// What a frame carries.
+fn open(bytes: &mut [u8]) -> Result<&[u8], FrameError> {
+    let length = cobs::decode_in_place(bytes).map_err(|_| FrameError::Corrupt)?;
+    let frame = bytes.get(..length).ok_or(FrameError::Corrupt)?;
+    let (payload, checksum) = frame.split_last_chunk().ok_or(FrameError::Corrupt)?;
+    if CRC_32.checksum(payload) != u32::from_le_bytes(*checksum) {
+        return Err(FrameError::Corrupt);
+    }
+    Ok(payload)
+}

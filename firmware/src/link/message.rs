@@ -1,0 +1,399 @@
+//! What the numbered messages say, as fixed little-endian records.
+//!
+//! | kind | to | message | body |
+//! |---|---|---|---|
+//! | 0x01 | device | configure | [`Configuration`], 26 bytes |
+//! | 0x02 | device | photons | entries of 4 bytes, see [`Entry`] |
+//! | 0x03 | device | synchronise | any 4 bytes |
+//! | 0x04 | device | statistics request | none |
+//! | 0x81 | host | configured | none |
+//! | 0x82 | host | refused | a [`Refusal`], 1 byte |
+//! | 0x83 | host | events | AER words of 16 bytes |
+//! | 0x84 | host | synchronised | the 4 bytes, after all that came before them |
+//! | 0x85 | host | statistics | [`Report`], 112 bytes |
+
+use dtof_core::{ConfigError, GateError, RangeScaleError, Statistics};
+use heapless::Vec;
+
+use super::endpoint::LinkCounters;
+
+/// The version both ends announce when a session begins.
+pub const LINK_VERSION: u16 = 1;
+
+/// Host to device: a [`Configuration`].
+pub const CONFIGURE: u8 = 0x01;
+/// Host to device: [`Entry`] after [`Entry`].
+pub const PHOTONS: u8 = 0x02;
+/// Host to device: answer when all before it is done.
+pub const SYNCHRONISE: u8 = 0x03;
+/// Host to device: send a [`Report`].
+pub const STATISTICS_REQUEST: u8 = 0x04;
+/// Device to host: the configuration is in force.
+pub const CONFIGURED: u8 = 0x81;
+/// Device to host: the configuration is not; a [`Refusal`].
+pub const REFUSED: u8 = 0x82;
+/// Device to host: AER words.
+pub const EVENTS: u8 = 0x83;
+/// Device to host: all before is done; the body of the question.
+pub const SYNCHRONISED: u8 = 0x84;
+/// Device to host: a [`Report`].
+pub const STATISTICS: u8 = 0x85;
+
+/// What a photons message is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Entry {
+    /// A photon in the present laser cycle. Pixel 65,535 cannot be named.
+    Photon {
+        /// Which pixel, below 65,535.
+        pixel: u16,
+        /// Its TDC code.
+        code: u16,
+    },
+    /// The present laser cycle ends, and `cycles - 1` empty ones after it.
+    EndOfCycles {
+        /// At least 1.
+        cycles: u16,
+    },
+}
+
+impl Entry {
+    /// Bytes of an entry.
+    pub const BYTES: usize = 4;
+    const END: u16 = u16::MAX;
+
+    /// As it is sent.
+    #[must_use]
+    pub const fn to_le_bytes(self) -> [u8; Self::BYTES] {
+        let (low, high) = match self {
+            Self::Photon { pixel, code } => (pixel, code),
+            Self::EndOfCycles { cycles } => (Self::END, cycles),
+        };
+        let ([a, b], [c, d]) = (low.to_le_bytes(), high.to_le_bytes());
+        [a, b, c, d]
+    }
+
+    /// As it was received.
+    #[must_use]
+    pub const fn from_le_bytes([a, b, c, d]: [u8; Self::BYTES]) -> Self {
+        let (low, high) = (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]));
+        if low == Self::END {
+            Self::EndOfCycles { cycles: high }
+        } else {
+            Self::Photon {
+                pixel: low,
+                code: high,
+            }
+        }
+    }
+}
+
+/// Where the device takes its photons from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Source {
+    /// From the link: photons messages.
+    Link,
+    /// From its sensor.
+    Sensor,
+}
+
+/// How the pixels are to operate, not yet validated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Configuration {
+    /// α in 1/256.
+    pub alpha: u16,
+    /// Photons a reported peak holds at least.
+    pub minimum_count: u16,
+    /// Laser cycles between looks.
+    pub x: u16,
+    /// The exposure a decision must exceed.
+    pub l1: u16,
+    /// The exposure at which a pixel starts over.
+    pub l2: u16,
+    /// First bin that may hold the peak.
+    pub gate_first: u16,
+    /// Last bin that may hold the peak.
+    pub gate_last: u16,
+    /// Pixels, addresses 0 up.
+    pub pixels: u16,
+    /// Bin width in 1/65,536 ps.
+    pub bin_width: u32,
+    /// Range offset in 1/256 mm.
+    pub offset: i32,
+    /// 0: link, 1: sensor.
+    pub source: u8,
+    /// 0: the paper's rule.
+    pub rule: u8,
+}
+
+impl Configuration {
+    /// Bytes of the record.
+    pub const BYTES: usize = 26;
+
+    /// As it is sent.
+    #[must_use]
+    pub fn to_le_bytes(&self) -> [u8; Self::BYTES] {
+        let mut bytes = [0; Self::BYTES];
+        let fields = [
+            self.alpha,
+            self.minimum_count,
+            self.x,
+            self.l1,
+            self.l2,
+            self.gate_first,
+            self.gate_last,
+            self.pixels,
+        ];
+        let wide = self
+            .bin_width
+            .to_le_bytes()
+            .into_iter()
+            .chain(self.offset.to_le_bytes());
+        let all = fields
+            .into_iter()
+            .flat_map(u16::to_le_bytes)
+            .chain(wide)
+            .chain([self.source, self.rule]);
+        for (place, byte) in bytes.iter_mut().zip(all) {
+            *place = byte;
+        }
+        bytes
+    }
+
+    /// As it was received, or `None` if it is not as long as the record.
+    #[must_use]
+    pub fn from_le_bytes(bytes: &[u8]) -> Option<Self> {
+        let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;
+        let two = |at: usize| Some(u16::from_le_bytes(bytes.get(at..at + 2)?.try_into().ok()?));
+        let four = |at: usize| bytes.get(at..at + 4)?.try_into().ok();
+        Some(Self {
+            alpha: two(0)?,
+            minimum_count: two(2)?,
+            x: two(4)?,
+            l1: two(6)?,
+            l2: two(8)?,
+            gate_first: two(10)?,
+            gate_last: two(12)?,
+            pixels: two(14)?,
+            bin_width: u32::from_le_bytes(four(16)?),
+            offset: i32::from_le_bytes(four(20)?),
+            source: *bytes.get(24)?,
+            rule: *bytes.get(25)?,
+        })
+    }
+}
+
+/// Why a configuration is not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Refusal {
+    /// Not as long as the record, or of an unknown source or rule.
+    Unknown = 1,
+    /// X is 0.
+    ZeroX = 2,
+    /// X is greater than L1.
+    XAboveL1 = 3,
+    /// L2 is not greater than L1.
+    L2NotAboveL1 = 4,
+    /// No look falls between L1 and L2.
+    NoLook = 5,
+    /// The gate ends past the last bin.
+    GatePastLastBin = 6,
+    /// The gate leaves fewer than 8 bins.
+    GateTooNarrow = 7,
+    /// The bin width is zero, or a range would be out of range.
+    Range = 8,
+    /// No pixels, or more than the device has.
+    Pixels = 9,
+    /// The minimum peak count is 0 or more than a counter holds.
+    MinimumCount = 10,
+    /// The device has no sensor.
+    NoSensor = 11,
+}
+
+impl Refusal {
+    const ALL: [Self; 11] = [
+        Self::Unknown,
+        Self::ZeroX,
+        Self::XAboveL1,
+        Self::L2NotAboveL1,
+        Self::NoLook,
+        Self::GatePastLastBin,
+        Self::GateTooNarrow,
+        Self::Range,
+        Self::Pixels,
+        Self::MinimumCount,
+        Self::NoSensor,
+    ];
+
+    /// From its number on the wire.
+    #[must_use]
+    pub fn from_number(number: u8) -> Option<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|&refusal| refusal as u8 == number)
+    }
+}
+
+impl core::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Unknown => f.write_str("the configuration is not one this device knows"),
+            Self::ZeroX => ConfigError::ZeroX.fmt(f),
+            Self::XAboveL1 => ConfigError::XAboveL1.fmt(f),
+            Self::L2NotAboveL1 => ConfigError::L2NotAboveL1.fmt(f),
+            Self::NoLook => ConfigError::NoLook.fmt(f),
+            Self::GatePastLastBin => GateError::PastLastBin.fmt(f),
+            Self::GateTooNarrow => GateError::TooNarrow.fmt(f),
+            Self::Range => f.write_str("the bin width is zero, or a range would be out of range"),
+            Self::Pixels => f.write_str("the device does not have that many pixels"),
+            Self::MinimumCount => f.write_str("the minimum peak count must be from 1 to 1023"),
+            Self::NoSensor => f.write_str("the device has no sensor"),
+        }
+    }
+}
+
+impl core::error::Error for Refusal {}
+
+impl From<ConfigError> for Refusal {
+    fn from(error: ConfigError) -> Self {
+        match error {
+            ConfigError::ZeroX => Self::ZeroX,
+            ConfigError::XAboveL1 => Self::XAboveL1,
+            ConfigError::L2NotAboveL1 => Self::L2NotAboveL1,
+            ConfigError::NoLook => Self::NoLook,
+            ConfigError::XNotFour => Self::Unknown,
+        }
+    }
+}
+
+impl From<GateError> for Refusal {
+    fn from(error: GateError) -> Self {
+        match error {
+            GateError::PastLastBin => Self::GatePastLastBin,
+            GateError::TooNarrow => Self::GateTooNarrow,
+        }
+    }
+}
+
+impl From<RangeScaleError> for Refusal {
+    fn from(_: RangeScaleError) -> Self {
+        Self::Range
+    }
+}
+
+/// What the device has done since it was configured, and what happened to the
+/// link since it was switched on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Report {
+    /// Laser cycles that have ended.
+    pub cycles: u64,
+    /// All pixels together.
+    pub statistics: Statistics,
+    /// Photons of pixels the device does not have.
+    pub unaddressed: u64,
+    /// Bytes the receive queue had no room for.
+    pub overrun: u32,
+    /// Messages with a kind or a body that the device does not know.
+    pub unknown: u32,
+    /// Errors of the sensor.
+    pub sensor_errors: u32,
+    /// The device's end of the link.
+    pub link: LinkCounters,
+}
+
+impl Report {
+    /// Bytes of the record.
+    pub const BYTES: usize = 9 * 8 + 10 * 4;
+
+    /// As it is sent.
+    #[must_use]
+    pub fn to_le_bytes(&self) -> Vec<u8, { Self::BYTES }> {
+        let Statistics {
+            counted,
+            saturated,
+            rejected,
+            gated_out,
+            events,
+            deferred,
+            expired,
+        } = self.statistics;
+        let wide = [
+            self.cycles,
+            counted,
+            saturated,
+            rejected,
+            gated_out,
+            events,
+            deferred,
+            expired,
+            self.unaddressed,
+        ];
+        let LinkCounters {
+            frames,
+            corrupt,
+            oversized,
+            foreign,
+            out_of_order,
+            duplicate,
+            retransmitted,
+        } = self.link;
+        let narrow = [
+            self.overrun,
+            self.unknown,
+            self.sensor_errors,
+            frames,
+            corrupt,
+            oversized,
+            foreign,
+            out_of_order,
+            duplicate,
+            retransmitted,
+        ];
+        let wide = wide.into_iter().flat_map(u64::to_le_bytes);
+        let narrow = narrow.into_iter().flat_map(u32::to_le_bytes);
+        wide.chain(narrow).collect()
+    }
+
+    /// As it was received, or `None` if it is not as long as the record.
+    #[must_use]
+    pub fn from_le_bytes(bytes: &[u8]) -> Option<Self> {
+        let (wide, narrow) = bytes.split_at_checked(9 * 8)?;
+        let mut wide = wide
+            .chunks_exact(8)
+            .filter_map(|eight| Some(u64::from_le_bytes(eight.try_into().ok()?)));
+        let mut narrow = narrow
+            .chunks_exact(4)
+            .filter_map(|four| Some(u32::from_le_bytes(four.try_into().ok()?)));
+        // Fields are read in the order they are written.
+        let report = Self {
+            cycles: wide.next()?,
+            statistics: Statistics {
+                counted: wide.next()?,
+                saturated: wide.next()?,
+                rejected: wide.next()?,
+                gated_out: wide.next()?,
+                events: wide.next()?,
+                deferred: wide.next()?,
+                expired: wide.next()?,
+            },
+            unaddressed: wide.next()?,
+            overrun: narrow.next()?,
+            unknown: narrow.next()?,
+            sensor_errors: narrow.next()?,
+            link: LinkCounters {
+                frames: narrow.next()?,
+                corrupt: narrow.next()?,
+                oversized: narrow.next()?,
+                foreign: narrow.next()?,
+                out_of_order: narrow.next()?,
+                duplicate: narrow.next()?,
+                retransmitted: narrow.next()?,
+            },
+        };
+        (bytes.len() == Self::BYTES).then_some(report)
+    }
+}

@@ -1,0 +1,329 @@
+//! A host and a device with a bad wire between them: over ten thousand faults,
+//! every event arrives once, in order and as it was.
+
+use std::collections::VecDeque;
+
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{
+    AerDecoder, AerRecord, AerWord, AsyncPixel, Count, DepthEvent, LaserCycle, PaperRule,
+    PixelAddress, PixelConfig, RangeGate,
+};
+use dtof_firmware::link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
+use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
+use dtof_firmware::link::message::{self, Configuration, Entry, Report};
+use dtof_firmware::sidecar::{Sidecar, greeting};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+const PIXELS: u16 = 8;
+
+const CONFIGURATION: Configuration = Configuration {
+    alpha: 4 << 8,
+    minimum_count: 5,
+    x: 4,
+    l1: 20,
+    l2: 200,
+    gate_first: 0,
+    gate_last: 127,
+    pixels: PIXELS,
+    bin_width: 250 << 16,
+    offset: 0,
+    source: 0,
+    rule: 0,
+};
+
+/// Faults done to the bytes so far.
+#[derive(Debug, Default, Clone, Copy)]
+struct Faults {
+    flipped: u32,
+    dropped: u32,
+    doubled: u32,
+    swapped: u32,
+    pulled: u32,
+}
+
+impl Faults {
+    fn all(&self) -> u32 {
+        self.flipped + self.dropped + self.doubled + self.swapped + self.pulled
+    }
+}
+
+/// One direction of the wire.
+struct Wire {
+    bytes: VecDeque<u8>,
+    /// One fault in so many bytes.
+    one_in: u32,
+    pulled_until: u32,
+    faults: Faults,
+}
+
+impl Wire {
+    fn new(one_in: u32) -> Self {
+        Self {
+            bytes: VecDeque::new(),
+            one_in,
+            pulled_until: 0,
+            faults: Faults::default(),
+        }
+    }
+
+    fn carry(&mut self, bytes: &[u8], now: u32, rng: &mut Pcg32) {
+        for &byte in bytes {
+            if now < self.pulled_until {
+                continue;
+            }
+            if self.one_in == 0 || !rng.next_u32().is_multiple_of(self.one_in) {
+                self.bytes.push_back(byte);
+                continue;
+            }
+            match rng.next_u32() % 100 {
+                0..30 => {
+                    self.bytes.push_back(byte ^ (1 << (rng.next_u32() % 8)));
+                    self.faults.flipped += 1;
+                }
+                30..60 => self.faults.dropped += 1,
+                60..80 => {
+                    self.bytes.extend([byte, byte]);
+                    self.faults.doubled += 1;
+                }
+                80..99 => {
+                    let before = self.bytes.pop_back();
+                    self.bytes.push_back(byte);
+                    self.bytes.extend(before);
+                    self.faults.swapped += 1;
+                }
+                _ => {
+                    self.pulled_until = now + 1000;
+                    self.faults.pulled += 1;
+                }
+            }
+        }
+    }
+}
+
+/// What the host sends, and what it should get.
+struct Script {
+    messages: Vec<Vec<u8>>,
+    events: Vec<DepthEvent>,
+    photons: u64,
+}
+
+fn script(cycles: u64, rng: &mut Pcg32) -> Script {
+    let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+    let config = PixelConfig::<128>::new(4, 20, 200, RangeGate::full(), rule).unwrap();
+    let mut pixels: Vec<_> = (0..PIXELS)
+        .map(|address| AsyncPixel::<128>::new(PixelAddress(address)))
+        .collect();
+    let mut entries = Vec::new();
+    let mut events = Vec::new();
+    let mut photons = 0;
+    for cycle in 0..cycles {
+        for (address, pixel) in (0..).zip(&mut pixels) {
+            for _ in 0..rng.next_u32() % 3 {
+                // Half of them in one bin; a few past the last.
+                let random = (rng.next_u32() % 130) as u16;
+                let code = if rng.next_u32() & 1 == 0 {
+                    20 + 10 * address
+                } else {
+                    random
+                };
+                pixel.count(&config, code);
+                photons += 1;
+                entries.extend(
+                    Entry::Photon {
+                        pixel: address,
+                        code,
+                    }
+                    .to_le_bytes(),
+                );
+            }
+        }
+        entries.extend(Entry::EndOfCycles { cycles: 1 }.to_le_bytes());
+        for pixel in &mut pixels {
+            pixel.end_laser_cycle(&config, LaserCycle(cycle));
+            events.extend(pixel.acknowledge());
+        }
+    }
+    Script {
+        messages: entries
+            .chunks(BODY_BYTES / 4 * 4)
+            .map(<[u8]>::to_vec)
+            .collect(),
+        events,
+        photons,
+    }
+}
+
+struct Outcome {
+    events: Vec<DepthEvent>,
+    report: Report,
+    host: LinkCounters,
+    device: LinkCounters,
+    faults: u32,
+    milliseconds: u32,
+}
+
+/// Runs a session to its end. The host takes messages only in one of
+/// `reads_one_in` milliseconds.
+fn run(script: &Script, one_in: u32, reads_one_in: u32, rng: &mut Pcg32) -> Outcome {
+    let mut device = Sidecar::<{ PIXELS as usize }>::new(false);
+    let mut host = Endpoint::host(7, greeting(0, 0), 0);
+    let (mut up, mut down) = (Wire::new(one_in), Wire::new(one_in));
+    let (mut up_frames, mut down_frames) = (Deframer::new(), Deframer::new());
+    let mut wire = [0; WIRE_BYTES];
+    let mut decoder = AerDecoder::new();
+    let mut events = Vec::new();
+    let mut report = None;
+    let configuration = CONFIGURATION.to_le_bytes();
+    let mut to_send: VecDeque<(u8, &[u8])> = [(message::CONFIGURE, &configuration[..])]
+        .into_iter()
+        .chain(
+            script
+                .messages
+                .iter()
+                .map(|body| (message::PHOTONS, &body[..])),
+        )
+        .chain([
+            (message::SYNCHRONISE, &b"done"[..]),
+            (message::STATISTICS_REQUEST, &[]),
+        ])
+        .collect();
+    let mut answers = Vec::new();
+
+    for now in 0..10_000_000 {
+        while host.is_open() && host.has_room() {
+            let Some((kind, body)) = to_send.pop_front() else {
+                break;
+            };
+            host.offer(kind, body).unwrap();
+        }
+        loop {
+            let length = host.transmit(now, &mut wire);
+            if length == 0 {
+                break;
+            }
+            down.carry(&wire[..length], now, rng);
+        }
+        while let Some(byte) = down.bytes.pop_front() {
+            if let Some(frame) = down_frames.push(byte) {
+                device.receive(frame, now);
+            }
+        }
+        device.work(0);
+        loop {
+            let length = device.transmit(now, &mut wire);
+            if length == 0 {
+                break;
+            }
+            up.carry(&wire[..length], now, rng);
+        }
+        while let Some(byte) = up.bytes.pop_front() {
+            if let Some(frame) = up_frames.push(byte) {
+                host.receive(frame, now);
+            }
+        }
+        if !now.is_multiple_of(reads_one_in) {
+            continue;
+        }
+        while let Some(message) = host.take() {
+            match message.kind {
+                message::EVENTS => {
+                    for word in message.body.chunks_exact(16) {
+                        let word = AerWord::from_le_bytes(word.try_into().unwrap());
+                        match decoder.decode(word).unwrap() {
+                            AerRecord::Event(event) => events.push(event),
+                            AerRecord::Time(_) => {}
+                            AerRecord::End { .. } => panic!(),
+                        }
+                    }
+                }
+                message::STATISTICS => report = Report::from_le_bytes(&message.body),
+                kind => answers.push(kind),
+            }
+        }
+        if let Some(report) = report
+            && host.is_settled()
+        {
+            assert_eq!(answers, [message::CONFIGURED, message::SYNCHRONISED]);
+            return Outcome {
+                events,
+                report,
+                host: *host.counters(),
+                device: *device.endpoint().counters(),
+                faults: up.faults.all() + down.faults.all(),
+                milliseconds: now,
+            };
+        }
+    }
+    panic!(
+        "out of step: {:?} {:?}",
+        host.counters(),
+        device.endpoint().counters()
+    );
+}
+
+#[track_caller]
+fn check(script: &Script, outcome: &Outcome) {
+    assert!(
+        outcome.events == script.events,
+        "{} of {} events",
+        outcome.events.len(),
+        script.events.len()
+    );
+    let statistics = outcome.report.statistics;
+    assert_eq!(
+        statistics.counted + statistics.saturated + statistics.rejected + statistics.gated_out,
+        script.photons
+    );
+    assert!(statistics.rejected > 0);
+    assert_eq!(statistics.events, script.events.len() as u64);
+    assert_eq!(statistics.deferred, 0);
+}
+
+#[test]
+fn a_good_wire_needs_no_repetition() {
+    let mut rng = Pcg32::seed_from_u64(1);
+    let script = script(5_000, &mut rng);
+    let outcome = run(&script, 0, 1, &mut rng);
+    check(&script, &outcome);
+    for end in [outcome.host, outcome.device] {
+        assert_eq!(
+            end,
+            LinkCounters {
+                frames: end.frames,
+                ..LinkCounters::default()
+            }
+        );
+    }
+}
+
+#[test]
+fn a_slow_reader_changes_no_event() {
+    let mut rng = Pcg32::seed_from_u64(2);
+    let script = script(2_000, &mut rng);
+    let outcome = run(&script, 0, 500, &mut rng);
+    check(&script, &outcome);
+    println!("slow reader: {} ms", outcome.milliseconds);
+}
+
+#[test]
+fn ten_thousand_faults_change_no_event_and_are_counted() {
+    let mut faults = 0;
+    for (seed, one_in) in (3..).zip([5_000, 1_000, 400].into_iter().cycle()) {
+        if faults >= 10_000 {
+            break;
+        }
+        let mut rng = Pcg32::seed_from_u64(seed);
+        let script = script(4_000, &mut rng);
+        let outcome = run(&script, one_in, 1, &mut rng);
+        check(&script, &outcome);
+        println!(
+            "{} faults in {} ms: host {:?} device {:?}",
+            outcome.faults, outcome.milliseconds, outcome.host, outcome.device
+        );
+        assert!(outcome.host.corrupt + outcome.device.corrupt > 0);
+        assert!(outcome.host.retransmitted + outcome.device.retransmitted > 0);
+        faults += outcome.faults;
+    }
+    println!("{faults} faults");
+}
