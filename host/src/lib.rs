@@ -10,6 +10,7 @@
 //! ```
 
 pub mod aer_file;
+pub mod device;
 pub mod engine;
 pub mod events_csv;
 pub mod maps;

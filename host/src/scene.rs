@@ -1,5 +1,5 @@
 //! The scene of the demo: a wall, before it a matt box, before that a bright
-//! ball; 64×32 macropixels.
+//! ball, on an array of any size.
 //!
 //! Each pixel sees one surface. Signal photons follow the reflectivity and the
 //! inverse square of the distance; the background is the same everywhere.
@@ -11,12 +11,6 @@ use crate::settings::Settings;
 use crate::simulation::{Rates, SimulatedArray};
 use crate::source::Geometry;
 use crate::summary::{Row, grouped};
-
-/// The array.
-pub const GEOMETRY: Geometry = Geometry {
-    columns: 64,
-    rows: 32,
-};
 
 /// Background photons a bin and laser cycle.
 const BACKGROUND: f64 = 0.02;
@@ -70,11 +64,17 @@ pub struct View {
     pub range_mm: f64,
 }
 
-/// The whole scene, row by row.
+/// The whole scene on an array, row by row.
 #[must_use]
-pub fn views() -> Vec<View> {
-    let row = |row| (0..GEOMETRY.columns).map(move |column| view(column.into(), row));
-    (0..GEOMETRY.rows).map(f64::from).flat_map(row).collect()
+pub fn views(geometry: Geometry) -> Vec<View> {
+    // The scene is laid out on 64×32.
+    let across = 64.0 / f64::from(geometry.columns);
+    let down = 32.0 / f64::from(geometry.rows);
+    let row = |row| {
+        let columns = (0..geometry.columns).map(f64::from);
+        columns.map(move |column| view(column * across, f64::from(row) * down))
+    };
+    (0..geometry.rows).flat_map(row).collect()
 }
 
 fn view(column: f64, row: f64) -> View {
@@ -103,9 +103,9 @@ fn view(column: f64, row: f64) -> View {
 ///
 /// # Errors
 /// Never for the settings of the demo.
-pub fn photons(settings: &Settings, cycles: u64) -> Result<SimulatedArray> {
+pub fn photons(geometry: Geometry, settings: &Settings, cycles: u64) -> Result<SimulatedArray> {
     let mm_per_bin = mm_per_bin(settings);
-    let rates: Vec<Rates> = views()
+    let rates: Vec<Rates> = views(geometry)
         .iter()
         .map(|view| Rates {
             background: BACKGROUND,
@@ -116,7 +116,7 @@ pub fn photons(settings: &Settings, cycles: u64) -> Result<SimulatedArray> {
         })
         .collect();
     SimulatedArray::new(
-        GEOMETRY,
+        geometry,
         &rates,
         u16::try_from(settings.bins)?,
         cycles,
@@ -132,7 +132,7 @@ fn mm_per_bin(settings: &Settings) -> f64 {
 #[must_use]
 pub fn against_truth(maps: &Maps, settings: &Settings) -> Vec<Row> {
     let mm_per_bin = mm_per_bin(settings);
-    let views = views();
+    let views = views(maps.geometry);
     let mut rows = Vec::new();
     for surface in Surface::ALL {
         let pixels: Vec<(&View, &PixelHistory)> = views

@@ -3,15 +3,17 @@
 
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
-use dtof::engine::host_engine;
+use dtof::device::{self, Client, DeviceEngine};
+use dtof::engine::{Engine, host_engine};
 use dtof::output::Output;
 use dtof::report::Section;
 use dtof::run::run;
 use dtof::scene;
 use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
-use dtof::source::PhotonSource;
+use dtof::source::{Geometry, PhotonSource};
+use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 
 use super::print_summary;
@@ -23,6 +25,13 @@ pub struct Demo {
     /// Where the results go.
     #[arg(long, default_value = Demo::OUT)]
     out: PathBuf,
+    /// Macropixels of the array [default: 64x32; 16x8 with --device]
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = array)]
+    array: Option<Geometry>,
+    /// Decide on a device, not on this computer: `qemu` starts an emulated one, else
+    /// tcp:HOST:PORT or a serial port
+    #[arg(long, value_name = "DEVICE")]
+    device: Option<String>,
     /// Seed of the simulated photons.
     #[arg(long, default_value_t = Demo::SEED)]
     seed: u64,
@@ -35,6 +44,8 @@ impl Default for Demo {
     fn default() -> Self {
         Self {
             out: Self::OUT.into(),
+            array: None,
+            device: None,
             seed: Self::SEED,
             quiet: false,
         }
@@ -58,8 +69,14 @@ impl Demo {
             x: 10,
             seed: self.seed,
         };
-        let mut photons = scene::photons(&settings, CYCLES)?;
-        let mut engine = host_engine(&settings, &photons.addresses())?;
+        let (columns, rows) = if self.device.is_some() {
+            (16, 8)
+        } else {
+            (64, 32)
+        };
+        let geometry = self.array.unwrap_or(Geometry { columns, rows });
+        let mut photons = scene::photons(geometry, &settings, CYCLES)?;
+        let mut engine = engine(self.device.as_deref(), &settings, &photons.addresses())?;
         let mut output = Output::create(&self.out, &settings, photons.geometry())?;
         let summary = run(
             &mut photons,
@@ -74,13 +91,41 @@ impl Demo {
             heading: "Surfaces",
             rows: &surfaces,
         }];
-        let lead = "A simulated static scene of 64×32 macropixels: a wall, before it a matt box, \
-                    before that a bright ball. Every pixel reports a depth event the moment its \
-                    peak stands clear of the background, then starts over.";
-        output.finish(&summary, "Asynchronous depth events", lead, &sections)?;
+        let lead = format!(
+            "A simulated static scene of {}×{} macropixels: a wall, before it a matt box, before \
+             that a bright ball. Every pixel reports a depth event the moment its peak stands \
+             clear of the background, then starts over.",
+            geometry.columns, geometry.rows
+        );
+        output.finish(&summary, "Asynchronous depth events", &lead, &sections)?;
         if !self.quiet {
             print_summary(&[summary.rows(), surfaces].concat(), &self.out);
         }
         Ok(())
     }
+}
+
+/// The engine of this computer, or that of a device.
+fn engine(
+    device: Option<&str>,
+    settings: &Settings,
+    addresses: &[PixelAddress],
+) -> Result<Box<dyn Engine>> {
+    let Some(device) = device else {
+        return host_engine(settings, addresses);
+    };
+    let client = Client::new(device::open(device)?).with_context(|| device.to_owned())?;
+    Ok(Box::new(DeviceEngine::new(client, settings, addresses)?))
+}
+
+fn array(text: &str) -> Result<Geometry, String> {
+    let sides = text.split_once('x').and_then(|(columns, rows)| {
+        let sides = (columns.parse::<u16>().ok()?, rows.parse::<u16>().ok()?);
+        (sides.0 > 0 && sides.1 > 0).then_some(sides)
+    });
+    let (columns, rows) = sides.ok_or("must be COLUMNSxROWS, as 64x32")?;
+    Ok(Geometry {
+        columns: columns.into(),
+        rows: rows.into(),
+    })
 }

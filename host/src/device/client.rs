@@ -1,0 +1,233 @@
+//! The host's end of the link over a real port.
+
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use anyhow::{Context, Result, bail, ensure};
+use dtof_core::{AER_VERSION, AerDecoder, AerRecord, AerWord, DepthEvent};
+use dtof_firmware::link::endpoint::{Endpoint, LinkCounters, Message};
+use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
+use dtof_firmware::link::message::{self, Configuration, LINK_VERSION, Refusal, Report};
+use dtof_firmware::sidecar::greeting;
+
+use super::port::Port;
+
+/// A device that says nothing for so long is gone.
+const SILENCE: Duration = Duration::from_secs(5);
+
+/// A session with a device.
+pub struct Client {
+    port: Box<dyn Port>,
+    endpoint: Endpoint,
+    deframer: Deframer,
+    decoder: AerDecoder,
+    started: Instant,
+    events: Vec<DepthEvent>,
+    /// Messages are taken no more often than this: a slow reader, for tests.
+    pub reads_every: Duration,
+    read: Instant,
+    bins: u16,
+    pixels: u16,
+}
+
+impl Client {
+    /// Begins a session.
+    ///
+    /// # Errors
+    /// If nobody answers, or one of another version.
+    pub fn new(port: Box<dyn Port>) -> Result<Self> {
+        // Any number but that of the session before will do.
+        let time = SystemTime::now()
+            .duration_since(UNIX_EPOCH)
+            .unwrap_or_default();
+        let session = (time.as_millis() % 65_521) as u16;
+        let now = Instant::now();
+        let mut client = Self {
+            port,
+            endpoint: Endpoint::host(session, greeting(0, 0), 0),
+            deframer: Deframer::new(),
+            decoder: AerDecoder::new(),
+            started: now,
+            events: Vec::new(),
+            reads_every: Duration::ZERO,
+            read: now,
+            bins: 0,
+            pixels: 0,
+        };
+        while !client.endpoint.is_open() {
+            client.exchange().context("no device answered")?;
+        }
+        let [a, b, c, d, e, f, g, h] = *client.endpoint.peer_greeting();
+        let versions = (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]));
+        ensure!(
+            versions == (LINK_VERSION, AER_VERSION),
+            "the device speaks link version {} and AER version {}, this program {LINK_VERSION} and {AER_VERSION}",
+            versions.0,
+            versions.1
+        );
+        client.bins = u16::from_le_bytes([e, f]);
+        client.pixels = u16::from_le_bytes([g, h]);
+        Ok(client)
+    }
+
+    /// Bins of the device's histograms.
+    #[must_use]
+    pub fn bins(&self) -> u16 {
+        self.bins
+    }
+
+    /// Pixels the device has at most.
+    #[must_use]
+    pub fn pixels(&self) -> u16 {
+        self.pixels
+    }
+
+    /// The host's end of the link.
+    #[must_use]
+    pub fn counters(&self) -> &LinkCounters {
+        self.endpoint.counters()
+    }
+
+    /// Puts a configuration in force.
+    ///
+    /// # Errors
+    /// If the device refuses it, with its reason.
+    pub fn configure(&mut self, configuration: &Configuration) -> Result<()> {
+        self.send(message::CONFIGURE, &configuration.to_le_bytes())?;
+        let answer = self.answer()?;
+        match answer.kind {
+            message::CONFIGURED => Ok(()),
+            message::REFUSED => {
+                let refusal = answer
+                    .body
+                    .first()
+                    .and_then(|&number| Refusal::from_number(number));
+                Err(refusal.context("for a reason this program does not know")?)
+                    .context("the device refuses the configuration")
+            }
+            kind => bail!("the device answers with message {kind:#04x}"),
+        }
+    }
+
+    /// Waits until the device has done all it was sent, and gives its events.
+    ///
+    /// # Errors
+    /// If the device is gone.
+    pub fn synchronise(&mut self) -> Result<Vec<DepthEvent>> {
+        self.send(message::SYNCHRONISE, &[])?;
+        let answer = self.answer()?;
+        ensure!(
+            answer.kind == message::SYNCHRONISED,
+            "the device answers with message {:#04x}",
+            answer.kind
+        );
+        Ok(self.take_events())
+    }
+
+    /// What the device has done so far.
+    ///
+    /// # Errors
+    /// If the device is gone.
+    pub fn report(&mut self) -> Result<Report> {
+        self.send(message::STATISTICS_REQUEST, &[])?;
+        let answer = self.answer()?;
+        Report::from_le_bytes(&answer.body)
+            .filter(|_| answer.kind == message::STATISTICS)
+            .context("the device answers with no statistics")
+    }
+
+    /// The events that have arrived.
+    pub fn take_events(&mut self) -> Vec<DepthEvent> {
+        std::mem::take(&mut self.events)
+    }
+
+    /// Sends a message, waiting while the window is full.
+    ///
+    /// # Errors
+    /// If the device is gone.
+    pub fn send(&mut self, kind: u8, body: &[u8]) -> Result<()> {
+        while self.endpoint.offer(kind, body).is_err() {
+            self.exchange()?;
+            if let Some(message) = self.next()? {
+                bail!("the device sends message {:#04x} unasked", message.kind);
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits for the next message that is not events.
+    fn answer(&mut self) -> Result<Message> {
+        loop {
+            if let Some(message) = self.next()? {
+                return Ok(message);
+            }
+            self.exchange()?;
+        }
+    }
+
+    /// Takes messages until one is not events.
+    fn next(&mut self) -> Result<Option<Message>> {
+        if self.read.elapsed() < self.reads_every {
+            return Ok(None);
+        }
+        self.read = Instant::now();
+        while let Some(message) = self.endpoint.take() {
+            if message.kind != message::EVENTS {
+                return Ok(Some(message));
+            }
+            for word in message.body.chunks(AerWord::BYTES) {
+                let word = word.try_into().context("the device sends half a word")?;
+                match self.decoder.decode(AerWord::from_le_bytes(word))? {
+                    AerRecord::Event(event) => self.events.push(event),
+                    AerRecord::Time(_) => {}
+                    AerRecord::End { .. } => bail!("the device ends a stream it never ends"),
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// Sends what is due and takes what has come. Waits a moment if nothing has.
+    ///
+    /// # Errors
+    /// If the device is gone or has been restarted.
+    pub fn exchange(&mut self) -> Result<()> {
+        let mut wire = [0; WIRE_BYTES];
+        loop {
+            let length = self.endpoint.transmit(self.now_ms(), &mut wire);
+            if length == 0 {
+                break;
+            }
+            self.port
+                .send(&wire[..length])
+                .context("the device cannot be written to")?;
+        }
+        let mut bytes = [0; 4096];
+        let length = self
+            .port
+            .receive(&mut bytes)
+            .context("the device cannot be read from")?;
+        let now_ms = self.now_ms();
+        for &byte in &bytes[..length] {
+            if let Some(frame) = self.deframer.push(byte) {
+                self.endpoint.receive(frame, now_ms);
+            }
+        }
+        ensure!(
+            !self.endpoint.is_lost(),
+            "the device has been restarted and has forgotten this session"
+        );
+        let silent = Duration::from_millis(self.endpoint.silent_ms(now_ms).into());
+        ensure!(
+            silent < SILENCE,
+            "the device says nothing for {} seconds",
+            SILENCE.as_secs()
+        );
+        Ok(())
+    }
+
+    /// Wraps after 49 days, as the link's clock does.
+    #[allow(clippy::cast_possible_truncation)]
+    fn now_ms(&self) -> u32 {
+        self.started.elapsed().as_millis() as u32
+    }
+}

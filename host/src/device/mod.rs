@@ -1,0 +1,141 @@
+//! The engine on a device: the same photons over the link, the same events
+//! back.
+
+mod client;
+mod port;
+
+use anyhow::{Result, bail, ensure};
+use dtof_core::{DepthEvent, PixelAddress, Statistics};
+use dtof_firmware::link::message::{self, Configuration, Entry, Report};
+
+pub use client::Client;
+pub use port::{Port, open};
+
+use crate::engine::Engine;
+use crate::settings::Settings;
+use crate::source::Slice;
+
+/// Photons into a device, events out.
+pub struct DeviceEngine {
+    client: Client,
+    report: Report,
+}
+
+impl DeviceEngine {
+    /// Configures the device for the pixels `addresses`, which must be the first
+    /// of its own, and for photons from the link.
+    ///
+    /// # Errors
+    /// If the device refuses, with its reason.
+    pub fn new(
+        mut client: Client,
+        settings: &Settings,
+        addresses: &[PixelAddress],
+    ) -> Result<Self> {
+        let consecutive = addresses
+            .iter()
+            .map(|address| address.0)
+            .eq((0..).take(addresses.len()));
+        ensure!(consecutive, "a device has pixels 0 up, without gaps");
+        client.configure(&configuration(
+            settings,
+            u16::try_from(addresses.len())?,
+            0,
+        )?)?;
+        Ok(Self {
+            client,
+            report: Report::default(),
+        })
+    }
+
+    /// What the device said of itself after the last slice.
+    #[must_use]
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+}
+
+/// The settings as the device takes them.
+///
+/// # Errors
+/// If the device has another number of bins.
+pub fn configuration(settings: &Settings, pixels: u16, source: u8) -> Result<Configuration> {
+    let last_bin = u16::try_from(settings.bins)? - 1;
+    let (gate_first, gate_last) = settings.gate.unwrap_or((0, last_bin));
+    Ok(Configuration {
+        alpha: settings.alpha.0.to_bits(),
+        minimum_count: settings.min_count,
+        x: settings.x,
+        l1: settings.l1,
+        l2: settings.l2,
+        gate_first,
+        gate_last,
+        pixels,
+        bin_width: settings.bin_width_ps.0.to_bits(),
+        offset: settings.offset_mm.0.to_bits(),
+        source,
+        rule: 0,
+    })
+}
+
+impl Engine for DeviceEngine {
+    fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
+        let cycles = slice.pixels.first().map_or(0, |pixel| pixel.cycles);
+        if slice.pixels.iter().any(|pixel| pixel.cycles != cycles) {
+            bail!("a device cannot replay pixels whose recordings end at different times");
+        }
+        let mut entries = Entries {
+            client: &mut self.client,
+            body: Vec::new(),
+        };
+        let mut photons: Vec<_> = slice
+            .pixels
+            .iter()
+            .map(|pixel| pixel.photons.iter().peekable())
+            .collect();
+        for cycle in 0..cycles {
+            for (pixel, photons) in (0..).zip(&mut photons) {
+                while let Some(photon) = photons.next_if(|photon| photon.cycle == cycle) {
+                    entries.push(Entry::Photon {
+                        pixel,
+                        code: photon.code,
+                    })?;
+                }
+            }
+            entries.push(Entry::EndOfCycles { cycles: 1 })?;
+        }
+        entries.flush()?;
+        let events = self.client.synchronise()?;
+        self.report = self.client.report()?;
+        Ok(events)
+    }
+
+    fn statistics(&self) -> Statistics {
+        self.report.statistics
+    }
+}
+
+/// Entries on their way into photons messages.
+struct Entries<'a> {
+    client: &'a mut Client,
+    body: Vec<u8>,
+}
+
+impl Entries<'_> {
+    const FULL: usize = dtof_firmware::link::endpoint::BODY_BYTES / Entry::BYTES * Entry::BYTES;
+
+    fn push(&mut self, entry: Entry) -> Result<()> {
+        self.body.extend(entry.to_le_bytes());
+        if self.body.len() == Self::FULL {
+            self.flush()
+        } else {
+            Ok(())
+        }
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        self.client.send(message::PHOTONS, &self.body)?;
+        self.body.clear();
+        Ok(())
+    }
+}

@@ -1,0 +1,91 @@
+//! Ports a device can be behind.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+
+/// How long a port waits for a byte.
+const PATIENCE: Duration = Duration::from_millis(2);
+/// What the boards' serial ports are set to.
+const BAUD: u32 = 1_000_000;
+
+/// Bytes to a device and from it.
+pub trait Port {
+    /// Sends all of `bytes`.
+    ///
+    /// # Errors
+    /// If the port is gone.
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Gives what has come, waiting a moment for it; 0 bytes if nothing has.
+    ///
+    /// # Errors
+    /// If the port is gone.
+    fn receive(&mut self, bytes: &mut [u8]) -> io::Result<usize>;
+}
+
+impl Port for TcpStream {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.write_all(bytes)
+    }
+
+    fn receive(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        match self.read(bytes) {
+            Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
+            result => patient(result),
+        }
+    }
+}
+
+impl Port for Box<dyn serialport::SerialPort> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.write_all(bytes)
+    }
+
+    fn receive(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        patient(self.read(bytes))
+    }
+}
+
+/// Nothing yet is no error.
+fn patient(result: io::Result<usize>) -> io::Result<usize> {
+    match result {
+        Err(error)
+            if matches!(
+                error.kind(),
+                ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted
+            ) =>
+        {
+            Ok(0)
+        }
+        result => result,
+    }
+}
+
+/// Opens `tcp:HOST:PORT` or the serial port of that name.
+///
+/// # Errors
+/// If there is none.
+pub fn open(name: &str) -> Result<Box<dyn Port>> {
+    if let Some(address) = name.strip_prefix("tcp:") {
+        return Ok(Box::new(tcp(address).with_context(|| name.to_owned())?));
+    }
+    let port = serialport::new(name, BAUD).timeout(PATIENCE).open();
+    match port {
+        Ok(port) => Ok(Box::new(port)),
+        Err(error) => bail!("{name}: {error}"),
+    }
+}
+
+/// A connection that waits no longer than a port should.
+///
+/// # Errors
+/// If nobody listens.
+pub fn tcp(address: &str) -> io::Result<TcpStream> {
+    let stream = TcpStream::connect(address)?;
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(PATIENCE))?;
+    Ok(stream)
+}
