@@ -1,0 +1,189 @@
+//! The engine on a device against the engine on this computer: the same
+//! photons, word for word the same events. The device is the sidecar of the
+//! firmware behind a TCP port of this computer.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use dtof::device::{self, Client, DeviceEngine};
+use dtof::engine::{Engine, host_engine};
+use dtof::scene;
+use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use dtof::source::{Geometry, PhotonSource};
+use dtof_core::DepthEvent;
+use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
+use dtof_firmware::sidecar::Sidecar;
+
+const PIXELS: usize = 64;
+
+fn settings() -> Settings {
+    Settings {
+        bins: 128,
+        bin_width_ps: U16F16Number(U16F16::lit("250")),
+        offset_mm: I24F8Number(I24F8::ZERO),
+        gate: None,
+        alpha: U8F8Number(U8F8::lit("8")),
+        min_count: 5,
+        l1: 100,
+        l2: 2000,
+        x: 10,
+        seed: 1,
+    }
+}
+
+/// Serves one connection after the other, each with a sidecar fresh from
+/// power-on; a connection ends when the host is gone or after `lives`.
+fn device(lives: Option<Duration>) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let name = format!("tcp:{}", listener.local_addr().unwrap());
+    thread::spawn(move || {
+        while let Ok((mut stream, _)) = listener.accept() {
+            serve(&mut stream, lives);
+        }
+    });
+    name
+}
+
+fn serve(stream: &mut TcpStream, lives: Option<Duration>) {
+    stream.set_nodelay(true).unwrap();
+    stream
+        .set_read_timeout(Some(Duration::from_millis(1)))
+        .unwrap();
+    let mut sidecar = Box::new(Sidecar::<PIXELS>::new(false));
+    let mut deframer = Deframer::new();
+    let started = Instant::now();
+    let mut restarted = false;
+    loop {
+        let now = u32::try_from(started.elapsed().as_millis()).unwrap();
+        if lives.is_some_and(|lives| !restarted && started.elapsed() > lives) {
+            *sidecar = Sidecar::new(false);
+            restarted = true;
+        }
+        let mut bytes = [0; 1024];
+        match stream.read(&mut bytes) {
+            Ok(0) => return,
+            Ok(length) => {
+                for &byte in &bytes[..length] {
+                    if let Some(frame) = deframer.push(byte) {
+                        sidecar.receive(frame, now);
+                    }
+                }
+            }
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+            Err(_) => return,
+        }
+        sidecar.work(0);
+        let mut wire = [0; WIRE_BYTES];
+        loop {
+            let length = sidecar.transmit(now, &mut wire);
+            if length == 0 {
+                break;
+            }
+            if stream.write_all(&wire[..length]).is_err() {
+                return;
+            }
+        }
+    }
+}
+
+/// All events of `cycles` laser cycles of the demo's scene.
+fn events(engine: &mut dyn Engine, cycles: u64) -> anyhow::Result<Vec<DepthEvent>> {
+    let geometry = Geometry {
+        columns: 8,
+        rows: 8,
+    };
+    let mut photons = scene::photons(geometry, &settings(), cycles)?;
+    let mut events = Vec::new();
+    for _ in 0..cycles / 250 {
+        events.extend(engine.run(&photons.next_slice(250)?)?);
+    }
+    Ok(events)
+}
+
+fn addresses() -> Vec<dtof_core::PixelAddress> {
+    (0..64).map(dtof_core::PixelAddress).collect()
+}
+
+#[track_caller]
+fn same_events(cycles: u64, reads_every: Duration, at_least: u64) {
+    let mut client = Client::new(device::open(&device(None)).unwrap()).unwrap();
+    assert_eq!((client.bins(), client.pixels()), (128, 64));
+    client.reads_every = reads_every;
+    let mut on_device = DeviceEngine::new(client, &settings(), &addresses()).unwrap();
+    let mut on_host = host_engine(&settings(), &addresses()).unwrap();
+    let expected = events(on_host.as_mut(), cycles).unwrap();
+    let actual = events(&mut on_device, cycles).unwrap();
+    assert!(!expected.is_empty() && actual == expected);
+    assert_eq!(on_device.statistics(), on_host.statistics());
+    assert_eq!(on_device.report().cycles, cycles);
+    assert!(on_device.statistics().counted >= at_least);
+}
+
+#[test]
+fn a_million_photons_give_the_same_events_on_a_device() {
+    same_events(6_000, Duration::ZERO, 1_000_000);
+}
+
+#[test]
+fn a_host_that_seldom_reads_gets_the_same_events() {
+    same_events(1_500, Duration::from_millis(20), 100_000);
+}
+
+#[test]
+fn a_configuration_the_device_cannot_take_is_refused_with_its_reason() {
+    let name = device(None);
+    let refused = |settings: &Settings, pixels: u16| {
+        let client = Client::new(device::open(&name).unwrap()).unwrap();
+        let addresses: Vec<_> = (0..pixels).map(dtof_core::PixelAddress).collect();
+        let engine = DeviceEngine::new(client, settings, &addresses);
+        format!("{:#}", engine.err().expect("refused"))
+    };
+    let reason = refused(
+        &Settings {
+            l2: 100,
+            ..settings()
+        },
+        64,
+    );
+    assert!(
+        reason.contains("refuses") && reason.contains("L2 must be greater than L1"),
+        "{reason}"
+    );
+    let reason = refused(&settings(), 65);
+    assert!(
+        reason.contains("does not have that many pixels"),
+        "{reason}"
+    );
+}
+
+#[test]
+fn a_device_that_restarts_is_noticed() {
+    let name = device(Some(Duration::from_millis(200)));
+    let client = Client::new(device::open(&name).unwrap()).unwrap();
+    let mut engine = DeviceEngine::new(client, &settings(), &addresses()).unwrap();
+    let error = loop {
+        if let Err(error) = events(&mut engine, 250) {
+            break error;
+        }
+    };
+    assert!(format!("{error:#}").contains("restarted"), "{error:#}");
+}
+
+#[test]
+fn nobody_at_the_other_end_is_an_error_not_a_hang() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let name = format!("tcp:{}", listener.local_addr().unwrap());
+    let error = Client::new(device::open(&name).unwrap())
+        .err()
+        .expect("nobody answers");
+    assert!(
+        format!("{error:#}").contains("no device answered"),
+        "{error:#}"
+    );
+    drop(listener);
+    assert!(device::open(&name).is_err());
+    assert!(device::open("/dev/not-a-port").is_err());
+}
