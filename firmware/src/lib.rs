@@ -1,0 +1,21 @@
+//! The sidecar: what runs on a microcontroller beside the sensor. A library
+//! that also builds and is tested on the computer in front of you, and thin
+//! images that put it onto a board (`src/bin`).
+//!
+//! ```text
+//! board::Board        milliseconds, watchdog, sleep: all that differs between boards
+//!   ↕ interrupts
+//! serial::Serial      two queues between the interrupt handler and the main loop
+//!   ↕ embedded-io
+//! echo::Echo          sends back what it receives
+//! ```
+
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod board;
+pub mod echo;
+pub mod self_test;
+pub mod serial;
