@@ -85,11 +85,7 @@ fn stream<const BINS: usize>(
 }
 
 /// An event, its words, and whether they come back as the event.
-fn write_event(
-    out: &mut impl Write,
-    encoder: &mut AerEncoder,
-    event: &DepthEvent,
-) -> fmt::Result {
+fn write_event(out: &mut impl Write, encoder: &mut AerEncoder, event: &DepthEvent) -> fmt::Result {
     writeln!(
         out,
         "cycle {} exposure {} bin {} offset {} count {} background {} flags {}",

@@ -123,6 +123,13 @@ impl SerialInterrupt<'_> {
         self.lost.store(lost.saturating_add(1), Ordering::Relaxed);
     }
 
+    /// Whether there is something to send.
+    #[inline]
+    #[must_use]
+    pub fn has_to_send(&self) -> bool {
+        self.sending.ready()
+    }
+
     /// What the port is to send next, if anything. Once there is nothing, the
     /// handler lets the port rest; `start_sending` makes it ask again.
     #[inline]
@@ -315,11 +322,13 @@ mod tests {
     fn every_write_starts_sending() {
         static STARTED: AtomicU32 = AtomicU32::new(0);
         let mut buffers = Buffers::<8, 8>::new();
-        let (_interrupt, mut serial) = buffers.split(|| {
+        let (interrupt, mut serial) = buffers.split(|| {
             STARTED.fetch_add(1, Ordering::Relaxed);
         });
+        assert!(!interrupt.has_to_send());
         assert_eq!(serial.write(&[1, 2]), Ok(2));
         assert_eq!(serial.write(&[3]), Ok(1));
+        assert!(interrupt.has_to_send());
         assert_eq!(STARTED.load(Ordering::Relaxed), 2);
     }
 

@@ -7,10 +7,7 @@
 #![no_std]
 #![no_main]
 
-#[cfg(not(all(
-    target_os = "none",
-    any(feature = "mps2-an386", feature = "stm32f405")
-)))]
+#[cfg(not(all(target_os = "none", any(feature = "mps2-an386", feature = "stm32f405"))))]
 compile_error!("an image for a board: cargo xtask self-test");
 
 use core::fmt;

@@ -9,10 +9,7 @@
 
 #[cfg(all(target_os = "none", feature = "mps2-an386"))]
 pub mod mps2_an386;
-#[cfg(all(
-    target_os = "none",
-    any(feature = "mps2-an386", feature = "stm32f405")
-))]
+#[cfg(all(target_os = "none", any(feature = "mps2-an386", feature = "stm32f405")))]
 mod report;
 #[cfg(all(target_os = "none", feature = "stm32f405"))]
 pub mod stm32f405;

@@ -219,28 +219,28 @@ mod uart {
         );
     }
 
+    // Every access costs the emulator much more than the rest of the handler.
+
     pub fn on_receive(port: &mut SerialInterrupt<'_>) {
-        // First, so that a byte that comes now interrupts again.
+        // First, so that a byte that comes from now on interrupts again.
         write(Register::IntClear, RX_INTERRUPT);
-        let mut state = read(Register::State);
+        let state = read(Register::State);
+        if state & RX_FULL != 0 {
+            let [byte, ..] = read(Register::Data).to_le_bytes();
+            port.on_receive(byte);
+        }
         if state & RX_OVERRUN != 0 {
             write(Register::State, RX_OVERRUN);
             port.on_loss();
-        }
-        while state & RX_FULL != 0 {
-            let [byte, ..] = read(Register::Data).to_le_bytes();
-            port.on_receive(byte);
-            state = read(Register::State);
         }
     }
 
     pub fn on_transmit(port: &mut SerialInterrupt<'_>) {
         write(Register::IntClear, TX_INTERRUPT);
-        while read(Register::State) & TX_FULL == 0 {
-            let Some(byte) = port.next_to_send() else {
-                break;
-            };
-            write(Register::Data, byte.into());
+        while port.has_to_send() && read(Register::State) & TX_FULL == 0 {
+            if let Some(byte) = port.next_to_send() {
+                write(Register::Data, byte.into());
+            }
         }
     }
 }

@@ -18,8 +18,8 @@ pub fn hard_fault(frame: &ExceptionFrame) {
     let scb = unsafe { &*SCB::PTR };
     once(|| {
         defmt::error!(
-            "hard fault at {=u32:#010x}, called from {=u32:#010x}: \
-             CFSR {=u32:#010x}, HFSR {=u32:#010x}, MMFAR {=u32:#010x}, BFAR {=u32:#010x}",
+            "hard fault at {=u32:#010x}: LR {=u32:#010x}, CFSR {=u32:#010x}, HFSR {=u32:#010x}, \
+             MMFAR {=u32:#010x}, BFAR {=u32:#010x}",
             frame.pc(),
             frame.lr(),
             scb.cfsr.read(),

@@ -62,10 +62,8 @@ impl Stm32F405 {
     /// If called twice.
     #[must_use]
     pub fn start() -> (Self, Serial<'static>) {
-        let (Some(core), Some(device)) = (
-            cortex_m::Peripherals::take(),
-            pac::Peripherals::take(),
-        ) else {
+        let (Some(core), Some(device)) = (cortex_m::Peripherals::take(), pac::Peripherals::take())
+        else {
             panic!("the board is started twice");
         };
         let clocks = if cfg!(feature = "pll-off") {
