@@ -4,16 +4,47 @@
 use std::env;
 use std::error::Error;
 
+/// The images a board runs, each with the features of the boards it is for.
+const IMAGES: [(&str, &[&str]); 3] = [
+    ("sidecar-mps2-an386", &["MPS2_AN386"]),
+    ("sidecar-stm32f405", &["STM32F405"]),
+    ("self-test", &["MPS2_AN386", "STM32F405"]),
+];
+
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed=core-image.x");
+    println!("cargo::rerun-if-changed=memory");
     println!("cargo::rerun-if-changed=../memory.x");
 
-    // The one target of a real board; elsewhere the linker's own layout does.
-    if env::var("TARGET")? == "thumbv7em-none-eabihf" {
-        let here = env::var("CARGO_MANIFEST_DIR")?;
-        println!("cargo::rustc-link-arg-bin=core-image=-L{here}/..");
-        println!("cargo::rustc-link-arg-bin=core-image=-T{here}/core-image.x");
+    // The one target of real boards; elsewhere the linker's own layout does.
+    if env::var("TARGET")? != "thumbv7em-none-eabihf" {
+        return Ok(());
+    }
+    let here = env::var("CARGO_MANIFEST_DIR")?;
+    let link = |image: &str, argument: &str| {
+        println!("cargo::rustc-link-arg-bin={image}={argument}");
+    };
+
+    link("core-image", &format!("-L{here}/.."));
+    link("core-image", &format!("-T{here}/core-image.x"));
+
+    for (image, boards) in IMAGES {
+        let is_for = |board: &&&str| env::var_os(format!("CARGO_FEATURE_{board}")).is_some();
+        match boards.iter().find(is_for) {
+            // Whole: the linker looks for the `memory.x` that cortex-m-rt's
+            // `link.x` includes in the folder it is started in before all others,
+            // and cargo starts it where the other board's is.
+            Some(&"MPS2_AN386") => link(image, &format!("-T{here}/memory/mps2-an386.x")),
+            Some(_) => {
+                link(image, &format!("-L{here}/.."));
+                link(image, "-Tlink.x");
+            }
+            None => continue,
+        }
+        link(image, "-Tdefmt.x");
+        // Sections start where the one before ends, not at the next page.
+        link(image, "--nmagic");
     }
     Ok(())
 }

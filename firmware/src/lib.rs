@@ -1,7 +1,24 @@
-//! The sidecar beside the sensor: everything of the firmware that does not
-//! depend on a board, so that it runs and is tested on any computer too.
+//! The sidecar: what runs on a microcontroller beside the sensor. A library
+//! that also builds and is tested on the computer in front of you, and thin
+//! images that put it onto a board (`src/bin`).
+//!
+//! ```text
+//! board::Board        milliseconds, watchdog, sleep: all that differs between boards
+//!   ↕ interrupts
+//! serial::Serial      two queues between the interrupt handler and the main loop
+//!   ↕ embedded-io
+//! link                frames, and messages that arrive once and in order
+//!   ↕
+//! sidecar::Sidecar    pixels, configuration, events
+//! ```
 
 #![no_std]
 
+#[cfg(test)]
+extern crate std;
+
+pub mod board;
 pub mod link;
+pub mod self_test;
+pub mod serial;
 pub mod sidecar;

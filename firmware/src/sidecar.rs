@@ -16,11 +16,12 @@ use dtof_core::{
     AER_VERSION, AerEncoder, AerWord, AsyncPixel, Count, LaserCycle, Look, PaperRule, PixelAddress,
     PixelConfig, RangeGate, RangeScale, Statistics,
 };
+use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::Vec;
 use heapless::spsc::Queue;
 
 use crate::link::endpoint::{BODY_BYTES, Endpoint, Message};
-use crate::link::frame::{FrameError, WIRE_BYTES};
+use crate::link::frame::{Deframer, FrameError, WIRE_BYTES};
 use crate::link::message::{self, Configuration, Entry, LINK_VERSION, Refusal, Report, Source};
 
 /// Bins of every histogram.
@@ -47,6 +48,11 @@ struct Photons {
 #[derive(Debug)]
 pub struct Sidecar<const PIXELS: usize> {
     endpoint: Endpoint,
+    deframer: Deframer,
+    /// A frame on its way, and how much of it has gone.
+    wire: [u8; WIRE_BYTES],
+    wire_length: usize,
+    wire_sent: usize,
     pixels: Vec<AsyncPixel<BINS>, PIXELS>,
     config: Option<PixelConfig<BINS>>,
     source: Source,
@@ -72,6 +78,10 @@ impl<const PIXELS: usize> Sidecar<PIXELS> {
         let greeting = greeting(BINS as u16, PIXELS as u16);
         Self {
             endpoint: Endpoint::device(greeting),
+            deframer: Deframer::new(),
+            wire: [0; WIRE_BYTES],
+            wire_length: 0,
+            wire_sent: 0,
             pixels: Vec::new(),
             config: None,
             source: Source::Link,
@@ -84,6 +94,52 @@ impl<const PIXELS: usize> Sidecar<PIXELS> {
             unaddressed: 0,
             unknown: 0,
             sensor_errors: 0,
+        }
+    }
+
+    /// Does all that can be done without waiting: takes what `serial` has
+    /// received, works on it, and gives it what there is to send and it takes.
+    /// `lost` is what the port has lost so far.
+    ///
+    /// # Errors
+    /// Those of `serial`.
+    pub fn poll<S: Read + ReadReady + Write + WriteReady>(
+        &mut self,
+        serial: &mut S,
+        lost: u32,
+        now_ms: u32,
+    ) -> Result<(), S::Error> {
+        let mut bytes = [0; 64];
+        while serial.read_ready()? {
+            let length = serial.read(&mut bytes)?;
+            let mut deframer = core::mem::take(&mut self.deframer);
+            for &byte in bytes.iter().take(length) {
+                if let Some(frame) = deframer.push(byte) {
+                    self.receive(frame, now_ms);
+                }
+            }
+            self.deframer = deframer;
+            self.work(lost);
+            self.send(serial, now_ms)?;
+        }
+        self.work(lost);
+        self.send(serial, now_ms)
+    }
+
+    /// Frames onto the wire, as far as it takes them.
+    fn send<S: Write + WriteReady>(&mut self, serial: &mut S, now_ms: u32) -> Result<(), S::Error> {
+        loop {
+            while let Some(rest @ [_, ..]) = self.wire.get(self.wire_sent..self.wire_length) {
+                if !serial.write_ready()? {
+                    return Ok(());
+                }
+                self.wire_sent += serial.write(rest)?;
+            }
+            self.wire_sent = 0;
+            self.wire_length = self.endpoint.transmit(now_ms, &mut self.wire);
+            if self.wire_length == 0 {
+                return Ok(());
+            }
         }
     }
 

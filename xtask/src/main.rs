@@ -1,10 +1,18 @@
 //! `cargo xtask`: what set-up and checks need beyond cargo itself.
 
+mod boards;
+mod emulate;
+mod firmware;
 mod image;
+mod log;
 mod panics;
+mod qemu;
+mod self_test;
+mod sizes;
 mod source;
 mod symbols;
 mod toolchain;
+mod tools;
 
 use std::env;
 use std::path::Path;
@@ -15,9 +23,20 @@ use anyhow::{Context, Result, bail};
 const HELP: &str = "\
 cargo xtask <command>
 
-  setup         install what rust-toolchain.toml names and is not there yet
+  setup         install what rust-toolchain.toml names and is not there yet;
+                QEMU and defmt-print as well if that needs no question
   check-image   link dtof-core for every target; no panic, float or allocation
-  check-source  no floating-point type and no unsafe in core/src";
+  check-source  no floating-point type and no unsafe in core/src
+
+  image BOARD   build the sidecar for mps2-an386 or stm32f405
+  sizes         flash and RAM of each image
+  emulate [--port PORT] [exit|panic|fault]
+                run the sidecar in QEMU, its serial port on a TCP port (5386)
+  flash [CHIP]  write the sidecar onto an STM32F405 or STM32F407 and show its log;
+                the chip as probe-rs names it, by default that of the Discovery
+  check-boards  the images start, end and echo in QEMU
+  self-test     the core works out the same on the target; --bless writes down
+                what it works out here";
 
 fn main() -> ExitCode {
     match run() {
@@ -32,9 +51,21 @@ fn main() -> ExitCode {
 fn run() -> Result<()> {
     let arguments: Vec<String> = env::args().skip(1).collect();
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["setup"] => toolchain::set_up(root()?),
+        ["setup"] => {
+            toolchain::set_up(root()?)?;
+            tools::set_up();
+            Ok(())
+        }
         ["check-image"] => image::check(root()?),
         ["check-source"] => source::check(root()?),
+        ["image", board] => firmware::image(root()?, board),
+        ["sizes"] => sizes::print(root()?),
+        ["emulate", ref rest @ ..] => emulate::emulate(root()?, rest),
+        ["flash"] => emulate::flash(root()?, emulate::CHIP),
+        ["flash", chip] => emulate::flash(root()?, chip),
+        ["check-boards"] => boards::check(root()?),
+        ["self-test"] => self_test::run(root()?),
+        ["self-test", "--bless"] => self_test::bless(root()?),
         ["help" | "--help" | "-h"] => {
             println!("{HELP}");
             Ok(())

@@ -1,0 +1,42 @@
+//! The sidecar on the board QEMU emulates: `cargo xtask emulate`.
+
+#![no_std]
+#![no_main]
+
+#[cfg(not(target_os = "none"))]
+compile_error!("an image for a board: cargo xtask image mps2-an386");
+
+use core::panic::PanicInfo;
+
+use cortex_m_rt::{ExceptionFrame, entry, exception};
+use dtof_firmware::board::{mps2_an386::Mps2An386, turn};
+use dtof_firmware::sidecar::Sidecar;
+use static_cell::ConstStaticCell;
+
+/// As many macropixels as the memory of the STM32F405 has room for.
+static SIDECAR: ConstStaticCell<Sidecar<256>> = ConstStaticCell::new(Sidecar::new(false));
+
+#[entry]
+fn main() -> ! {
+    let (mut board, mut serial) = Mps2An386::start();
+    defmt::info!("mps2-an386 started");
+    board.obey_command_line();
+    let sidecar = SIDECAR.take();
+    loop {
+        turn(&mut board, &mut serial, |serial, now_ms| {
+            let lost = serial.lost();
+            let Ok(()) = sidecar.poll(serial, lost, now_ms);
+        });
+    }
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    Mps2An386::on_panic(info)
+}
+
+#[allow(unsafe_code, reason = "the attribute asks for it")]
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    Mps2An386::on_hard_fault(frame)
+}

@@ -1,0 +1,41 @@
+//! The sidecar on STM32F405 and STM32F407: `cargo xtask flash`.
+
+#![no_std]
+#![no_main]
+
+#[cfg(not(target_os = "none"))]
+compile_error!("an image for a board: cargo xtask image stm32f405");
+
+use core::panic::PanicInfo;
+
+use cortex_m_rt::{ExceptionFrame, entry, exception};
+use dtof_firmware::board::{stm32f405::Stm32F405, turn};
+use dtof_firmware::sidecar::Sidecar;
+use static_cell::ConstStaticCell;
+
+/// As many macropixels as the memory of the STM32F405 has room for.
+static SIDECAR: ConstStaticCell<Sidecar<256>> = ConstStaticCell::new(Sidecar::new(false));
+
+#[entry]
+fn main() -> ! {
+    let (mut board, mut serial) = Stm32F405::start();
+    defmt::info!("stm32f405 started");
+    let sidecar = SIDECAR.take();
+    loop {
+        turn(&mut board, &mut serial, |serial, now_ms| {
+            let lost = serial.lost();
+            let Ok(()) = sidecar.poll(serial, lost, now_ms);
+        });
+    }
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    Stm32F405::on_panic(info)
+}
+
+#[allow(unsafe_code, reason = "the attribute asks for it")]
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    Stm32F405::on_hard_fault(frame)
+}

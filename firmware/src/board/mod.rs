@@ -1,0 +1,113 @@
+//! Boards: what the main loop needs of one, and the two there are.
+//!
+//! A board is one file beside this one. It starts the clock, a timer of one
+//! millisecond and a serial port, hands the received bytes to
+//! [`SerialInterrupt`](crate::serial::SerialInterrupt) and fetches those to send
+//! from there, and implements [`Board`]. An image is one build with the feature
+//! of its board and one file in `src/bin`; its memory is in the linker script
+//! `build.rs` chooses.
+
+#[cfg(all(target_os = "none", feature = "mps2-an386"))]
+pub mod mps2_an386;
+#[cfg(all(target_os = "none", any(feature = "mps2-an386", feature = "stm32f405")))]
+mod report;
+#[cfg(all(target_os = "none", feature = "stm32f405"))]
+pub mod stm32f405;
+
+// Each board defines the interrupt handlers of the image.
+#[cfg(all(feature = "mps2-an386", feature = "stm32f405"))]
+compile_error!("an image is for one board: choose one of mps2-an386 and stm32f405");
+
+use crate::serial::Serial;
+
+/// What the main loop needs of a board.
+pub trait Board {
+    /// Milliseconds since the start; after 2³² (49 days) from 0 again.
+    fn now_ms(&self) -> u32;
+
+    /// Keeps the watchdog from resetting the board, if it has one.
+    fn feed_watchdog(&mut self) {}
+
+    /// Makes the interrupt handler of the serial port run soon, so that it
+    /// fetches what there is to send. Never waits; harmless if there is nothing.
+    fn start_sending();
+
+    /// Sleeps until an interrupt comes, unless `has_work` says that there is
+    /// something to do. It is asked with interrupts held back, so that none can
+    /// come between the question and the sleep. At least the timer's comes within
+    /// a millisecond.
+    fn wait_for_interrupt(&mut self, has_work: impl FnOnce() -> bool);
+}
+
+/// The main loop, once round: `work` is given the port and the time, does what
+/// can be done without waiting, and is called again at the latest when more has
+/// been received or a millisecond has passed.
+pub fn turn<B: Board>(
+    board: &mut B,
+    serial: &mut Serial<'_>,
+    work: impl FnOnce(&mut Serial<'_>, u32),
+) {
+    work(serial, board.now_ms());
+    board.feed_watchdog();
+    board.wait_for_interrupt(|| serial.has_received());
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use embedded_io::Read;
+
+    use super::*;
+    use crate::serial::Buffers;
+
+    /// Writes down what it is asked for.
+    #[derive(Default)]
+    struct Mock {
+        now_ms: u32,
+        fed: u32,
+        slept: Vec<u32>,
+    }
+
+    impl Board for Mock {
+        fn now_ms(&self) -> u32 {
+            self.now_ms
+        }
+
+        fn feed_watchdog(&mut self) {
+            self.fed += 1;
+        }
+
+        fn start_sending() {}
+
+        fn wait_for_interrupt(&mut self, has_work: impl FnOnce() -> bool) {
+            if !has_work() {
+                self.slept.push(self.now_ms);
+            }
+            self.now_ms += 1;
+        }
+    }
+
+    #[test]
+    fn sleeps_only_when_everything_is_read_and_always_feeds() {
+        let mut buffers = Buffers::<8, 8>::new();
+        let (mut interrupt, mut serial) = buffers.split(Mock::start_sending);
+        let mut board = Mock::default();
+        for byte in 0..3 {
+            interrupt.on_receive(byte);
+        }
+        let mut read = Vec::new();
+        for _ in 0..4 {
+            turn(&mut board, &mut serial, |serial, now_ms| {
+                let mut byte = [0];
+                if serial.has_received() {
+                    serial.read_exact(&mut byte).unwrap();
+                    read.push((now_ms, byte[0]));
+                }
+            });
+        }
+        assert_eq!(read, [(0, 0), (1, 1), (2, 2)]);
+        assert_eq!(board.slept, [2, 3]);
+        assert_eq!(board.fed, 4);
+    }
+}

@@ -1,0 +1,177 @@
+//! STM32F405 and STM32F407, the latter on ST's Discovery board with its debugger
+//! (STM32F407G-DISC1).
+//!
+//! | | |
+//! |---|---|
+//! | clock | 168 MHz from an external crystal of 8 MHz |
+//! | serial port | USART2, 1 Mbaud, 8 data bits, no parity, 1 stop bit |
+//! | PA2 | sends; pin 14 of P1 on the Discovery, to RX of a USB adapter of 3.3 V |
+//! | PA3 | receives; pin 13 of P1 on the Discovery, to TX of the adapter |
+//! | watchdog | the independent one, resets after about a second |
+//! | log | defmt over RTT, which the debugger reads |
+//!
+//! The Discovery's debugger has a serial port of its own, but it is wired to
+//! nothing; hence the adapter.
+//!
+//! The feature `pll-off` leaves the processor at 16 MHz from its internal
+//! oscillator, for emulators in which the PLL never starts. All else stays.
+
+use core::cell::RefCell;
+use core::panic::PanicInfo;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m::peripheral::{NVIC, SCB};
+use cortex_m_rt::{ExceptionFrame, exception};
+use critical_section::Mutex;
+use defmt_rtt as _;
+use static_cell::ConstStaticCell;
+use stm32f4xx_hal::nb;
+use stm32f4xx_hal::pac::{self, Interrupt, USART2, interrupt};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::Config as ClockConfig;
+use stm32f4xx_hal::serial::{Config as SerialConfig, Rx, Tx};
+use stm32f4xx_hal::watchdog::IndependentWatchdog;
+
+use super::{Board, report};
+use crate::serial::{BoardBuffers, Buffers, Serial, SerialInterrupt};
+
+const BAUD: u32 = 1_000_000;
+
+/// The port and its end of the queues.
+struct Port {
+    interrupt: SerialInterrupt<'static>,
+    tx: Tx<USART2>,
+    rx: Rx<USART2>,
+}
+
+static BUFFERS: ConstStaticCell<BoardBuffers> = ConstStaticCell::new(Buffers::new());
+static PORT: Mutex<RefCell<Option<Port>>> = Mutex::new(RefCell::new(None));
+static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
+
+/// The board, once started.
+pub struct Stm32F405 {
+    watchdog: IndependentWatchdog,
+}
+
+impl Stm32F405 {
+    /// Starts clock, timer, serial port and watchdog. Waits for the crystal: a
+    /// board without one stays here.
+    ///
+    /// # Panics
+    /// If called twice.
+    #[must_use]
+    pub fn start() -> (Self, Serial<'static>) {
+        let (Some(core), Some(device)) = (cortex_m::Peripherals::take(), pac::Peripherals::take())
+        else {
+            panic!("the board is started twice");
+        };
+        let clocks = if cfg!(feature = "pll-off") {
+            ClockConfig::hsi()
+        } else {
+            ClockConfig::hse(8.MHz()).sysclk(168.MHz())
+        };
+        let mut rcc = device.RCC.freeze(clocks);
+
+        let mut timer = core.SYST;
+        timer.set_clock_source(SystClkSource::Core);
+        timer.set_reload(rcc.clocks.hclk().raw() / 1000 - 1);
+        timer.clear_current();
+        timer.enable_interrupt();
+        timer.enable_counter();
+
+        let pins = device.GPIOA.split(&mut rcc);
+        let config = SerialConfig::default().baudrate(BAUD.bps());
+        let Ok(usart) = device.USART2.serial((pins.pa2, pins.pa3), config, &mut rcc) else {
+            panic!("{BAUD} baud cannot be had from this clock");
+        };
+        let (tx, mut rx) = usart.split();
+        rx.listen();
+        let (interrupt, serial) = BUFFERS.take().split(Self::start_sending);
+        critical_section::with(|cs| PORT.replace(cs, Some(Port { interrupt, tx, rx })));
+        // SAFETY: the handler shares data with the main loop through queues,
+        // atomics and a mutex only, and nothing relies on its being masked.
+        #[allow(unsafe_code, reason = "there is no other way to unmask")]
+        unsafe {
+            NVIC::unmask(Interrupt::USART2);
+        }
+
+        let mut watchdog = IndependentWatchdog::new(device.IWDG);
+        // A breakpoint is no reason to reset.
+        watchdog.stop_on_debug(&device.DBGMCU, true);
+        watchdog.start(1000.millis());
+        (Self { watchdog }, serial)
+    }
+
+    /// Reports a panic and resets.
+    pub fn on_panic(info: &PanicInfo<'_>) -> ! {
+        report::panic(info);
+        SCB::sys_reset()
+    }
+
+    /// Reports a hard fault and resets.
+    pub fn on_hard_fault(frame: &ExceptionFrame) -> ! {
+        report::hard_fault(frame);
+        SCB::sys_reset()
+    }
+}
+
+impl Board for Stm32F405 {
+    fn now_ms(&self) -> u32 {
+        MILLISECONDS.load(Ordering::Relaxed)
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.feed();
+    }
+
+    fn start_sending() {
+        NVIC::pend(Interrupt::USART2);
+    }
+
+    fn wait_for_interrupt(&mut self, has_work: impl FnOnce() -> bool) {
+        cortex_m::interrupt::free(|_| {
+            if !has_work() {
+                // An interrupt that is held back ends the sleep all the same.
+                cortex_m::asm::wfi();
+            }
+        });
+    }
+}
+
+#[exception]
+fn SysTick() {
+    MILLISECONDS.fetch_add(1, Ordering::Relaxed);
+}
+
+#[interrupt]
+fn USART2() {
+    critical_section::with(|cs| {
+        if let Some(port) = PORT.borrow_ref_mut(cs).as_mut() {
+            port.serve();
+        }
+    });
+}
+
+impl Port {
+    /// Fetches what has been received and hands over what there is to send. Runs
+    /// when either is possible, and when sending is to start.
+    fn serve(&mut self) {
+        loop {
+            match self.rx.read() {
+                Ok(byte) => self.interrupt.on_receive(byte),
+                Err(nb::Error::Other(_)) => self.interrupt.on_loss(),
+                Err(nb::Error::WouldBlock) => break,
+            }
+        }
+        while self.tx.is_tx_empty() {
+            let Some(byte) = self.interrupt.next_to_send() else {
+                self.tx.unlisten();
+                return;
+            };
+            // There is room, as was just seen.
+            let _ = self.tx.write(byte);
+        }
+        self.tx.listen();
+    }
+}

@@ -1,0 +1,172 @@
+//! What `dtof-core` works out, as text: the same lines on every board as on the
+//! host, byte for byte.
+//!
+//! `firmware/self-test.out` holds them as the host writes them. A test compares;
+//! `cargo xtask self-test` runs the image `self-test` in the emulator and
+//! compares what that writes, and with `--bless` writes the file.
+
+use core::fmt::{self, Write};
+
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{
+    AerDecoder, AerEncoder, AerRecord, AerWord, AsyncPixel, Count, DepthEvent, LaserCycle,
+    PaperRule, PixelAddress, PixelConfig, RangeGate, isqrt,
+};
+
+/// The last line of a run that came to its end.
+pub const LAST_LINE: &str = "end";
+
+/// Writes every line.
+///
+/// # Errors
+/// Those of `out`.
+pub fn run(out: &mut impl Write) -> fmt::Result {
+    roots(out)?;
+    let mut encoder = AerEncoder::new();
+    stream::<8>(out, &mut encoder, 3)?;
+    stream::<128>(out, &mut encoder, 60)?;
+    writeln!(out, "{LAST_LINE}")
+}
+
+/// Every root of 10 bits, and of wider numbers those beside the squares.
+fn roots(out: &mut impl Write) -> fmt::Result {
+    let mut checksum = Checksum::new();
+    for value in 0..=1023 {
+        checksum.add(isqrt::<5>(value));
+    }
+    writeln!(out, "isqrt 10 bits 0..=1023: {:08x}", checksum.0)?;
+
+    let mut checksum = Checksum::new();
+    for root in 1..=255 {
+        for value in [root * root - 1, root * root, root * root + 1] {
+            checksum.add(isqrt::<8>(value));
+            checksum.add(isqrt::<12>(value << 8));
+        }
+    }
+    writeln!(out, "isqrt 16 and 24 bits: {:08x}", checksum.0)
+}
+
+/// One macropixel that sees a target at `target`, between and across two bins,
+/// with as much background.
+fn stream<const BINS: usize>(
+    out: &mut impl Write,
+    encoder: &mut AerEncoder,
+    target: u16,
+) -> fmt::Result {
+    writeln!(out, "stream of {BINS} bins")?;
+    let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+    let gate = RangeGate::full();
+    let config = match PixelConfig::<BINS>::new(10, 40, 2000, gate, rule) {
+        Ok(config) => config,
+        Err(error) => return writeln!(out, "{error}"),
+    };
+    let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(u16::from(BINS > 8)));
+    let mut random = Random(1);
+    // Just before the upper bits of the laser cycle change.
+    let first = (1 << 20) - 400;
+    for cycle in first..first + 800 {
+        if random.below(2) == 0 {
+            pixel.count(&config, target + u16::from(random.below(4) == 0));
+        }
+        // One code in nine lies past the last of 8 bins.
+        let bins = if BINS == 8 { 9 } else { BINS };
+        if random.below(2) == 0 {
+            pixel.count(&config, random.below(bins));
+        }
+        pixel.end_laser_cycle(&config, LaserCycle(cycle));
+        // Now and then the link has no room.
+        if cycle % 256 < 160
+            && let Some(event) = pixel.acknowledge()
+        {
+            write_event(out, encoder, &event)?;
+        }
+    }
+    writeln!(out, "{:?}", pixel.statistics())
+}
+
+/// An event, its words, and whether they come back as the event.
+fn write_event(out: &mut impl Write, encoder: &mut AerEncoder, event: &DepthEvent) -> fmt::Result {
+    writeln!(
+        out,
+        "cycle {} exposure {} bin {} offset {} count {} background {} flags {}",
+        event.cycle.0,
+        event.exposure,
+        event.peak_bin.raw(),
+        event.offset.raw(),
+        event.peak_count.raw(),
+        event.background.raw(),
+        event.flags.bits(),
+    )?;
+    let (time, word) = encoder.encode(event);
+    // A time word just for the decoder, which sees no others.
+    let mut decoder = AerDecoder::new();
+    let _ = decoder.decode(AerWord::time(event.cycle));
+    if decoder.decode(word) != Ok(AerRecord::Event(*event)) {
+        writeln!(out, "the next word does not come back as this event")?;
+    }
+    for word in time.into_iter().chain([word]) {
+        write!(out, "word ")?;
+        for byte in word.to_le_bytes() {
+            write!(out, "{byte:02x}")?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
+}
+
+/// FNV-1a of 32 bits over the four bytes of each value, the lowest first.
+struct Checksum(u32);
+
+impl Checksum {
+    const fn new() -> Self {
+        Self(0x811c_9dc5)
+    }
+
+    fn add(&mut self, value: u32) {
+        for byte in value.to_le_bytes() {
+            self.0 = (self.0 ^ u32::from(byte)).wrapping_mul(0x0100_0193);
+        }
+    }
+}
+
+/// A generator good enough here: multiplier and increment are those of
+/// Numerical Recipes.
+struct Random(u32);
+
+impl Random {
+    /// The next number below `limit`, at most 2¹⁶.
+    #[allow(clippy::cast_possible_truncation, reason = "below 2¹⁶ twice over")]
+    fn below(&mut self, limit: usize) -> u16 {
+        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (((self.0 >> 16) * limit as u32) >> 16) as u16
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::string::String;
+
+    use super::*;
+
+    #[test]
+    fn the_host_writes_the_expected_lines() {
+        let mut text = String::new();
+        run(&mut text).unwrap();
+        assert_eq!(
+            text,
+            include_str!("../self-test.out"),
+            "if that is meant: cargo xtask self-test --bless"
+        );
+    }
+
+    #[test]
+    fn the_lines_show_what_they_should() {
+        let text = include_str!("../self-test.out");
+        for part in ["offset ", "rejected: ", "flags 4", "deferred: "] {
+            assert!(text.contains(part), "{part}");
+        }
+        assert!(!text.contains("does not come back"));
+        assert!(text.matches("word ").count() > 2 * text.matches("stream ").count());
+        assert!(text.ends_with("end\n"));
+    }
+}

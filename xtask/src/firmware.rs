@@ -1,0 +1,81 @@
+//! The images a board runs: `cargo xtask image`.
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::toolchain;
+
+const TARGET: &str = "thumbv7em-none-eabihf";
+const PROFILE: &str = "firmware";
+
+/// A board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Board {
+    Mps2An386,
+    Stm32F405,
+}
+
+impl Board {
+    pub const ALL: [Self; 2] = [Self::Mps2An386, Self::Stm32F405];
+
+    /// Its name and that of its feature.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mps2An386 => "mps2-an386",
+            Self::Stm32F405 => "stm32f405",
+        }
+    }
+
+    pub fn named(name: &str) -> Result<Self> {
+        let found = Self::ALL.into_iter().find(|board| board.name() == name);
+        found.with_context(|| format!("no board `{name}`: mps2-an386 or stm32f405"))
+    }
+
+    /// Builds the sidecar, with these features more.
+    pub fn sidecar(self, root: &Path, features: &[&str]) -> Result<PathBuf> {
+        let image = format!("sidecar-{}", self.name());
+        build(root, &image, &[&[self.name()], features].concat())
+    }
+
+    /// Builds the self-test.
+    pub fn self_test(self, root: &Path) -> Result<PathBuf> {
+        build(root, "self-test", &[self.name(), "self-test"])
+    }
+}
+
+/// Builds one image and says where it is. Each set of features has a folder of
+/// its own, so that none takes another's place.
+fn build(root: &Path, image: &str, features: &[&str]) -> Result<PathBuf> {
+    toolchain::ensure_target(TARGET)?;
+    let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
+    let folder = root.join(folder);
+    let status = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .current_dir(root)
+        .args(["build", "--quiet", "--locked", "--package", "dtof-firmware"])
+        .args(["--bin", image, "--features", &features.join(",")])
+        .args(["--target", TARGET, "--profile", PROFILE, "--target-dir"])
+        .arg(&folder)
+        .status()
+        .context("cargo does not start")?;
+    ensure!(status.success(), "{image} does not build, see above");
+
+    let built = folder.join(TARGET).join(PROFILE).join(image);
+    if !built.is_file() {
+        bail!("{image} was built, but is not at {}", built.display());
+    }
+    let kept = folder.join(TARGET).join("images");
+    std::fs::create_dir_all(&kept).with_context(|| kept.display().to_string())?;
+    let kept = kept.join(format!("{image}+{}", features.join("+")));
+    std::fs::copy(&built, &kept).with_context(|| kept.display().to_string())?;
+    Ok(kept)
+}
+
+/// Builds the sidecar of a board and says where it is.
+pub fn image(root: &Path, board: &str) -> Result<()> {
+    let path = Board::named(board)?.sidecar(root, &[])?;
+    println!("{}", path.display());
+    Ok(())
+}

@@ -1,0 +1,90 @@
+//! `cargo xtask sizes`: what each image takes of its board.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use object::elf::{SHF_ALLOC, SHT_NOBITS};
+use object::read::elf::{ElfFile32, SectionHeader};
+
+use crate::firmware::Board;
+
+/// Builds and measures every image.
+pub fn print(root: &Path) -> Result<()> {
+    println!(
+        "{:<12} {:<11} {:>8} {:>8}",
+        "image", "board", "flash", "RAM"
+    );
+    for board in Board::ALL {
+        for (image, path) in [
+            ("sidecar", board.sidecar(root, &[])?),
+            ("self-test", board.self_test(root)?),
+        ] {
+            let Sizes { flash, ram } = Sizes::read(&path)?;
+            println!("{image:<12} {:<11} {flash:>8} {ram:>8}", board.name());
+        }
+    }
+    println!("bytes; RAM without the stack, which has what is left");
+    Ok(())
+}
+
+/// Bytes an image takes.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Sizes {
+    flash: u64,
+    ram: u64,
+}
+
+impl Sizes {
+    fn read(path: &Path) -> Result<Self> {
+        let bytes = fs::read(path).with_context(|| path.display().to_string())?;
+        let file = ElfFile32::<object::Endianness>::parse(&*bytes)
+            .with_context(|| path.display().to_string())?;
+        let endian = file.endian();
+        let mut sizes = Self::default();
+        for section in file.elf_section_table().iter() {
+            if section.sh_flags(endian) & SHF_ALLOC != 0 {
+                sizes.add(
+                    section.sh_addr(endian).into(),
+                    section.sh_size(endian).into(),
+                    section.sh_type(endian) != SHT_NOBITS,
+                );
+            }
+        }
+        Ok(sizes)
+    }
+
+    /// A section at `address` when the image runs, which does or does not have
+    /// content.
+    fn add(&mut self, address: u64, size: u64, has_content: bool) {
+        // Where the flash of no board is and the RAM of every board.
+        let in_ram = address >= 0x1000_0000;
+        if in_ram {
+            self.ram += size;
+        }
+        if has_content {
+            self.flash += size;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn data_takes_both_and_bss_only_ram() {
+        let mut sizes = Sizes::default();
+        sizes.add(0x0800_0000, 1, true); // .text
+        sizes.add(0x2000_0000, 10, true); // .data, copied from flash
+        sizes.add(0x2000_000a, 100, false); // .bss
+        sizes.add(0x1000_0000, 1000, false); // .bss in CCM RAM
+        assert_eq!(
+            sizes,
+            Sizes {
+                flash: 11,
+                ram: 1110
+            }
+        );
+    }
+}

@@ -1,0 +1,93 @@
+//! Programs that are used if they are there.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result};
+
+/// A program, and the one line that installs it.
+pub struct Tool {
+    pub program: &'static str,
+    pub install: &'static str,
+}
+
+pub const QEMU: Tool = Tool {
+    program: "qemu-system-arm",
+    install: "sudo apt-get install --yes qemu-system-arm",
+};
+
+pub const DEFMT_PRINT: Tool = Tool {
+    program: "defmt-print",
+    install: "cargo install --locked defmt-print",
+};
+
+pub const PROBE_RS: Tool = Tool {
+    program: "probe-rs",
+    install: "cargo install --locked probe-rs-tools",
+};
+
+impl Tool {
+    /// What it says of its version, if it is there.
+    pub fn version(&self) -> Option<String> {
+        let output = Command::new(self.program)
+            .arg("--version")
+            .stdin(Stdio::null())
+            .stderr(Stdio::null())
+            .output()
+            .ok()?;
+        let text = String::from_utf8_lossy(&output.stdout);
+        let line = text.lines().next().unwrap_or_default();
+        output.status.success().then(|| line.to_owned())
+    }
+
+    pub fn is_there(&self) -> bool {
+        self.version().is_some()
+    }
+
+    /// Says how to install it.
+    pub fn missing(&self) -> String {
+        format!("{} is missing: {}", self.program, self.install)
+    }
+
+    /// Its version, or an error that says how to install it.
+    pub fn require(&self) -> Result<String> {
+        self.version().with_context(|| self.missing())
+    }
+}
+
+/// Installs the emulator and the log's decoder if they are missing and that
+/// needs no question; else says what to type. Nothing else needs them, so that
+/// this never fails.
+pub fn set_up() {
+    install(&QEMU, || {
+        let is_root = Command::new("id").arg("-u").output().ok()?.stdout == b"0\n";
+        if !(is_root && Path::new("/etc/debian_version").exists()) {
+            return None;
+        }
+        let mut apt = Command::new("apt-get");
+        apt.env("DEBIAN_FRONTEND", "noninteractive");
+        apt.args(["install", "--yes", "--quiet", "--no-install-recommends"]);
+        apt.arg(QEMU.program);
+        Some(apt)
+    });
+    install(&DEFMT_PRINT, || {
+        let mut cargo = Command::new("cargo");
+        cargo.args(["install", "--locked", "--quiet", "defmt-print"]);
+        Some(cargo)
+    });
+}
+
+fn install(tool: &Tool, command: impl FnOnce() -> Option<Command>) {
+    if let Some(version) = tool.version() {
+        println!("{version}: there");
+        return;
+    }
+    if let Some(mut command) = command() {
+        println!("{}: installing", tool.program);
+        // What goes wrong is said by what is still missing.
+        let _ = command.stdin(Stdio::null()).status();
+    }
+    if !tool.is_there() {
+        println!("{}", tool.missing());
+    }
+}
