@@ -30,8 +30,8 @@
 //! assert_eq!(interrupt.next_to_send(), Some(1));
 //! ```
 //!
-//! A byte costs either side one copy and three accesses of memory, in the same
-//! time however full the queue is.
+//! A byte takes either side the same short time however full the queue is, with
+//! no interrupt held back.
 
 use core::convert::Infallible;
 use core::hint;

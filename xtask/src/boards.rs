@@ -6,31 +6,26 @@ use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use dtof_firmware::serial::RECEIVE_CAPACITY;
 
 use crate::firmware::Board;
 use crate::log;
-use crate::qemu::{Emulator, Version};
+use crate::qemu::{self, Emulator};
 use crate::tools::DEFMT_PRINT;
 
 /// Bytes sent to mps2-an386 and back.
 const BYTES: usize = 1 << 20;
 
-/// The QEMU in which stm32f405 is known to work.
-const STM32_QEMU: Version = Version(7, 2);
-
 /// Runs all of it.
 pub fn check(root: &Path) -> Result<()> {
-    let version = Version::installed()?;
+    let cannot = qemu::cannot_run(Board::Stm32F405)?;
     let image = Board::Mps2An386.sidecar(root, &[])?;
     ends(&image)?;
     echoes(&image)?;
-    if version == STM32_QEMU {
-        let image = Board::Stm32F405.sidecar(root, &["pll-off"])?;
-        boots(&image)?;
-    } else {
-        println!("SKIPPED: stm32f405 runs in QEMU {STM32_QEMU}, this is {version}");
+    match cannot {
+        Some(reason) => println!("{reason}"),
+        None => boots(&Board::Stm32F405.sidecar(root, &["pll-off"])?)?,
     }
     Ok(())
 }
@@ -77,7 +72,7 @@ fn echoes(image: &Path) -> Result<()> {
         if let Ok(text) = log::decode(image, output) {
             println!("{text}");
         }
-        anyhow::bail!("mps2-an386: byte {at} comes back wrong");
+        bail!("mps2-an386: byte {at} comes back wrong");
     }
     println!(
         "mps2-an386: {BYTES} bytes sent and received back in {seconds:.1} s, {:.1} kB/s each way",

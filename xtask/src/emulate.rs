@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 use crate::firmware::Board;
 use crate::tools::{DEFMT_PRINT, PROBE_RS, QEMU};
@@ -42,7 +42,12 @@ pub fn emulate(root: &Path, arguments: &[&str]) -> Result<()> {
     if decoded {
         let stdout = emulator.stdout.take().context("no output of QEMU")?;
         let status = log::decoder(&image).stdin(stdout).status();
-        status.context("defmt-print does not start")?;
+        if !status.is_ok_and(|status| status.success()) {
+            // It may have ended by itself.
+            let _ = emulator.kill();
+            emulator.wait()?;
+            bail!("{} failed", DEFMT_PRINT.program);
+        }
     }
     let status = emulator.wait()?;
     ensure!(status.success(), "QEMU: {status}");

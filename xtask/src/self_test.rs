@@ -8,31 +8,38 @@ use anyhow::{Context, Result, ensure};
 use dtof_firmware::self_test;
 
 use crate::firmware::Board;
-use crate::qemu::Emulator;
+use crate::qemu::{self, Emulator};
 
 const EXPECTED: &str = "firmware/self-test.out";
 
-/// Runs the image in QEMU and compares.
+/// Runs the image of each board in QEMU and compares.
 pub fn run(root: &Path) -> Result<()> {
     let expected = fs::read_to_string(root.join(EXPECTED)).context(EXPECTED)?;
-    let board = Board::Mps2An386;
+    for board in Board::ALL {
+        match qemu::cannot_run(board)? {
+            Some(reason) => println!("{reason}"),
+            None => run_on(board, root, &expected)?,
+        }
+    }
+    Ok(())
+}
+
+fn run_on(board: Board, root: &Path, expected: &str) -> Result<()> {
+    let name = board.name();
     let image = board.self_test(root)?;
     let (status, output) = Emulator::start(board, &image, &[])?.wait()?;
-    let output = String::from_utf8_lossy(&output);
 
-    let differences = differences(&expected, &output);
+    let differences = differences(expected, &String::from_utf8_lossy(&output));
     for line in &differences {
         println!("{line}");
     }
     ensure!(
         differences.is_empty(),
-        "{}: differs from {EXPECTED}, see above",
-        board.name()
+        "{name}: differs from {EXPECTED}, see above"
     );
-    ensure!(status.success(), "{}: QEMU: {status}", board.name());
+    ensure!(status.success(), "{name}: QEMU: {status}");
     println!(
-        "{}: {} lines as in {EXPECTED}",
-        board.name(),
+        "{name}: {} lines as in {EXPECTED}",
         expected.lines().count()
     );
     Ok(())
