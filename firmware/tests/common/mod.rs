@@ -3,6 +3,8 @@
 
 #![allow(dead_code, reason = "no test uses all of it")]
 
+pub mod tmf882x;
+
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
