@@ -65,7 +65,7 @@ fn read_results(first: u8, values: &[u32]) -> Vec<Access> {
 }
 
 /// The registers 0x01 and 0x03 to 0x09 as they should be configured, then
-/// CONFIG1 with START_MEAS.
+/// CONFIG1 with `START_MEAS`.
 fn configure(registers: [(u8, u8); 8], config1: u8) -> Vec<Access> {
     let reset = [read(0x01, &[0x40]), read(0x03, &[0x07])].concat();
     let writes = registers.map(|(register, value)| write(register, value));

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 /// Data sheet SNAS647C, section 8.4.2.1.1 "Calculating Time-of-Flight
 /// (Measurement Mode 1)": CALIBRATION2 = 21121, CALIBRATION1 = 2110,
-/// CALIBRATION2_PERIODS = 10, CLOCK = 8 MHz, TIME1 = 4175 give 247.061 ns.
+/// `CALIBRATION2_PERIODS` = 10, CLOCK = 8 MHz, TIME1 = 4175 give 247.061 ns.
 #[test]
 fn the_data_sheets_example_in_picoseconds() {
     let calibration = Calibration::new(8_000, CalibrationPeriods::Ten, 2110, 21121).unwrap();

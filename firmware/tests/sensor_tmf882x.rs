@@ -54,7 +54,8 @@ fn a_sensor_that_runs_the_bootloader_is_loaded_in_chunks() {
         let done = || read(0x41, 0x08, &[0x00, 0x00, 0xFF]);
         bench.switch_on(false);
         // In standby at first, then not ready yet.
-        bench.work(&[read(0x41, 0xE0, &[0x30]), write(0x41, &[0xE0, 0x31])]);
+        let standby = [read(0x41, 0xE0, &[0x30]), write(0x41, &[0xE0, 0x31])];
+        assert_eq!(bench.poll(&standby), Ok(Polled::Idle));
         assert_eq!(bench.poll(&[read(0x41, 0xE0, &[0x31])]), Ok(Polled::Idle));
         bench.identify(0x80, &[0x08, 0x14, 0x01, 0x29, 0xC1]);
         let busy = read(0x41, 0x08, &[0x14, 0x00, 0xEB]);
@@ -121,15 +122,45 @@ fn a_reference_that_nobody_wants_is_not_given() {
 }
 
 #[test]
-fn a_result_interrupt_alone_is_cleared() {
+fn a_result_is_cleared_and_results_alone_are_an_error() {
+    let result = [read(0x41, 0xE1, &[0x03]), write(0x41, &[0xE1, 0x02])];
     let mut bench = measuring();
+    let good = packets(&some_counts());
+    for bytes in &good {
+        bench.interrupt.set(false);
+        bench.work(&result);
+        bench.work(&result);
+        bench.packet(bytes).unwrap();
+    }
+    assert_eq!(bench.sink.take().len(), 10);
+
     bench.interrupt.set(false);
-    bench.work(&[read(0x41, 0xE1, &[0x03]), write(0x41, &[0xE1, 0x02])]);
-    // With results only, the data is missing all the same.
+    bench.work(&result);
+    bench.work(&result);
+    let polled = bench.poll(&result[..1]);
+    assert_eq!(polled, Err(Error::StuckInterrupt { status: 0x03 }));
+    stops_measuring(&mut bench, polled);
+
     bench.wait(1001);
-    let accesses = [read(0x41, 0xE1, &[0x03]), write(0x41, &[0xE1, 0x02])];
-    let missing = Error::Timeout(Waiting::Histogram);
-    assert_eq!(bench.poll(&accesses), Err(missing));
+    bench.interrupt.set(false);
+    let polled = bench.poll(&result[..1]);
+    assert_eq!(polled, Err(Error::Timeout(Waiting::Histogram)));
+    stops_measuring(&mut bench, polled);
+}
+
+/// A sensor that shows one packet for ever is found out, too.
+#[test]
+fn packets_that_make_no_set_time_out() {
+    let mut bench = measuring();
+    let good = packets(&some_counts());
+    assert_eq!(bench.packet(&good[7]), Ok(Polled::Idle));
+    bench.wait(1000);
+    assert_eq!(bench.packet(&good[7]), Ok(Polled::Idle));
+    bench.wait(1);
+    let polled = bench.packet(&good[7]);
+    assert_eq!(polled, Err(Error::Timeout(Waiting::Histogram)));
+    assert_eq!(bench.sensor.counts().left_out, 3);
+    stops_measuring(&mut bench, polled);
 }
 
 /// Histograms come out as they went in, whatever the counts and the chunks.
@@ -414,7 +445,7 @@ fn a_wrong_packet_costs_its_set() {
         assert!(bench.sensor.is_measuring());
         // The rest of the set is of no use.
         for bytes in &good[13..] {
-            assert_eq!(bench.packet(bytes), Ok(Polled::Working));
+            assert_eq!(bench.packet(bytes), Ok(Polled::Idle));
         }
         assert_eq!(bench.sink.take(), []);
         assert_eq!(bench.sensor.counts().left_out, 17);

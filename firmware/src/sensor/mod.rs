@@ -43,9 +43,10 @@ pub trait PhotonSink {
 /// A sensor that is asked when its interrupt pin (or a timer) says so; never
 /// blocks longer than its bus transfers.
 ///
-/// Ask on every edge of the interrupt pin, again while the answer is not
-/// [`Polled::Idle`], and once a millisecond besides: bringing a sensor up and
-/// noticing that it is gone take the timer.
+/// Ask on every edge of the interrupt pin and once a millisecond besides:
+/// bringing a sensor up and noticing that it is gone take the timer. Ask again
+/// at once while the answer is not [`Polled::Idle`], but not without a bound: a
+/// fast sensor may always have more.
 pub trait Sensor {
     /// What can go wrong; the error of the bus is inside.
     type Error;

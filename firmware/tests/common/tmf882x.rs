@@ -1,4 +1,4 @@
-//! A TMF882x on a mocked bus: what its accesses look like, and a bench that
+//! A TMF8820 on a mocked bus: what its accesses look like, and a bench that
 //! brings the driver up.
 
 use std::iter;

@@ -68,7 +68,8 @@ pub struct Settings {
     pub stop_edge: Edge,
     /// Where a measurement without enough stops ends: clock periods
     /// (`CLOCK_CNTR_OVF`) in mode 2, turns of the ring oscillator
-    /// (`COARSE_CNTR_OVF`), some 3.5 ns each, in mode 1.
+    /// (`COARSE_CNTR_OVF`) in mode 1. The data sheet does not say how long a turn
+    /// is; TI's support has given 63 and 126 counts for it, 3.5 and 7 ns.
     pub overflow: u16,
     /// Clock periods after START in which STOP is ignored
     /// (`CLOCK_CNTR_STOP_MASK`).

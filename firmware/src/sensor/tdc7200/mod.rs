@@ -48,7 +48,7 @@ pub use self::config::{Config, ConfigError, Edge, Mode, Settings, Stops};
 pub use self::error::Error;
 pub use self::time::{Calibration, CalibrationPeriods};
 
-/// ENABLE stays low this long. The data sheet names no minimum.
+/// ENABLE stays low this long; no minimum is known.
 const RESET_MS: u32 = 1;
 /// From ENABLE high to a stable regulator: 1.5 ms (section 8.4.7 "Wait Times
 /// for TDC7200 Startup", T3), rounded up.

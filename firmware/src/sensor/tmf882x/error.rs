@@ -63,7 +63,7 @@ pub enum Error<B, P> {
         /// What `CONFIG_RESULT` holds.
         page: u8,
     },
-    /// INT stays low while `INT_STATUS` names no reason.
+    /// INT stays low while `INT_STATUS` names no reason, or none but results.
     StuckInterrupt {
         /// What `INT_STATUS` holds.
         status: u8,

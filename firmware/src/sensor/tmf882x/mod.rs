@@ -11,16 +11,21 @@
 //!
 //! # Where the numbers come from
 //!
-//! Register addresses, commands and status values: data sheet DS000693 and the
-//! vendor's published drivers (`tmf8828.c` of the Arduino driver, the Python
-//! driver `tmf8820_21_28_driver_python`, `tmf8x2x_config_page_common.h`), which
-//! agree. From the drivers alone, not from the data sheet's register table: the
-//! bootloader's messages and the seed of `DOWNLOAD_INIT`; the layout of the
-//! histogram packets; that the interrupt is cleared before its packet is read,
-//! with both the result and the histogram interrupt enabled; that the address
-//! changes by `I2C_SLAVE_ADDRESS`, `I2C_ADDR_CHANGE` = 0 and command 0x21, whose
-//! status is read at the new address. The waits after ENABLE and after the start
-//! of the image, 10 ms each, are the drivers' too.
+//! Register addresses, fields, commands and status values are those of the
+//! vendor's published headers (`tmf8x2x_application_registers.h`,
+//! `tmf8x2x_config_page_common.h`), generated from the register description that
+//! the data sheet DS000693 prints. From the vendor's drivers alone (`tmf8828.c`
+//! for Arduino, `tmf8820_21_28_driver_python`), with no table to name:
+//!
+//! - the bootloader's messages, and the seed 0x29 of `DOWNLOAD_INIT`, which the
+//!   newer drivers leave out;
+//! - that a raw histogram comes as packets, and which is which;
+//! - that an interrupt is cleared before its packet is read, and that the result
+//!   interrupt is enabled along with the histogram interrupt;
+//! - that the address changes by `I2C_SLAVE_ADDRESS`, `I2C_ADDR_CHANGE` = 0 and
+//!   command 0x21, whose status is read at the new address;
+//! - the value 0x08 of ID;
+//! - the waits of 10 ms after ENABLE and after the start of the image.
 //!
 //! # Not supported
 //!
@@ -282,7 +287,6 @@ where
             }
             if enable & PON == 0 {
                 self.write(&[ENABLE, enable | PON])?;
-                return Ok(Polled::Working);
             }
             return Ok(Polled::Idle);
         }
@@ -409,30 +413,37 @@ where
         let limit = settings.stuck_limit;
         let [status] = self.read_register(INT_STATUS)?;
         let reasons = status & (RESULT_INT | HISTOGRAM_INT);
-        if reasons == 0 {
+        if reasons & HISTOGRAM_INT == 0 {
+            // A result now and then is no reason to worry; more in a row are.
             let stuck = stuck.saturating_add(1);
             if stuck >= limit {
                 return Err(Error::StuckInterrupt { status });
             }
-            self.state = State::Measuring { since, stuck };
-            return Ok(Polled::Idle);
-        }
-        self.write(&[INT_STATUS, reasons])?;
-        if reasons & HISTOGRAM_INT == 0 {
-            // Results alone are not what was asked for.
             if silent {
                 return Err(Error::Timeout(Waiting::Histogram));
             }
-            self.state = State::Measuring { since, stuck: 0 };
+            self.state = State::Measuring { since, stuck };
+            if reasons == 0 {
+                return Ok(Polled::Idle);
+            }
+            self.write(&[INT_STATUS, reasons])?;
             return Ok(Polled::Working);
         }
-        self.state = State::Measuring {
-            since: Since::new(now_ms),
-            stuck: 0,
-        };
-        self.take_packet(sink)
+        self.write(&[INT_STATUS, reasons])?;
+        let taken = self.take_packet(sink)?;
+        if taken != Polled::Idle || !silent {
+            let since = if taken == Polled::Idle {
+                since
+            } else {
+                Since::new(now_ms)
+            };
+            self.state = State::Measuring { since, stuck: 0 };
+            return Ok(taken);
+        }
+        Err(Error::Timeout(Waiting::Histogram))
     }
 
+    /// Reads a packet. [`Polled::Idle`] if it is left out.
     fn take_packet(&mut self, sink: &mut impl PhotonSink) -> Result<Polled, I2C, INT> {
         let mut bytes = [0; PACKET];
         let mut register = CONFIG_RESULT;
@@ -463,7 +474,7 @@ where
             Ok(Taken::Part) => Ok(Polled::Working),
             Ok(Taken::LeftOut) => {
                 count(&mut self.counts.left_out);
-                Ok(Polled::Working)
+                Ok(Polled::Idle)
             }
             Err(OutOfOrder { expected, found }) => Err(Error::OutOfOrder { expected, found }),
         }

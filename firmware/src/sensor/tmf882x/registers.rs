@@ -1,5 +1,5 @@
-//! Registers, commands and answers of the TMF8820/21/28 (data sheet DS000693,
-//! "Register Description"; names as in the vendor's published drivers).
+//! Registers, commands and answers of the TMF8820/21/28, named as in the
+//! vendor's published headers and the data sheet DS000693.
 
 /// The I²C address after power-up.
 pub(super) const DEFAULT_ADDRESS: u8 = 0x41;
