@@ -57,7 +57,7 @@ pub struct Settings {
 
 impl Settings {
     /// 537 × 1,024 pulses of map 1 as the vendor's drivers have it, but every
-    /// 132 ms: at 400 kHz the 30 packets alone take 95 ms.
+    /// 132 ms: at 400 kHz the 30 packets alone take 98 ms.
     #[must_use]
     pub const fn new(first_pixel: PixelAddress) -> Self {
         Self {

@@ -50,8 +50,8 @@
 //!
 //! # Cost
 //!
-//! A packet takes 139 bytes on the bus and one more a chunk, 3.2 ms at 400 kHz;
-//! a set 30 of them. The driver has 2.6 KiB of RAM for the counts of a set.
+//! A packet takes 145 bytes on the bus, addresses included, and three more for
+//! every chunk after the first: 3.3 ms at 400 kHz. A set has 30 of them. The driver has 2.6 KiB of RAM for the counts of a set.
 
 mod bootloader;
 mod config;
@@ -87,10 +87,11 @@ const BOOT_MS: u32 = 10;
 /// A TMF8820/21/28 on an I²C bus, with INT and ENABLE, and its image.
 ///
 /// `CHUNK` is how many bytes of a packet or of the image go over the bus in one
-/// transaction, 1 to 128 (checked when compiled): what another device on the bus
+/// transaction, 1 to 135 (checked when compiled; the
+/// bootloader takes 128 at most): what another device on the bus
 /// may have to wait for.
 #[derive(Debug)]
-pub struct Tmf882x<'a, I2C, INT, EN, const CHUNK: usize = 128> {
+pub struct Tmf882x<'a, I2C, INT, EN, const CHUNK: usize = PACKET> {
     i2c: I2C,
     interrupt: INT,
     enable: EN,
@@ -161,10 +162,7 @@ where
         config: Config,
     ) -> Self {
         const {
-            assert!(
-                CHUNK >= 1 && CHUNK <= MAX_DATA,
-                "CHUNK must be from 1 to 128"
-            );
+            assert!(CHUNK >= 1 && CHUNK <= PACKET, "CHUNK must be from 1 to 135");
         };
         Self {
             i2c,
@@ -312,7 +310,7 @@ where
             return self.load(BootCommand::SetRamAddress, &[0, 0], sent, now);
         }
         let rest = self.image.get(sent..).unwrap_or_default();
-        if let Some(chunk) = rest.chunks(CHUNK).next() {
+        if let Some(chunk) = rest.chunks(CHUNK.min(MAX_DATA)).next() {
             return self.load(BootCommand::WriteRam, chunk, sent + chunk.len(), now);
         }
         // It does not answer this one: the application does.
