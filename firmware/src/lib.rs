@@ -3,13 +3,15 @@
 //! images that put it onto a board (`src/bin`).
 //!
 //! ```text
-//! board::Board        milliseconds, watchdog, sleep: all that differs between boards
-//!   ↕ interrupts
-//! serial::Serial      two queues between the interrupt handler and the main loop
-//!   ↕ embedded-io
-//! link                frames, and messages that arrive once and in order
-//!   ↕
+//! sensor::Sensor      photons and histograms, over embedded-hal
+//!   ↓
 //! sidecar::Sidecar    pixels, configuration, events
+//!   ↕
+//! link                frames, and messages that arrive once and in order
+//!   ↕ embedded-io
+//! serial::Serial      two queues between the interrupt handler and the main loop
+//!   ↕ interrupts
+//! board::Board        milliseconds, watchdog, sleep: all that differs between boards
 //! ```
 
 #![no_std]
@@ -20,5 +22,6 @@ extern crate std;
 pub mod board;
 pub mod link;
 pub mod self_test;
+pub mod sensor;
 pub mod serial;
 pub mod sidecar;

@@ -1,0 +1,146 @@
+//! How a TMF8820/21/28 measures.
+
+use core::fmt;
+
+use dtof_core::PixelAddress;
+
+use super::frame::CHANNELS;
+use super::registers::DEFAULT_ADDRESS;
+
+/// The vendor's maps of nine zones that are measured at once (`SPAD_MAP_ID`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum SpadMap {
+    /// 3×3 zones, 29° × 29°.
+    #[default]
+    Map1 = 1,
+    /// 3×3 zones, 29° × 43.5°, macro mode.
+    Map2 = 2,
+    /// 3×3 zones, 29° × 43.5°, macro mode.
+    Map3 = 3,
+    /// 3×3 zones, 44° × 48°.
+    Map6 = 6,
+    /// Nine zones, 29° × 43.5°.
+    Map8 = 8,
+    /// Nine zones, 29° × 43.5°.
+    Map9 = 9,
+    /// 3×3 zones, 29° × 29°, a checkerboard.
+    Map11 = 11,
+    /// 3×3 zones, 29° × 29°, the other checkerboard.
+    Map12 = 12,
+}
+
+/// What can be chosen. [`Config::new`] checks it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Settings {
+    /// The pixel of zone 1; the other eight follow it.
+    pub first_pixel: PixelAddress,
+    /// The pixel that the reference histogram goes to, if to any.
+    pub reference: Option<PixelAddress>,
+    /// The I²C address to change to, 7 bits; 0x41 is the one after power-up.
+    pub address: u8,
+    /// `PERIOD_MS`: milliseconds from one measurement to the next.
+    pub period_ms: u16,
+    /// `KILO_ITERATIONS`: laser pulses a measurement, in 1,024.
+    pub kilo_iterations: u16,
+    /// `SPAD_MAP_ID`: which SPADs make up the zones.
+    pub spad_map: SpadMap,
+    /// Milliseconds a command may take.
+    pub command_timeout_ms: u32,
+    /// Milliseconds without a packet after which the measurement is given up.
+    pub data_timeout_ms: u32,
+    /// Polls in a row that may find INT low and `INT_STATUS` without a reason.
+    pub stuck_limit: u8,
+}
+
+impl Settings {
+    /// 537 × 1,024 pulses of map 1 as the vendor's drivers have it, but every
+    /// 132 ms: at 400 kHz the 30 packets alone take 98 ms.
+    #[must_use]
+    pub const fn new(first_pixel: PixelAddress) -> Self {
+        Self {
+            first_pixel,
+            reference: None,
+            address: DEFAULT_ADDRESS,
+            period_ms: 132,
+            kilo_iterations: 537,
+            spad_map: SpadMap::Map1,
+            command_timeout_ms: 50,
+            data_timeout_ms: 1000,
+            stuck_limit: 3,
+        }
+    }
+}
+
+/// Checked [`Settings`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Config(Settings);
+
+/// Settings that cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ConfigError {
+    /// The I²C address is reserved: below 0x08 or above 0x77.
+    Address,
+    /// A measurement without pulses.
+    ZeroIterations,
+    /// The ninth zone would have a pixel past the last.
+    Pixels,
+    /// The time limit of data is not longer than the period.
+    Timeout,
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Address => "the I2C address must be within 0x08 and 0x77",
+            Self::ZeroIterations => "a measurement needs at least 1,024 pulses",
+            Self::Pixels => "nine pixels do not fit behind the first",
+            Self::Timeout => "data would time out within one period",
+        })
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+impl Config {
+    /// Checks `settings`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] says what cannot be.
+    pub fn new(settings: Settings) -> Result<Self, ConfigError> {
+        if !(0x08..=0x77).contains(&settings.address) {
+            return Err(ConfigError::Address);
+        }
+        if settings.kilo_iterations == 0 {
+            return Err(ConfigError::ZeroIterations);
+        }
+        let PixelAddress(first) = settings.first_pixel;
+        if first.checked_add(u16::from(CHANNELS) - 2).is_none() {
+            return Err(ConfigError::Pixels);
+        }
+        if settings.data_timeout_ms <= u32::from(settings.period_ms) {
+            return Err(ConfigError::Timeout);
+        }
+        Ok(Self(settings))
+    }
+
+    /// What was checked.
+    #[must_use]
+    pub const fn settings(&self) -> &Settings {
+        &self.0
+    }
+
+    /// Where the histogram of a channel goes.
+    pub(super) const fn pixel(&self, channel: u8) -> Option<PixelAddress> {
+        let PixelAddress(first) = self.0.first_pixel;
+        match channel.checked_sub(1) {
+            // At most the ninth zone, which fits.
+            Some(zone) => Some(PixelAddress(first.saturating_add(zone as u16))),
+            None => self.0.reference,
+        }
+    }
+}

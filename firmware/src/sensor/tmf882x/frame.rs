@@ -1,0 +1,156 @@
+//! Raw histograms as they come: 30 packets for ten histograms.
+//!
+//! A packet is 135 bytes from `CONFIG_RESULT` on:
+//!
+//! | bytes | register | |
+//! |---|---|---|
+//! | 0 | 0x20 | result: 0x81, a packet of raw histograms |
+//! | 1 | 0x21 | transaction, changes with each packet |
+//! | 2, 3 | 0x22, 0x23 | bytes yet to come of the whole set |
+//! | 4 | 0x24 | number of the packet |
+//! | 5 | 0x25 | data bytes in the packet: 128 |
+//! | 6 | 0x26 | which of the time-multiplexed measurements |
+//! | 7..135 | 0x27.. | data |
+//!
+//! Packet n, 0 to 29, is one byte of each of the 128 counts of channel n mod 10:
+//! the least significant ones in packets 0 to 9, the most significant ones in
+//! packets 20 to 29. Channel 0 is the reference, 1 to 9 are the zones.
+
+/// Bytes of a packet.
+pub(super) const PACKET: usize = HEADER + BINS;
+/// Bins of a histogram.
+pub(super) const BINS: usize = 128;
+/// Channels, the reference included.
+pub(super) const CHANNELS: u8 = 10;
+/// Packets of a set.
+const PACKETS: u8 = 3 * CHANNELS;
+const HEADER: usize = 7;
+/// Byte 0 of a packet of raw histograms.
+const RAW_HISTOGRAM: u8 = 0x81;
+
+/// Bytes that are not a packet of raw histograms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NoPacket {
+    ForeignResult(u8),
+    WrongSize(u8),
+}
+
+/// A packet of raw histograms.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Packet<'a> {
+    pub(super) number: u8,
+    data: &'a [u8],
+}
+
+impl<'a> Packet<'a> {
+    pub(super) fn of(bytes: &'a [u8; PACKET]) -> Result<Self, NoPacket> {
+        let (&[result, _, _, _, number, size, _], data) = bytes
+            .split_first_chunk::<HEADER>()
+            .ok_or(NoPacket::WrongSize(0))?;
+        if result != RAW_HISTOGRAM {
+            return Err(NoPacket::ForeignResult(result));
+        }
+        if usize::from(size) != BINS {
+            return Err(NoPacket::WrongSize(size));
+        }
+        Ok(Self { number, data })
+    }
+}
+
+/// A packet that is not the one that should have come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct OutOfOrder {
+    pub(super) expected: u8,
+    pub(super) found: u8,
+}
+
+/// Puts packets together to histograms. 2.5 KiB: two bytes of every count.
+#[derive(Clone, Debug)]
+pub(super) struct Assembly {
+    low: [[u16; BINS]; CHANNELS as usize],
+    next: Next,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Next {
+    /// Packet 0; all others are left out.
+    Set,
+    /// This packet, 1 to 29.
+    Packet(u8),
+}
+
+impl Assembly {
+    pub(super) const fn new() -> Self {
+        Self {
+            low: [[0; BINS]; CHANNELS as usize],
+            next: Next::Set,
+        }
+    }
+
+    /// Waits for the next packet 0.
+    pub(super) const fn restart(&mut self) {
+        self.next = Next::Set;
+    }
+
+    /// Takes a packet. Its histogram, with the number of its channel, once its
+    /// most significant bytes are there.
+    ///
+    /// # Errors
+    /// [`OutOfOrder`]: the set is given up. A packet 0 begins the next one.
+    pub(super) fn take(&mut self, packet: Packet) -> Result<Taken, OutOfOrder> {
+        let found = packet.number;
+        let result = match self.next {
+            Next::Packet(expected) if found != expected => Err(OutOfOrder { expected, found }),
+            Next::Set if found >= PACKETS => Err(OutOfOrder { expected: 0, found }),
+            Next::Set if found != 0 => Ok(Taken::LeftOut),
+            Next::Set | Next::Packet(_) => Ok(Taken::Part),
+        };
+        if result != Ok(Taken::Part) && found != 0 {
+            self.next = Next::Set;
+            return result;
+        }
+        self.next = match found + 1 {
+            PACKETS => Next::Set,
+            next => Next::Packet(next),
+        };
+        let channel = found % CHANNELS;
+        let Some(low) = self.low.get_mut(usize::from(channel)) else {
+            return result;
+        };
+        match found / CHANNELS {
+            0 => {
+                for (low, &byte) in low.iter_mut().zip(packet.data) {
+                    *low = u16::from(byte);
+                }
+            }
+            1 => {
+                for (low, &byte) in low.iter_mut().zip(packet.data) {
+                    *low |= u16::from(byte) << 8;
+                }
+            }
+            _ => {
+                let mut counts = [0; BINS];
+                for ((count, &low), &byte) in counts.iter_mut().zip(&*low).zip(packet.data) {
+                    *count = u32::from(byte) << 16 | u32::from(low);
+                }
+                return Ok(Taken::Histogram { channel, counts });
+            }
+        }
+        result
+    }
+}
+
+/// What became of a packet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "lives on the stack for a moment, and there is no heap"
+)]
+pub(super) enum Taken {
+    /// It is not part of a set that began with packet 0.
+    LeftOut,
+    /// More of its histogram is yet to come.
+    Part,
+    /// It completed this one.
+    Histogram { channel: u8, counts: [u32; BINS] },
+}

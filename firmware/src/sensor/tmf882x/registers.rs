@@ -1,0 +1,105 @@
+//! Registers, commands and answers of the TMF8820/21/28, named as in the
+//! vendor's published headers and the data sheet DS000693.
+
+/// The I²C address after power-up.
+pub(super) const DEFAULT_ADDRESS: u8 = 0x41;
+
+/// APPID: what runs.
+pub(super) const APPID: u8 = 0x00;
+/// APPID of the bootloader.
+pub(super) const BOOTLOADER: u8 = 0x80;
+/// APPID of the measurement application in RAM.
+pub(super) const APPLICATION: u8 = 0x03;
+
+/// `CMD_STAT`: a command is written here, its state read back.
+pub(super) const CMD_STAT: u8 = 0x08;
+/// `CMD_STAT`: done.
+pub(super) const STAT_OK: u8 = 0x00;
+/// `CMD_STAT`: accepted and going on, the answer to [`Command::Measure`].
+pub(super) const STAT_ACCEPTED: u8 = 0x01;
+/// `CMD_STAT` from here on is a command that is not done yet; all between
+/// [`STAT_ACCEPTED`] and this are errors.
+pub(super) const FIRST_COMMAND: u8 = 0x10;
+
+/// `CONFIG_RESULT`: which page or result the registers from here on hold.
+pub(super) const CONFIG_RESULT: u8 = 0x20;
+
+/// `PERIOD_MS`, `KILO_ITERATIONS`, 16 bits each, least significant byte first
+/// (common configuration page).
+pub(super) const PERIOD_MS: u8 = 0x24;
+/// `SPAD_MAP_ID` (common configuration page).
+pub(super) const SPAD_MAP_ID: u8 = 0x34;
+/// `HIST_DUMP` (common configuration page).
+pub(super) const HIST_DUMP: u8 = 0x39;
+/// `HIST_DUMP` bit 0: give raw histograms away.
+pub(super) const RAW_HISTOGRAMS: u8 = 1;
+/// `I2C_SLAVE_ADDRESS`, in bits 7..1 (common configuration page).
+pub(super) const I2C_SLAVE_ADDRESS: u8 = 0x3B;
+/// `I2C_ADDR_CHANGE`: at which levels of the GPIOs the address changes; 0 is
+/// always (common configuration page).
+pub(super) const I2C_ADDR_CHANGE: u8 = 0x3E;
+
+/// ENABLE.
+pub(super) const ENABLE: u8 = 0xE0;
+/// ENABLE bit 6: the processor is ready; no other register may be used before.
+pub(super) const CPU_READY: u8 = 1 << 6;
+/// ENABLE bit 0: powered on; 0 is standby.
+pub(super) const PON: u8 = 1;
+
+/// `INT_STATUS`: why the pin INT is low. Writing a 1 clears a bit.
+pub(super) const INT_STATUS: u8 = 0xE1;
+/// `INT_ENAB`: which of these bits pull the pin INT low.
+pub(super) const INT_ENAB: u8 = 0xE2;
+/// `INT_STATUS` bit 1: a measurement result stands ready.
+pub(super) const RESULT_INT: u8 = 1 << 1;
+/// `INT_STATUS` bit 3: a packet of a raw histogram stands ready.
+pub(super) const HISTOGRAM_INT: u8 = 1 << 3;
+
+/// ID: bits 5..0 are [`CHIP_ID`].
+pub(super) const ID: u8 = 0xE3;
+/// The chip's identification.
+pub(super) const CHIP_ID: u8 = 0x08;
+/// Its bits in ID.
+pub(super) const CHIP_ID_BITS: u8 = 0x3f;
+
+/// A command of the measurement application.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Command {
+    /// Measure until told to stop.
+    Measure = 0x10,
+    /// Take over the configuration page.
+    WriteConfigPage = 0x15,
+    /// Show the common configuration page.
+    LoadConfigPageCommon = 0x16,
+    /// Change the I²C address to that of the common configuration page.
+    I2cSlaveAddress = 0x21,
+    /// Stop measuring.
+    Stop = 0xFF,
+}
+
+impl Command {
+    /// What `CMD_STAT` holds in the end.
+    pub(super) const fn done(self) -> u8 {
+        match self {
+            Self::Measure => STAT_ACCEPTED,
+            _ => STAT_OK,
+        }
+    }
+}
+
+/// A command of the bootloader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum BootCommand {
+    /// Start the program in RAM.
+    RamRemapReset = 0x11,
+    /// Begin a download.
+    DownloadInit = 0x14,
+    /// Write to RAM and go on behind it.
+    WriteRam = 0x41,
+    /// Set the address in RAM.
+    SetRamAddress = 0x43,
+}
