@@ -22,7 +22,7 @@
 //! assert_eq!(depth.offset.raw(), 128 + 64); // 40.75 bins
 //!
 //! // 250 ps bins are 37.474 mm each.
-//! let scale = RangeScale::new(U16F16::lit("250"), I24F8::ZERO)?;
+//! let scale = RangeScale::new(const { U16F16::lit("250") }, I24F8::ZERO)?;
 //! let range = scale.range(BinPosition::of(histogram.peak().bin, depth.offset));
 //! assert_eq!(range, I24F8::lit("1527.066")); // 40.75 × 37.474, to 1/256 mm
 //! # Ok::<(), dtof_core::RangeScaleError>(())

@@ -35,7 +35,9 @@ mod sealed {
 /// iterations for wider counts.
 pub trait CounterWidth: sealed::Sealed {
     /// The integer that holds one counter.
-    type Counter: Copy + Default + Ord + Into<u32> + core::fmt::Debug;
+    type Counter: Copy + Ord + Into<u32> + core::fmt::Debug;
+    /// An empty counter.
+    const ZERO: Self::Counter;
     /// Bits a counter uses; it saturates at `2^BITS - 1`.
     const BITS: u32;
     /// The count at which a counter is full.
@@ -64,6 +66,7 @@ macro_rules! counter_width {
         impl sealed::Sealed for $name {}
         impl CounterWidth for $name {
             type Counter = $counter;
+            const ZERO: $counter = 0;
             const BITS: u32 = $bits;
             #[inline]
             #[allow(clippy::cast_possible_truncation)] // at most 2^BITS - 1, which fits
@@ -108,10 +111,10 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
 
     /// An empty histogram.
     #[must_use]
-    pub fn new() -> Self {
+    pub const fn new() -> Self {
         const { assert!(Self::LOG2_BINS >= 3) };
         Self {
-            counts: [W::Counter::default(); BINS],
+            counts: [W::ZERO; BINS],
             peak_key: 0,
             total: 0,
             rejected: 0,
@@ -233,7 +236,7 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     /// Empties the histogram for the next exposure.
     #[inline]
     pub fn clear(&mut self) {
-        self.counts.fill(W::Counter::default());
+        self.counts.fill(W::ZERO);
         self.peak_key = 0;
         self.total = 0;
         self.rejected = 0;

@@ -29,9 +29,9 @@
 //! use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 //! use dtof_core::*;
 //!
-//! let rule = PaperRule::new(U8F8::lit("8"), Count::saturating(5));
+//! let rule = PaperRule::new(const { U8F8::lit("8") }, Count::saturating(5));
 //! let config = PixelConfig::<128>::new(10, 100, 2000, RangeGate::full(), rule)?;
-//! let scale = RangeScale::new(U16F16::lit("250"), I24F8::ZERO)?; // 250 ps bins
+//! let scale = RangeScale::new(const { U16F16::lit("250") }, I24F8::ZERO)?; // 250 ps bins
 //! let mut pixel = AsyncPixel::<128>::new(PixelAddress(0));
 //!
 //! let mut event = None;

@@ -15,7 +15,7 @@
 //! use dtof_core::fixed::types::U8F8;
 //! use dtof_core::*;
 //!
-//! let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+//! let rule = PaperRule::new(const { U8F8::lit("4") }, Count::saturating(5));
 //! let config = PixelConfig::<128>::new(4, 40, 2000, RangeGate::full(), rule)?;
 //! let mut pixel = AsyncPixel::<128>::new(PixelAddress(7));
 //!
@@ -89,7 +89,7 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
     /// # Errors
     /// [`ConfigError`] unless `0 < x <= l1 < l2` and a multiple of `x` lies
     /// strictly between `l1` and `l2`.
-    pub fn new(
+    pub const fn new(
         x: u16,
         l1: u16,
         l2: u16,
@@ -252,7 +252,7 @@ pub struct AsyncPixel<const BINS: usize, W: CounterWidth = Count10> {
 impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// An empty pixel at the beginning of its first exposure.
     #[must_use]
-    pub fn new(address: PixelAddress) -> Self {
+    pub const fn new(address: PixelAddress) -> Self {
         Self {
             address,
             exposure: 0,
@@ -260,7 +260,15 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             deferred: false,
             histogram: Histogram::new(),
             slot: EventSlot::new(),
-            statistics: Statistics::default(),
+            statistics: Statistics {
+                counted: 0,
+                saturated: 0,
+                rejected: 0,
+                gated_out: 0,
+                events: 0,
+                deferred: 0,
+                expired: 0,
+            },
         }
     }
 

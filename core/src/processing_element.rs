@@ -8,7 +8,7 @@
 //! use dtof_core::fixed::types::U8F8;
 //! use dtof_core::*;
 //!
-//! let rule = PaperRule::new(U8F8::lit("8"), Count::saturating(5));
+//! let rule = PaperRule::new(const { U8F8::lit("8") }, Count::saturating(5));
 //! let config = PixelConfig::new(4, 40, 2000, RangeGate::full(), rule)?;
 //! let addresses = [0, 1, 2, 3].map(PixelAddress);
 //! let mut element = ProcessingElement::<128>::new(config, addresses)?;

@@ -14,9 +14,9 @@ use crate::peak::Peak;
 use crate::threshold::Threshold;
 use crate::units::Count;
 
-/// Decides from one histogram. Implementations hold their configuration only;
-/// all state is in the histogram.
-pub trait DetectionRule {
+/// Decides from one histogram. Implementations hold their configuration only,
+/// which is copied; all state is in the histogram.
+pub trait DetectionRule: Copy {
     /// The background a bin if `peak`, the highest of the gated bins, is a
     /// detection; `None` if it is not.
     fn detect<const BINS: usize, W: CounterWidth>(

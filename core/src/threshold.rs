@@ -11,7 +11,7 @@
 //! ```
 //! use dtof_core::{Count, Count10, Threshold, fixed::types::U8F8};
 //!
-//! let threshold = Threshold::new(U8F8::lit("2.5"), Count::saturating(5));
+//! let threshold = Threshold::new(const { U8F8::lit("2.5") }, Count::saturating(5));
 //! let background = Count::saturating(20); // root 4
 //! assert_eq!(threshold.level::<Count10>(background), 30u16);
 //! assert!(!threshold.is_exceeded::<Count10>(Count::saturating(30), background));

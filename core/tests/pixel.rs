@@ -532,6 +532,7 @@ fn large_configurations_are_checked_without_overflow() {
 }
 
 /// Fires on every second photon, whatever the bins say.
+#[derive(Clone, Copy)]
 struct EverySecond;
 
 impl DetectionRule for EverySecond {

@@ -26,8 +26,10 @@ fn log() -> Option<PathBuf> {
         env!("CARGO_MANIFEST_DIR"),
         "/../../shared/data/tmf8820_plane_gt/distance_data.json"
     );
-    let path = std::env::var_os("TMF8820_LOG").map_or_else(|| beside.into(), PathBuf::from);
-    path.exists().then_some(path)
+    if let Some(named) = std::env::var_os("TMF8820_LOG") {
+        return Some(named.into()); // and fail if it is not there
+    }
+    Some(PathBuf::from(beside)).filter(|path| path.exists())
 }
 
 /// Distance to the plane of each capture in millimetres.

@@ -144,7 +144,10 @@ impl<R: Read> Reader<R> {
         let mut bytes = [0; HEADER_BYTES as usize];
         input
             .read_exact(&mut bytes)
-            .context("not an AER file: shorter than its header")?;
+            .map_err(|error| match error.kind() {
+                io::ErrorKind::UnexpectedEof => anyhow!("not an AER file: shorter than its header"),
+                _ => error.into(),
+            })?;
         let mut digest = CRC_32.digest();
         digest.update(&bytes);
         Ok(Self {

@@ -46,7 +46,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Help is printed whole; of an error only its first paragraph, as one line.
+/// Help is printed whole; an error with its hints as one line.
 fn refuse(error: &clap::Error) -> ExitCode {
     if !error.use_stderr() {
         return error
@@ -54,10 +54,9 @@ fn refuse(error: &clap::Error) -> ExitCode {
             .map_or(ExitCode::FAILURE, |()| ExitCode::SUCCESS);
     }
     let text = error.to_string();
-    let reason: Vec<&str> = text
-        .lines()
-        .map(str::trim)
-        .take_while(|line| !line.is_empty())
+    let lines = text.lines().map(str::trim);
+    let reason: Vec<&str> = lines
+        .filter(|line| !line.is_empty() && !line.starts_with("Usage:"))
         .collect();
     eprintln!("{}", reason.join(" "));
     ExitCode::from(2)

@@ -49,7 +49,7 @@ fn read_file(path: &Path) -> Result<NpyRecording> {
     };
     ensure!(
         matches!(element.type_char(), TypeChar::Int | TypeChar::Uint),
-        "elements are {element}, not integers"
+        "elements are {element}, not integers; convert them with .astype(numpy.uint32)"
     );
     ensure!(
         header.order() == Order::C || shape.len() < 2,
@@ -111,7 +111,8 @@ fn signed<T: Into<i64>>(counts: Vec<T>) -> Result<Vec<u64>> {
     let counts = counts.into_iter().map(T::into).enumerate();
     counts
         .map(|(index, count): (usize, i64)| {
-            u64::try_from(count).with_context(|| format!("element {index} is negative: {count}"))
+            let unsigned = u64::try_from(count);
+            unsigned.map_err(|_| anyhow!("element {index} is negative: {count}"))
         })
         .collect()
 }

@@ -37,7 +37,8 @@ impl Output {
     /// If nothing can be written there, or the settings do not give a range.
     pub fn create(folder: &Path, settings: &Settings, geometry: Geometry) -> Result<Self> {
         let scale = settings.range_scale()?;
-        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        fs::create_dir_all(folder)
+            .with_context(|| format!("{}: cannot be the output folder", folder.display()))?;
         let mut csv = BufWriter::new(aside(folder)?);
         writeln!(csv, "{}", events_csv::HEADER)?;
         let header = aer_file::Header {
@@ -116,6 +117,7 @@ impl Output {
             let place = self.folder.join(name);
             file.persist(&place)
                 .map(drop)
+                .map_err(|error| error.error)
                 .with_context(|| place.display().to_string())
         };
         let whole = |text: &str, name: &str| -> Result<()> {

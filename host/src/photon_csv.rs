@@ -49,17 +49,25 @@ impl Rows {
             last_cycle: 0,
         };
         ensure!(rows.read_line()?, "{name}:1: the file is empty");
-        let header = rows.text().unwrap_or_default();
+        // Some spreadsheets begin a file with a byte order mark.
+        let header = rows.text().unwrap_or("bytes that are not UTF-8");
+        let header = header.strip_prefix('\u{feff}').unwrap_or(header);
         ensure!(
             header == "pixel,cycle,bin",
-            "{name}:1: the header must be pixel,cycle,bin"
+            "{name}:1: the header must be pixel,cycle,bin, not {header:?}"
         );
         Ok(rows)
     }
 
     fn next(&mut self) -> Result<Option<Row>> {
-        if !self.read_line()? {
-            return Ok(None);
+        loop {
+            if !self.read_line()? {
+                return Ok(None);
+            }
+            // A blank line is no photon and no damage.
+            if !self.text().is_ok_and(str::is_empty) {
+                break;
+            }
         }
         let row = self.parse();
         let row = row.with_context(|| format!("{}:{}", self.path.display(), self.line_number))?;
@@ -104,7 +112,10 @@ impl Rows {
         }
         match u16::try_from(bin) {
             Ok(bin) if usize::from(bin) < self.bins => Ok(Row { pixel, cycle, bin }),
-            _ => bail!("bin {bin} is past the last of {} bins", self.bins),
+            _ => bail!(
+                "bin {bin} is past the last of {} bins (see --bins)",
+                self.bins
+            ),
         }
     }
 }
@@ -112,6 +123,7 @@ impl Rows {
 /// A checked photon list.
 pub struct PhotonCsv {
     addresses: Vec<PixelAddress>,
+    geometry: Geometry,
     cycles: u64,
     not_replayed: u64,
     next_cycle: u64,
@@ -123,11 +135,11 @@ pub struct PhotonCsv {
 impl PhotonCsv {
     /// Checks all of `path`, whose photons lie in `bins` bins, to replay its
     /// first `cycles` laser cycles. The recording lasts until the laser cycle
-    /// of its last photon.
+    /// of its last photon. The array has `columns`; without, it is one row.
     ///
     /// # Errors
     /// What is wrong with the file; its name and the line first.
-    pub fn open(path: &Path, bins: usize, cycles: u64) -> Result<Self> {
+    pub fn open(path: &Path, bins: usize, columns: Option<u32>, cycles: u64) -> Result<Self> {
         let mut rows = Rows::open(path, bins)?;
         let mut pixels = BTreeSet::new();
         let mut not_replayed = 0;
@@ -140,8 +152,14 @@ impl PhotonCsv {
             }
         }
         ensure!(!pixels.is_empty(), "{}:2: no photons", path.display());
+        let pixels_in_file = u32::from(pixels.last().copied().unwrap_or(0)) + 1;
+        let columns = columns.unwrap_or(pixels_in_file);
         let mut rows = Rows::open(path, bins)?;
         Ok(Self {
+            geometry: Geometry {
+                columns,
+                rows: pixels_in_file.div_ceil(columns),
+            },
             addresses: pixels.into_iter().map(PixelAddress).collect(),
             cycles: cycles.min(recorded),
             not_replayed,
@@ -154,14 +172,7 @@ impl PhotonCsv {
 
 impl PhotonSource for PhotonCsv {
     fn geometry(&self) -> Geometry {
-        let last = self
-            .addresses
-            .last()
-            .map_or(0, |address| u32::from(address.0));
-        Geometry {
-            columns: last + 1,
-            rows: 1,
-        }
+        self.geometry
     }
 
     fn addresses(&self) -> Vec<PixelAddress> {

@@ -36,6 +36,8 @@ pub struct Capture {
 pub struct RecordedHistograms {
     geometry: Geometry,
     cycles: u64,
+    /// Laser cycles of the shortest and the longest capture.
+    recorded: (u64, u64),
     next_cycle: u64,
     pixels: Vec<RecordedPixel>,
 }
@@ -54,7 +56,7 @@ impl RecordedHistograms {
         seed: u64,
     ) -> Result<Self> {
         let mut pixels = Vec::new();
-        let mut longest = 0;
+        let (mut shortest, mut longest) = (u64::MAX, 0);
         for capture in captures {
             let totals = capture
                 .histograms
@@ -69,6 +71,7 @@ impl RecordedHistograms {
                 .context("a histogram holds 2^53 photons or more")?;
             let brightest = totals.iter().copied().max().unwrap_or(0);
             let recorded = recorded_cycles(length, brightest, cycles)?;
+            shortest = shortest.min(recorded);
             longest = longest.max(recorded);
             for (counts, total) in capture.histograms.iter().zip(totals) {
                 let address = u16::try_from(pixels.len()).context("more than 65,536 pixels")?;
@@ -83,6 +86,7 @@ impl RecordedHistograms {
         Ok(Self {
             geometry,
             cycles: cycles.min(longest),
+            recorded: (shortest, longest),
             next_cycle: 0,
             pixels,
         })
@@ -125,6 +129,14 @@ impl PhotonSource for RecordedHistograms {
 
     fn cycles(&self) -> u64 {
         self.cycles
+    }
+
+    fn not_replayed(&self) -> u64 {
+        self.pixels.iter().map(|pixel| pixel.photons_left).sum()
+    }
+
+    fn recorded_cycles(&self) -> Option<(u64, u64)> {
+        Some(self.recorded)
     }
 
     fn next_slice(&mut self, cycles: u16) -> Result<Slice> {

@@ -166,7 +166,8 @@ pub fn against_truth(maps: &Maps, settings: &Settings) -> Vec<Row> {
         rows.push((
             format!("{}, rms error", surface.name()),
             format!(
-                "{:.1} mm last event, {:.1} mm mean of ten, {false_events} beyond {FALSE_BEYOND_BINS} bins",
+                "{:.1} mm last event of each pixel ({false_events} beyond {FALSE_BEYOND_BINS} bins), \
+                 {:.1} mm mean of ten",
                 root_mean_square(&last),
                 root_mean_square(&mean),
             ),

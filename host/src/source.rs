@@ -62,9 +62,15 @@ pub trait PhotonSource {
     /// Laser cycles there are, from 0.
     fn cycles(&self) -> u64;
 
-    /// Recorded photons that lie after those laser cycles.
+    /// Recorded photons that no slice has held so far.
     fn not_replayed(&self) -> u64 {
         0
+    }
+
+    /// Laser cycles that recorded histograms are taken to have lasted: those of
+    /// the shortest and of the longest capture.
+    fn recorded_cycles(&self) -> Option<(u64, u64)> {
+        None
     }
 
     /// The photons of the next `cycles` laser cycles.

@@ -10,6 +10,11 @@ use crate::source::PhotonSource;
 /// What came out, as `summary.json` has it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
+    /// The recording, if it was one.
+    pub input: Option<String>,
+    /// Laser cycles that recorded histograms were taken to have lasted: the
+    /// shortest and the longest capture.
+    pub recorded_cycles: Option<(u64, u64)>,
     /// Laser cycles replayed.
     pub cycles: u64,
     /// Photons offered to the pixels: counted, saturated, rejected or gated out.
@@ -30,7 +35,8 @@ pub struct Summary {
     pub deferred: u64,
     /// Exposures that reached L2 without an event.
     pub expired: u64,
-    /// Recorded photons after the last laser cycle replayed.
+    /// Recorded photons that were not replayed, as they lie after the last
+    /// laser cycle.
     pub not_replayed: u64,
     /// How the pixels operated.
     pub settings: Settings,
@@ -58,6 +64,8 @@ impl Summary {
             expired,
         } = *statistics;
         Self {
+            input: None,
+            recorded_cycles: source.recorded_cycles(),
             cycles: source.cycles(),
             photons: counted + saturated + rejected + gated_out,
             events,
@@ -77,8 +85,23 @@ impl Summary {
     #[must_use]
     pub fn rows(&self) -> Vec<Row> {
         let row = |name: &str, value: u64| (name.to_owned(), grouped(value));
-        let mut rows = vec![
-            row("laser cycles", self.cycles),
+        let mut rows = Vec::new();
+        if let Some(input) = &self.input {
+            rows.push(("recording".to_owned(), input.clone()));
+        }
+        if let Some((shortest, longest)) = self.recorded_cycles {
+            let cycles = if shortest == longest {
+                grouped(longest)
+            } else {
+                format!("{} to {}, by capture", grouped(shortest), grouped(longest))
+            };
+            rows.push((
+                "taken to have lasted".to_owned(),
+                format!("{cycles} laser cycles"),
+            ));
+        }
+        rows.extend([
+            row("laser cycles replayed", self.cycles),
             row("photons", self.photons),
             row("depth events", self.events),
             (
@@ -86,17 +109,22 @@ impl Summary {
                 format!("{} of {}", self.pixels_reporting, self.pixels),
             ),
             row("exposures without an event", self.expired),
-        ];
+        ]);
+        if self.events == 0 {
+            let why = if self.cycles <= u64::from(self.settings.l1) {
+                format!("none can come before laser cycle {}", self.settings.l1)
+            } else {
+                "no peak stood clear of the background".to_owned()
+            };
+            rows.push(("why no event".to_owned(), why));
+        }
         // Losses are named where there are any.
         let losses = [
             ("photons outside the range gate", self.gated_out),
             ("photons lost to full counters", self.saturated),
             ("photons with a code past the last bin", self.rejected),
             ("decisions put off", self.deferred),
-            (
-                "recorded photons after the last laser cycle replayed",
-                self.not_replayed,
-            ),
+            ("recorded photons not replayed", self.not_replayed),
         ];
         rows.extend(
             losses
@@ -123,11 +151,19 @@ impl Settings {
             ),
             row("range offset", format!("{} mm", self.offset_mm.0)),
             row("range gate", gate),
-            row("α", self.alpha.0.to_string()),
-            row("minimum peak count", self.min_count.to_string()),
             row(
-                "L1, L2, X",
-                format!("{}, {}, {} laser cycles", self.l1, self.l2, self.x),
+                "threshold",
+                format!(
+                    "background + {} × its square root (α), at least {} photons",
+                    self.alpha.0, self.min_count
+                ),
+            ),
+            row(
+                "decisions",
+                format!(
+                    "every {} laser cycles (X), in exposures longer than {} (L1) and shorter than {} (L2)",
+                    self.x, self.l1, self.l2
+                ),
             ),
             row("seed", self.seed.to_string()),
         ]

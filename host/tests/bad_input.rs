@@ -22,7 +22,7 @@ fn csv_rows_that_are_not_photons_are_named_by_line() {
         "0,1,2\n0,2,",
         &["photons.csv:3:", "bin \"\"", "whole number"],
     );
-    csv_refused("0,1,2\n\n0,2,3\n", &["photons.csv:3:", "1 fields, not 3"]);
+    csv_refused("0,1,2\n\n\n0,2\n\n", &["photons.csv:5:", "2 fields, not 3"]);
     csv_refused("+1,0,2\n", &["photons.csv:2:", "pixel \"+1\""]);
     csv_refused(&"0,".repeat(1000), &["photons.csv:2:", "fields, not 3"]);
     csv_refused(
@@ -59,7 +59,7 @@ fn csv_files_that_are_not_photon_lists_are_refused() {
         (&b""[..], "photons.csv:1: the file is empty"),
         (
             b"cycle,pixel,bin\n0,1,2\n",
-            "photons.csv:1: the header must be pixel,cycle,bin",
+            "photons.csv:1: the header must be pixel,cycle,bin, not \"cycle,pixel,bin\"",
         ),
         (b"pixel,cycle,bin\n0,\xff,2\n", "photons.csv:2: not text"),
     ] {
@@ -212,11 +212,12 @@ fn settings_that_cannot_be_are_refused() {
         (&["--x", "30", "--l2", "50"], "no multiple of X"),
         (&["--l2", "65536"], "65536"),
         (&["--alpha", "256"], "--alpha"),
-        (&["--alpha", "-1"], "-1"),
+        (&["--alpha", "-1"], "must be a number from 0 to"),
         (&["--alpha", "NaN"], "--alpha"),
         (&["--bins", "100"], "power of two"),
         (&["--bins", "4"], "power of two"),
         (&["--bins", "2048"], "power of two"),
+        (&["--columns", "0"], "--columns"),
         (&["--gate", "0..128"], "past the last bin"),
         (&["--gate", "20..26"], "fewer than 8 bins"),
         (&["--gate", "30..20"], "fewer than 8 bins"),
@@ -231,6 +232,7 @@ fn settings_that_cannot_be_are_refused() {
         (&["--photons-per-cycle", "1"], "are for histograms"),
         (&["--recorded-cycles", "0"], "--recorded-cycles"),
         (&["--nonsense"], "--nonsense"),
+        (&["--apha", "4"], "a similar argument exists: '--alpha'"),
     ] {
         scratch.refused(&scratch.replay(&input, arguments), &[part]);
     }

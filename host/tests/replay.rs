@@ -196,6 +196,8 @@ fn the_brightest_pixel_of_a_capture_sets_the_pace() {
     let input = scratch.file("recorded.npy", npy("|u1", "(2, 8)", &data));
     // 200 photons at half a photon a laser cycle: 400 laser cycles.
     let summary = scratch.replayed(&input, &["--photons-per-cycle", "0.5"]);
+    assert_eq!(summary["recorded_cycles"], serde_json::json!([400, 400]));
+    assert_eq!(summary["not_replayed"], 0);
     assert_eq!(
         (&summary["cycles"], &summary["photons"]),
         (&400.into(), &250.into())
@@ -294,4 +296,42 @@ fn the_demo_reports_every_pixel_and_is_silent_when_asked() {
     );
     let report = scratch.read("out/demo/report.html");
     assert!(report.contains("</html>") && report.matches("<svg").count() == 3);
+}
+
+#[test]
+fn histogram_photons_after_the_last_cycle_are_counted() {
+    let scratch = Scratch::new();
+    let input = scratch.file("RECORDED.NPY", npy("|u1", "(2, 8)", &[100; 16]));
+    let more = ["--recorded-cycles", "1000", "--cycles", "100"];
+    let summary = scratch.replayed(&input, &more);
+    let photons = |name: &str| summary[name].as_u64().unwrap();
+    assert_eq!(photons("photons") + photons("not_replayed"), 1600);
+    assert!(photons("photons") > 0 && photons("not_replayed") > 0);
+    assert_eq!(summary["input"], input.to_str().unwrap());
+}
+
+#[test]
+fn spreadsheets_may_add_a_byte_order_mark_line_ends_and_blank_lines() {
+    let scratch = Scratch::new();
+    let plain = steady(7, 60, 100);
+    let input = scratch.file("plain.csv", &plain);
+    scratch.replayed(&input, &[]);
+    let expected = scratch.read("out/events.csv");
+    let dressed = format!("\u{feff}{}\r\n\r\n", plain.replace('\n', "\r\n"));
+    let input = scratch.file("dressed.csv", dressed);
+    scratch.replayed(&input, &[]);
+    assert_eq!(scratch.read("out/events.csv"), expected);
+    assert!(expected.lines().count() > 2);
+}
+
+#[test]
+fn a_run_too_short_for_an_event_says_so() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", steady(7, 60, 100));
+    let output = scratch.replay(&input, &["--cycles", "40"]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        said.contains("none can come before laser cycle 40"),
+        "{said}"
+    );
 }

@@ -27,11 +27,14 @@ pub struct Replay {
     /// Where the results go
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Photon lists: columns of the array, pixel = row × columns + column [default: one row]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    columns: Option<u32>,
     /// Bins of a histogram, a power of two from 8 to 1024 [default: the file's; 128 for .csv]
     #[arg(long, value_name = "N")]
     bins: Option<usize>,
     /// Picoseconds a bin, rounded to 1/65536 [default: 250; 92.1 for .json]
-    #[arg(long, value_name = "PS", value_parser = number::<U16F16>)]
+    #[arg(long, value_name = "PS", value_parser = number::<U16F16>, allow_hyphen_values = true)]
     bin_width_ps: Option<U16F16>,
     /// Millimetres added to every range, rounded to 1/256 [default: 0; -179.5 for .json]
     #[arg(long, value_name = "MM", value_parser = number::<I24F8>, allow_hyphen_values = true)]
@@ -41,7 +44,7 @@ pub struct Replay {
     gate: Option<(u16, u16)>,
     /// Standard deviations of the background a peak must exceed it by, 0 to 255.996, rounded to
     /// 1/256
-    #[arg(long, value_parser = number::<U8F8>, default_value = "4")]
+    #[arg(long, value_parser = number::<U8F8>, default_value = "4", allow_hyphen_values = true)]
     alpha: U8F8,
     /// Photons a reported peak holds at least
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1023))]
@@ -102,14 +105,16 @@ impl Replay {
         };
         let mut engine = host_engine(&settings, &photons.addresses())?;
         let mut output = Output::create(&self.out, &settings, photons.geometry())?;
-        let summary = run(
+        let mut summary = run(
             photons.as_mut(),
             engine.as_mut(),
             &mut output,
             &settings,
             self.quiet,
         )?;
-        let lead = format!("Recorded photons of {}.", self.input.display());
+        let input = self.input.display().to_string();
+        let lead = format!("Recorded photons of {input}.");
+        summary.input = Some(input);
         output.finish(&summary, "Asynchronous depth events", &lead, &[])?;
         if !self.quiet {
             print_summary(&summary.rows(), &self.out);
@@ -120,7 +125,14 @@ impl Replay {
     /// Reads or checks the whole file, by its extension.
     fn open(&self) -> Result<Recording> {
         let path = &self.input;
-        match path.extension().and_then(|extension| extension.to_str()) {
+        let extension = path.extension().and_then(|extension| extension.to_str());
+        let extension = extension.map(str::to_ascii_lowercase);
+        ensure!(
+            self.columns.is_none() || extension.as_deref() == Some("csv"),
+            "--columns is for photon lists; {} has its own",
+            path.display()
+        );
+        match extension.as_deref() {
             Some("npy") => {
                 let npy = npy::read(path)?;
                 self.expect_bins(npy.bins)?;
@@ -144,8 +156,12 @@ impl Replay {
                     path.display()
                 );
                 let bins = self.bins.unwrap_or(128);
+                ensure!(
+                    (8..=1024).contains(&bins) && bins.is_power_of_two(),
+                    "--bins {bins}: must be a power of two from 8 to 1024"
+                );
                 Ok(Recording::new(
-                    PhotonCsv::open(path, bins, self.cycles)?,
+                    PhotonCsv::open(path, bins, self.columns, self.cycles)?,
                     bins,
                 ))
             }
@@ -172,7 +188,7 @@ impl Replay {
         let wanted = self.bins.unwrap_or(bins);
         ensure!(
             wanted == bins,
-            "{name}: --bins {wanted}, but the file has {bins}"
+            "{name}: --bins {wanted}, but the file has {bins}; leave --bins out"
         );
         Ok(())
     }
