@@ -17,12 +17,12 @@ use dtof_core::{
     PixelConfig, RangeGate, RangeScale, Statistics,
 };
 use embedded_io::{Read, ReadReady, Write, WriteReady};
-use heapless::Vec;
 use heapless::spsc::Queue;
+use heapless::vec::{Vec, VecView};
 
 use crate::link::endpoint::{BODY_BYTES, Endpoint, Message};
 use crate::link::frame::{Deframer, FrameError, WIRE_BYTES};
-use crate::link::message::{self, Configuration, Entry, LINK_VERSION, Refusal, Report, Source};
+use crate::link::message::{self, Configuration, LINK_VERSION, Refusal, Report, Source, Token};
 
 /// Bins of every histogram.
 pub const BINS: usize = 128;
@@ -40,20 +40,20 @@ type Answer = (u8, Vec<u8, BODY_BYTES>);
 struct Photons {
     body: Vec<u8, BODY_BYTES>,
     next: usize,
-    /// Laser cycles of the entry before `next` that have not ended yet.
+    pixel: usize,
+    /// Laser cycles of the token before `next` that have not ended yet.
     cycles: u16,
 }
 
-/// Up to `PIXELS` macropixels of 128 bins behind a link.
-#[derive(Debug)]
-pub struct Sidecar<const PIXELS: usize> {
+/// Macropixels of 128 bins behind a link.
+pub struct Sidecar<'a> {
     endpoint: Endpoint,
     deframer: Deframer,
     /// A frame on its way, and how much of it has gone.
     wire: [u8; WIRE_BYTES],
     wire_length: usize,
     wire_sent: usize,
-    pixels: Vec<AsyncPixel<BINS>, PIXELS>,
+    pixels: &'a mut VecView<AsyncPixel<BINS>>,
     config: Option<PixelConfig<BINS>>,
     source: Source,
     has_sensor: bool,
@@ -68,21 +68,22 @@ pub struct Sidecar<const PIXELS: usize> {
     sensor_errors: u32,
 }
 
-impl<const PIXELS: usize> Sidecar<PIXELS> {
-    /// Waits for a host. `has_sensor` says whether photons may come from
-    /// anywhere but the link.
+impl<'a> Sidecar<'a> {
+    /// Waits for a host. `pixels` is the room for them, `has_sensor` says whether
+    /// photons may come from anywhere but the link.
     #[must_use]
-    #[allow(clippy::cast_possible_truncation)] // checked
-    pub const fn new(has_sensor: bool) -> Self {
-        const { assert!(PIXELS >= 1 && PIXELS < 65_535) };
-        let greeting = greeting(BINS as u16, PIXELS as u16);
+    pub fn new(pixels: &'a mut VecView<AsyncPixel<BINS>>, has_sensor: bool) -> Self {
+        pixels.clear();
+        let room = u16::try_from(pixels.capacity()).unwrap_or(u16::MAX);
+        #[allow(clippy::cast_possible_truncation, reason = "128")]
+        let greeting = greeting(BINS as u16, room);
         Self {
             endpoint: Endpoint::device(greeting),
             deframer: Deframer::new(),
             wire: [0; WIRE_BYTES],
             wire_length: 0,
             wire_sent: 0,
-            pixels: Vec::new(),
+            pixels,
             config: None,
             source: Source::Link,
             has_sensor,
@@ -207,14 +208,11 @@ impl<const PIXELS: usize> Sidecar<PIXELS> {
                     },
                 )
             }
-            message::PHOTONS
-                if self.config.is_some()
-                    && self.source == Source::Link
-                    && message.body.len().is_multiple_of(Entry::BYTES) =>
-            {
+            message::PHOTONS if self.config.is_some() && self.source == Source::Link => {
                 self.photons = Some(Photons {
                     body: message.body,
                     next: 0,
+                    pixel: 0,
                     cycles: 0,
                 });
                 None
@@ -244,7 +242,7 @@ impl<const PIXELS: usize> Sidecar<PIXELS> {
         if !(1..=1023).contains(&wanted.minimum_count) {
             return Err(Refusal::MinimumCount);
         }
-        if wanted.pixels == 0 || usize::from(wanted.pixels) > PIXELS {
+        if wanted.pixels == 0 || usize::from(wanted.pixels) > self.pixels.capacity() {
             return Err(Refusal::Pixels);
         }
         let gate = RangeGate::new(wanted.gate_first, wanted.gate_last)?;
@@ -296,21 +294,26 @@ impl<const PIXELS: usize> Sidecar<PIXELS> {
                 }
                 photons.cycles -= 1;
             }
-            let entry = photons
-                .body
-                .get(photons.next..)
-                .and_then(<[u8]>::first_chunk);
-            let Some(&entry) = entry else { return };
-            photons.next += Entry::BYTES;
-            match Entry::from_le_bytes(entry) {
-                Entry::Photon { pixel, code } => self.count(pixel, code),
-                Entry::EndOfCycles { cycles } => photons.cycles = cycles,
+            let left = photons.body.get(photons.next..).unwrap_or_default();
+            let Some((token, rest)) = Token::split_first(left) else {
+                // Nothing left, or nothing that means anything.
+                self.unknown = self.unknown.saturating_add(u32::from(!left.is_empty()));
+                return;
+            };
+            photons.next = photons.body.len() - rest.len();
+            match token {
+                Token::Photon { code } => self.count(photons.pixel, code),
+                Token::Advance { pixels } => photons.pixel += usize::from(pixels),
+                Token::EndOfCycles { cycles } => {
+                    photons.pixel = 0;
+                    photons.cycles = cycles;
+                }
             }
         }
     }
 
-    fn count(&mut self, pixel: u16, code: u16) {
-        match (self.pixels.get_mut(usize::from(pixel)), &self.config) {
+    fn count(&mut self, pixel: usize, code: u16) {
+        match (self.pixels.get_mut(pixel), &self.config) {
             (Some(pixel), Some(config)) => pixel.count(config, code),
             _ => self.unaddressed += 1,
         }
@@ -324,7 +327,7 @@ impl<const PIXELS: usize> Sidecar<PIXELS> {
         let cycle = LaserCycle(self.cycle);
         self.cycle += 1;
         let mut fired = false;
-        for pixel in &mut self.pixels {
+        for pixel in self.pixels.iter_mut() {
             fired |= pixel.end_laser_cycle(config, cycle) == Look::Event;
         }
         fired
@@ -333,7 +336,7 @@ impl<const PIXELS: usize> Sidecar<PIXELS> {
     /// Slots to queue, queue to messages, as far as there is room.
     fn drain(&mut self) {
         self.send_words();
-        for pixel in &mut self.pixels {
+        for pixel in self.pixels.iter_mut() {
             if !pixel.request() {
                 continue;
             }
@@ -371,7 +374,7 @@ impl<const PIXELS: usize> Sidecar<PIXELS> {
 
     fn report(&self, overrun: u32) -> Report {
         let mut statistics = Statistics::default();
-        for pixel in &self.pixels {
+        for pixel in self.pixels.iter() {
             statistics += pixel.statistics();
         }
         Report {

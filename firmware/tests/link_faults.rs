@@ -10,7 +10,7 @@ use dtof_core::{
 };
 use dtof_firmware::link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
-use dtof_firmware::link::message::{self, Configuration, Entry, Report};
+use dtof_firmware::link::message::{self, Configuration, Report, Token};
 use dtof_firmware::sidecar::{Sidecar, greeting};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -114,10 +114,12 @@ fn script(cycles: u64, rng: &mut Pcg32) -> Script {
     let mut pixels: Vec<_> = (0..PIXELS)
         .map(|address| AsyncPixel::<128>::new(PixelAddress(address)))
         .collect();
-    let mut entries = Vec::new();
+    let mut messages = vec![Vec::new()];
     let mut events = Vec::new();
     let mut photons = 0;
     for cycle in 0..cycles {
+        // One laser cycle a piece, some of them a message.
+        let mut piece = Vec::new();
         for (address, pixel) in (0..).zip(&mut pixels) {
             for _ in 0..rng.next_u32() % 3 {
                 // Half of them in one bin; a few past the last.
@@ -129,26 +131,22 @@ fn script(cycles: u64, rng: &mut Pcg32) -> Script {
                 };
                 pixel.count(&config, code);
                 photons += 1;
-                entries.extend(
-                    Entry::Photon {
-                        pixel: address,
-                        code,
-                    }
-                    .to_le_bytes(),
-                );
+                piece.extend(Token::Photon { code }.to_bytes());
             }
+            piece.extend(Token::Advance { pixels: 1 }.to_bytes());
         }
-        entries.extend(Entry::EndOfCycles { cycles: 1 }.to_le_bytes());
+        piece.extend(Token::EndOfCycles { cycles: 1 }.to_bytes());
         for pixel in &mut pixels {
             pixel.end_laser_cycle(&config, LaserCycle(cycle));
             events.extend(pixel.acknowledge());
         }
+        if messages.last().unwrap().len() + piece.len() > BODY_BYTES {
+            messages.push(Vec::new());
+        }
+        messages.last_mut().unwrap().extend(piece);
     }
     Script {
-        messages: entries
-            .chunks(BODY_BYTES / 4 * 4)
-            .map(<[u8]>::to_vec)
-            .collect(),
+        messages,
         events,
         photons,
     }
@@ -166,7 +164,8 @@ struct Outcome {
 /// Runs a session to its end. The host takes messages only in one of
 /// `reads_one_in` milliseconds.
 fn run(script: &Script, one_in: u32, reads_one_in: u32, rng: &mut Pcg32) -> Outcome {
-    let mut device = Sidecar::<{ PIXELS as usize }>::new(false);
+    let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
+    let mut device = Sidecar::new(&mut pixels, false);
     let mut host = Endpoint::host(7, greeting(0, 0), 0);
     let (mut up, mut down) = (Wire::new(one_in), Wire::new(one_in));
     let (mut up_frames, mut down_frames) = (Deframer::new(), Deframer::new());

@@ -3,7 +3,7 @@
 
 use dtof_firmware::link::endpoint::Endpoint;
 use dtof_firmware::link::frame::{Deframer, FrameError, PAYLOAD_BYTES, WIRE_BYTES, encode};
-use dtof_firmware::link::message::{Configuration, Entry, PHOTONS, Refusal, Report};
+use dtof_firmware::link::message::{Configuration, PHOTONS, Refusal, Report, Token};
 use dtof_firmware::sidecar::greeting;
 use proptest::prelude::*;
 
@@ -57,8 +57,14 @@ fn both_ends_send_the_golden_frames() {
     assert_eq!(host.peer_greeting(), &greeting(128, 64));
 
     let mut body = Vec::new();
-    body.extend(Entry::Photon { pixel: 3, code: 60 }.to_le_bytes());
-    body.extend(Entry::EndOfCycles { cycles: 1 }.to_le_bytes());
+    for token in [
+        Token::Advance { pixels: 3 },
+        Token::Photon { code: 60 },
+        Token::Photon { code: 300 },
+        Token::EndOfCycles { cycles: 1 },
+    ] {
+        body.extend(token.to_bytes());
+    }
     host.offer(PHOTONS, &body).unwrap();
     let photons = next(&mut host, 0);
     assert_eq!(hex(&photons), hex(&golden("photons 0")));
@@ -159,7 +165,16 @@ proptest! {
     }
 
     #[test]
-    fn entries_come_back(bytes: [u8; 4]) {
-        prop_assert_eq!(Entry::from_le_bytes(bytes).to_le_bytes(), bytes);
+    fn tokens_come_back(code: u16, pixels in 1u8..=64, cycles: u16) {
+        let tokens =
+            [Token::Photon { code }, Token::Advance { pixels }, Token::EndOfCycles { cycles }];
+        let bytes: Vec<u8> = tokens.iter().flat_map(|token| token.to_bytes()).collect();
+        let mut left = &bytes[..];
+        for token in tokens {
+            let (first, rest) = Token::split_first(left).unwrap();
+            prop_assert_eq!(first, token);
+            left = rest;
+        }
+        prop_assert_eq!(Token::split_first(left), None);
     }
 }

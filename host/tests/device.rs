@@ -52,15 +52,14 @@ fn serve(stream: &mut TcpStream, lives: Option<Duration>) {
     stream
         .set_read_timeout(Some(Duration::from_millis(1)))
         .unwrap();
-    let mut sidecar = Box::new(Sidecar::<PIXELS>::new(false));
+    let mut pixels = heapless::Vec::<_, PIXELS>::new();
+    let mut sidecar = Sidecar::new(&mut pixels, false);
     let mut deframer = Deframer::new();
     let started = Instant::now();
-    let mut restarted = false;
     loop {
         let now = u32::try_from(started.elapsed().as_millis()).unwrap();
-        if lives.is_some_and(|lives| !restarted && started.elapsed() > lives) {
-            *sidecar = Sidecar::new(false);
-            restarted = true;
+        if lives.is_some_and(|lives| started.elapsed() > lives) {
+            return serve(stream, None); // switched off and on
         }
         let mut bytes = [0; 1024];
         match stream.read(&mut bytes) {

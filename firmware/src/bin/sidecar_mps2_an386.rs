@@ -9,19 +9,21 @@ compile_error!("an image for a board: cargo xtask image mps2-an386");
 use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, entry, exception};
+use dtof_core::AsyncPixel;
 use dtof_firmware::board::{mps2_an386::Mps2An386, turn};
-use dtof_firmware::sidecar::Sidecar;
+use dtof_firmware::sidecar::{BINS, Sidecar};
+use heapless::Vec;
 use static_cell::ConstStaticCell;
 
 /// As many macropixels as the memory of the STM32F405 has room for.
-static SIDECAR: ConstStaticCell<Sidecar<256>> = ConstStaticCell::new(Sidecar::new(false));
+static PIXELS: ConstStaticCell<Vec<AsyncPixel<BINS>, 256>> = ConstStaticCell::new(Vec::new());
 
 #[entry]
 fn main() -> ! {
     let (mut board, mut serial) = Mps2An386::start();
     defmt::info!("mps2-an386 started");
     board.obey_command_line();
-    let sidecar = SIDECAR.take();
+    let mut sidecar = Sidecar::new(PIXELS.take(), false);
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
             let lost = serial.lost();

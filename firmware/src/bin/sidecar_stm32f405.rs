@@ -9,18 +9,20 @@ compile_error!("an image for a board: cargo xtask image stm32f405");
 use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, entry, exception};
+use dtof_core::AsyncPixel;
 use dtof_firmware::board::{stm32f405::Stm32F405, turn};
-use dtof_firmware::sidecar::Sidecar;
+use dtof_firmware::sidecar::{BINS, Sidecar};
+use heapless::Vec;
 use static_cell::ConstStaticCell;
 
 /// As many macropixels as the memory of the STM32F405 has room for.
-static SIDECAR: ConstStaticCell<Sidecar<256>> = ConstStaticCell::new(Sidecar::new(false));
+static PIXELS: ConstStaticCell<Vec<AsyncPixel<BINS>, 256>> = ConstStaticCell::new(Vec::new());
 
 #[entry]
 fn main() -> ! {
     let (mut board, mut serial) = Stm32F405::start();
     defmt::info!("stm32f405 started");
-    let sidecar = SIDECAR.take();
+    let mut sidecar = Sidecar::new(PIXELS.take(), false);
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
             let lost = serial.lost();

@@ -3,7 +3,7 @@
 //! | kind | to | message | body |
 //! |---|---|---|---|
 //! | 0x01 | device | configure | [`Configuration`], 26 bytes |
-//! | 0x02 | device | photons | entries of 4 bytes, see [`Entry`] |
+//! | 0x02 | device | photons | [`Token`]s |
 //! | 0x03 | device | synchronise | any 4 bytes |
 //! | 0x04 | device | statistics request | none |
 //! | 0x81 | host | configured | none |
@@ -22,7 +22,7 @@ pub const LINK_VERSION: u16 = 1;
 
 /// Host to device: a [`Configuration`].
 pub const CONFIGURE: u8 = 0x01;
-/// Host to device: [`Entry`] after [`Entry`].
+/// Host to device: [`Token`] after [`Token`].
 pub const PHOTONS: u8 = 0x02;
 /// Host to device: answer when all before it is done.
 pub const SYNCHRONISE: u8 = 0x03;
@@ -39,50 +39,78 @@ pub const SYNCHRONISED: u8 = 0x84;
 /// Device to host: a [`Report`].
 pub const STATISTICS: u8 = 0x85;
 
-/// What a photons message is made of.
+/// What a photons message is made of. Tokens begin at pixel 0 in each message
+/// and after each end of a laser cycle, and do not reach over the end of a
+/// message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Entry {
-    /// A photon in the present laser cycle. Pixel 65,535 cannot be named.
+pub enum Token {
+    /// A photon of the present pixel in the present laser cycle: one byte for
+    /// codes below 128, three for others.
     Photon {
-        /// Which pixel, below 65,535.
-        pixel: u16,
         /// Its TDC code.
         code: u16,
     },
-    /// The present laser cycle ends, and `cycles - 1` empty ones after it.
+    /// The present pixel is one farther on by `pixels`, 1 to 64: one byte.
+    Advance {
+        /// How many.
+        pixels: u8,
+    },
+    /// The present laser cycle ends, and `cycles - 1` empty ones after it:
+    /// three bytes.
     EndOfCycles {
-        /// At least 1.
+        /// How many; none if 0.
         cycles: u16,
     },
 }
 
-impl Entry {
-    /// Bytes of an entry.
-    pub const BYTES: usize = 4;
-    const END: u16 = u16::MAX;
+impl Token {
+    /// Bytes of the longest.
+    pub const MAX_BYTES: usize = 3;
+    const ADVANCE: u8 = 0x80;
+    const PHOTON: u8 = 0xc0;
+    const END: u8 = 0xc1;
 
     /// As it is sent.
     #[must_use]
-    pub const fn to_le_bytes(self) -> [u8; Self::BYTES] {
-        let (low, high) = match self {
-            Self::Photon { pixel, code } => (pixel, code),
+    pub fn to_bytes(self) -> Vec<u8, { Self::MAX_BYTES }> {
+        let (first, number) = match self {
+            Self::Photon { code } => match u8::try_from(code) {
+                Ok(code) if code < Self::ADVANCE => return Vec::from_iter([code]),
+                _ => (Self::PHOTON, code),
+            },
+            Self::Advance { pixels } => {
+                return Vec::from_iter([Self::ADVANCE | (pixels.wrapping_sub(1) & 0x3f)]);
+            }
             Self::EndOfCycles { cycles } => (Self::END, cycles),
         };
-        let ([a, b], [c, d]) = (low.to_le_bytes(), high.to_le_bytes());
-        [a, b, c, d]
+        let [low, high] = number.to_le_bytes();
+        Vec::from_iter([first, low, high])
     }
 
-    /// As it was received.
+    /// The first token of `bytes` and the bytes after it; `None` if there is
+    /// none.
     #[must_use]
-    pub const fn from_le_bytes([a, b, c, d]: [u8; Self::BYTES]) -> Self {
-        let (low, high) = (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]));
-        if low == Self::END {
-            Self::EndOfCycles { cycles: high }
-        } else {
-            Self::Photon {
-                pixel: low,
-                code: high,
+    pub fn split_first(bytes: &[u8]) -> Option<(Self, &[u8])> {
+        let (&first, rest) = bytes.split_first()?;
+        match first {
+            0..Self::ADVANCE => Some((Self::Photon { code: first.into() }, rest)),
+            Self::ADVANCE..Self::PHOTON => Some((
+                Self::Advance {
+                    pixels: (first & 0x3f) + 1,
+                },
+                rest,
+            )),
+            Self::PHOTON | Self::END => {
+                let (&number, rest) = rest.split_first_chunk()?;
+                let number = u16::from_le_bytes(number);
+                let token = if first == Self::PHOTON {
+                    Self::Photon { code: number }
+                } else {
+                    Self::EndOfCycles { cycles: number }
+                };
+                Some((token, rest))
             }
+            _ => None,
         }
     }
 }

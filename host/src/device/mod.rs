@@ -6,7 +6,8 @@ mod port;
 
 use anyhow::{Result, bail, ensure};
 use dtof_core::{DepthEvent, PixelAddress, Statistics};
-use dtof_firmware::link::message::{self, Configuration, Entry, Report};
+use dtof_firmware::link::endpoint::BODY_BYTES;
+use dtof_firmware::link::message::{self, Configuration, Report, Token};
 
 pub use client::Client;
 pub use port::{Port, open};
@@ -84,7 +85,7 @@ impl Engine for DeviceEngine {
         if slice.pixels.iter().any(|pixel| pixel.cycles != cycles) {
             bail!("a device cannot replay pixels whose recordings end at different times");
         }
-        let mut entries = Entries {
+        let mut tokens = Tokens {
             client: &mut self.client,
             body: Vec::new(),
         };
@@ -94,17 +95,15 @@ impl Engine for DeviceEngine {
             .map(|pixel| pixel.photons.iter().peekable())
             .collect();
         for cycle in 0..cycles {
-            for (pixel, photons) in (0..).zip(&mut photons) {
+            let mut at = 0;
+            for (pixel, photons) in photons.iter_mut().enumerate() {
                 while let Some(photon) = photons.next_if(|photon| photon.cycle == cycle) {
-                    entries.push(Entry::Photon {
-                        pixel,
-                        code: photon.code,
-                    })?;
+                    at = tokens.photon(at, pixel, photon.code)?;
                 }
             }
-            entries.push(Entry::EndOfCycles { cycles: 1 })?;
+            tokens.push(Token::EndOfCycles { cycles: 1 })?;
         }
-        entries.flush()?;
+        tokens.flush()?;
         let events = self.client.synchronise()?;
         self.report = self.client.report()?;
         Ok(events)
@@ -115,22 +114,39 @@ impl Engine for DeviceEngine {
     }
 }
 
-/// Entries on their way into photons messages.
-struct Entries<'a> {
+/// Tokens on their way into photons messages.
+struct Tokens<'a> {
     client: &'a mut Client,
     body: Vec<u8>,
 }
 
-impl Entries<'_> {
-    const FULL: usize = dtof_firmware::link::endpoint::BODY_BYTES / Entry::BYTES * Entry::BYTES;
-
-    fn push(&mut self, entry: Entry) -> Result<()> {
-        self.body.extend(entry.to_le_bytes());
-        if self.body.len() == Self::FULL {
-            self.flush()
-        } else {
-            Ok(())
+impl Tokens<'_> {
+    /// A photon of `pixel` where the present pixel is `at`; gives the present
+    /// pixel then.
+    fn photon(&mut self, mut at: usize, pixel: usize, code: u16) -> Result<usize> {
+        // The most that a photon takes: three bytes and the way from pixel 0,
+        // where a new message begins.
+        if self.body.len() + Token::MAX_BYTES + pixel.div_ceil(64) > BODY_BYTES {
+            self.flush()?;
+            at = 0;
         }
+        while at < pixel {
+            #[allow(clippy::cast_possible_truncation, reason = "at most 64")]
+            let pixels = (pixel - at).min(64) as u8;
+            self.push(Token::Advance { pixels })?;
+            at += usize::from(pixels);
+        }
+        self.push(Token::Photon { code })?;
+        Ok(at)
+    }
+
+    fn push(&mut self, token: Token) -> Result<()> {
+        let token = token.to_bytes();
+        if self.body.len() + token.len() > BODY_BYTES {
+            self.flush()?;
+        }
+        self.body.extend(token);
+        Ok(())
     }
 
     fn flush(&mut self) -> Result<()> {
