@@ -1,31 +1,45 @@
 //! `cargo xtask check-boards`: the images do in QEMU what they should.
 
-use std::io::{Read, Write};
-use std::net::TcpStream;
 use std::path::Path;
-use std::thread;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail, ensure};
-use dtof_firmware::serial::RECEIVE_CAPACITY;
+use anyhow::{Context, Result, ensure};
+use dtof::device::{Client, DeviceEngine};
+use dtof::engine::{Engine, host_engine};
+use dtof::scene;
+use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use dtof::source::{Geometry, PhotonSource};
+use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 
 use crate::firmware::Board;
 use crate::log;
 use crate::qemu::{self, Emulator};
 use crate::tools::DEFMT_PRINT;
 
-/// Bytes sent to mps2-an386 and back.
-const BYTES: usize = 1 << 20;
-
 /// Runs all of it.
 pub fn check(root: &Path) -> Result<()> {
     let cannot = qemu::cannot_run(Board::Stm32F405)?;
     let image = Board::Mps2An386.sidecar(root, &[])?;
     ends(&image)?;
-    echoes(&image)?;
+    // A million photons of 64 macropixels.
+    let array = Geometry {
+        columns: 8,
+        rows: 8,
+    };
+    for reads_every in [0, 10] {
+        let reads_every = Duration::from_secs(reads_every);
+        agrees(Board::Mps2An386, &image, array, 5300, reads_every)?;
+    }
     match cannot {
         Some(reason) => println!("{reason}"),
-        None => boots(&Board::Stm32F405.sidecar(root, &["pll-off"])?)?,
+        None => {
+            let image = Board::Stm32F405.sidecar(root, &["pll-off"])?;
+            let array = Geometry {
+                columns: 4,
+                rows: 2,
+            };
+            agrees(Board::Stm32F405, &image, array, 200, Duration::ZERO)?;
+        }
     }
     Ok(())
 }
@@ -59,92 +73,63 @@ fn ends(image: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A million random bytes come back as they were sent.
-fn echoes(image: &Path) -> Result<()> {
-    let mut emulator = Emulator::start(Board::Mps2An386, image, &[])?;
-    let mut port = emulator.connect()?;
-    let sent = random_bytes(BYTES);
-    let start = Instant::now();
-    let received = exchange(&mut port, &sent).context("mps2-an386: echo")?;
-    let seconds = start.elapsed().as_secs_f64();
-    let output = emulator.stop()?;
-    if let Some(at) = first_difference(&sent, &received) {
-        if let Ok(text) = log::decode(image, output) {
-            println!("{text}");
-        }
-        bail!("mps2-an386: byte {at} comes back wrong");
+/// What decides the events: a setting at which there are many.
+fn settings() -> Settings {
+    Settings {
+        bins: 128,
+        bin_width_ps: U16F16Number(U16F16::lit("250")),
+        offset_mm: I24F8Number(I24F8::ZERO),
+        gate: None,
+        alpha: U8F8Number(U8F8::lit("4")),
+        min_count: 5,
+        l1: 20,
+        l2: 2000,
+        x: 4,
+        seed: 1,
     }
-    println!(
-        "mps2-an386: {BYTES} bytes sent and received back in {seconds:.1} s, {:.1} kB/s each way",
-        BYTES as f64 / seconds / 1e3
-    );
-    Ok(())
 }
 
-/// The image of the real board starts and sends back a few bytes.
-fn boots(image: &Path) -> Result<()> {
-    let mut emulator = Emulator::start(Board::Stm32F405, image, &[])?;
-    let mut port = emulator.connect()?;
-    // What comes before the port is started is lost: knock until it answers.
+/// The demo's scene on a board and on this computer gives the same events and
+/// the same counts, however seldom the host reads.
+fn agrees(
+    board: Board,
+    image: &Path,
+    geometry: Geometry,
+    cycles: u16,
+    reads_every: Duration,
+) -> Result<()> {
+    let name = board.name();
+    let mut emulator = Emulator::start(board, image, &[])?;
     let start = Instant::now();
-    port.set_read_timeout(Some(Duration::from_millis(200)))?;
-    let mut answer = [0];
-    while port.read_exact(&mut answer).is_err() {
-        ensure!(
-            start.elapsed() < Duration::from_secs(20),
-            "stm32f405: does not start or does not answer"
-        );
-        port.write_all(&[0])?;
-    }
-    // The answers to what else was knocked.
-    thread::sleep(Duration::from_millis(500));
-    while port.read_exact(&mut answer).is_ok() {}
-
-    port.set_read_timeout(Some(Duration::from_secs(20)))?;
-    let sent = random_bytes(512);
-    let received = exchange(&mut port, &sent).context("stm32f405: echo")?;
-    ensure!(received == sent, "stm32f405: bytes come back wrong");
-    println!("stm32f405: boots and sends {} bytes back", sent.len());
+    let mut client = Client::new(emulator.connect()?).context(name)?;
+    client.reads_every = reads_every;
+    let settings = settings();
+    let mut photons = scene::photons(geometry, &settings, cycles.into())?;
+    let addresses = photons.addresses();
+    let slice = photons.next_slice(cycles)?;
+    let mut on_host = host_engine(&settings, &addresses)?;
+    let expected = on_host.run(&slice)?;
+    let mut on_board = DeviceEngine::new(client, &settings, &addresses)?;
+    let events = on_board.run(&slice).context(name)?;
+    ensure!(
+        events == expected,
+        "{name}: not the events of this computer"
+    );
+    let statistics = on_board.statistics();
+    ensure!(
+        statistics == on_host.statistics(),
+        "{name}: not the counts of this computer"
+    );
+    let photons = statistics.counted + statistics.saturated + statistics.rejected;
+    println!(
+        "{name}: {photons} photons of {} macropixels, {} events, each as on this computer; \
+         read every {} s; {:.0} s, {:?}",
+        addresses.len(),
+        events.len(),
+        reads_every.as_secs(),
+        start.elapsed().as_secs_f64(),
+        on_board.report().link,
+    );
     emulator.stop()?;
     Ok(())
-}
-
-/// Sends all and receives as much, with never more bytes on their way than the
-/// board has room for.
-fn exchange(port: &mut TcpStream, bytes: &[u8]) -> Result<Vec<u8>> {
-    let mut received = Vec::with_capacity(bytes.len());
-    let mut sent = 0;
-    let mut buffer = [0; 4096];
-    while received.len() < bytes.len() {
-        let room = RECEIVE_CAPACITY - (sent - received.len());
-        let next = &bytes[sent..bytes.len().min(sent + room)];
-        port.write_all(next)?;
-        sent += next.len();
-        let count = port.read(&mut buffer).with_context(|| {
-            let missing = sent - received.len();
-            format!("{missing} of {sent} bytes do not come back")
-        })?;
-        ensure!(count > 0, "QEMU closes the serial port");
-        received.extend_from_slice(&buffer[..count]);
-        ensure!(received.len() <= sent, "more comes back than was sent");
-    }
-    Ok(received)
-}
-
-/// The same every time (xorshift of Marsaglia).
-fn random_bytes(count: usize) -> Vec<u8> {
-    let mut state = 0x2545_f491_u32;
-    let mut next = || {
-        state ^= state << 13;
-        state ^= state >> 17;
-        state ^= state << 5;
-        state.to_le_bytes()[1]
-    };
-    (0..count).map(|_| next()).collect()
-}
-
-fn first_difference(left: &[u8], right: &[u8]) -> Option<usize> {
-    left.iter()
-        .zip(right)
-        .position(|(left, right)| left != right)
 }

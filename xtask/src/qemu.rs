@@ -1,14 +1,15 @@
 //! QEMU, with an image and its serial port on a TCP port.
 
 use std::fmt;
-use std::io::{ErrorKind, Read};
-use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::io::Read;
+use std::net::{Ipv4Addr, TcpListener};
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+use dtof::device::{self, Port};
 
 use crate::firmware::Board;
 use crate::tools::QEMU;
@@ -117,28 +118,19 @@ impl Emulator {
         })
     }
 
-    /// Connects to the serial port. Reading and writing fail after a while
-    /// without progress.
-    pub fn connect(&mut self) -> Result<TcpStream> {
+    /// Connects to the serial port.
+    pub fn connect(&mut self) -> Result<Box<dyn Port>> {
         let start = Instant::now();
         loop {
-            match TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)) {
-                Ok(stream) => {
-                    stream.set_nodelay(true)?;
-                    stream.set_read_timeout(Some(PATIENCE))?;
-                    stream.set_write_timeout(Some(PATIENCE))?;
-                    return Ok(stream);
-                }
-                Err(error) if error.kind() != ErrorKind::ConnectionRefused => {
-                    return Err(error).context("QEMU's serial port");
-                }
-                Err(_) => {}
-            }
+            let error = match device::open(&format!("tcp:127.0.0.1:{}", self.port)) {
+                Ok(port) => return Ok(port),
+                Err(error) => error,
+            };
             if let Some(status) = self.child.try_wait()? {
                 bail!("QEMU ended at once: {status}");
             }
             if start.elapsed() > PATIENCE {
-                bail!("QEMU does not open its serial port");
+                return Err(error).context("QEMU does not open its serial port");
             }
             thread::sleep(Duration::from_millis(20));
         }

@@ -18,20 +18,21 @@ use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 
 use super::print_summary;
 
-const CYCLES: u64 = 10_000;
-
 #[derive(Args)]
 pub struct Demo {
     /// Where the results go.
     #[arg(long, default_value = Demo::OUT)]
     out: PathBuf,
-    /// Macropixels of the array [default: 64x32; 16x8 with --device]
+    /// Macropixels of the array [default: 64x32; 8x8 with --device]
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = array)]
     array: Option<Geometry>,
     /// Decide on a device, not on this computer: `qemu` starts an emulated one, else
     /// tcp:HOST:PORT or a serial port
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
+    /// Laser cycles of the scene
+    #[arg(long, value_name = "N", default_value_t = Demo::CYCLES, value_parser = clap::value_parser!(u64).range(1..))]
+    cycles: u64,
     /// Seed of the simulated photons.
     #[arg(long, default_value_t = Demo::SEED)]
     seed: u64,
@@ -46,6 +47,7 @@ impl Default for Demo {
             out: Self::OUT.into(),
             array: None,
             device: None,
+            cycles: Self::CYCLES,
             seed: Self::SEED,
             quiet: false,
         }
@@ -55,6 +57,7 @@ impl Default for Demo {
 impl Demo {
     const OUT: &str = "out/demo";
     const SEED: u64 = 1;
+    const CYCLES: u64 = 10_000;
 
     pub fn run(&self) -> Result<()> {
         let settings = Settings {
@@ -70,12 +73,12 @@ impl Demo {
             seed: self.seed,
         };
         let (columns, rows) = if self.device.is_some() {
-            (16, 8)
+            (8, 8)
         } else {
             (64, 32)
         };
         let geometry = self.array.unwrap_or(Geometry { columns, rows });
-        let mut photons = scene::photons(geometry, &settings, CYCLES)?;
+        let mut photons = scene::photons(geometry, &settings, self.cycles)?;
         let mut engine = engine(self.device.as_deref(), &settings, &photons.addresses())?;
         let mut output = Output::create(&self.out, &settings, photons.geometry())?;
         let summary = run(

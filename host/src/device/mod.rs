@@ -3,6 +3,7 @@
 
 mod client;
 mod port;
+mod qemu;
 
 use anyhow::{Result, bail, ensure};
 use dtof_core::{DepthEvent, PixelAddress, Statistics};

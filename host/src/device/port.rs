@@ -6,6 +6,8 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 
+use super::qemu::Emulator;
+
 /// How long a port waits for a byte.
 const PATIENCE: Duration = Duration::from_millis(2);
 /// What the boards' serial ports are set to.
@@ -64,11 +66,15 @@ fn patient(result: io::Result<usize>) -> io::Result<usize> {
     }
 }
 
-/// Opens `tcp:HOST:PORT` or the serial port of that name.
+/// Opens `tcp:HOST:PORT` or the serial port of that name; `qemu` starts an
+/// emulated device and opens its port.
 ///
 /// # Errors
 /// If there is none.
 pub fn open(name: &str) -> Result<Box<dyn Port>> {
+    if name == "qemu" {
+        return Ok(Box::new(Emulator::start()?));
+    }
     if let Some(address) = name.strip_prefix("tcp:") {
         return Ok(Box::new(tcp(address).with_context(|| name.to_owned())?));
     }
