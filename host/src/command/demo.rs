@@ -79,7 +79,7 @@ impl Demo {
                     peak stands clear of the background, then starts over.";
         output.finish(&summary, "Asynchronous depth events", lead, &sections)?;
         if !self.quiet {
-            print_summary(&[summary.rows(), surfaces].concat(), &self.out);
+            print_summary(&[summary.rows(), surfaces].concat(), &self.out)?;
         }
         Ok(())
     }
