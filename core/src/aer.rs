@@ -188,6 +188,7 @@ impl AerEncoder {
     /// The word of an event, and the time word to send before it if one is
     /// due. Events need not be in order of time.
     #[inline]
+    #[must_use = "without the time word the events that follow have a wrong laser cycle"]
     pub const fn encode(&mut self, event: &DepthEvent) -> (Option<AerWord>, AerWord) {
         let high = event.cycle.0 >> CYCLE_LOW.bits;
         let time = match self.cycle_high {

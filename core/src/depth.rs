@@ -42,7 +42,8 @@ use crate::units::{BinPosition, Count, SubBinOffset};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Depth {
-    /// From the start of the peak bin: 0 to 1 bin inclusive.
+    /// From the start of the peak bin: 0 to 1 bin inclusive if that is the
+    /// highest, −0.5 to 1.5 if it is not.
     pub offset: SubBinOffset,
     /// [`Flags::SATURATED`] if the counter of the peak bin is full,
     /// [`Flags::CLIPPED`] if the window reaches past the gate.
@@ -115,7 +116,7 @@ pub struct RangeScale {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RangeScaleError {
-    /// The bin width is zero.
+    /// The bin width is zero, or so small that a bin rounds to 0 mm.
     ZeroBinWidth,
     /// The farthest or nearest position would lie beyond ±8,388 m, what the
     /// range format holds.
@@ -148,11 +149,11 @@ impl RangeScale {
         reason = "millimetres a bin are less than a sixth of the picoseconds"
     )]
     pub const fn new(bin_width: U16F16, offset: I24F8) -> Result<Self, RangeScaleError> {
-        if bin_width.to_bits() == 0 {
-            return Err(RangeScaleError::ZeroBinWidth);
-        }
         // 32 + 28 bits.
         let bin = (bin_width.to_bits() as u64 * Self::HALF_C + 500_000_000) / 1_000_000_000;
+        if bin == 0 {
+            return Err(RangeScaleError::ZeroBinWidth);
+        }
         let scale = Self {
             bin: bin as u32,
             offset,

@@ -84,6 +84,7 @@ impl EventSlot {
 
     /// ACK: takes the event, so that the pixel may fire again.
     #[inline]
+    #[must_use = "the event is taken from the slot"]
     pub const fn acknowledge(&mut self) -> Option<DepthEvent> {
         self.0.take()
     }

@@ -17,8 +17,8 @@ impl Flags {
     /// Bit 1: the depth window reaches past the range gate, so that the depth
     /// is drawn into the gate.
     pub const CLIPPED: Self = Self(1 << 1);
-    /// Bit 2: the decision was put off while the slot was full, so that the
-    /// exposure is longer than the photons asked for.
+    /// Bit 2: a decision was put off while the slot was full, so that the
+    /// exposure may be longer than the photons asked for.
     pub const DEFERRED: Self = Self(1 << 2);
 
     /// From bits, or `None` above six bits.

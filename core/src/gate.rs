@@ -96,7 +96,8 @@ impl<const BINS: usize> RangeGate<BINS> {
     #[inline]
     #[must_use]
     pub const fn contains(&self, bin: u16) -> bool {
-        self.first <= bin && bin < self.end
+        // One comparison: bins before the first wrap to the far end.
+        bin.wrapping_sub(self.first) < self.end - self.first
     }
 
     /// Where the four quadrants of the gated bins start, and where the last one

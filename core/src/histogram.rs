@@ -161,24 +161,31 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         frame: &[C; BINS],
         gate: &RangeGate<BINS>,
     ) -> u32 {
-        let mut gated_out = 0u32;
-        for (bin, (counter, &photons)) in (0..).zip(self.counts.iter_mut().zip(frame)) {
+        let gated = usize::from(gate.first())..usize::from(gate.last()) + 1;
+        let counters = self.counts.get_mut(gated.clone()).unwrap_or_default();
+        let photons = frame.get(gated.clone()).unwrap_or_default();
+        let (mut total, mut saturated, mut peak_key) = (0u32, 0u32, self.peak_key);
+        for ((counter, &photons), bin) in counters.iter_mut().zip(photons).zip(gate.first()..) {
             let photons: u32 = photons.into();
-            if !gate.contains(bin) {
-                gated_out = gated_out.saturating_add(photons);
+            if photons == 0 {
                 continue;
             }
             let before: u32 = (*counter).into();
             let taken = photons.min(W::MAX.saturating_sub(before));
             let count = before + taken;
             *counter = W::counter(count);
-            self.saturated = self.saturated.saturating_add(photons - taken);
-            self.total = self.total.wrapping_add(taken);
-            if count > 0 {
-                self.peak_key = self.peak_key.max(Self::key(count, bin.into()));
-            }
+            saturated = saturated.saturating_add(photons - taken);
+            total = total.wrapping_add(taken);
+            peak_key = peak_key.max(Self::key(count, bin.into()));
         }
-        gated_out
+        self.total = self.total.wrapping_add(total);
+        self.saturated = self.saturated.saturating_add(saturated);
+        self.peak_key = peak_key;
+        let outside = |bins: Option<&[C]>| {
+            let photons = bins.unwrap_or_default().iter();
+            photons.fold(0u32, |sum, &photons| sum.saturating_add(photons.into()))
+        };
+        outside(frame.get(..gated.start)).saturating_add(outside(frame.get(gated.end..)))
     }
 
     /// The highest bin; the lowest index wins a tie. Bin 0 with a count of 0

@@ -51,8 +51,8 @@
 //!
 //! # Rules of the crate
 //!
-//! Each module imports only from those above it in the pipeline. Configuration
-//! and state are separate types: one configuration, many pixels. Time is an
+//! Data flows one way through the pipeline. Configuration and state are separate
+//! types: one configuration, many pixels. Time is an
 //! argument. What is lost (saturated, rejected, gated out) is counted. Nothing
 //! is logged.
 //!

@@ -9,7 +9,9 @@
 //! An event goes into the pixel's slot; the pixel clears and counts on at once.
 //! While the link has not taken it the pixel does not fire again: it keeps
 //! counting and looks again X laser cycles later, and each look put off is
-//! counted as deferred. Back-pressure lengthens exposures; it loses no event.
+//! counted as deferred. Back-pressure lengthens exposures; it loses no event
+//! that was made. An exposure that reaches L2 meanwhile ends without one, and is
+//! counted apart.
 //!
 //! ```
 //! use dtof_core::fixed::types::U8F8;
@@ -166,14 +168,18 @@ pub struct Detection {
 /// pixel does at each look, on its own for histograms that arrive whole.
 ///
 /// `histogram` holds gated bins only, as [`Histogram::add_frame`] with the same
-/// gate and [`AsyncPixel::count`] see to.
+/// gate and [`AsyncPixel::count`] see to. A peak outside the gate is none.
 #[inline]
+#[must_use]
 pub fn detect<const BINS: usize, W: CounterWidth, R: DetectionRule>(
     histogram: &Histogram<BINS, W>,
     gate: &RangeGate<BINS>,
     rule: &R,
 ) -> Option<Detection> {
     let peak = histogram.peak();
+    if !gate.contains(peak.bin.raw()) {
+        return None;
+    }
     let background = rule.detect(histogram, gate, peak)?;
     let depth = centre_of_mass(histogram, gate, peak, background);
     Some(Detection {
@@ -222,6 +228,9 @@ pub struct Statistics {
     pub deferred: u64,
     /// Exposures that reached L2 without an event.
     pub expired: u64,
+    /// Of these, exposures with a decision put off: what they would have
+    /// reported is not known.
+    pub expired_deferred: u64,
 }
 
 impl AddAssign for Statistics {
@@ -234,6 +243,7 @@ impl AddAssign for Statistics {
         self.events += other.events;
         self.deferred += other.deferred;
         self.expired += other.expired;
+        self.expired_deferred += other.expired_deferred;
     }
 }
 
@@ -268,6 +278,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
                 events: 0,
                 deferred: 0,
                 expired: 0,
+                expired_deferred: 0,
             },
         }
     }
@@ -276,7 +287,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     #[inline]
     pub fn count<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, code: u16) {
         if config.gate.contains(code) || usize::from(code) >= BINS {
-            self.histogram.add(code);
+            self.histogram.add(code); // which counts a code past the last bin
         } else {
             self.statistics.gated_out += 1;
         }
@@ -315,7 +326,8 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// Ends `cycles` laser cycles at once, the last of which is `last`, and
     /// looks once if X or more have passed since the last look. With
     /// mini-frames whose length does not divide X the look so falls on the first
-    /// frame boundary after X laser cycles.
+    /// frame boundary after X laser cycles, which may leave no look between L1 and
+    /// L2 where [`PixelConfig::new`] found one.
     #[inline]
     pub fn end_laser_cycles<R: DetectionRule>(
         &mut self,
@@ -351,6 +363,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         }
         if self.exposure >= config.l2 {
             self.statistics.expired += 1;
+            self.statistics.expired_deferred += u64::from(self.deferred);
             self.restart();
             return Look::Expired;
         }
@@ -392,6 +405,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
 
     /// ACK: takes the event that waits, so that the pixel may fire again.
     #[inline]
+    #[must_use = "the event is taken from the slot"]
     pub const fn acknowledge(&mut self) -> Option<DepthEvent> {
         self.slot.acknowledge()
     }

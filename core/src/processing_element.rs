@@ -135,6 +135,7 @@ impl<const BINS: usize, R: DetectionRule, W: CounterWidth> ProcessingElement<BIN
 
     /// ACK: takes the event one macropixel holds.
     #[inline]
+    #[must_use = "the event is taken from the slot"]
     pub const fn acknowledge(&mut self, macropixel: Macropixel) -> Option<DepthEvent> {
         macropixel.of_mut(&mut self.pixels).acknowledge()
     }

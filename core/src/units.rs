@@ -1,8 +1,8 @@
 //! The quantities of the pipeline, as types: what holds a [`Count`] cannot be
 //! mistaken for a [`BinIndex`].
 //!
-//! Every type keeps its raw integer private and in range, so that a
-//! [`DepthEvent`](crate::DepthEvent) always fits its
+//! A type whose integer has a narrower range keeps it private and in range, so
+//! that a [`DepthEvent`](crate::DepthEvent) always fits its
 //! [`AerWord`](crate::AerWord). Where a conversion rounds, its name or its
 //! documentation says how.
 //!

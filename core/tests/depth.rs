@@ -231,7 +231,7 @@ fn every_position_is_within_a_hundredth_of_a_millimetre() {
     // The smallest width, the paper's two, a worst case of rounding (half of
     // 1/65,536 mm a bin too few), a wide one.
     for (width, offset) in [
-        ("0.0000152587890625", "0"),
+        ("0.00006103515625", "0"),
         ("1", "-8000000"),
         ("250", "-123.4375"),
         ("8750", "0.00390625"),
@@ -250,7 +250,8 @@ fn every_position_is_within_a_hundredth_of_a_millimetre() {
 fn every_width_rounds_within_the_bound_at_both_ends() {
     let mut rng = Pcg32::seed_from_u64(4);
     for _ in 0..1_000_000 {
-        let width = U16F16::from_bits(1 + rng.next_u32() % (54_000 << 16));
+        // From 4/65,536 ps, the smallest that is not 0 mm a bin.
+        let width = U16F16::from_bits(4 + rng.next_u32() % (54_000 << 16));
         let scale = RangeScale::new(width, I24F8::ZERO).unwrap();
         check_range(&scale, *POSITIONS.start(), width, I24F8::ZERO);
         check_range(&scale, *POSITIONS.end(), width, I24F8::ZERO);

@@ -88,6 +88,7 @@ impl Model {
         self.since_look = 0;
         if self.exposure >= u32::from(self.settings.l2) {
             self.statistics.expired += 1;
+            self.statistics.expired_deferred += u64::from(self.put_off);
             self.reset();
             return Look::Expired;
         }

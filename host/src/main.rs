@@ -2,6 +2,7 @@
 
 mod command;
 
+use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -39,8 +40,10 @@ fn main() -> ExitCode {
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
+        // Whoever reads the output has seen enough.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            complain(&format!("error: {error:#}"));
             ExitCode::FAILURE
         }
     }
@@ -58,6 +61,17 @@ fn refuse(error: &clap::Error) -> ExitCode {
     let reason: Vec<&str> = lines
         .filter(|line| !line.is_empty() && !line.starts_with("Usage:"))
         .collect();
-    eprintln!("{}", reason.join(" "));
+    complain(&reason.join(" "));
     ExitCode::from(2)
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    let io = error.downcast_ref::<io::Error>();
+    io.is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+}
+
+/// One line on standard error; if that cannot be written, nobody reads it.
+fn complain(message: &str) {
+    let line: Vec<&str> = message.lines().collect();
+    let _ = writeln!(io::stderr(), "{}", line.join(" "));
 }

@@ -22,6 +22,13 @@ pub struct PixelHistory {
 }
 
 impl PixelHistory {
+    fn push(&mut self, range_mm: f64) {
+        if self.recent.len() == MEAN_OF {
+            self.recent.pop_front();
+        }
+        self.recent.push_back(range_mm);
+    }
+
     /// The range of the last event.
     #[must_use]
     pub fn last_mm(&self) -> Option<f64> {
@@ -60,10 +67,7 @@ impl Maps {
     /// Takes one event into account.
     pub fn add(&mut self, event: &DepthEvent, scale: &RangeScale) {
         let pixel = &mut self.pixels[usize::from(event.pixel.0)];
-        if pixel.recent.len() == MEAN_OF {
-            pixel.recent.pop_front();
-        }
-        pixel.recent.push_back(range_mm(event, scale));
+        pixel.push(range_mm(event, scale));
         pixel.events += 1;
         pixel.first_cycle.get_or_insert(event.cycle.0);
     }
@@ -72,5 +76,21 @@ impl Maps {
     #[must_use]
     pub fn reporting(&self) -> usize {
         self.pixels.iter().filter(|pixel| pixel.events > 0).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_range_is_the_newest_and_the_mean_that_of_the_last_ten() {
+        let mut pixel = PixelHistory::default();
+        assert_eq!((pixel.last_mm(), pixel.mean_mm()), (None, None));
+        for range in 1..=12 {
+            pixel.push(range.into());
+        }
+        assert_eq!(pixel.last_mm(), Some(12.0));
+        assert_eq!(pixel.mean_mm(), Some(7.5)); // of 3 to 12
     }
 }

@@ -2,7 +2,7 @@
 //! the bins, the leading axes the pixels in row-major order.
 
 use std::fs::File;
-use std::io::{BufReader, Seek};
+use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
@@ -33,15 +33,16 @@ pub fn read(path: &Path) -> Result<NpyRecording> {
 
 fn read_file(path: &Path) -> Result<NpyRecording> {
     let mut file = BufReader::new(File::open(path)?);
+    let length = file.get_ref().metadata()?.len();
+    check_header(&mut file, length)?;
+    file.rewind()?;
     let header = NpyHeader::from_reader(&mut file).map_err(|error| {
         // Of a drawing of where the header is wrong, the first line.
         let reason = error.to_string();
-        anyhow!(
-            "not an .npy file: {}",
-            reason.lines().next().unwrap_or_default()
-        )
+        let reason = reason.lines().next().unwrap_or_default();
+        anyhow!("not an .npy file as numpy.save writes it: {reason}")
     })?;
-    let data_bytes = file.get_ref().metadata()?.len() - file.stream_position()?;
+    let data_bytes = length - file.stream_position()?;
     let shape = header.shape().to_vec();
 
     let DType::Plain(element) = header.dtype() else {
@@ -104,6 +105,40 @@ fn read_file(path: &Path) -> Result<NpyRecording> {
             histograms: counts.chunks(bins).map(<[u64]>::to_vec).collect(),
         },
     })
+}
+
+/// Refuses a header that would take long to read: one longer than the file or
+/// than any of plain integers, or nested deeper than a shape in a dictionary.
+fn check_header(file: &mut impl Read, length: u64) -> Result<()> {
+    let mut start = [0; 10];
+    let read = file.read_exact(&mut start);
+    ensure!(
+        read.is_ok() && start.starts_with(b"\x93NUMPY"),
+        "not an .npy file as numpy.save writes it"
+    );
+    let [.., version, _, low, high] = start;
+    let mut bytes = u64::from(u16::from_le_bytes([low, high]));
+    if version > 1 {
+        let mut more = [0; 2];
+        file.read_exact(&mut more)?;
+        bytes |= u64::from(u16::from_le_bytes(more)) << 16;
+    }
+    ensure!(
+        bytes <= length.min(4096),
+        "the header is longer than one of integers can be"
+    );
+    let mut depth = 0u32;
+    let mut header = Vec::new();
+    file.take(bytes).read_to_end(&mut header)?;
+    for byte in header {
+        match byte {
+            b'(' | b'[' | b'{' => depth += 1,
+            b')' | b']' | b'}' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        ensure!(depth <= 3, "the elements are not plain integers");
+    }
+    Ok(())
 }
 
 /// Counts of a signed type, none of which may be negative.

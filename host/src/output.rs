@@ -1,11 +1,11 @@
 //! The output folder: `events.csv`, `events.aer`, `summary.json`, the maps as
 //! SVG, and `report.html` that shows them.
 //!
-//! Every file is written beside its place and moved there when it is whole, the
-//! summary last: what is cut short never looks complete.
+//! Every file is written beside its place. When all are whole they are moved
+//! there, the summary last: a folder with a summary is complete.
 
 use std::fs;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -20,6 +20,11 @@ use crate::report::{self, Figure, Section};
 use crate::settings::Settings;
 use crate::source::Geometry;
 use crate::summary::Summary;
+
+/// What makes a folder complete: moved to its place last.
+const SUMMARY: &str = "summary.json";
+/// Names of files that are not complete begin and end so.
+const ASIDE: (&str, &str) = (".dtof-", ".partial");
 
 /// Files on their way into the output folder.
 pub struct Output {
@@ -39,6 +44,7 @@ impl Output {
         let scale = settings.range_scale()?;
         fs::create_dir_all(folder)
             .with_context(|| format!("{}: cannot be the output folder", folder.display()))?;
+        remove_leftovers(folder);
         let mut csv = BufWriter::new(aside(folder)?);
         writeln!(csv, "{}", events_csv::HEADER)?;
         let header = aer_file::Header {
@@ -113,36 +119,58 @@ impl Output {
         });
         let report = report::html(title, lead, &all, &figures);
 
-        let keep = |file: NamedTempFile, name: &str| -> Result<()> {
-            let place = self.folder.join(name);
-            file.persist(&place)
-                .map(drop)
-                .map_err(|error| error.error)
-                .with_context(|| place.display().to_string())
-        };
-        let whole = |text: &str, name: &str| -> Result<()> {
+        let aside = |text: &str| -> Result<NamedTempFile> {
             let mut file = aside(&self.folder)?;
             file.write_all(text.as_bytes())
                 .with_context(|| self.folder.display().to_string())?;
-            keep(file, name)
+            Ok(file)
         };
-        keep(flushed(self.csv)?, "events.csv")?;
-        keep(flushed(self.aer.finish()?)?, "events.aer")?;
+        // Everything is written before anything is moved to its place.
+        let mut files = vec![
+            (flushed(self.csv)?, "events.csv"),
+            (flushed(self.aer.finish()?)?, "events.aer"),
+        ];
         for picture in &pictures {
-            whole(&picture.svg, picture.name)?;
+            files.push((aside(&picture.svg)?, picture.name));
         }
-        whole(&report, "report.html")?;
-        whole(
-            &(serde_json::to_string_pretty(summary)? + "\n"),
-            "summary.json",
-        )
+        files.push((aside(&report)?, "report.html"));
+        files.push((
+            aside(&(serde_json::to_string_pretty(summary)? + "\n"))?,
+            SUMMARY,
+        ));
+
+        // Without a summary the folder does not look complete.
+        let old = self.folder.join(SUMMARY);
+        match fs::remove_file(&old) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(error).with_context(|| old.display().to_string());
+            }
+            _ => {}
+        }
+        for (file, name) in files {
+            let place = self.folder.join(name);
+            let moved = file.persist(&place).map_err(|error| error.error);
+            moved.with_context(|| place.display().to_string())?;
+        }
+        Ok(())
+    }
+}
+
+/// What a run that was killed has left. None of it is worth an error.
+fn remove_leftovers(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with(ASIDE.0) && name.ends_with(ASIDE.1) {
+            let _ = fs::remove_file(entry.path());
+        }
     }
 }
 
 /// A file in `folder` that vanishes unless it is moved to its place.
 fn aside(folder: &Path) -> Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".dtof-").suffix(".partial");
+    builder.prefix(ASIDE.0).suffix(ASIDE.1);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;

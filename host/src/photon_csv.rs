@@ -40,6 +40,8 @@ impl Rows {
     fn open(path: &Path, bins: usize) -> Result<Self> {
         let name = path.display();
         let file = File::open(path).with_context(|| name.to_string())?;
+        let kind = file.metadata().with_context(|| name.to_string())?;
+        ensure!(kind.is_file(), "{name}: not a file that can be read twice");
         let mut rows = Self {
             path: path.to_owned(),
             file: BufReader::new(file),

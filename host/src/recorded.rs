@@ -14,6 +14,13 @@ use rayon::prelude::*;
 
 use crate::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice, pixel_rng};
 
+/// Photons of a histogram and laser cycles of a recording, at most: within it
+/// the binomial numbers are exact to better than one in ten thousand.
+const MOST: u64 = 1 << 40;
+/// Photons of all pixels in one laser cycle, at most, so that they fit into
+/// memory.
+const MOST_A_CYCLE: f64 = 5e7;
+
 /// How many laser cycles a recording is taken to have lasted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RecordingLength {
@@ -36,6 +43,7 @@ pub struct Capture {
 pub struct RecordedHistograms {
     geometry: Geometry,
     cycles: u64,
+    photons_per_cycle: f64,
     /// Laser cycles of the shortest and the longest capture.
     recorded: (u64, u64),
     next_cycle: u64,
@@ -56,6 +64,7 @@ impl RecordedHistograms {
         seed: u64,
     ) -> Result<Self> {
         let mut pixels = Vec::new();
+        let mut photons_per_cycle = 0.0;
         let (mut shortest, mut longest) = (u64::MAX, 0);
         for capture in captures {
             let totals = capture
@@ -67,12 +76,15 @@ impl RecordedHistograms {
                         .try_fold(0u64, |sum, &count| sum.checked_add(count))
                 })
                 .collect::<Option<Vec<u64>>>()
-                .filter(|totals| totals.iter().all(|&total| total < 1 << 53))
-                .context("a histogram holds 2^53 photons or more")?;
+                .filter(|totals| totals.iter().all(|&total| total <= MOST))
+                .context("a histogram holds more than 2^40 photons")?;
             let brightest = totals.iter().copied().max().unwrap_or(0);
             let recorded = recorded_cycles(length, brightest, cycles)?;
             shortest = shortest.min(recorded);
             longest = longest.max(recorded);
+            #[allow(clippy::cast_precision_loss, reason = "at most 2^40")]
+            let mean = |total: &u64| *total as f64 / recorded.max(1) as f64;
+            photons_per_cycle += totals.iter().map(mean).sum::<f64>();
             for (counts, total) in capture.histograms.iter().zip(totals) {
                 let address = u16::try_from(pixels.len()).context("more than 65,536 pixels")?;
                 pixels.push(RecordedPixel {
@@ -83,8 +95,13 @@ impl RecordedHistograms {
                 });
             }
         }
+        ensure!(
+            photons_per_cycle <= MOST_A_CYCLE,
+            "{photons_per_cycle:.0} photons a laser cycle are more than {MOST_A_CYCLE:.0}"
+        );
         Ok(Self {
             geometry,
+            photons_per_cycle,
             cycles: cycles.min(longest),
             recorded: (shortest, longest),
             next_cycle: 0,
@@ -101,14 +118,20 @@ impl RecordedHistograms {
 )]
 fn recorded_cycles(length: RecordingLength, brightest: u64, wanted: u64) -> Result<u64> {
     match length {
-        RecordingLength::Cycles(cycles) => Ok(cycles),
+        RecordingLength::Cycles(cycles) => {
+            ensure!(
+                cycles <= MOST,
+                "--recorded-cycles {cycles} is more than 2^40"
+            );
+            Ok(cycles)
+        }
         // Without a photon every length is the same; last as long as asked for.
         RecordingLength::PhotonsPerCycle(_) if brightest == 0 => Ok(wanted),
         RecordingLength::PhotonsPerCycle(rate) => {
             let cycles = (brightest as f64 / rate).round().max(1.0);
             ensure!(
-                cycles < 2f64.powi(53),
-                "--photons-per-cycle {rate} makes the recording endless"
+                cycles <= MOST as f64,
+                "--photons-per-cycle {rate} makes the recording longer than 2^40 laser cycles"
             );
             Ok(cycles as u64)
         }
@@ -129,6 +152,10 @@ impl PhotonSource for RecordedHistograms {
 
     fn cycles(&self) -> u64 {
         self.cycles
+    }
+
+    fn photons_per_cycle(&self) -> f64 {
+        self.photons_per_cycle
     }
 
     fn not_replayed(&self) -> u64 {
@@ -163,7 +190,7 @@ struct RecordedPixel {
 }
 
 impl RecordedPixel {
-    #[allow(clippy::cast_precision_loss)] // both below 2^53
+    #[allow(clippy::cast_precision_loss, reason = "at most 2^40")]
     fn next_cycles(&mut self, cycles: u16) -> Result<PixelPhotons> {
         let mut received = PixelPhotons::default();
         while received.cycles < cycles && self.cycles_left > 0 {
@@ -257,6 +284,47 @@ mod tests {
         }
         assert_eq!(replayed, counts);
         assert!(photons.is_sorted_by_key(|photon| photon.cycle));
+    }
+
+    #[test]
+    fn equal_pixels_and_other_seeds_receive_other_photons() {
+        let photons = |seed| {
+            let capture = Capture {
+                histograms: vec![vec![100; 8]; 2],
+            };
+            let geometry = Geometry {
+                columns: 2,
+                rows: 1,
+            };
+            let length = RecordingLength::Cycles(1000);
+            let mut source =
+                RecordedHistograms::new(geometry, &[capture], length, 1000, seed).unwrap();
+            source.next_slice(1000).unwrap().pixels
+        };
+        let (one, other) = (photons(1), photons(2));
+        let all = [&one[0], &one[1], &other[0], &other[1]];
+        for (index, pixel) in all.iter().enumerate() {
+            assert_eq!(pixel.photons.len(), 800);
+            assert!(all[..index].iter().all(|before| before != pixel));
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_into_memory_is_refused() {
+        let refused = |count: u64, length| {
+            let capture = Capture {
+                histograms: vec![vec![count; 8]],
+            };
+            let geometry = Geometry {
+                columns: 1,
+                rows: 1,
+            };
+            RecordedHistograms::new(geometry, &[capture], length, 1, 1).is_err()
+        };
+        assert!(refused(1 << 38, RecordingLength::Cycles(1 << 40)));
+        assert!(refused(1 << 30, RecordingLength::Cycles(1)));
+        assert!(refused(1, RecordingLength::Cycles((1 << 40) + 1)));
+        assert!(!refused(1 << 30, RecordingLength::Cycles(1 << 20)));
     }
 
     #[test]

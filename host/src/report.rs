@@ -54,9 +54,7 @@ td{font-variant-numeric:tabular-nums}
 /// `sections`.
 ///
 /// The page is whole: it loads nothing and runs no script. All texts are
-/// escaped. Identifiers within a figure are made its own, so that figures with
-/// the same identifiers do not mix; identifiers in the style sheet of a figure
-/// are left as they are.
+/// escaped. Figures are taken as they are, and define no identifiers.
 #[must_use]
 pub fn html(title: &str, lead: &str, sections: &[Section], figures: &[Figure]) -> String {
     let title = text(title);
@@ -71,8 +69,8 @@ pub fn html(title: &str, lead: &str, sections: &[Section], figures: &[Figure]) -
          <body>\n<main>\n<header>\n<h1>{title}</h1>\n<p>{lead}</p>\n</header>\n\
          <div class=\"cards\">\n"
     );
-    for (index, figure) in figures.iter().enumerate() {
-        let svg = with_own_ids(figure.svg, &format!("figure-{}-", index + 1));
+    for figure in figures {
+        let svg = element(figure.svg);
         let caption = text(figure.caption);
         page += &format!("<figure>\n{svg}\n<figcaption>{caption}</figcaption>\n</figure>\n");
     }
@@ -96,83 +94,7 @@ fn text(text: &str) -> String {
     escape(&one_line(text))
 }
 
-/// The `<svg>` element of a document, with `prefix` before every identifier and
-/// every reference to one.
-fn with_own_ids(svg: &str, prefix: &str) -> String {
-    // What may precede it, such as an XML declaration, has no place in a page.
-    let mut rest = svg
-        .find("<svg")
-        .map_or(svg, |start| &svg[start..])
-        .trim_end();
-    let mut result = String::with_capacity(rest.len());
-    while let Some(start) = rest.find('<') {
-        let (content, tag) = rest.split_at(start);
-        result.push_str(content);
-        let (tag, after) = tag.split_at(tag_length(tag));
-        if tag.starts_with("<!") {
-            result.push_str(tag);
-        } else {
-            result.push_str(&tag_with_own_ids(tag, prefix));
-        }
-        rest = after;
-    }
-    result + rest
-}
-
-/// The length of the tag, comment or the like that `text` begins with. The
-/// values in a tag may contain `>`.
-fn tag_length(text: &str) -> usize {
-    for (open, close) in [("<!--", "-->"), ("<![CDATA[", "]]>")] {
-        if text.starts_with(open) {
-            return text.find(close).map_or(text.len(), |at| at + close.len());
-        }
-    }
-    let mut quote = None;
-    for (at, c) in text.char_indices() {
-        match (quote, c) {
-            (None, '"' | '\'') => quote = Some(c),
-            (None, '>') => return at + 1,
-            (Some(open), c) if c == open => quote = None,
-            _ => {}
-        }
-    }
-    text.len()
-}
-
-/// `tag` with `prefix` before the identifiers in the values of its attributes.
-fn tag_with_own_ids(tag: &str, prefix: &str) -> String {
-    let mut result = String::with_capacity(tag.len() + prefix.len());
-    let mut rest = tag;
-    while let Some(open) = rest.find(['"', '\'']) {
-        let quote = &rest[open..=open];
-        let value = &rest[open + 1..];
-        let Some(close) = value.find(quote) else {
-            break;
-        };
-        let name = rest[..open].trim_end().trim_end_matches('=').trim_end();
-        let name = name.rsplit(char::is_whitespace).next().unwrap_or(name);
-        result.push_str(&rest[..=open]);
-        result.push_str(&own_ids(name, &value[..close], prefix));
-        result.push_str(quote);
-        rest = &value[close + 1..];
-    }
-    result + rest
-}
-
-/// The `value` of the attribute `name` with `prefix` before its identifiers.
-fn own_ids(name: &str, value: &str, prefix: &str) -> String {
-    match name {
-        "id" => format!("{prefix}{value}"),
-        "href" | "xlink:href" => match value.strip_prefix('#') {
-            Some(id) => format!("#{prefix}{id}"),
-            None => value.to_owned(),
-        },
-        "aria-labelledby" | "aria-describedby" | "aria-controls" => {
-            let ids = value.split_whitespace().map(|id| format!("{prefix}{id}"));
-            ids.collect::<Vec<_>>().join(" ")
-        }
-        _ => value
-            .replace("url(#", &format!("url(#{prefix}"))
-            .replace("url('#", &format!("url('#{prefix}")),
-    }
+/// The `<svg>` element of a document: a page has no room for its declaration.
+fn element(svg: &str) -> &str {
+    svg.find("<svg").map_or("", |start| svg[start..].trim_end())
 }

@@ -11,9 +11,10 @@ use crate::settings::Settings;
 use crate::source::PhotonSource;
 use crate::summary::Summary;
 
-/// Laser cycles produced and decided at a time. Bounds the memory; changes
-/// nothing in the events.
+/// Laser cycles produced and decided at a time, at most, and about how many
+/// photons. Bounds the memory; changes nothing in the events.
 const SLICE: u16 = 256;
+const SLICE_PHOTONS: f64 = 1e7;
 
 /// Runs all of `source` and writes its events into `output`. A progress bar
 /// shows after a second, unless `quiet`, and only on a terminal.
@@ -29,9 +30,15 @@ pub fn run(
 ) -> Result<Summary> {
     let cycles = source.cycles();
     let progress = Progress::new(cycles, quiet);
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "1 to SLICE"
+    )]
+    let most = (SLICE_PHOTONS / source.photons_per_cycle()).clamp(1.0, SLICE.into()) as u16;
     let mut done = 0;
     while done < cycles {
-        let next = u16::try_from(cycles - done).map_or(SLICE, |left| left.min(SLICE));
+        let next = u16::try_from(cycles - done).map_or(most, |left| left.min(most));
         let slice = source.next_slice(next)?;
         output.write(&engine.run(&slice)?)?;
         done += u64::from(next);

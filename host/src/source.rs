@@ -62,6 +62,11 @@ pub trait PhotonSource {
     /// Laser cycles there are, from 0.
     fn cycles(&self) -> u64;
 
+    /// Photons of all pixels in a laser cycle, about; 0 if that is not known.
+    fn photons_per_cycle(&self) -> f64 {
+        0.0
+    }
+
     /// Recorded photons that no slice has held so far.
     fn not_replayed(&self) -> u64 {
         0
@@ -84,5 +89,10 @@ pub trait PhotonSource {
 /// alone, so that the order in which threads serve pixels changes nothing.
 #[must_use]
 pub fn pixel_rng(seed: u64, pixel: PixelAddress) -> Pcg64 {
-    Pcg64::seed_from_u64(seed ^ u64::from(pixel.0).rotate_left(48))
+    // A place of its own in the seed's sequence; the step is odd and about 0.6 of
+    // the period, so that places lie far apart.
+    const STEP: u128 = 0x9e37_79b9_7f4a_7c15_f39c_c060_5ced_c835;
+    let mut rng = Pcg64::seed_from_u64(seed);
+    rng.advance(STEP.wrapping_mul(pixel.0.into()));
+    rng
 }

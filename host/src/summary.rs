@@ -35,6 +35,8 @@ pub struct Summary {
     pub deferred: u64,
     /// Exposures that reached L2 without an event.
     pub expired: u64,
+    /// Of these, exposures with a decision put off.
+    pub expired_deferred: u64,
     /// Recorded photons that were not replayed, as they lie after the last
     /// laser cycle.
     pub not_replayed: u64,
@@ -62,6 +64,7 @@ impl Summary {
             events,
             deferred,
             expired,
+            expired_deferred,
         } = *statistics;
         Self {
             input: None,
@@ -76,6 +79,7 @@ impl Summary {
             gated_out,
             deferred,
             expired,
+            expired_deferred,
             not_replayed: source.not_replayed(),
             settings: settings.clone(),
         }
@@ -110,13 +114,16 @@ impl Summary {
             ),
             row("exposures without an event", self.expired),
         ]);
-        if self.events == 0 {
-            let why = if self.cycles <= u64::from(self.settings.l1) {
-                format!("none can come before laser cycle {}", self.settings.l1)
-            } else {
-                "no peak stood clear of the background".to_owned()
-            };
-            rows.push(("why no event".to_owned(), why));
+        let (x, l1) = (self.settings.x, self.settings.l1);
+        let last_look = self.cycles - self.cycles % u64::from(x);
+        if last_look <= u64::from(l1) {
+            rows.push((
+                "too short for an event".to_owned(),
+                format!(
+                    "the first decision comes after {} laser cycles",
+                    (l1 / x + 1) * x
+                ),
+            ));
         }
         // Losses are named where there are any.
         let losses = [

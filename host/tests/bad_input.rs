@@ -214,6 +214,7 @@ fn settings_that_cannot_be_are_refused() {
         (&["--alpha", "256"], "--alpha"),
         (&["--alpha", "-1"], "must be a number from 0 to"),
         (&["--alpha", "NaN"], "--alpha"),
+        (&["--alpha", "0.001"], "less than half"),
         (&["--bins", "100"], "power of two"),
         (&["--bins", "4"], "power of two"),
         (&["--bins", "2048"], "power of two"),
@@ -225,6 +226,7 @@ fn settings_that_cannot_be_are_refused() {
         (&["--min-count", "0"], "--min-count"),
         (&["--min-count", "1024"], "--min-count"),
         (&["--bin-width-ps", "0"], "bin width is zero"),
+        (&["--bin-width-ps", "0.00003"], "bin width is zero"),
         (&["--bin-width-ps", "65535"], "8388 m"),
         (&["--bin-width-ps", "wide"], "--bin-width-ps"),
         (&["--offset-mm", "9e9"], "--offset-mm"),
@@ -240,7 +242,7 @@ fn settings_that_cannot_be_are_refused() {
     for (arguments, part) in [
         (&["--photons-per-cycle", "0"][..], "--photons-per-cycle"),
         (&["--photons-per-cycle", "inf"], "--photons-per-cycle"),
-        (&["--photons-per-cycle", "1e-300"], "endless"),
+        (&["--photons-per-cycle", "1e-300"], "longer than 2^40"),
         (&["--bins", "16"], "--bins 16, but the file has 8"),
         (
             &["--photons-per-cycle", "1", "--recorded-cycles", "5"],
@@ -289,6 +291,63 @@ fn an_output_folder_that_cannot_be_written_is_refused() {
         scratch.refused(&output, &[folder]);
     }
     assert_eq!(scratch.read("taken"), "a file, not a folder");
+}
+
+#[test]
+fn a_folder_that_cannot_be_completed_has_no_summary() {
+    let scratch = Scratch::new();
+    let first = scratch.file("first.csv", format!("{CSV_HEADER}0,0,0\n"));
+    scratch.replayed(&first, &[]);
+    std::fs::remove_file(scratch.path("out/report.html")).unwrap();
+    std::fs::create_dir(scratch.path("out/report.html")).unwrap();
+    scratch.file("out/.dtof-left.partial", "from a run that was killed");
+    let second = scratch.file("second.csv", format!("{CSV_HEADER}0,0,1\n"));
+    let output = scratch.replay(&second, &[]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        !output.status.success() && message.contains("report.html"),
+        "{message}"
+    );
+    assert!(!scratch.path("out/summary.json").exists());
+    assert!(!scratch.path("out/.dtof-left.partial").exists());
+}
+
+#[test]
+fn output_that_cannot_be_written_is_an_error_not_a_panic() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
+    let full = || {
+        std::fs::File::options()
+            .write(true)
+            .open("/dev/full")
+            .unwrap()
+    };
+    let run = |arguments: &[&str], out: std::process::Stdio, err: std::process::Stdio| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_dtof"));
+        command.current_dir(scratch.path(".")).args(arguments);
+        command.stdout(out).stderr(err).output().unwrap()
+    };
+    let input = input.to_str().unwrap();
+    let arguments = ["replay", "--input", input, "--out", "out"];
+    let output = run(&arguments, full().into(), std::process::Stdio::piped());
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        String::from_utf8(output.stderr)
+            .unwrap()
+            .contains("No space left")
+    );
+    let output = run(&["decode", "none"], full().into(), full().into());
+    assert_eq!(output.status.code(), Some(1));
+}
+
+#[test]
+fn an_npy_header_made_to_take_long_is_refused_at_once() {
+    let nested = format!("{{'descr': {}'<u4'{}, }}", "[".repeat(60), "]".repeat(60));
+    npy_refused(&nested, &[0; 32], &["not plain integers"]);
+    let scratch = Scratch::new();
+    let long = [&b"\x93NUMPY\x02\x00\xff\xff\xff\xff"[..], &[b' '; 200]].concat();
+    let input = scratch.file("recorded.npy", long);
+    scratch.refused(&scratch.replay(&input, &[]), &["header is longer"]);
 }
 
 #[test]

@@ -274,6 +274,79 @@ fn a_gate_leaves_the_cover_glass_out() {
 }
 
 #[test]
+fn the_demo_is_the_papers_static_scene() {
+    let scratch = Scratch::new();
+    assert!(scratch.dtof(&["demo", "--quiet"]).status.success());
+    let summary: serde_json::Value =
+        serde_json::from_str(&scratch.read("out/demo/summary.json")).unwrap();
+    // Section III-B: α = 8, L1 = 100, L2 = 2000, X = 10, 10,000 laser cycles.
+    let settings = &summary["settings"];
+    assert_eq!(settings["alpha"], 8.0);
+    assert_eq!(
+        (&settings["l1"], &settings["l2"], &settings["x"]),
+        (&100.into(), &2000.into(), &10.into())
+    );
+    assert_eq!(
+        (&summary["cycles"], &summary["pixels"]),
+        (&10_000.into(), &2048.into())
+    );
+    // The array of the AER file's header: 64 columns, 32 rows.
+    let aer = std::fs::read(scratch.path("out/demo/events.aer")).unwrap();
+    assert_eq!(aer[12..24], [128, 0, 0, 0, 64, 0, 0, 0, 32, 0, 0, 0]);
+    // The pictures of the README are those of the demo.
+    for (picture, shown) in [
+        ("depth-last", "demo-depth"),
+        ("event-counts", "demo-events"),
+    ] {
+        let path = format!("{}/../docs/figures/{shown}.svg", env!("CARGO_MANIFEST_DIR"));
+        let committed = std::fs::read_to_string(path).unwrap();
+        assert!(
+            scratch.read(&format!("out/demo/{picture}.svg")) == committed,
+            "{shown}"
+        );
+    }
+}
+
+#[test]
+fn replay_takes_the_stated_defaults_and_keeps_quiet() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", steady(0, 60, 100));
+    let output = scratch.replay(&input, &["--quiet"]);
+    assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
+    let summary: serde_json::Value =
+        serde_json::from_str(&scratch.read("out/summary.json")).unwrap();
+    let settings = serde_json::json!({
+        "bins": 128, "bin_width_ps": 250.0, "offset_mm": 0.0, "gate": null, "alpha": 4.0,
+        "min_count": 5, "l1": 40, "l2": 2000, "x": 4, "seed": 1
+    });
+    assert_eq!(summary["settings"], settings);
+    let histogram = npy("<u4", "(8,)", &10_000u32.to_le_bytes().repeat(8));
+    let input = scratch.file("recorded.npy", histogram);
+    let summary = scratch.replayed(&input, &[]);
+    // One photon a laser cycle, the first 10,000 laser cycles.
+    assert_eq!(
+        summary["recorded_cycles"],
+        serde_json::json!([80_000, 80_000])
+    );
+    assert_eq!(summary["cycles"], 10_000);
+}
+
+#[test]
+fn an_exposure_without_an_event_is_counted() {
+    let scratch = Scratch::new();
+    // A photon every 50 laser cycles never makes a peak of five before L2.
+    let rows: String = (0..10)
+        .map(|photon| format!("0,{},60\n", photon * 50))
+        .collect();
+    let input = scratch.file("photons.csv", format!("pixel,cycle,bin\n{rows}"));
+    let summary = scratch.replayed(&input, &["--l2", "200"]);
+    assert_eq!(
+        (&summary["events"], &summary["expired"]),
+        (&0.into(), &2.into())
+    );
+}
+
+#[test]
 fn the_demo_reports_every_pixel_and_is_silent_when_asked() {
     let scratch = Scratch::new();
     let output = scratch.dtof(&["demo", "--quiet"]);
@@ -331,7 +404,7 @@ fn a_run_too_short_for_an_event_says_so() {
     let output = scratch.replay(&input, &["--cycles", "40"]);
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(
-        said.contains("none can come before laser cycle 40"),
+        said.contains("the first decision comes after 44 laser cycles"),
         "{said}"
     );
 }

@@ -34,23 +34,6 @@ pub fn quadrant_background(counts: &[f64], first: usize, last: usize, peak: usiz
     maximum(&counts[start..middle]).min(maximum(&counts[middle..end]))
 }
 
-/// The background level as the mean of all bins in `first..=last`, the peak
-/// included: the alternative that sec. IV-B finds "time- and
-/// resource-intensive".
-///
-/// # Panics
-///
-/// If `first..=last` is empty or reaches beyond the histogram.
-#[must_use]
-pub fn mean_background(counts: &[f64], first: usize, last: usize) -> f64 {
-    assert!(
-        first <= last && last < counts.len(),
-        "the window lies in the histogram"
-    );
-    let window = &counts[first..=last];
-    window.iter().sum::<f64>() / window.len() as f64
-}
-
 /// The largest of some counts, zero if there are none.
 fn maximum(counts: &[f64]) -> f64 {
     counts.iter().copied().fold(0.0, f64::max)
@@ -101,14 +84,5 @@ mod tests {
         assert_eq!(quadrant_background(&counts, 0, 2, 0), 6.0);
         // n = 1: the only bin is in the upper half, the lower has none.
         assert_eq!(quadrant_background(&counts, 1, 1, 1), 0.0);
-    }
-
-    #[test]
-    fn the_mean_takes_in_every_bin_of_the_window() {
-        let counts = [2.0, 4.0, 9.0, 1.0];
-        // (2 + 4 + 9 + 1) / 4
-        assert_eq!(mean_background(&counts, 0, 3), 4.0);
-        // (4 + 9) / 2
-        assert_eq!(mean_background(&counts, 1, 2), 6.5);
     }
 }

@@ -25,7 +25,7 @@ mod pixel;
 mod square_root;
 mod threshold;
 
-pub use background::{mean_background, quadrant_background};
+pub use background::quadrant_background;
 pub use depth::{centre_of_mass, range_mm};
 pub use histogram::Histogram;
 pub use peak::peak;

@@ -21,11 +21,7 @@ impl Decode {
         let printed = self.print(&mut out);
         // What was read before the damage is printed before the damage is named.
         let flushed = out.flush().map_err(anyhow::Error::from);
-        match printed.and(flushed) {
-            // Whoever reads has seen enough.
-            Err(error) if is_broken_pipe(&error) => Ok(()),
-            done => done,
-        }
+        printed.and(flushed)
     }
 
     fn print(&self, out: &mut impl Write) -> Result<()> {
@@ -40,9 +36,4 @@ impl Decode {
         }
         Ok(())
     }
-}
-
-fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    let io = error.downcast_ref::<io::Error>();
-    io.is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
 }

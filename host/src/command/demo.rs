@@ -102,7 +102,7 @@ impl Demo {
         );
         output.finish(&summary, "Asynchronous depth events", &lead, &sections)?;
         if !self.quiet {
-            print_summary(&[summary.rows(), surfaces].concat(), &self.out);
+            print_summary(&[summary.rows(), surfaces].concat(), &self.out)?;
         }
         Ok(())
     }

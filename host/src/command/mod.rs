@@ -4,15 +4,20 @@ pub mod decode;
 pub mod demo;
 pub mod replay;
 
+use std::io::{self, Write};
 use std::path::Path;
 
 use dtof::summary::{Row, aligned};
 
 /// What a run came to, on the terminal.
-fn print_summary(rows: &[Row], folder: &Path) {
-    print!("{}", aligned(rows));
-    println!(
-        "\nOpen {} in a browser.",
-        folder.join("report.html").display()
-    );
+fn print_summary(rows: &[Row], folder: &Path) -> io::Result<()> {
+    let report = folder.join("report.html");
+    let mut out = io::stdout().lock();
+    write!(
+        out,
+        "{}\nOpen {} in a browser.\n",
+        aligned(rows),
+        report.display()
+    )?;
+    out.flush()
 }

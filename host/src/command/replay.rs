@@ -117,7 +117,7 @@ impl Replay {
         summary.input = Some(input);
         output.finish(&summary, "Asynchronous depth events", &lead, &[])?;
         if !self.quiet {
-            print_summary(&summary.rows(), &self.out);
+            print_summary(&summary.rows(), &self.out)?;
         }
         Ok(())
     }
@@ -207,6 +207,18 @@ impl Recording {
 
 /// A fixed-point number, rounded to the nearest.
 fn number<T: FromStr + Fixed>(text: &str) -> Result<T, String> {
+    let number = parsed::<T>(text)?;
+    // Zero is meant only where zero is written.
+    if number == T::ZERO && text.contains(|digit| matches!(digit, '1'..='9')) {
+        return Err(format!(
+            "is less than half of {}, the smallest step",
+            T::DELTA
+        ));
+    }
+    Ok(number)
+}
+
+fn parsed<T: FromStr + Fixed>(text: &str) -> Result<T, String> {
     text.parse()
         .map_err(|_| format!("must be a number from {} to {}", T::MIN, T::MAX))
 }
