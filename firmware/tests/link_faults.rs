@@ -326,3 +326,134 @@ fn ten_thousand_faults_change_no_event_and_are_counted() {
     }
     println!("{faults} faults");
 }
+
+/// Runs a good wire until the host has its statistics, or the device has
+/// forgotten the session, or `milliseconds` are over.
+fn session(
+    device: &mut Sidecar<'_>,
+    number: u16,
+    script: &Script,
+    milliseconds: u32,
+) -> (Vec<DepthEvent>, Option<Report>, bool) {
+    let mut host = Endpoint::host(number, greeting(0, 0), 0);
+    let (mut up, mut down) = (Deframer::new(), Deframer::new());
+    let mut wire = [0; WIRE_BYTES];
+    let configuration = CONFIGURATION.to_le_bytes();
+    let mut to_send: VecDeque<(u8, &[u8])> = [(message::CONFIGURE, &configuration[..])]
+        .into_iter()
+        .chain(
+            script
+                .messages
+                .iter()
+                .map(|body| (message::PHOTONS, &body[..])),
+        )
+        .chain([(message::STATISTICS_REQUEST, &[][..])])
+        .collect();
+    let mut decoder = AerDecoder::new();
+    let mut events = Vec::new();
+    for now in 0..milliseconds {
+        while host.is_open() && host.has_room() {
+            let Some((kind, body)) = to_send.pop_front() else {
+                break;
+            };
+            host.offer(kind, body).unwrap();
+        }
+        let length = host.transmit(now, &mut wire);
+        for &byte in &wire[..length] {
+            if let Some(frame) = down.push(byte) {
+                device.receive(frame, now);
+            }
+        }
+        device.work(0);
+        let length = device.transmit(now, &mut wire);
+        for &byte in &wire[..length] {
+            if let Some(frame) = up.push(byte) {
+                host.receive(frame, now);
+            }
+        }
+        while let Some(message) = host.take() {
+            match message.kind {
+                message::EVENTS => {
+                    for word in message.body.chunks_exact(16) {
+                        let word = AerWord::from_le_bytes(word.try_into().unwrap());
+                        if let AerRecord::Event(event) = decoder.decode(word).unwrap() {
+                            events.push(event);
+                        }
+                    }
+                }
+                message::STATISTICS => {
+                    return (events, Report::from_le_bytes(&message.body), host.is_lost());
+                }
+                _ => {}
+            }
+        }
+        if host.is_lost() {
+            return (events, None, true);
+        }
+    }
+    (events, None, false)
+}
+
+#[test]
+fn a_host_that_restarts_begins_anew_and_gets_every_event() {
+    let mut rng = Pcg32::seed_from_u64(4);
+    let script = script(2_000, &mut rng);
+    let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
+    let mut device = Sidecar::new(&mut pixels, false);
+    for number in 1..20 {
+        // Gone in the middle of it, with messages on their way.
+        let (events, report, _) = session(&mut device, number, &script, 40);
+        assert!(report.is_none() && events.len() < script.events.len());
+        assert!(script.events.starts_with(&events));
+    }
+    let (events, report, lost) = session(&mut device, 20, &script, 100_000);
+    assert!(events == script.events && !lost);
+    assert_eq!(
+        report.unwrap().statistics.events,
+        script.events.len() as u64
+    );
+}
+
+#[test]
+fn a_device_that_restarts_is_noticed_and_serves_the_next_session() {
+    let mut rng = Pcg32::seed_from_u64(5);
+    let script = script(2_000, &mut rng);
+    let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
+    let mut device = Sidecar::new(&mut pixels, false);
+    let mut host = Endpoint::host(1, greeting(0, 0), 0);
+    let mut wire = [0; WIRE_BYTES];
+    let answer = |device: &mut Sidecar<'_>, host: &mut Endpoint, wire: &mut [u8; WIRE_BYTES]| {
+        let mut up = Deframer::new();
+        let length = device.transmit(0, wire);
+        for &byte in &wire[..length] {
+            if let Some(frame) = up.push(byte) {
+                host.receive(frame, 0);
+            }
+        }
+    };
+    // A session of the device's earlier life, which another stands for.
+    let mut earlier_pixels = heapless::Vec::<_, 1>::new();
+    let mut earlier = Sidecar::new(&mut earlier_pixels, false);
+    let mut down = Deframer::new();
+    let length = host.transmit(0, &mut wire);
+    for &byte in &wire[..length] {
+        if let Some(frame) = down.push(byte) {
+            earlier.receive(frame, 0);
+        }
+    }
+    answer(&mut earlier, &mut host, &mut wire);
+    assert!(host.is_open() && !host.is_lost());
+    host.offer(message::STATISTICS_REQUEST, &[]).unwrap();
+    let length = host.transmit(0, &mut wire);
+    for &byte in &wire[..length] {
+        if let Some(frame) = down.push(byte) {
+            device.receive(frame, 0);
+        }
+    }
+    answer(&mut device, &mut host, &mut wire);
+    assert!(host.is_lost());
+    assert_eq!(device.endpoint().counters().foreign, 1);
+
+    let (events, report, _) = session(&mut device, 2, &script, 100_000);
+    assert!(events == script.events && report.is_some());
+}

@@ -10,7 +10,7 @@
 //! | 0x82 | host | refused | a [`Refusal`], 1 byte |
 //! | 0x83 | host | events | AER words of 16 bytes |
 //! | 0x84 | host | synchronised | the 4 bytes, after all that came before them |
-//! | 0x85 | host | statistics | [`Report`], 112 bytes |
+//! | 0x85 | host | statistics | [`Report`], 120 bytes |
 
 use dtof_core::{ConfigError, GateError, RangeScaleError, Statistics};
 use heapless::Vec;
@@ -335,7 +335,7 @@ pub struct Report {
 
 impl Report {
     /// Bytes of the record.
-    pub const BYTES: usize = 9 * 8 + 10 * 4;
+    pub const BYTES: usize = 10 * 8 + 10 * 4;
 
     /// As it is sent.
     #[must_use]
@@ -348,6 +348,7 @@ impl Report {
             events,
             deferred,
             expired,
+            expired_deferred,
         } = self.statistics;
         let wide = [
             self.cycles,
@@ -358,6 +359,7 @@ impl Report {
             events,
             deferred,
             expired,
+            expired_deferred,
             self.unaddressed,
         ];
         let LinkCounters {
@@ -389,7 +391,7 @@ impl Report {
     /// As it was received, or `None` if it is not as long as the record.
     #[must_use]
     pub fn from_le_bytes(bytes: &[u8]) -> Option<Self> {
-        let (wide, narrow) = bytes.split_at_checked(9 * 8)?;
+        let (wide, narrow) = bytes.split_at_checked(10 * 8)?;
         let mut wide = wide
             .chunks_exact(8)
             .filter_map(|eight| Some(u64::from_le_bytes(eight.try_into().ok()?)));
@@ -407,6 +409,7 @@ impl Report {
                 events: wide.next()?,
                 deferred: wide.next()?,
                 expired: wide.next()?,
+                expired_deferred: wide.next()?,
             },
             unaddressed: wide.next()?,
             overrun: narrow.next()?,
