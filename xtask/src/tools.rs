@@ -64,10 +64,12 @@ pub fn set_up() {
         if !(is_root && Path::new("/etc/debian_version").exists()) {
             return None;
         }
-        let mut apt = Command::new("apt-get");
+        // A new machine may never have heard of its packages.
+        let install = "apt-get update --quiet && apt-get install --yes --quiet \
+                       --no-install-recommends qemu-system-arm";
+        let mut apt = Command::new("sh");
         apt.env("DEBIAN_FRONTEND", "noninteractive");
-        apt.args(["install", "--yes", "--quiet", "--no-install-recommends"]);
-        apt.arg(QEMU.program);
+        apt.args(["-c", install]);
         Some(apt)
     });
     install(&DEFMT_PRINT, || {
