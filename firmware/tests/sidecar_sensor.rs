@@ -10,12 +10,15 @@ use dtof_core::{
     AsyncPixel, Count, Count24, DepthEvent, Flags, Histogram, LaserCycle, PaperRule, PixelAddress,
     PixelConfig, RangeGate, detect,
 };
-use dtof_firmware::link::frame::WIRE_BYTES;
+use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::{self, Configuration, Report};
+use dtof_firmware::sensor::simulated;
 use dtof_firmware::sidecar::Sidecar;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
+/// Room for the bytes of a few milliseconds.
+type Buffers = dtof_firmware::serial::Buffers<512, 1024>;
 type Pixels = heapless::Vec<AsyncPixel<128>, 8>;
 
 fn rule() -> PaperRule {
@@ -345,4 +348,58 @@ fn histograms_without_room_for_an_event_are_counted_as_deferred() {
     assert_eq!(statistics.events + statistics.deferred, 1_000);
     // Those that were not looked at are counted all the same.
     assert_eq!(offered(&report), 1_000 * (125 * 100 + 84_000));
+}
+
+/// The main loop of an image, and 100 bytes a millisecond on the wire.
+#[test]
+fn the_simulated_scene_comes_over_a_serial_port() {
+    let mut buffers = Buffers::new();
+    let (mut interrupt, mut serial) = buffers.split(|| {});
+    let mut pixels = heapless::Vec::<AsyncPixel<128>, 16>::new();
+    let mut device = Sidecar::new(&mut pixels, true);
+    let mut sensor = simulated::scene();
+    let mut host = Host::new(1, 0);
+    let mut frames = Deframer::new();
+    let mut wire = [0; WIRE_BYTES];
+    for now_ms in 0..5_000 {
+        if now_ms == 10 {
+            let wanted = Configuration {
+                pixels: 16,
+                l1: 40,
+                l2: 2_000,
+                ..CONFIGURATION
+            };
+            host.ask(message::CONFIGURE, &wanted.to_le_bytes());
+        }
+        let length = host.endpoint.transmit(now_ms, &mut wire);
+        wire[..length]
+            .iter()
+            .for_each(|&byte| interrupt.on_receive(byte));
+        let lost = serial.lost();
+        let Ok(()) = device.poll_with(&mut sensor, &mut serial, lost, now_ms);
+        for byte in std::iter::from_fn(|| interrupt.next_to_send()).take(100) {
+            if let Some(frame) = frames.push(byte) {
+                host.endpoint.receive(frame, now_ms);
+            }
+        }
+        host.read(4);
+    }
+    assert_eq!(host.answers.len(), 1);
+    assert_eq!(host.answers[0].0, message::CONFIGURED);
+    assert_eq!(serial.lost(), 0);
+    // All pixels report, and most of the time the right bins.
+    assert!(host.events.len() > 2_000, "{}", host.events.len());
+    let right = |event: &&DepthEvent| {
+        let pulse = 20 + 6 * event.pixel.0;
+        (pulse..pulse + 3).contains(&event.peak_bin.raw())
+    };
+    let count = host.events.iter().filter(right).count();
+    assert!(
+        count * 100 > host.events.len() * 95,
+        "{count} of {}",
+        host.events.len()
+    );
+    for pixel in 0..16 {
+        assert!(host.events.iter().any(|event| event.pixel.0 == pixel));
+    }
 }
