@@ -55,7 +55,7 @@ mod tests {
     #[test]
     fn the_surface_recedes_and_fades() {
         assert_eq!(PIXELS[0], pixel(0));
-        for [near, far] in PIXELS.array_windows() {
+        for (near, far) in PIXELS.iter().zip(&PIXELS[1..]) {
             assert_eq!(far.address.0, near.address.0 + 1);
             assert_eq!(far.position, near.position + 6);
             assert!(far.signal < near.signal);
