@@ -1,14 +1,20 @@
 //! Recorded histograms of a TMF8820, when the public capture log lies at
 //! `../shared/data/tmf8820_plane_gt/distance_data.json` beside the workspace or
 //! where `TMF8820_LOG` says: as packets on a mocked bus they come out exactly as
-//! recorded.
+//! recorded, and in the sidecar give the decision of the core.
 
 mod common;
 
 use std::io::Write;
 use std::path::PathBuf;
 
-use common::tmf882x::{Bench, Counts, settings};
+use common::host::{CONFIGURATION, Host};
+use common::tmf882x::{Bench, Counts, packet, packets, settings};
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{AsyncPixel, Count, Count24, Histogram, PaperRule, RangeGate, detect};
+use dtof_firmware::link::message::Configuration;
+use dtof_firmware::sensor::Sensor;
+use dtof_firmware::sidecar::Sidecar;
 use serde_json::Value;
 
 /// Writes past the test harness, which hides what passing tests print.
@@ -44,20 +50,94 @@ fn counts(capture: &Value) -> Counts {
     histograms.try_into().unwrap()
 }
 
-#[test]
-fn recorded_histograms_come_out_as_recorded() {
+/// All captures, if the log is there.
+fn captures(of: &str) -> Option<Vec<Counts>> {
     let Some(path) = log() else {
-        tell(
-            "SKIPPED: recorded histograms over I2C: no TMF8820 capture log beside the workspace, nor in TMF8820_LOG",
-        );
-        return;
+        tell(&format!(
+            "SKIPPED: recorded histograms {of}: no TMF8820 capture log beside the workspace, nor in TMF8820_LOG"
+        ));
+        return None;
     };
     let captures: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
-    let captures = captures.as_array().unwrap();
+    let captures: Vec<_> = captures.as_array().unwrap().iter().map(counts).collect();
     assert!(!captures.is_empty());
+    Some(captures)
+}
+
+#[test]
+fn recorded_histograms_come_out_as_recorded() {
+    let Some(captures) = captures("over I2C") else {
+        return;
+    };
     let mut bench = Bench::<128>::new(settings(), &[]);
     bench.bring_up_running();
-    for capture in captures {
-        bench.set(&counts(capture));
+    for capture in &captures {
+        bench.set(capture);
     }
+}
+
+#[test]
+fn the_sidecar_decides_recorded_histograms_as_the_core_does() {
+    let Some(captures) = captures("in the sidecar") else {
+        return;
+    };
+    // The reference is pixel 99, which is none of the sidecar's; the zones are 10
+    // to 18, the centre one 14.
+    let mut pixels = heapless::Vec::<AsyncPixel<128>, 19>::new();
+    let mut device = Sidecar::new(&mut pixels, true);
+    let mut host = Host::new(1, 0);
+    let wanted = Configuration {
+        alpha: 4 << 8,
+        minimum_count: 5,
+        pixels: 19,
+        ..CONFIGURATION
+    };
+    host.configure(&mut device, 0, &wanted);
+    let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+    let gate = RangeGate::full();
+
+    let mut bench = Bench::<128>::new(settings(), &[]);
+    bench.bring_up_running();
+    let mut expected = Vec::new();
+    for capture in &captures {
+        for bytes in packets(capture) {
+            bench.interrupt.set(false);
+            bench.i2c.update_expectations(&packet(0x41, &bytes, 128));
+            bench.sensor.poll(bench.now_ms, &mut device).unwrap();
+            bench.i2c.done();
+            bench.interrupt.set(true);
+        }
+        host.exchange(&mut device, 0);
+        host.read(4);
+        let mut histogram = Histogram::<128, Count24>::new();
+        // The reference comes first, the centre zone is the fifth of nine.
+        histogram.add_frame(&capture[5], &gate);
+        expected.push(detect(&histogram, &gate, &rule));
+    }
+    let report = host.report(&mut device, 0);
+    let decided = captures.len() as u64 * 9;
+    let statistics = report.statistics;
+    assert_eq!(statistics.events + statistics.expired, decided);
+    assert_eq!(report.cycles, captures.len() as u64 * 10);
+    assert_eq!(statistics.deferred, 0);
+    let reference = captures.iter().flat_map(|capture| capture[0]);
+    assert_eq!(report.unaddressed, reference.map(u64::from).sum::<u64>());
+
+    let mut events = host.events.iter().filter(|event| event.pixel.0 == 14);
+    for detection in expected.iter().flatten() {
+        let event = events.next().unwrap();
+        assert_eq!(event.peak_bin, detection.peak.bin);
+        assert_eq!(event.peak_count, detection.peak.count);
+        assert_eq!(event.offset, detection.depth.offset);
+        assert_eq!(event.background, detection.background);
+        assert_eq!((event.flags, event.exposure), (detection.depth.flags, 1));
+    }
+    assert!(events.next().is_none());
+    let centre = expected.iter().flatten().count();
+    assert!(centre > 0);
+    println!(
+        "{} captures: {} events, {centre} of the centre zone",
+        captures.len(),
+        statistics.events
+    );
 }

@@ -14,6 +14,7 @@ pub mod device;
 pub mod engine;
 pub mod events_csv;
 pub mod maps;
+pub mod monitor;
 pub mod npy;
 pub mod output;
 pub mod photon_csv;

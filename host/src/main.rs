@@ -25,6 +25,8 @@ enum Command {
     Replay(Box<command::replay::Replay>),
     /// Print the events of an AER file as CSV.
     Decode(command::decode::Decode),
+    /// Print the events of a device with a sensor as CSV, as they come.
+    Monitor(Box<command::monitor::Monitor>),
 }
 
 fn main() -> ExitCode {
@@ -37,6 +39,7 @@ fn main() -> ExitCode {
         Some(Command::Demo(demo)) => demo.run(),
         Some(Command::Replay(replay)) => replay.run(),
         Some(Command::Decode(decode)) => decode.run(),
+        Some(Command::Monitor(monitor)) => monitor.run(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

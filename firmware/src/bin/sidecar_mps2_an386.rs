@@ -11,6 +11,7 @@ use core::panic::PanicInfo;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use dtof_core::AsyncPixel;
 use dtof_firmware::board::{mps2_an386::Mps2An386, turn};
+use dtof_firmware::sensor::simulated;
 use dtof_firmware::sidecar::{BINS, Sidecar};
 use heapless::Vec;
 use static_cell::ConstStaticCell;
@@ -23,11 +24,12 @@ fn main() -> ! {
     let (mut board, mut serial) = Mps2An386::start();
     defmt::info!("mps2-an386 started");
     board.obey_command_line();
-    let mut sidecar = Sidecar::new(PIXELS.take(), false);
+    let mut sidecar = Sidecar::new(PIXELS.take(), true);
+    let mut sensor = simulated::scene();
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
             let lost = serial.lost();
-            let Ok(()) = sidecar.poll(serial, lost, now_ms);
+            let Ok(()) = sidecar.poll_with(&mut sensor, serial, lost, now_ms);
         });
     }
 }

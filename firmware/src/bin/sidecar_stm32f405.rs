@@ -11,6 +11,7 @@ use core::panic::PanicInfo;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use dtof_core::AsyncPixel;
 use dtof_firmware::board::{stm32f405::Stm32F405, turn};
+use dtof_firmware::sensor::simulated;
 use dtof_firmware::sidecar::{BINS, Sidecar};
 use heapless::Vec;
 use static_cell::ConstStaticCell;
@@ -22,11 +23,12 @@ static PIXELS: ConstStaticCell<Vec<AsyncPixel<BINS>, 256>> = ConstStaticCell::ne
 fn main() -> ! {
     let (mut board, mut serial) = Stm32F405::start();
     defmt::info!("stm32f405 started");
-    let mut sidecar = Sidecar::new(PIXELS.take(), false);
+    let mut sidecar = Sidecar::new(PIXELS.take(), true);
+    let mut sensor = simulated::scene();
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
             let lost = serial.lost();
-            let Ok(()) = sidecar.poll(serial, lost, now_ms);
+            let Ok(()) = sidecar.poll_with(&mut sensor, serial, lost, now_ms);
         });
     }
 }

@@ -319,7 +319,8 @@ impl From<RangeScaleError> for Refusal {
 pub struct Report {
     /// Laser cycles that have ended.
     pub cycles: u64,
-    /// All pixels together.
+    /// All pixels and whole histograms together; of events those sent before
+    /// the report.
     pub statistics: Statistics,
     /// Photons of pixels the device does not have.
     pub unaddressed: u64,

@@ -3,6 +3,7 @@
 
 #![allow(dead_code, reason = "no test uses all of it")]
 
+pub mod host;
 pub mod tmf882x;
 
 use std::cell::{Cell, RefCell};

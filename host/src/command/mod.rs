@@ -2,6 +2,8 @@
 
 pub mod decode;
 pub mod demo;
+pub mod monitor;
+mod operation;
 pub mod replay;
 
 use std::io::{self, Write};

@@ -1,7 +1,6 @@
 //! `dtof replay`: recorded photons or histograms through the engine.
 
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
@@ -10,12 +9,11 @@ use dtof::output::Output;
 use dtof::photon_csv::PhotonCsv;
 use dtof::recorded::{Capture, RecordedHistograms, RecordingLength};
 use dtof::run::run;
-use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
 use dtof::source::{Geometry, PhotonSource};
 use dtof::{npy, tmf8820};
-use dtof_core::fixed::traits::Fixed;
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::fixed::types::{I24F8, U16F16};
 
+use super::operation::{Operation, number};
 use super::print_summary;
 
 #[derive(Args)]
@@ -39,25 +37,8 @@ pub struct Replay {
     /// Millimetres added to every range, rounded to 1/256 [default: 0; -179.5 for .json]
     #[arg(long, value_name = "MM", value_parser = number::<I24F8>, allow_hyphen_values = true)]
     offset_mm: Option<I24F8>,
-    /// Only these bins may hold the peak, both inclusive [default: all]
-    #[arg(long, value_name = "FIRST..LAST", value_parser = gate)]
-    gate: Option<(u16, u16)>,
-    /// Standard deviations of the background a peak must exceed it by, 0 to 255.996, rounded to
-    /// 1/256
-    #[arg(long, value_parser = number::<U8F8>, default_value = "4", allow_hyphen_values = true)]
-    alpha: U8F8,
-    /// Photons a reported peak holds at least
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1023))]
-    min_count: u16,
-    /// The exposure a decision must exceed, in laser cycles
-    #[arg(long, value_name = "N", default_value_t = 40)]
-    l1: u16,
-    /// The exposure at which a pixel starts over without an event, in laser cycles
-    #[arg(long, value_name = "N", default_value_t = 2000)]
-    l2: u16,
-    /// Laser cycles between looks
-    #[arg(long, value_name = "N", default_value_t = 4)]
-    x: u16,
+    #[command(flatten)]
+    operation: Operation,
     /// Histograms: photons a laser cycle in the brightest pixel of each capture [default: 1]
     #[arg(long, value_name = "R", value_parser = rate, conflicts_with = "recorded_cycles")]
     photons_per_cycle: Option<f64>,
@@ -91,18 +72,12 @@ impl Replay {
             bin_width_ps,
             offset_mm,
         } = self.open()?;
-        let settings = Settings {
+        let settings = self.operation.settings(
             bins,
-            bin_width_ps: U16F16Number(self.bin_width_ps.unwrap_or(bin_width_ps)),
-            offset_mm: I24F8Number(self.offset_mm.unwrap_or(offset_mm)),
-            gate: self.gate,
-            alpha: U8F8Number(self.alpha),
-            min_count: self.min_count,
-            l1: self.l1,
-            l2: self.l2,
-            x: self.x,
-            seed: self.seed,
-        };
+            self.bin_width_ps.unwrap_or(bin_width_ps),
+            self.offset_mm.unwrap_or(offset_mm),
+            self.seed,
+        );
         let mut engine = host_engine(&settings, &photons.addresses())?;
         let mut output = Output::create(&self.out, &settings, photons.geometry())?;
         let mut summary = run(
@@ -205,33 +180,8 @@ impl Recording {
     }
 }
 
-/// A fixed-point number, rounded to the nearest.
-fn number<T: FromStr + Fixed>(text: &str) -> Result<T, String> {
-    let number = parsed::<T>(text)?;
-    // Zero is meant only where zero is written.
-    if number == T::ZERO && text.contains(|digit| matches!(digit, '1'..='9')) {
-        return Err(format!(
-            "is less than half of {}, the smallest step",
-            T::DELTA
-        ));
-    }
-    Ok(number)
-}
-
-fn parsed<T: FromStr + Fixed>(text: &str) -> Result<T, String> {
-    text.parse()
-        .map_err(|_| format!("must be a number from {} to {}", T::MIN, T::MAX))
-}
-
 fn rate(text: &str) -> Result<f64, String> {
     let rate = text.parse::<f64>().ok();
     rate.filter(|rate| rate.is_finite() && *rate > 0.0)
         .ok_or("must be a number above 0".to_owned())
-}
-
-fn gate(text: &str) -> Result<(u16, u16), String> {
-    let bins = text
-        .split_once("..")
-        .and_then(|(first, last)| Some((first.parse().ok()?, last.parse().ok()?)));
-    bins.ok_or("must be FIRST..LAST, as 20..119".to_owned())
 }

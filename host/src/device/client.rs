@@ -128,11 +128,27 @@ impl Client {
     /// # Errors
     /// If the device is gone.
     pub fn report(&mut self) -> Result<Report> {
-        self.send(message::STATISTICS_REQUEST, &[])?;
-        let answer = self.answer()?;
-        Report::from_le_bytes(&answer.body)
-            .filter(|_| answer.kind == message::STATISTICS)
-            .context("the device answers with no statistics")
+        self.request_report()?;
+        report(&self.answer()?)
+    }
+
+    /// Asks what the device has done so far; [`Self::poll_report`] gives the
+    /// answer.
+    ///
+    /// # Errors
+    /// If the device is gone.
+    pub fn request_report(&mut self) -> Result<()> {
+        self.send(message::STATISTICS_REQUEST, &[])
+    }
+
+    /// [`Self::exchange`], and takes what has arrived: events, which
+    /// [`Self::take_events`] gives, and the report if it was asked for.
+    ///
+    /// # Errors
+    /// If the device is gone.
+    pub fn poll_report(&mut self) -> Result<Option<Report>> {
+        self.exchange()?;
+        self.next()?.map(|answer| report(&answer)).transpose()
     }
 
     /// The events that have arrived.
@@ -230,4 +246,11 @@ impl Client {
     fn now_ms(&self) -> u32 {
         self.started.elapsed().as_millis() as u32
     }
+}
+
+/// A message that must be a report.
+fn report(answer: &Message) -> Result<Report> {
+    Report::from_le_bytes(&answer.body)
+        .filter(|_| answer.kind == message::STATISTICS)
+        .context("the device answers with no statistics")
 }

@@ -51,6 +51,7 @@
 //! ```
 
 mod poisson;
+mod scene;
 
 use core::convert::Infallible;
 use core::fmt;
@@ -64,6 +65,7 @@ use rand_pcg::Pcg32;
 use super::{PhotonSink, Polled, Sensor};
 
 pub use self::poisson::Poisson;
+pub use self::scene::scene;
 
 /// The stream of random numbers; any will do.
 const STREAM: u64 = 0x6474_6f66;

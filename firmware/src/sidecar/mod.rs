@@ -9,12 +9,14 @@
 //! an event cannot leave its slot: the host stops being acknowledged, stops
 //! sending, and the events are those of an engine with all the room in the
 //! world. A sensor does not wait; there the slot stays full and the pixel puts
-//! its decisions off, as the paper has it.
+//! its decisions off, as the paper has it. [`Sidecar::poll_with`] asks the sensor
+//! as well.
 
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+mod configuration;
+mod photons;
+mod sensor;
 use dtof_core::{
-    AER_VERSION, AerEncoder, AerWord, AsyncPixel, Count, LaserCycle, Look, PaperRule, PixelAddress,
-    PixelConfig, RangeGate, RangeScale, Statistics,
+    AER_VERSION, AerEncoder, AerWord, AsyncPixel, DepthEvent, PixelConfig, Statistics,
 };
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::spsc::Queue;
@@ -22,7 +24,9 @@ use heapless::vec::{Vec, VecView};
 
 use crate::link::endpoint::{BODY_BYTES, Endpoint, Message};
 use crate::link::frame::{Deframer, FrameError, WIRE_BYTES};
-use crate::link::message::{self, Configuration, LINK_VERSION, Refusal, Report, Source, Token};
+use crate::link::message::{self, Configuration, LINK_VERSION, Refusal, Report, Source};
+
+use self::photons::Photons;
 
 /// Bins of every histogram.
 pub const BINS: usize = 128;
@@ -34,16 +38,6 @@ const WORDS: usize = BODY_BYTES / AerWord::BYTES;
 
 /// The kind and the body of a message.
 type Answer = (u8, Vec<u8, BODY_BYTES>);
-
-/// A photons message and how far it has been worked through.
-#[derive(Debug)]
-struct Photons {
-    body: Vec<u8, BODY_BYTES>,
-    next: usize,
-    pixel: usize,
-    /// Laser cycles of the token before `next` that have not ended yet.
-    cycles: u16,
-}
 
 /// Macropixels of 128 bins behind a link.
 pub struct Sidecar<'a> {
@@ -63,6 +57,12 @@ pub struct Sidecar<'a> {
     encoder: AerEncoder,
     words: Queue<AerWord, QUEUE>,
     cycle: u64,
+    /// Laser cycles since the pixels looked last: all look at once.
+    since_look: u16,
+    /// What was done with histograms that came whole.
+    whole: Statistics,
+    /// The pixel whose slot is emptied next.
+    turn: usize,
     unaddressed: u64,
     unknown: u32,
     sensor_errors: u32,
@@ -92,6 +92,9 @@ impl<'a> Sidecar<'a> {
             encoder: AerEncoder::new(),
             words: Queue::new(),
             cycle: 0,
+            since_look: 0,
+            whole: Statistics::default(),
+            turn: 0,
             unaddressed: 0,
             unknown: 0,
             sensor_errors: 0,
@@ -167,13 +170,13 @@ impl<'a> Sidecar<'a> {
     /// what the serial port has lost so far.
     pub fn work(&mut self, overrun: u32) {
         loop {
-            self.drain();
             if let Some((kind, body)) = &self.answer {
                 if self.endpoint.offer(*kind, body).is_err() {
                     return;
                 }
                 self.answer = None;
             }
+            self.drain();
             if self.photons.is_some() {
                 self.work_through();
                 if self.photons.is_some() {
@@ -209,12 +212,7 @@ impl<'a> Sidecar<'a> {
                 )
             }
             message::PHOTONS if self.config.is_some() && self.source == Source::Link => {
-                self.photons = Some(Photons {
-                    body: message.body,
-                    next: 0,
-                    pixel: 0,
-                    cycles: 0,
-                });
+                self.photons = Some(Photons::new(message.body));
                 None
             }
             message::SYNCHRONISE => Some((message::SYNCHRONISED, message.body)),
@@ -229,41 +227,6 @@ impl<'a> Sidecar<'a> {
         }
     }
 
-    /// Validates a configuration and takes it on, all pixels at the beginning of
-    /// an exposure. The one before stays if it is refused.
-    fn configure(&mut self, wanted: &Configuration) -> Result<(), Refusal> {
-        let source = match (wanted.source, wanted.rule) {
-            (0, 0) => Source::Link,
-            (1, 0) if self.has_sensor => Source::Sensor,
-            (1, 0) => return Err(Refusal::NoSensor),
-            _ => return Err(Refusal::Unknown),
-        };
-        let minimum = Count::saturating(wanted.minimum_count.into());
-        if !(1..=1023).contains(&wanted.minimum_count) {
-            return Err(Refusal::MinimumCount);
-        }
-        if wanted.pixels == 0 || usize::from(wanted.pixels) > self.pixels.capacity() {
-            return Err(Refusal::Pixels);
-        }
-        let gate = RangeGate::new(wanted.gate_first, wanted.gate_last)?;
-        let rule = PaperRule::new(U8F8::from_bits(wanted.alpha), minimum);
-        let config = PixelConfig::new(wanted.x, wanted.l1, wanted.l2, gate, rule)?;
-        RangeScale::new(
-            U16F16::from_bits(wanted.bin_width),
-            I24F8::from_bits(wanted.offset),
-        )?;
-        self.pixels.clear();
-        for address in 0..wanted.pixels {
-            // There is room: checked above.
-            let _ = self.pixels.push(AsyncPixel::new(PixelAddress(address)));
-        }
-        self.config = Some(config);
-        self.source = source;
-        self.unaddressed = 0;
-        self.cycle = 0;
-        Ok(())
-    }
-
     /// A new session: nothing is left of the one before.
     fn start_over(&mut self) {
         self.pixels.clear();
@@ -272,92 +235,68 @@ impl<'a> Sidecar<'a> {
         self.photons = None;
         self.answer = None;
         self.encoder = AerEncoder::new();
-        self.cycle = 0;
-        self.unaddressed = 0;
+        self.restart_counts();
         while self.words.dequeue().is_some() {}
     }
 
-    /// Works through a photons message until it is done or an event cannot
-    /// leave its slot.
-    fn work_through(&mut self) {
-        let Some(mut photons) = self.photons.take() else {
-            return;
-        };
-        loop {
-            while photons.cycles > 0 {
-                if self.pixels.iter().any(AsyncPixel::request) {
-                    self.photons = Some(photons);
-                    return;
-                }
-                if self.end_laser_cycle() {
-                    self.drain();
-                }
-                photons.cycles -= 1;
-            }
-            let left = photons.body.get(photons.next..).unwrap_or_default();
-            let Some((token, rest)) = Token::split_first(left) else {
-                // Nothing left, or nothing that means anything.
-                self.unknown = self.unknown.saturating_add(u32::from(!left.is_empty()));
-                return;
-            };
-            photons.next = photons.body.len() - rest.len();
-            match token {
-                Token::Photon { code } => self.count(photons.pixel, code),
-                Token::Advance { pixels } => photons.pixel += usize::from(pixels),
-                Token::EndOfCycles { cycles } => {
-                    photons.pixel = 0;
-                    photons.cycles = cycles;
-                }
-            }
-        }
+    /// What the host asks, if that is what it has sent next.
+    fn question(&self) -> Option<u8> {
+        let next = self.endpoint.peek()?.kind;
+        (next != message::PHOTONS).then_some(next)
     }
 
-    fn count(&mut self, pixel: usize, code: u16) {
-        match (self.pixels.get_mut(pixel), &self.config) {
-            (Some(pixel), Some(config)) => pixel.count(config, code),
-            _ => self.unaddressed += 1,
-        }
-    }
-
-    /// Whether one of the pixels fired.
-    fn end_laser_cycle(&mut self) -> bool {
-        let Some(config) = &self.config else {
-            return false;
-        };
-        let cycle = LaserCycle(self.cycle);
-        self.cycle += 1;
-        let mut fired = false;
-        for pixel in self.pixels.iter_mut() {
-            fired |= pixel.end_laser_cycle(config, cycle) == Look::Event;
-        }
-        fired
+    /// Whether events stay in their slots for now: photons of a sensor do not
+    /// wait, so that a question would never be answered if all events that come
+    /// meanwhile went before the answer.
+    fn holds_slots(&self) -> bool {
+        self.source == Source::Sensor
+            && self
+                .question()
+                .is_some_and(|kind| kind != message::CONFIGURE)
     }
 
     /// Slots to queue, queue to messages, as far as there is room.
     fn drain(&mut self) {
         self.send_words();
-        for pixel in self.pixels.iter_mut() {
+        if self.holds_slots() {
+            return;
+        }
+        // From where there was no room for more, so that each pixel has its turn.
+        let turn = core::mem::take(&mut self.turn);
+        let pixels = self.pixels.len();
+        for index in (turn..pixels).chain(0..turn) {
+            let Some(pixel) = self.pixels.get_mut(index) else {
+                break;
+            };
             if !pixel.request() {
                 continue;
             }
-            // An event may need a time word before it.
-            if self.words.capacity() - self.words.len() < 2 {
-                return;
+            if !has_room_for_event(&self.words) {
+                self.turn = index;
+                break;
             }
             if let Some(event) = pixel.acknowledge() {
-                let (time, word) = self.encoder.encode(&event);
-                for word in time.into_iter().chain([word]) {
-                    let _ = self.words.enqueue(word); // there is room for both
-                }
+                self.enqueue(&event);
             }
         }
         self.send_words();
     }
 
-    /// A full message at once, a smaller one only when nothing else is under way.
+    /// Takes an event for which there is room.
+    fn enqueue(&mut self, event: &DepthEvent) {
+        let (time, word) = self.encoder.encode(event);
+        for word in time.into_iter().chain([word]) {
+            let _ = self.words.enqueue(word);
+        }
+    }
+
+    /// A full message at once, a smaller one only when nothing else is under way
+    /// or an answer waits for it.
     fn send_words(&mut self) {
-        while self.words.len() >= WORDS || (!self.words.is_empty() && self.endpoint.is_settled()) {
-            if !self.endpoint.has_room() {
+        let all = self.endpoint.is_settled() || self.question().is_some();
+        while self.words.len() >= WORDS || (!self.words.is_empty() && all) {
+            // An answer stands before the events that came after the question.
+            if self.answer.is_some() || !self.endpoint.has_room() {
                 return;
             }
             let words = core::iter::from_fn(|| self.words.dequeue()).take(WORDS);
@@ -367,16 +306,32 @@ impl<'a> Sidecar<'a> {
         }
     }
 
-    /// Whether every event has become a message.
+    /// Whether every event before a question has become a message.
     fn is_drained(&self) -> bool {
-        self.words.is_empty() && !self.pixels.iter().any(AsyncPixel::request)
+        self.words.is_empty() && (self.holds_slots() || self.waiting() == 0)
+    }
+
+    /// Events that have not left their slots.
+    fn waiting(&self) -> u64 {
+        let waiting = self.pixels.iter().filter(|pixel| pixel.request());
+        waiting.map(|_| 1).sum()
+    }
+
+    fn restart_counts(&mut self) {
+        self.cycle = 0;
+        self.since_look = 0;
+        self.whole = Statistics::default();
+        self.turn = 0;
+        self.unaddressed = 0;
     }
 
     fn report(&self, overrun: u32) -> Report {
-        let mut statistics = Statistics::default();
+        let mut statistics = self.whole;
         for pixel in self.pixels.iter() {
             statistics += pixel.statistics();
         }
+        // Those that were sent before the report.
+        statistics.events -= self.waiting();
         Report {
             cycles: self.cycle,
             statistics,
@@ -387,6 +342,11 @@ impl<'a> Sidecar<'a> {
             link: *self.endpoint.counters(),
         }
     }
+}
+
+/// An event may need a time word before it.
+fn has_room_for_event(words: &Queue<AerWord, QUEUE>) -> bool {
+    words.capacity() - words.len() >= 2
 }
 
 /// What an end says of itself: versions of link and AER words, and of a device

@@ -1,0 +1,96 @@
+//! Photons into pixels, and those that come over the link.
+
+use dtof_core::{AsyncPixel, LaserCycle, Look};
+use heapless::vec::Vec;
+
+use super::Sidecar;
+use crate::link::endpoint::BODY_BYTES;
+use crate::link::message::Token;
+
+/// A photons message and how far it has been worked through.
+#[derive(Debug)]
+pub(super) struct Photons {
+    body: Vec<u8, BODY_BYTES>,
+    next: usize,
+    pixel: usize,
+    /// Laser cycles of the token before `next` that have not ended yet.
+    cycles: u16,
+}
+
+impl Photons {
+    pub(super) const fn new(body: Vec<u8, BODY_BYTES>) -> Self {
+        Self {
+            body,
+            next: 0,
+            pixel: 0,
+            cycles: 0,
+        }
+    }
+}
+
+impl Sidecar<'_> {
+    /// Works through a photons message until it is done or an event cannot
+    /// leave its slot.
+    pub(super) fn work_through(&mut self) {
+        let Some(mut photons) = self.photons.take() else {
+            return;
+        };
+        loop {
+            while photons.cycles > 0 {
+                if self.pixels.iter().any(AsyncPixel::request) {
+                    self.photons = Some(photons);
+                    return;
+                }
+                photons.cycles -= self.end_laser_cycles_to_look(photons.cycles);
+            }
+            let left = photons.body.get(photons.next..).unwrap_or_default();
+            let Some((token, rest)) = Token::split_first(left) else {
+                // Nothing left, or nothing that means anything.
+                self.unknown = self.unknown.saturating_add(u32::from(!left.is_empty()));
+                return;
+            };
+            photons.next = photons.body.len() - rest.len();
+            match token {
+                Token::Photon { code } => self.count(photons.pixel, code),
+                Token::Advance { pixels } => photons.pixel += usize::from(pixels),
+                Token::EndOfCycles { cycles } => {
+                    photons.pixel = 0;
+                    photons.cycles = cycles;
+                }
+            }
+        }
+    }
+
+    pub(super) fn count(&mut self, pixel: usize, code: u16) {
+        match (self.pixels.get_mut(pixel), &self.config) {
+            (Some(pixel), Some(config)) => pixel.count(config, code),
+            _ => self.unaddressed += 1,
+        }
+    }
+
+    /// Ends up to `cycles` laser cycles, but none after the one at whose end the
+    /// pixels look, and says how many. The events go as far as there is room.
+    pub(super) fn end_laser_cycles_to_look(&mut self, cycles: u16) -> u16 {
+        let Some(config) = &self.config else {
+            return cycles;
+        };
+        // All pixels begin at once and look every X laser cycles.
+        let to_look = config.x().saturating_sub(self.since_look).max(1);
+        let ended = cycles.min(to_look);
+        self.since_look = if ended < to_look {
+            self.since_look + ended
+        } else {
+            0
+        };
+        self.cycle += u64::from(ended);
+        let last = LaserCycle(self.cycle.saturating_sub(1));
+        let mut fired = false;
+        for pixel in self.pixels.iter_mut() {
+            fired |= pixel.end_laser_cycles(config, last, ended) == Look::Event;
+        }
+        if fired {
+            self.drain();
+        }
+        ended
+    }
+}

@@ -1,0 +1,118 @@
+//! Photons and histograms of a sensor, which does not wait.
+
+use dtof_core::{Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, Statistics, detect};
+use embedded_io::{Read, ReadReady, Write, WriteReady};
+
+use super::{BINS, Sidecar, has_room_for_event};
+use crate::link::message::{self, Source};
+use crate::sensor::{PhotonSink, Polled, Sensor};
+
+/// Polls of the sensor one after the other. A sensor that always has more must
+/// not keep the link waiting.
+const POLLS: usize = 4;
+
+impl Sidecar<'_> {
+    /// [`Self::poll`], and `sensor` while a configuration takes photons from it.
+    /// Its errors are counted in the report.
+    ///
+    /// # Errors
+    /// Those of `serial`.
+    pub fn poll_with<S: Read + ReadReady + Write + WriteReady>(
+        &mut self,
+        sensor: &mut impl Sensor,
+        serial: &mut S,
+        lost: u32,
+        now_ms: u32,
+    ) -> Result<(), S::Error> {
+        self.poll(serial, lost, now_ms)?;
+        self.poll_sensor(sensor, now_ms);
+        self.poll(serial, lost, now_ms)
+    }
+
+    /// Asks `sensor` while a configuration takes photons from it, and again while
+    /// it has more, up to a bound. Its errors are counted in the report.
+    pub fn poll_sensor(&mut self, sensor: &mut impl Sensor, now_ms: u32) {
+        for _ in 0..POLLS {
+            if !self.takes_sensor() {
+                return;
+            }
+            match sensor.poll(now_ms, self) {
+                Ok(Polled::Idle) => return,
+                Ok(Polled::Working | Polled::Data) => {}
+                Err(_) => {
+                    self.sensor_errors = self.sensor_errors.saturating_add(1);
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Whether photons of a sensor count. Those that come while a configuration
+    /// waits for the last events of the one before belong to neither.
+    fn takes_sensor(&self) -> bool {
+        self.config.is_some()
+            && self.source == Source::Sensor
+            && self.question() != Some(message::CONFIGURE)
+    }
+}
+
+/// Counts while a configuration takes photons from the sensor, else does nothing.
+impl PhotonSink for Sidecar<'_> {
+    fn photon(&mut self, pixel: PixelAddress, code: u16) {
+        if self.takes_sensor() {
+            self.count(pixel.0.into(), code);
+        }
+    }
+
+    fn end_laser_cycles(&mut self, mut cycles: u16) {
+        if !self.takes_sensor() {
+            return;
+        }
+        while cycles > 0 {
+            cycles -= self.end_laser_cycles_to_look(cycles);
+        }
+    }
+
+    /// Decides once, whatever L1, L2 and X are. The histogram stands for a laser
+    /// cycle of its own, and the event's exposure is 1. Without room for an event
+    /// it is counted as deferred and not looked at: the next one is as good.
+    fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; BINS]) {
+        let (true, Some(config)) = (self.takes_sensor(), self.config) else {
+            return;
+        };
+        let cycle = LaserCycle(self.cycle);
+        self.cycle += 1;
+        if usize::from(pixel.0) >= self.pixels.len() {
+            let photons = counts.iter().map(|&count| u64::from(count));
+            self.unaddressed += photons.sum::<u64>();
+            return;
+        }
+        let mut histogram = Histogram::<BINS, Count24>::new();
+        let gated_out = histogram.add_frame(counts, config.gate());
+        let mut done = Statistics {
+            counted: histogram.total().into(),
+            saturated: histogram.saturated().into(),
+            gated_out: gated_out.into(),
+            ..Statistics::default()
+        };
+        if !has_room_for_event(&self.words) {
+            done.deferred = 1;
+        } else if let Some(detection) = detect(&histogram, config.gate(), config.rule()) {
+            self.enqueue(&DepthEvent {
+                pixel,
+                cycle,
+                exposure: 1,
+                peak_bin: detection.peak.bin,
+                offset: detection.depth.offset,
+                peak_count: detection.peak.count,
+                background: detection.background,
+                flags: detection.depth.flags,
+            });
+            done.events = 1;
+        } else {
+            done.expired = 1;
+        }
+        self.whole += done;
+        self.drain();
+    }
+}

@@ -1,0 +1,151 @@
+//! A host on a good wire, and a sensor that gives what a script says.
+
+use dtof_core::{AerDecoder, AerRecord, AerWord, DepthEvent, PixelAddress};
+use dtof_firmware::link::endpoint::Endpoint;
+use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
+use dtof_firmware::link::message::{self, Configuration, Report};
+use dtof_firmware::sensor::{PhotonSink, Polled, Sensor};
+use dtof_firmware::sidecar::{Sidecar, greeting};
+
+/// A configuration that takes photons from the sensor.
+pub const CONFIGURATION: Configuration = Configuration {
+    alpha: 4 << 8,
+    minimum_count: 5,
+    x: 4,
+    l1: 20,
+    l2: 200,
+    gate_first: 0,
+    gate_last: 127,
+    pixels: 8,
+    bin_width: 250 << 16,
+    offset: 0,
+    source: 1,
+    rule: 0,
+};
+
+pub struct Host {
+    pub endpoint: Endpoint,
+    up: Deframer,
+    down: Deframer,
+    decoder: AerDecoder,
+    /// All events so far.
+    pub events: Vec<DepthEvent>,
+    /// All answers so far, and the events that came before each.
+    pub answers: Vec<(u8, Vec<u8>, usize)>,
+}
+
+impl Host {
+    pub fn new(session: u16, now_ms: u32) -> Self {
+        Self {
+            endpoint: Endpoint::host(session, greeting(0, 0), now_ms),
+            up: Deframer::new(),
+            down: Deframer::new(),
+            decoder: AerDecoder::new(),
+            events: Vec::new(),
+            answers: Vec::new(),
+        }
+    }
+
+    /// Everything that is due goes over the wire, both ways.
+    pub fn exchange(&mut self, device: &mut Sidecar, now_ms: u32) {
+        let mut wire = [0; WIRE_BYTES];
+        loop {
+            let length = self.endpoint.transmit(now_ms, &mut wire);
+            for &byte in &wire[..length] {
+                if let Some(frame) = self.down.push(byte) {
+                    device.receive(frame, now_ms);
+                }
+            }
+            device.work(0);
+            let answer = device.transmit(now_ms, &mut wire);
+            for &byte in &wire[..answer] {
+                if let Some(frame) = self.up.push(byte) {
+                    self.endpoint.receive(frame, now_ms);
+                }
+            }
+            if length + answer == 0 {
+                return;
+            }
+        }
+    }
+
+    /// Takes up to `messages` messages.
+    pub fn read(&mut self, messages: usize) {
+        for _ in 0..messages {
+            let Some(message) = self.endpoint.take() else {
+                return;
+            };
+            if message.kind != message::EVENTS {
+                let body = message.body.to_vec();
+                self.answers.push((message.kind, body, self.events.len()));
+                continue;
+            }
+            for word in message.body.chunks(16) {
+                let word = AerWord::from_le_bytes(word.try_into().unwrap());
+                match self.decoder.decode(word).unwrap() {
+                    AerRecord::Event(event) => self.events.push(event),
+                    AerRecord::Time(_) => {}
+                    AerRecord::End { .. } => panic!("an end"),
+                }
+            }
+        }
+    }
+
+    pub fn ask(&mut self, kind: u8, body: &[u8]) {
+        self.endpoint.offer(kind, body).unwrap();
+    }
+
+    /// Exchanges until the question is answered; the sensor stands still.
+    pub fn answer(&mut self, device: &mut Sidecar, now_ms: u32, kind: u8, body: &[u8]) -> Vec<u8> {
+        let before = self.answers.len();
+        while !self.endpoint.is_open() {
+            self.exchange(device, now_ms);
+        }
+        self.ask(kind, body);
+        for _ in 0..1000 {
+            self.exchange(device, now_ms);
+            self.read(1);
+            if let Some((_, body, _)) = self.answers.get(before) {
+                return body.clone();
+            }
+        }
+        panic!("no answer to {kind:#04x}");
+    }
+
+    pub fn configure(&mut self, device: &mut Sidecar, now_ms: u32, wanted: &Configuration) {
+        self.answer(device, now_ms, message::CONFIGURE, &wanted.to_le_bytes());
+        assert_eq!(self.answers.last().unwrap().0, message::CONFIGURED);
+    }
+
+    pub fn report(&mut self, device: &mut Sidecar, now_ms: u32) -> Report {
+        let body = self.answer(device, now_ms, message::STATISTICS_REQUEST, &[]);
+        Report::from_le_bytes(&body).unwrap()
+    }
+}
+
+/// One call of the sink.
+#[derive(Clone, Debug)]
+pub enum Call {
+    Photon(u16, u16),
+    End(u16),
+    Histogram(u16, Box<[u32; 128]>),
+}
+
+/// Gives the next item each time it is asked; `None` is an error.
+pub struct Scripted<I>(pub I);
+
+impl<I: Iterator<Item = Option<Vec<Call>>>> Sensor for Scripted<I> {
+    type Error = ();
+
+    fn poll(&mut self, _: u32, sink: &mut impl PhotonSink) -> Result<Polled, ()> {
+        for call in self.0.next().unwrap_or(Some(Vec::new())).ok_or(())? {
+            match call {
+                Call::Photon(pixel, code) => sink.photon(PixelAddress(pixel), code),
+                Call::End(cycles) => sink.end_laser_cycles(cycles),
+                Call::Histogram(pixel, counts) => sink.histogram(PixelAddress(pixel), &counts),
+            }
+        }
+        // One item a poll.
+        Ok(Polled::Idle)
+    }
+}

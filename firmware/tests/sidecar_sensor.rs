@@ -1,0 +1,405 @@
+//! The sidecar with photons and histograms of a sensor: the same events as a
+//! pixel's, longer exposures for a host that does not read, and nothing lost
+//! that is not counted.
+
+mod common;
+
+use common::host::{CONFIGURATION, Call, Host, Scripted};
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{
+    AsyncPixel, Count, Count24, DepthEvent, Flags, Histogram, LaserCycle, PaperRule, PixelAddress,
+    PixelConfig, RangeGate, detect,
+};
+use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
+use dtof_firmware::link::message::{self, Configuration, Report};
+use dtof_firmware::sensor::simulated;
+use dtof_firmware::sidecar::Sidecar;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+/// Room for the bytes of a few milliseconds.
+type Buffers = dtof_firmware::serial::Buffers<512, 1024>;
+type Pixels = heapless::Vec<AsyncPixel<128>, 8>;
+
+fn rule() -> PaperRule {
+    PaperRule::new(U8F8::lit("4"), Count::saturating(5))
+}
+
+/// Photons of one laser cycle and, now and then, of a few empty ones after it.
+fn calls(rng: &mut Pcg32) -> Vec<Call> {
+    let mut calls = Vec::new();
+    for pixel in 0..8 {
+        for _ in 0..rng.next_u32() % 3 {
+            let random = (rng.next_u32() % 130) as u16;
+            let signal = rng.next_u32() & 1 == 0;
+            let code = if signal { 20 + 10 * pixel } else { random };
+            calls.push(Call::Photon(pixel, code));
+        }
+    }
+    let cycles = if rng.next_u32().is_multiple_of(10) {
+        7
+    } else {
+        1
+    };
+    calls.push(Call::End(cycles));
+    calls
+}
+
+fn script(length: usize) -> Vec<Vec<Call>> {
+    let mut rng = Pcg32::seed_from_u64(1);
+    (0..length).map(|_| calls(&mut rng)).collect()
+}
+
+fn sensor(script: &[Vec<Call>]) -> Scripted<impl Iterator<Item = Option<Vec<Call>>>> {
+    Scripted(script.iter().cloned().map(Some))
+}
+
+/// What pixels with a link that takes every event at once report.
+fn reference(script: &[Vec<Call>]) -> Vec<DepthEvent> {
+    let config = PixelConfig::<128>::new(4, 20, 200, RangeGate::full(), rule()).unwrap();
+    let mut pixels: Vec<_> = (0..8)
+        .map(|address| AsyncPixel::<128>::new(PixelAddress(address)))
+        .collect();
+    let mut events = Vec::new();
+    let mut cycle = 0;
+    for call in script.iter().flatten() {
+        match *call {
+            Call::Photon(pixel, code) => pixels[usize::from(pixel)].count(&config, code),
+            Call::End(cycles) => {
+                for _ in 0..cycles {
+                    for pixel in &mut pixels {
+                        pixel.end_laser_cycle(&config, LaserCycle(cycle));
+                        events.extend(pixel.acknowledge());
+                    }
+                    cycle += 1;
+                }
+            }
+            Call::Histogram(..) => unreachable!(),
+        }
+    }
+    events
+}
+
+fn photons(script: &[Vec<Call>]) -> u64 {
+    let calls = script.iter().flatten();
+    calls
+        .map(|call| u64::from(matches!(call, Call::Photon(..))))
+        .sum()
+}
+
+fn offered(report: &Report) -> u64 {
+    let statistics = report.statistics;
+    statistics.counted + statistics.saturated + statistics.rejected + statistics.gated_out
+}
+
+#[test]
+fn a_host_that_reads_gets_the_events_of_the_pixels() {
+    let script = script(5_000);
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, true);
+    let mut host = Host::new(1, 0);
+    let mut sensor = sensor(&script);
+    host.configure(&mut device, 0, &CONFIGURATION);
+    for now_ms in 0..5_000 {
+        device.poll_sensor(&mut sensor, now_ms);
+        host.exchange(&mut device, now_ms);
+        host.read(4);
+    }
+    let report = host.report(&mut device, 5_000);
+    let expected = reference(&script);
+    assert!(expected.len() > 500 && host.events == expected);
+    assert_eq!(report.statistics.events, expected.len() as u64);
+    assert_eq!(report.statistics.deferred, 0);
+    assert_eq!(offered(&report), photons(&script));
+}
+
+#[test]
+fn a_host_that_does_not_read_lengthens_exposures_and_loses_no_event() {
+    let script = script(20_000);
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, true);
+    let mut host = Host::new(1, 0);
+    let mut sensor = sensor(&script);
+    host.configure(
+        &mut device,
+        0,
+        &Configuration {
+            l2: 60_000,
+            ..CONFIGURATION
+        },
+    );
+    for now_ms in 0..20_000 {
+        device.poll_sensor(&mut sensor, now_ms);
+        host.exchange(&mut device, now_ms);
+        // Reads for a while, stops for a while, reads again.
+        if !(2_000..4_000).contains(&now_ms) {
+            host.read(4);
+        }
+    }
+    let report = host.report(&mut device, 20_000);
+    // Questions do not empty slots; what is still in them comes after.
+    assert_eq!(report.statistics.events, host.events.len() as u64);
+    assert!(report.statistics.deferred > 100, "{report:?}");
+    assert_eq!(offered(&report), photons(&script));
+    assert_eq!(report.statistics.expired, 0);
+    // Each laser cycle was part of one exposure: no event of any pixel is missing.
+    for pixel in 0..8 {
+        let of_pixel = || host.events.iter().filter(|event| event.pixel.0 == pixel);
+        let mut end = 0;
+        for event in of_pixel() {
+            assert_eq!(event.cycle.0 + 1, end + u64::from(event.exposure));
+            end = event.cycle.0 + 1;
+        }
+        let deferred = of_pixel().filter(|event| event.flags.contains(Flags::DEFERRED));
+        let longest = deferred.map(|event| event.exposure).max().unwrap();
+        assert!(longest > 1_000, "pixel {pixel}: {longest}");
+    }
+}
+
+#[test]
+fn questions_are_answered_though_the_sensor_fills_the_link() {
+    let script = script(20_000);
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, true);
+    let mut host = Host::new(1, 0);
+    let mut sensor = sensor(&script);
+    host.configure(&mut device, 0, &CONFIGURATION);
+    let mut asked = 0;
+    for now_ms in 0..20_000 {
+        device.poll_sensor(&mut sensor, now_ms);
+        host.exchange(&mut device, now_ms);
+        if now_ms % 100 == 0 {
+            host.read(1);
+        }
+        if now_ms % 5_000 == 2_500 {
+            host.ask(message::STATISTICS_REQUEST, &[]);
+            asked += 1;
+        }
+    }
+    let last = host.report(&mut device, 20_000);
+    let reports: Vec<_> = host
+        .answers
+        .iter()
+        .filter(|(kind, ..)| *kind == message::STATISTICS)
+        .map(|(_, body, events)| (Report::from_le_bytes(body).unwrap(), *events))
+        .collect();
+    assert_eq!(reports.len(), asked + 1);
+    for (report, events) in reports {
+        assert_eq!(report.statistics.events, events as u64);
+    }
+    assert!(last.statistics.deferred > 1_000, "{last:?}");
+    // No pixel keeps the others from the link.
+    let count = |pixel| {
+        host.events
+            .iter()
+            .filter(|event| event.pixel.0 == pixel)
+            .count()
+    };
+    let counts: Vec<_> = (0..8).map(count).collect();
+    let (least, most) = (counts.iter().min().unwrap(), counts.iter().max().unwrap());
+    assert!(least * 2 > *most, "{counts:?}");
+}
+
+#[test]
+fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
+    let script = script(10_000);
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, true);
+    let mut unused = sensor(&script);
+    let mut wire = [0; WIRE_BYTES];
+    for now_ms in 0..10_000 {
+        device.poll_sensor(&mut unused, now_ms);
+        device.work(0);
+        assert_eq!(device.transmit(now_ms, &mut wire), 0);
+    }
+    // It was not even asked.
+    assert!(unused.0.next().is_some());
+
+    // A configuration that takes photons from the link keeps the sensor's out.
+    let mut host = Host::new(1, 10_000);
+    host.configure(
+        &mut device,
+        10_000,
+        &Configuration {
+            source: 0,
+            ..CONFIGURATION
+        },
+    );
+    device.poll_sensor(&mut unused, 10_000);
+    let report = host.report(&mut device, 10_000);
+    assert_eq!((report.cycles, offered(&report)), (0, 0));
+
+    // A host that goes away keeps the device from nothing, and finds the events
+    // when it comes back.
+    host.configure(&mut device, 10_001, &CONFIGURATION);
+    let mut sensor = sensor(&script);
+    for now_ms in 10_001..110_001 {
+        device.poll_sensor(&mut sensor, now_ms);
+        device.work(0);
+        while device.transmit(now_ms, &mut wire) > 0 {}
+    }
+    // What was lost on the way is sent again by now.
+    let report = host.report(&mut device, 110_200);
+    assert_eq!(offered(&report), photons(&script));
+    assert_eq!(report.statistics.events, host.events.len() as u64);
+    assert!(report.statistics.deferred > 0 && !host.events.is_empty());
+}
+
+#[test]
+fn a_configuration_waits_for_the_events_of_the_one_before() {
+    let script = script(3_000);
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, true);
+    let mut host = Host::new(1, 0);
+    let mut sensor = sensor(&script);
+    host.configure(&mut device, 0, &CONFIGURATION);
+    for now_ms in 0..2_000 {
+        device.poll_sensor(&mut sensor, now_ms);
+        host.exchange(&mut device, now_ms);
+    }
+    let report = host.report(&mut device, 2_000);
+    assert!(report.statistics.deferred > 0);
+    assert_eq!(report.statistics.events, host.events.len() as u64);
+    // Every slot has been full all the while.
+    host.configure(&mut device, 2_000, &CONFIGURATION);
+    assert_eq!(host.events.len() as u64, report.statistics.events + 8);
+    assert_eq!(host.report(&mut device, 2_000).statistics.events, 0);
+}
+
+/// A peak in `bin` on a level background.
+fn histogram(bin: usize) -> Box<[u32; 128]> {
+    let mut counts = [100; 128];
+    counts[bin - 1] = 5_000;
+    counts[bin] = 70_000;
+    counts[bin + 1] = 9_000;
+    Box::new(counts)
+}
+
+#[test]
+fn a_histogram_is_decided_once_within_the_gate() {
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, true);
+    let mut host = Host::new(1, 0);
+    let wanted = Configuration {
+        gate_first: 10,
+        gate_last: 99,
+        ..CONFIGURATION
+    };
+    host.configure(&mut device, 0, &wanted);
+    let mut outside = histogram(40);
+    outside[120] = 100_000;
+    let calls = vec![
+        Call::Histogram(3, outside.clone()),
+        Call::Histogram(4, Box::new([100; 128])),
+        Call::Histogram(8, Box::new([1; 128])),
+        Call::Histogram(3, histogram(41)),
+    ];
+    let mut sensor = Scripted([None, Some(calls), None].into_iter());
+    for now_ms in 0..3 {
+        device.poll_sensor(&mut sensor, now_ms);
+    }
+    let report = host.report(&mut device, 3);
+    assert_eq!(report.sensor_errors, 2);
+    assert_eq!((report.cycles, report.unaddressed), (4, 128));
+    let statistics = report.statistics;
+    assert_eq!(
+        (statistics.events, statistics.expired, statistics.deferred),
+        (2, 1, 0)
+    );
+    assert_eq!(statistics.gated_out, 38 * 100 * 3 + 100_000 - 100);
+
+    let gate = RangeGate::new(10, 99).unwrap();
+    let expected = |counts: &[u32; 128], cycle| {
+        let mut histogram = Histogram::<128, Count24>::new();
+        histogram.add_frame(counts, &gate);
+        let detection = detect(&histogram, &gate, &rule()).unwrap();
+        DepthEvent {
+            pixel: PixelAddress(3),
+            cycle: LaserCycle(cycle),
+            exposure: 1,
+            peak_bin: detection.peak.bin,
+            offset: detection.depth.offset,
+            peak_count: detection.peak.count,
+            background: detection.background,
+            flags: detection.depth.flags,
+        }
+    };
+    assert_eq!(
+        host.events,
+        [expected(&outside, 0), expected(&histogram(41), 3)]
+    );
+}
+
+#[test]
+fn histograms_without_room_for_an_event_are_counted_as_deferred() {
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, true);
+    let mut host = Host::new(1, 0);
+    host.configure(&mut device, 0, &CONFIGURATION);
+    let mut sensor = Scripted((0..1_000).map(|_| Some(vec![Call::Histogram(0, histogram(40))])));
+    for now_ms in 0..1_000 {
+        device.poll_sensor(&mut sensor, now_ms);
+        host.exchange(&mut device, now_ms);
+    }
+    let report = host.report(&mut device, 1_000);
+    let statistics = report.statistics;
+    assert_eq!(statistics.events, host.events.len() as u64);
+    assert!(statistics.events > 60 && statistics.deferred > 500);
+    assert_eq!(statistics.events + statistics.deferred, 1_000);
+    // Those that were not looked at are counted all the same.
+    assert_eq!(offered(&report), 1_000 * (125 * 100 + 84_000));
+}
+
+/// The main loop of an image, and 100 bytes a millisecond on the wire.
+#[test]
+fn the_simulated_scene_comes_over_a_serial_port() {
+    let mut buffers = Buffers::new();
+    let (mut interrupt, mut serial) = buffers.split(|| {});
+    let mut pixels = heapless::Vec::<AsyncPixel<128>, 16>::new();
+    let mut device = Sidecar::new(&mut pixels, true);
+    let mut sensor = simulated::scene();
+    let mut host = Host::new(1, 0);
+    let mut frames = Deframer::new();
+    let mut wire = [0; WIRE_BYTES];
+    for now_ms in 0..5_000 {
+        if now_ms == 10 {
+            let wanted = Configuration {
+                pixels: 16,
+                l1: 40,
+                l2: 2_000,
+                ..CONFIGURATION
+            };
+            host.ask(message::CONFIGURE, &wanted.to_le_bytes());
+        }
+        let length = host.endpoint.transmit(now_ms, &mut wire);
+        wire[..length]
+            .iter()
+            .for_each(|&byte| interrupt.on_receive(byte));
+        let lost = serial.lost();
+        let Ok(()) = device.poll_with(&mut sensor, &mut serial, lost, now_ms);
+        for byte in std::iter::from_fn(|| interrupt.next_to_send()).take(100) {
+            if let Some(frame) = frames.push(byte) {
+                host.endpoint.receive(frame, now_ms);
+            }
+        }
+        host.read(4);
+    }
+    assert_eq!(host.answers.len(), 1);
+    assert_eq!(host.answers[0].0, message::CONFIGURED);
+    assert_eq!(serial.lost(), 0);
+    // All pixels report, and most of the time the right bins.
+    assert!(host.events.len() > 2_000, "{}", host.events.len());
+    let right = |event: &&DepthEvent| {
+        let pulse = 20 + 6 * event.pixel.0;
+        (pulse..pulse + 3).contains(&event.peak_bin.raw())
+    };
+    let count = host.events.iter().filter(right).count();
+    assert!(
+        count * 100 > host.events.len() * 95,
+        "{count} of {}",
+        host.events.len()
+    );
+    for pixel in 0..16 {
+        assert!(host.events.iter().any(|event| event.pixel.0 == pixel));
+    }
+}

@@ -1,0 +1,56 @@
+//! `dtof monitor`: the events of a device with a sensor, as they come.
+
+use std::io::{self, BufWriter};
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use dtof::device::{self, Client};
+use dtof::monitor::monitor;
+use dtof_core::fixed::types::{I24F8, U16F16};
+
+use super::operation::{Operation, number};
+
+#[derive(Args)]
+pub struct Monitor {
+    /// tcp:HOST:PORT or a serial port
+    #[arg(long, value_name = "DEVICE")]
+    device: String,
+    /// Pixels of the sensor, with addresses from 0
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..))]
+    pixels: u16,
+    /// End after so many seconds [default: never]
+    #[arg(long, value_name = "S")]
+    seconds: Option<u32>,
+    /// Picoseconds a bin, rounded to 1/65536
+    #[arg(long, value_name = "PS", value_parser = number::<U16F16>, default_value = "250", allow_hyphen_values = true)]
+    bin_width_ps: U16F16,
+    /// Millimetres added to every range, rounded to 1/256
+    #[arg(long, value_name = "MM", value_parser = number::<I24F8>, default_value = "0", allow_hyphen_values = true)]
+    offset_mm: I24F8,
+    #[command(flatten)]
+    operation: Operation,
+}
+
+impl Monitor {
+    pub fn run(&self) -> Result<()> {
+        let name = || self.device.clone();
+        let mut client = Client::new(device::open(&self.device)?).with_context(name)?;
+        let settings = self.operation.settings(
+            client.bins().into(),
+            self.bin_width_ps,
+            self.offset_mm,
+            0, // nothing is drawn here
+        );
+        monitor(
+            &mut client,
+            &settings,
+            self.pixels,
+            self.seconds
+                .map(|seconds| Duration::from_secs(seconds.into())),
+            &mut BufWriter::new(io::stdout().lock()),
+            &mut io::stderr(),
+        )
+        .with_context(name)
+    }
+}

@@ -1,0 +1,80 @@
+//! The options that say how pixels operate, the same for every command.
+
+use std::str::FromStr;
+
+use clap::Args;
+use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use dtof_core::fixed::traits::Fixed;
+use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+
+#[derive(Args)]
+pub struct Operation {
+    /// Only these bins may hold the peak, both inclusive [default: all]
+    #[arg(long, value_name = "FIRST..LAST", value_parser = gate)]
+    gate: Option<(u16, u16)>,
+    /// Standard deviations of the background a peak must exceed it by, 0 to 255.996, rounded to
+    /// 1/256
+    #[arg(long, value_parser = number::<U8F8>, default_value = "4", allow_hyphen_values = true)]
+    alpha: U8F8,
+    /// Photons a reported peak holds at least
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1023))]
+    min_count: u16,
+    /// The exposure a decision must exceed, in laser cycles
+    #[arg(long, value_name = "N", default_value_t = 40)]
+    l1: u16,
+    /// The exposure at which a pixel starts over without an event, in laser cycles
+    #[arg(long, value_name = "N", default_value_t = 2000)]
+    l2: u16,
+    /// Laser cycles between looks
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    x: u16,
+}
+
+impl Operation {
+    /// With what the options do not say.
+    pub fn settings(
+        &self,
+        bins: usize,
+        bin_width_ps: U16F16,
+        offset_mm: I24F8,
+        seed: u64,
+    ) -> Settings {
+        Settings {
+            bins,
+            bin_width_ps: U16F16Number(bin_width_ps),
+            offset_mm: I24F8Number(offset_mm),
+            gate: self.gate,
+            alpha: U8F8Number(self.alpha),
+            min_count: self.min_count,
+            l1: self.l1,
+            l2: self.l2,
+            x: self.x,
+            seed,
+        }
+    }
+}
+
+/// A fixed-point number, rounded to the nearest.
+pub fn number<T: FromStr + Fixed>(text: &str) -> Result<T, String> {
+    let number = parsed::<T>(text)?;
+    // Zero is meant only where zero is written.
+    if number == T::ZERO && text.contains(|digit| matches!(digit, '1'..='9')) {
+        return Err(format!(
+            "is less than half of {}, the smallest step",
+            T::DELTA
+        ));
+    }
+    Ok(number)
+}
+
+fn parsed<T: FromStr + Fixed>(text: &str) -> Result<T, String> {
+    text.parse()
+        .map_err(|_| format!("must be a number from {} to {}", T::MIN, T::MAX))
+}
+
+fn gate(text: &str) -> Result<(u16, u16), String> {
+    let bins = text
+        .split_once("..")
+        .and_then(|(first, last)| Some((first.parse().ok()?, last.parse().ok()?)));
+    bins.ok_or("must be FIRST..LAST, as 20..119".to_owned())
+}

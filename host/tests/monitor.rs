@@ -1,0 +1,294 @@
+//! `dtof monitor` on the firmware's sidecar with a simulated sensor, behind a TCP
+//! port of this computer.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::num::NonZeroU16;
+use std::process::Command;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use dtof::device::{self, Client};
+use dtof::events_csv;
+use dtof::monitor::monitor;
+use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use dtof_core::fixed::types::{I24F8, U0F32, U8F8, U8F24, U16F16};
+use dtof_core::{AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig};
+use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
+use dtof_firmware::sensor::simulated::{self, Pulse, Simulated, SimulatedPixel};
+use dtof_firmware::sensor::{PhotonSink, Sensor};
+use dtof_firmware::sidecar::Sidecar;
+
+const PIXELS: u16 = 4;
+const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
+
+fn settings() -> Settings {
+    Settings {
+        bins: 128,
+        bin_width_ps: U16F16Number(U16F16::lit("250")),
+        offset_mm: I24F8Number(I24F8::ZERO),
+        gate: None,
+        alpha: U8F8Number(U8F8::lit("4")),
+        min_count: 5,
+        l1: 40,
+        l2: 2000,
+        x: 4,
+        seed: 0,
+    }
+}
+
+fn scene() -> Vec<SimulatedPixel> {
+    let (signal, background) = (U8F24::lit("0.5"), U8F24::lit("0.5"));
+    (0..PIXELS)
+        .map(|address| {
+            let position = 20 + 20 * address;
+            SimulatedPixel::new(PixelAddress(address), position, signal, background).unwrap()
+        })
+        .collect()
+}
+
+fn sensor(pixels: &[SimulatedPixel]) -> Simulated<'_> {
+    // Slow enough that no hiccup of this computer puts a decision off.
+    let settings = simulated::Settings {
+        seed: 1,
+        bins: 128,
+        cycles_per_second: 500,
+        cycles_per_poll: NonZeroU16::new(50).unwrap(),
+    };
+    Simulated::new(pixels, PULSE, settings)
+}
+
+/// A device that hangs up after `lives`.
+fn device(has_sensor: bool, lives: Duration) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let name = format!("tcp:{}", listener.local_addr().unwrap());
+    thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let _ = serve(&mut stream, has_sensor, lives);
+    });
+    name
+}
+
+fn serve(stream: &mut TcpStream, has_sensor: bool, lives: Duration) -> io::Result<()> {
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(Duration::from_millis(1)))?;
+    let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
+    let mut sidecar = Sidecar::new(&mut pixels, has_sensor);
+    let scene = scene();
+    let mut sensor = sensor(&scene);
+    let mut deframer = Deframer::new();
+    let started = Instant::now();
+    while started.elapsed() < lives {
+        let now = u32::try_from(started.elapsed().as_millis()).unwrap();
+        let mut bytes = [0; 1024];
+        let length = match stream.read(&mut bytes) {
+            Ok(0) => return Ok(()),
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => 0,
+            read => read?,
+        };
+        for &byte in &bytes[..length] {
+            if let Some(frame) = deframer.push(byte) {
+                sidecar.receive(frame, now);
+            }
+        }
+        sidecar.work(0);
+        sidecar.poll_sensor(&mut sensor, now);
+        sidecar.work(0);
+        let mut wire = [0; WIRE_BYTES];
+        loop {
+            let length = sidecar.transmit(now, &mut wire);
+            if length == 0 {
+                break;
+            }
+            stream.write_all(&wire[..length])?;
+        }
+    }
+    Ok(())
+}
+
+/// Pixels whose link takes every event at once.
+struct Reference {
+    config: PixelConfig<128>,
+    pixels: Vec<AsyncPixel<128>>,
+    cycle: u64,
+    events: Vec<DepthEvent>,
+}
+
+impl PhotonSink for Reference {
+    fn photon(&mut self, pixel: PixelAddress, code: u16) {
+        self.pixels[usize::from(pixel.0)].count(&self.config, code);
+    }
+    fn end_laser_cycles(&mut self, cycles: u16) {
+        for _ in 0..cycles {
+            for pixel in &mut self.pixels {
+                pixel.end_laser_cycle(&self.config, LaserCycle(self.cycle));
+                self.events.extend(pixel.acknowledge());
+            }
+            self.cycle += 1;
+        }
+    }
+    fn histogram(&mut self, _: PixelAddress, _: &[u32; 128]) {
+        panic!("a histogram");
+    }
+}
+
+/// The events of the first `cycles` laser cycles as CSV.
+fn reference(cycles: u64) -> String {
+    let mut reference = Reference {
+        config: settings().config().unwrap(),
+        pixels: (0..PIXELS)
+            .map(|address| AsyncPixel::new(PixelAddress(address)))
+            .collect(),
+        cycle: 0,
+        events: Vec::new(),
+    };
+    let scene = scene();
+    let mut sensor = sensor(&scene);
+    let mut now_ms = 0;
+    while reference.cycle < cycles {
+        let Ok(_) = sensor.poll(now_ms, &mut reference);
+        now_ms += 10;
+    }
+    let mut csv = Vec::new();
+    let scale = settings().range_scale().unwrap();
+    writeln!(csv, "{}", events_csv::HEADER).unwrap();
+    for event in &reference.events {
+        events_csv::write(&mut csv, event, &scale).unwrap();
+    }
+    String::from_utf8(csv).unwrap()
+}
+
+fn client(name: &str) -> Client {
+    Client::new(device::open(name).unwrap()).unwrap()
+}
+
+#[test]
+fn events_come_out_as_the_pixels_report_them_and_statistics_once_a_second() {
+    let mut client = client(&device(true, Duration::from_secs(60)));
+    let (mut events, mut statistics) = (Vec::new(), Vec::new());
+    let length = Some(Duration::from_millis(3_800));
+    let started = Instant::now();
+    monitor(
+        &mut client,
+        &settings(),
+        PIXELS,
+        length,
+        &mut events,
+        &mut statistics,
+    )
+    .unwrap();
+    assert!((3.8..8.0).contains(&started.elapsed().as_secs_f64()));
+    let events = String::from_utf8(events).unwrap();
+    assert!(events.lines().count() > 50, "{events}");
+    assert!(reference(5_000).starts_with(&events), "{events}");
+    let statistics = String::from_utf8(statistics).unwrap();
+    assert!(
+        (3..=4).contains(&statistics.lines().count()),
+        "{statistics}"
+    );
+    for line in statistics.lines() {
+        let rates = line.strip_prefix("events/s ").unwrap();
+        let rate: u32 = rates.split(',').next().unwrap().parse().unwrap();
+        assert!(rate > 0 && line.contains("photons/s "), "{line}");
+        // A pause of this computer may repeat a message, but nothing else.
+        assert!(line.contains("deferred 0, lost bytes 0, "), "{line}");
+        assert!(line.ends_with("sensor errors 0"), "{line}");
+    }
+    // The sensor rests.
+    thread::sleep(Duration::from_millis(100));
+    assert_eq!(client.report().unwrap().cycles, 0);
+}
+
+/// Takes so many bytes, then nobody reads any more.
+struct Closing(usize);
+
+impl Write for Closing {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0 = self
+            .0
+            .checked_sub(bytes.len())
+            .ok_or(ErrorKind::BrokenPipe)?;
+        Ok(bytes.len())
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_reader_that_has_seen_enough_ends_it() {
+    for (events, statistics) in [(10, 10_000), (500, 10_000), (100_000, 10)] {
+        let mut client = client(&device(true, Duration::from_secs(60)));
+        let (mut events, mut statistics) = (Closing(events), Closing(statistics));
+        monitor(
+            &mut client,
+            &settings(),
+            PIXELS,
+            None,
+            &mut events,
+            &mut statistics,
+        )
+        .unwrap();
+    }
+}
+
+#[test]
+fn a_device_that_goes_or_has_no_sensor_is_an_error() {
+    let mut gone = client(&device(true, Duration::from_millis(700)));
+    let (mut events, mut statistics) = (Vec::new(), Vec::new());
+    let error = monitor(
+        &mut gone,
+        &settings(),
+        PIXELS,
+        None,
+        &mut events,
+        &mut statistics,
+    );
+    let error = format!("{:#}", error.unwrap_err());
+    assert!(error.contains("the device cannot be"), "{error}");
+    // What came before is there.
+    assert!(events.len() > 200);
+
+    let mut without = client(&device(false, Duration::from_secs(60)));
+    let error = monitor(
+        &mut without,
+        &settings(),
+        PIXELS,
+        None,
+        &mut events,
+        &mut statistics,
+    );
+    let error = format!("{:#}", error.unwrap_err());
+    assert!(error.contains("the device has no sensor"), "{error}");
+}
+
+#[test]
+fn the_command_prints_rows_and_says_when_the_device_is_gone() {
+    let run = |lives, seconds| {
+        let name = device(true, Duration::from_millis(lives));
+        let pixels = PIXELS.to_string();
+        Command::new(env!("CARGO_BIN_EXE_dtof"))
+            .args([
+                "monitor",
+                "--device",
+                &name,
+                "--pixels",
+                &pixels,
+                "--seconds",
+                seconds,
+            ])
+            .output()
+            .unwrap()
+    };
+    let output = run(60_000, "1");
+    assert!(output.status.success(), "{output:?}");
+    let events = String::from_utf8(output.stdout).unwrap();
+    assert!(events.lines().count() > 10 && reference(5_000).starts_with(&events));
+    assert!(output.stderr.starts_with(b"events/s "));
+
+    let output = run(700, "60");
+    assert_eq!(output.status.code(), Some(1));
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("error: tcp:127.0.0.1:"), "{error}");
+    assert!(output.stdout.len() > 200);
+}
