@@ -163,6 +163,9 @@ pub fn against_truth(maps: &Maps, settings: &Settings) -> Vec<Row> {
                 first.map_or("-".to_owned(), grouped),
             ),
         ));
+        if last.is_empty() {
+            continue; // no event, no error
+        }
         rows.push((
             format!("{}, rms error", surface.name()),
             format!(
@@ -179,5 +182,5 @@ pub fn against_truth(maps: &Maps, settings: &Settings) -> Vec<Row> {
 #[allow(clippy::cast_precision_loss, reason = "some thousand pixels")]
 fn root_mean_square(errors: &[f64]) -> f64 {
     let squares: f64 = errors.iter().map(|error| error * error).sum();
-    (squares / errors.len().max(1) as f64).sqrt()
+    (squares / errors.len() as f64).sqrt()
 }
