@@ -21,6 +21,8 @@ use crate::source::Slice;
 pub struct DeviceEngine {
     client: Client,
     report: Report,
+    /// Photons sent so far.
+    sent: u64,
 }
 
 impl DeviceEngine {
@@ -47,6 +49,7 @@ impl DeviceEngine {
         Ok(Self {
             client,
             report: Report::default(),
+            sent: 0,
         })
     }
 
@@ -107,6 +110,25 @@ impl Engine for DeviceEngine {
         tokens.flush()?;
         let events = self.client.synchronise()?;
         self.report = self.client.report()?;
+        self.sent += slice
+            .pixels
+            .iter()
+            .map(|pixel| pixel.photons.len() as u64)
+            .sum::<u64>();
+        let Statistics {
+            counted,
+            saturated,
+            rejected,
+            gated_out,
+            ..
+        } = self.report.statistics;
+        let accounted = counted + saturated + rejected + gated_out;
+        ensure!(
+            accounted == self.sent,
+            "the device accounts for {accounted} of {} photons; of its messages {} made no sense",
+            self.sent,
+            self.report.unknown
+        );
         Ok(events)
     }
 
