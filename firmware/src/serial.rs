@@ -5,8 +5,7 @@
 //! received and asks for every byte to send. The main loop holds [`Serial`],
 //! which reads and writes through the traits of `embedded-io`. Neither locks
 //! nor waits for the other. A byte that finds the receive queue full is lost,
-//! and counted ([`Serial::lost`]); it is for the link's credits to see that none
-//! is.
+//! and counted ([`Serial::lost`]); the link repeats what it held.
 //!
 //! [`Read::read`] and [`Write::write`] wait if they must, as their traits say.
 //! They return at once if [`ReadReady::read_ready`] and
@@ -40,8 +39,9 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 use heapless::spsc::{Consumer, Producer, Queue};
 
-/// Bytes that wait to be read on either board: what may be on its way to the
-/// board at any time without loss.
+/// Bytes that wait to be read on either board: the link's window of four frames
+/// twice over. Should more be on its way, bytes are lost and the link repeats
+/// them.
 pub const RECEIVE_CAPACITY: usize = 2047;
 
 /// Bytes that wait to be sent on either board.

@@ -457,3 +457,78 @@ fn a_device_that_restarts_is_noticed_and_serves_the_next_session() {
     let (events, report, _) = session(&mut device, 2, &script, 100_000);
     assert!(events == script.events && report.is_some());
 }
+
+#[test]
+fn the_same_session_number_drawn_again_begins_anew() {
+    let mut rng = Pcg32::seed_from_u64(6);
+    let script = script(2_000, &mut rng);
+    let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
+    let mut device = Sidecar::new(&mut pixels, false);
+    session(&mut device, 7, &script, 40);
+    let (events, report, lost) = session(&mut device, 7, &script, 100_000);
+    assert!(events == script.events && report.is_some() && !lost);
+}
+
+/// Milliseconds until a hundred messages have crossed a line of so many bytes a
+/// second that has stood still for a quarter of a second.
+fn slow_line(bytes_a_second: usize) -> u32 {
+    let mut host = Endpoint::host(1, greeting(0, 0), 0);
+    let mut device = Endpoint::device(greeting(128, 8));
+    let (mut up, mut down) = (Deframer::new(), Deframer::new());
+    let mut line: VecDeque<u8> = VecDeque::new();
+    let mut wire = [0; WIRE_BYTES];
+    let mut arrived = 0;
+    let mut credit = 0;
+    for now in 0..1_000_000 {
+        while host.is_open() && host.offer(message::PHOTONS, &[1; BODY_BYTES]).is_ok() {}
+        loop {
+            // What the line has not carried waits in front of it, unseen.
+            let length = host.transmit(now, &mut wire);
+            line.extend(&wire[..length]);
+            if length == 0 {
+                break;
+            }
+        }
+        credit += if (5_000..5_250).contains(&now) {
+            0
+        } else {
+            bytes_a_second
+        };
+        while credit >= 1000 {
+            credit -= 1000;
+            let Some(byte) = line.pop_front() else {
+                continue;
+            };
+            if let Some(frame) = down.push(byte) {
+                device.receive(frame, now);
+            }
+        }
+        while device.take().is_some() {
+            arrived += u32::from(now > 10_000);
+        }
+        let length = device.transmit(now, &mut wire);
+        for &byte in &wire[..length] {
+            if let Some(frame) = up.push(byte) {
+                host.receive(frame, now);
+            }
+        }
+        if arrived >= 100 {
+            return now - 10_000;
+        }
+    }
+    panic!("{bytes_a_second} bytes a second: {arrived} messages");
+}
+
+#[test]
+fn a_slow_line_is_not_filled_with_repetitions() {
+    for bytes_a_second in [5_000, 7_000, 9_000, 11_000, 20_000] {
+        // 256 bytes a message; as long again is allowed for what is repeated.
+        let ideal = 100 * 256 * 1000 / bytes_a_second;
+        let took = slow_line(bytes_a_second);
+        println!("{bytes_a_second} B/s: {took} ms for 100 messages, {ideal} ms at best");
+        assert!(
+            took as usize <= ideal * 2,
+            "{bytes_a_second} B/s: {took} ms"
+        );
+    }
+}

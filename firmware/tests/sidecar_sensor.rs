@@ -239,7 +239,7 @@ fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
         while device.transmit(now_ms, &mut wire) > 0 {}
     }
     // What was lost on the way is sent again by now.
-    let report = host.report(&mut device, 110_200);
+    let report = host.report(&mut device, 112_000);
     assert_eq!(offered(&report), photons(&script));
     assert_eq!(report.statistics.events, host.events.len() as u64);
     assert!(report.statistics.deferred > 0 && !host.events.is_empty());

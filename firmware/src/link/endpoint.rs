@@ -19,8 +19,12 @@ use super::frame::{self, FrameError, PAYLOAD_BYTES, WIRE_BYTES};
 pub const BODY_BYTES: usize = PAYLOAD_BYTES - HEADER_BYTES;
 /// Messages under way, and messages that wait to be taken.
 pub const WINDOW: usize = 4;
-/// A message not acknowledged for so long is sent again.
+/// A message not acknowledged for so long is sent again. Each time the wait
+/// doubles, to [`RETRANSMIT_MOST_MS`]; it halves with every eight messages that
+/// arrive without.
 pub const RETRANSMIT_MS: u32 = 100;
+/// The longest wait.
+pub const RETRANSMIT_MOST_MS: u32 = 1600;
 /// An end with nothing to say says so this often.
 pub const KEEP_ALIVE_MS: u32 = 50;
 
@@ -28,6 +32,8 @@ pub const KEEP_ALIVE_MS: u32 = 50;
 pub const GREETING_BYTES: usize = 8;
 
 const HEADER_BYTES: usize = 6;
+/// Messages that arrive before the wait is halved.
+const PATIENCE: u8 = 8;
 const WINDOW_U8: u8 = 4;
 
 /// Kinds below this one are numbered; the others stand outside the sequence.
@@ -113,6 +119,12 @@ pub struct Endpoint {
     reply: Option<(u8, u16)>,
     acknowledge: bool,
     progress_ms: u32,
+    /// How long until what is under way is sent again.
+    wait_ms: u32,
+    /// Messages acknowledged since it was last changed.
+    quiet: u8,
+    /// The first message is being sent again, and goes alone.
+    alone: bool,
     spoke_ms: u32,
     heard_ms: u32,
     counters: LinkCounters,
@@ -156,6 +168,9 @@ impl Endpoint {
             reply: None,
             acknowledge: false,
             progress_ms: 0,
+            wait_ms: RETRANSMIT_MS,
+            quiet: 0,
+            alone: false,
             spoke_ms: 0,
             heard_ms: 0,
             counters: LinkCounters {
@@ -260,6 +275,10 @@ impl Endpoint {
             self.counters.corrupt += 1;
             return;
         };
+        if body.len() > BODY_BYTES {
+            self.counters.oversized += 1;
+            return;
+        }
         self.counters.frames += 1;
         let session = u16::from_le_bytes([session0, session1]);
         let ours = self.open && session == self.session;
@@ -269,7 +288,9 @@ impl Endpoint {
                     self.counters.corrupt += 1;
                     return;
                 };
-                if !ours {
+                // After a message of the session, only from another host that has
+                // drawn the same number.
+                if !ours || self.expected != 0 {
                     self.begin(session, *greeting);
                 }
                 self.reply = Some((WELCOME, session));
@@ -312,7 +333,7 @@ impl Endpoint {
     /// The other end has all messages before `expects`, and room up to `limit`.
     fn acknowledged(&mut self, expects: u8, limit: u8, now_ms: u32) {
         let arrived = expects.wrapping_sub(self.first);
-        if usize::from(arrived) > self.outbox.len() {
+        if arrived > self.sent_before {
             return; // older than what is known
         }
         for _ in 0..arrived {
@@ -320,6 +341,12 @@ impl Endpoint {
         }
         if arrived > 0 {
             self.progress_ms = now_ms;
+            self.alone = false;
+            self.quiet = self.quiet.saturating_add(arrived);
+            if self.quiet >= PATIENCE {
+                self.quiet = 0;
+                self.wait_ms = RETRANSMIT_MS.max(self.wait_ms / 2);
+            }
         }
         self.first = expects;
         self.sent = self.sent.saturating_sub(arrived);
@@ -347,21 +374,27 @@ impl Endpoint {
         if let Some((kind, session)) = self.reply.take() {
             return self.unnumbered(kind, session, now_ms, wire);
         }
-        let overdue = now_ms.wrapping_sub(self.progress_ms) >= RETRANSMIT_MS;
+        let waited_ms = now_ms.wrapping_sub(self.progress_ms);
         if !self.open {
-            if self.host && overdue {
+            if self.host && waited_ms >= RETRANSMIT_MS {
                 self.progress_ms = now_ms;
                 return self.unnumbered(HELLO, self.session, now_ms, wire);
             }
             return 0;
         }
-        if self.sent > 0 && overdue {
+        if self.sent > 0 && waited_ms >= self.wait_ms {
             self.sent = 0;
+            self.wait_ms = RETRANSMIT_MOST_MS.min(2 * self.wait_ms);
+            self.quiet = 0;
+            self.alone = true;
         }
         let number = self.first.wrapping_add(self.sent);
         let room = self.peer_limit.wrapping_sub(number);
         let next = self.outbox.iter().nth(self.sent.into());
-        if let Some(message) = next.filter(|_| (1..128).contains(&room)) {
+        // What is sent again goes alone until it arrives: a line that is slow
+        // rather than bad is not filled with repetitions.
+        let held = self.alone && self.sent > 0;
+        if let Some(message) = next.filter(|_| (1..128).contains(&room) && !held) {
             let header = self.header(message.kind, self.session, number);
             let length = frame::encode([&header, &message.body], wire);
             if self.sent == 0 {
@@ -390,8 +423,10 @@ impl Endpoint {
         now_ms: u32,
         wire: &mut [u8; WIRE_BYTES],
     ) -> usize {
-        self.spoke_ms = now_ms;
-        self.acknowledge = false;
+        if kind == KEEP_ALIVE {
+            self.spoke_ms = now_ms;
+            self.acknowledge = false;
+        }
         let header = self.header(kind, session, 0);
         let greeting: &[u8] = if matches!(kind, HELLO | WELCOME) {
             &self.greeting

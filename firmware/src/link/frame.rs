@@ -53,7 +53,7 @@ pub enum FrameError {
 /// Finds frames in a stream of bytes.
 #[derive(Clone, Debug, Default)]
 pub struct Deframer {
-    bytes: heapless::Vec<u8, WIRE_BYTES>,
+    bytes: heapless::Vec<u8, { WIRE_BYTES - 1 }>,
     oversized: bool,
     ended: bool,
 }

@@ -4,12 +4,12 @@
 //! |---|---|---|---|
 //! | 0x01 | device | configure | [`Configuration`], 26 bytes |
 //! | 0x02 | device | photons | [`Token`]s |
-//! | 0x03 | device | synchronise | any 4 bytes |
+//! | 0x03 | device | synchronise | anything |
 //! | 0x04 | device | statistics request | none |
 //! | 0x81 | host | configured | none |
 //! | 0x82 | host | refused | a [`Refusal`], 1 byte |
 //! | 0x83 | host | events | AER words of 16 bytes |
-//! | 0x84 | host | synchronised | the 4 bytes, after all that came before them |
+//! | 0x84 | host | synchronised | the same, after all that came before it |
 //! | 0x85 | host | statistics | [`Report`], 120 bytes |
 
 use dtof_core::{ConfigError, GateError, RangeScaleError, Statistics};

@@ -33,6 +33,8 @@ pub const BINS: usize = 128;
 
 /// Words that wait for the link: of an event one, and now and then a time word.
 const QUEUE: usize = 64;
+/// Times that all pixels look at most before the main loop goes round.
+const LOOKS: u16 = 64;
 /// Words in one message.
 const WORDS: usize = BODY_BYTES / AerWord::BYTES;
 
@@ -114,7 +116,9 @@ impl<'a> Sidecar<'a> {
         now_ms: u32,
     ) -> Result<(), S::Error> {
         let mut bytes = [0; 64];
-        while serial.read_ready()? {
+        // A piece at a time, so that the main loop goes round whatever the host
+        // sends.
+        if serial.read_ready()? {
             let length = serial.read(&mut bytes)?;
             let mut deframer = core::mem::take(&mut self.deframer);
             for &byte in bytes.iter().take(length) {
@@ -123,8 +127,6 @@ impl<'a> Sidecar<'a> {
                 }
             }
             self.deframer = deframer;
-            self.work(lost);
-            self.send(serial, now_ms)?;
         }
         self.work(lost);
         self.send(serial, now_ms)
@@ -166,9 +168,11 @@ impl<'a> Sidecar<'a> {
         self.endpoint.transmit(now_ms, wire)
     }
 
-    /// Does all that can be done now: messages, photons, events. `overrun` is
-    /// what the serial port has lost so far.
+    /// Does what can be done now: messages, photons, events; of laser cycles not
+    /// more than some, so that it does not take long. `overrun` is what the serial
+    /// port has lost so far.
     pub fn work(&mut self, overrun: u32) {
+        let mut looks = LOOKS;
         loop {
             if let Some((kind, body)) = &self.answer {
                 if self.endpoint.offer(*kind, body).is_err() {
@@ -178,7 +182,7 @@ impl<'a> Sidecar<'a> {
             }
             self.drain();
             if self.photons.is_some() {
-                self.work_through();
+                self.work_through(&mut looks);
                 if self.photons.is_some() {
                     return;
                 }

@@ -29,18 +29,19 @@ impl Photons {
 }
 
 impl Sidecar<'_> {
-    /// Works through a photons message until it is done or an event cannot
-    /// leave its slot.
-    pub(super) fn work_through(&mut self) {
+    /// Works through a photons message until it is done, an event cannot leave its
+    /// slot, or the pixels have looked `looks` times, which it counts down.
+    pub(super) fn work_through(&mut self, looks: &mut u16) {
         let Some(mut photons) = self.photons.take() else {
             return;
         };
         loop {
             while photons.cycles > 0 {
-                if self.pixels.iter().any(AsyncPixel::request) {
+                if *looks == 0 || self.pixels.iter().any(AsyncPixel::request) {
                     self.photons = Some(photons);
                     return;
                 }
+                *looks -= 1;
                 photons.cycles -= self.end_laser_cycles_to_look(photons.cycles);
             }
             let left = photons.body.get(photons.next..).unwrap_or_default();

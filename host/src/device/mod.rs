@@ -21,8 +21,9 @@ use crate::source::Slice;
 pub struct DeviceEngine {
     client: Client,
     report: Report,
-    /// Photons sent so far.
+    /// Photons and laser cycles sent so far.
     sent: u64,
+    cycles: u64,
 }
 
 impl DeviceEngine {
@@ -41,6 +42,12 @@ impl DeviceEngine {
             .map(|address| address.0)
             .eq((0..).take(addresses.len()));
         ensure!(consecutive, "a device has pixels 0 up, without gaps");
+        ensure!(
+            usize::from(client.bins()) == settings.bins,
+            "the device has {} bins, not {}",
+            client.bins(),
+            settings.bins
+        );
         client.configure(&configuration(
             settings,
             u16::try_from(addresses.len())?,
@@ -50,6 +57,7 @@ impl DeviceEngine {
             client,
             report: Report::default(),
             sent: 0,
+            cycles: 0,
         })
     }
 
@@ -63,7 +71,7 @@ impl DeviceEngine {
 /// The settings as the device takes them.
 ///
 /// # Errors
-/// If the device has another number of bins.
+/// If there are no bins.
 pub fn configuration(settings: &Settings, pixels: u16, source: u8) -> Result<Configuration> {
     let last_bin = u16::try_from(settings.bins)? - 1;
     let (gate_first, gate_last) = settings.gate.unwrap_or((0, last_bin));
@@ -110,6 +118,7 @@ impl Engine for DeviceEngine {
         tokens.flush()?;
         let events = self.client.synchronise()?;
         self.report = self.client.report()?;
+        self.cycles += u64::from(cycles);
         self.sent += slice
             .pixels
             .iter()
@@ -124,9 +133,12 @@ impl Engine for DeviceEngine {
         } = self.report.statistics;
         let accounted = counted + saturated + rejected + gated_out;
         ensure!(
-            accounted == self.sent,
-            "the device accounts for {accounted} of {} photons; of its messages {} made no sense",
+            accounted == self.sent && self.report.cycles == self.cycles,
+            "the device accounts for {accounted} of {} photons and {} of {} laser cycles; {} messages \
+             made no sense to it",
             self.sent,
+            self.report.cycles,
+            self.cycles,
             self.report.unknown
         );
         Ok(events)

@@ -2,7 +2,7 @@
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
@@ -10,6 +10,8 @@ use super::qemu::Emulator;
 
 /// How long a port waits for a byte.
 const PATIENCE: Duration = Duration::from_millis(2);
+/// A port that takes nothing for so long is gone.
+const STUCK: Duration = Duration::from_secs(5);
 /// What the boards' serial ports are set to.
 const BAUD: u32 = 1_000_000;
 
@@ -42,8 +44,17 @@ impl Port for TcpStream {
 }
 
 impl Port for Box<dyn serialport::SerialPort> {
-    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.write_all(bytes)
+    fn send(&mut self, mut bytes: &[u8]) -> io::Result<()> {
+        let since = Instant::now();
+        while !bytes.is_empty() {
+            // A full buffer is no error until it stays full.
+            let sent = patient(self.write(bytes))?;
+            bytes = &bytes[sent..];
+            if since.elapsed() > STUCK {
+                return Err(ErrorKind::TimedOut.into());
+            }
+        }
+        Ok(())
     }
 
     fn receive(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
