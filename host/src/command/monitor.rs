@@ -13,7 +13,7 @@ use super::operation::{Operation, number};
 
 #[derive(Args)]
 pub struct Monitor {
-    /// tcp:HOST:PORT or a serial port
+    /// tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated device
     #[arg(long, value_name = "DEVICE")]
     device: String,
     /// Pixels of the sensor, with addresses from 0
