@@ -152,6 +152,22 @@ fn script(cycles: u64, rng: &mut Pcg32) -> Script {
     }
 }
 
+/// The events of a message.
+fn decode(decoder: &mut AerDecoder, body: &[u8]) -> Vec<DepthEvent> {
+    let words = body
+        .chunks(AerWord::BYTES)
+        .map(|word| word.try_into().unwrap());
+    words
+        .filter_map(
+            |word| match decoder.decode(AerWord::from_le_bytes(word)).unwrap() {
+                AerRecord::Event(event) => Some(event),
+                AerRecord::Time(_) => None,
+                AerRecord::End { .. } => panic!("a device ends no stream"),
+            },
+        )
+        .collect()
+}
+
 struct Outcome {
     events: Vec<DepthEvent>,
     report: Report,
@@ -226,16 +242,7 @@ fn run(script: &Script, one_in: u32, reads_one_in: u32, rng: &mut Pcg32) -> Outc
         }
         while let Some(message) = host.take() {
             match message.kind {
-                message::EVENTS => {
-                    for word in message.body.chunks_exact(16) {
-                        let word = AerWord::from_le_bytes(word.try_into().unwrap());
-                        match decoder.decode(word).unwrap() {
-                            AerRecord::Event(event) => events.push(event),
-                            AerRecord::Time(_) => {}
-                            AerRecord::End { .. } => panic!(),
-                        }
-                    }
-                }
+                message::EVENTS => events.extend(decode(&mut decoder, &message.body)),
                 message::STATISTICS => report = Report::from_le_bytes(&message.body),
                 kind => answers.push(kind),
             }
@@ -373,14 +380,7 @@ fn session(
         }
         while let Some(message) = host.take() {
             match message.kind {
-                message::EVENTS => {
-                    for word in message.body.chunks_exact(16) {
-                        let word = AerWord::from_le_bytes(word.try_into().unwrap());
-                        if let AerRecord::Event(event) = decoder.decode(word).unwrap() {
-                            events.push(event);
-                        }
-                    }
-                }
+                message::EVENTS => events.extend(decode(&mut decoder, &message.body)),
                 message::STATISTICS => {
                     return (events, Report::from_le_bytes(&message.body), host.is_lost());
                 }

@@ -137,13 +137,6 @@ impl PhotonSource for SimulatedArray {
         self.geometry
     }
 
-    fn addresses(&self) -> Vec<PixelAddress> {
-        (0..=u16::MAX)
-            .take(self.pixels.len())
-            .map(PixelAddress)
-            .collect()
-    }
-
     fn cycles(&self) -> u64 {
         self.cycles
     }

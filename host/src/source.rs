@@ -56,8 +56,12 @@ pub trait PhotonSource {
     /// The array.
     fn geometry(&self) -> Geometry;
 
-    /// The pixels that are there, ascending.
-    fn addresses(&self) -> Vec<PixelAddress>;
+    /// The pixels that are there, ascending: all of the array unless said
+    /// otherwise.
+    fn addresses(&self) -> Vec<PixelAddress> {
+        let all = (0..=u16::MAX).take(self.geometry().addresses());
+        all.map(PixelAddress).collect()
+    }
 
     /// Laser cycles there are, from 0.
     fn cycles(&self) -> u64;
