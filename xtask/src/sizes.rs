@@ -3,14 +3,23 @@
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use object::elf::{SHF_ALLOC, SHT_NOBITS};
 use object::read::elf::{ElfFile32, SectionHeader};
+use object::{Object, ObjectSymbol};
 
 use crate::firmware::Board;
 
+/// Macropixels the sidecar has room for.
+const MOST_PIXELS: u64 = 256;
+/// What the sidecar may take of the real board: 48 KiB of its flash, and of its
+/// 128 KiB of RAM so much that 16 KiB are left to the stack.
+const MOST_FLASH: u64 = 48 * 1024;
+const MOST_RAM: u64 = (128 - 16) * 1024;
+
 /// Builds and measures every image.
 pub fn print(root: &Path) -> Result<()> {
+    let mut real_board = None;
     println!(
         "{:<12} {:<11} {:>8} {:>8}",
         "image", "board", "flash", "RAM"
@@ -22,10 +31,41 @@ pub fn print(root: &Path) -> Result<()> {
         ] {
             let Sizes { flash, ram } = Sizes::read(&path)?;
             println!("{image:<12} {:<11} {flash:>8} {ram:>8}", board.name());
+            if (image, board) == ("sidecar", Board::Stm32F405) {
+                real_board = Some((flash, ram, pixels(&path)?));
+            }
         }
     }
     println!("bytes; RAM without the stack, which has what is left");
+    let (flash, ram, pixels) = real_board.context("no image of the real board")?;
+    let others = ram - pixels;
+    println!("sidecar on stm32f405, by macropixels of 128 bins:");
+    for count in [64, 128, MOST_PIXELS] {
+        println!(
+            "{count:>4} {:>8} bytes of RAM",
+            others + count * pixels / MOST_PIXELS
+        );
+    }
+    ensure!(
+        flash <= MOST_FLASH,
+        "stm32f405: more than {MOST_FLASH} bytes of flash"
+    );
+    ensure!(
+        ram <= MOST_RAM,
+        "stm32f405: more than {MOST_RAM} bytes of RAM"
+    );
     Ok(())
+}
+
+/// Bytes of the sidecar's macropixels.
+fn pixels(path: &Path) -> Result<u64> {
+    let bytes = fs::read(path).with_context(|| path.display().to_string())?;
+    let file = object::File::parse(&*bytes)?;
+    let mut symbols = file.symbols();
+    let pixels = symbols.find(|symbol| symbol.name().is_ok_and(|name| name.contains("PIXELS")));
+    Ok(pixels
+        .context("no memory called PIXELS in the image")?
+        .size())
 }
 
 /// Bytes an image takes.
