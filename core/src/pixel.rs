@@ -233,6 +233,14 @@ pub struct Statistics {
     pub expired_deferred: u64,
 }
 
+impl Statistics {
+    /// Photons offered, counted or not.
+    #[must_use]
+    pub const fn photons(&self) -> u64 {
+        self.counted + self.saturated + self.rejected + self.gated_out
+    }
+}
+
 impl AddAssign for Statistics {
     /// Those of one more pixel.
     fn add_assign(&mut self, other: Self) {

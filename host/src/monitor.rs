@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind, Write};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use dtof_core::{DepthEvent, RangeScale, Statistics};
+use dtof_core::{DepthEvent, RangeScale};
 use dtof_firmware::link::message::Report;
 
 use crate::device::{Client, configuration};
@@ -120,7 +120,7 @@ impl Figures {
         let line = format!(
             "events/s {:.0}, photons/s {:.0}, deferred {}, lost bytes {}, retransmissions {}, sensor errors {}",
             rate(now.events, last.events),
-            rate(offered(now), offered(last)),
+            rate(now.photons(), last.photons()),
             now.deferred,
             report.overrun.wrapping_sub(first.overrun),
             (client.counters().retransmitted - self.retransmitted).wrapping_add(
@@ -135,9 +135,4 @@ impl Figures {
         self.last = report;
         line
     }
-}
-
-/// All photons, counted or not.
-fn offered(statistics: &Statistics) -> u64 {
-    statistics.counted + statistics.saturated + statistics.rejected + statistics.gated_out
 }

@@ -5,9 +5,10 @@
 //! inverse square of the distance; the background is the same everywhere.
 
 use anyhow::Result;
+use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 
 use crate::maps::{Maps, PixelHistory};
-use crate::settings::Settings;
+use crate::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
 use crate::simulation::{Rates, SimulatedArray};
 use crate::source::Geometry;
 use crate::summary::{Row, grouped};
@@ -96,6 +97,24 @@ fn view(column: f64, row: f64) -> View {
             surface: Surface::Wall,
             range_mm: 3400.0 + 400.0 * column / 63.0,
         }
+    }
+}
+
+/// The paper's settings for its static scene (section III-B), on 128 bins of
+/// 250 ps.
+#[must_use]
+pub fn settings(seed: u64) -> Settings {
+    Settings {
+        bins: 128,
+        bin_width_ps: U16F16Number(U16F16::lit("250")),
+        offset_mm: I24F8Number(I24F8::ZERO),
+        gate: None,
+        alpha: U8F8Number(U8F8::lit("8")),
+        min_count: 5,
+        l1: 100,
+        l2: 2000,
+        x: 10,
+        seed,
     }
 }
 

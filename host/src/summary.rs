@@ -57,7 +57,6 @@ impl Summary {
         settings: &Settings,
     ) -> Self {
         let Statistics {
-            counted,
             saturated,
             rejected,
             gated_out,
@@ -65,12 +64,13 @@ impl Summary {
             deferred,
             expired,
             expired_deferred,
+            ..
         } = *statistics;
         Self {
             input: None,
             recorded_cycles: source.recorded_cycles(),
             cycles: source.cycles(),
-            photons: counted + saturated + rejected + gated_out,
+            photons: statistics.photons(),
             events,
             pixels: source.addresses().len(),
             pixels_reporting,

@@ -10,28 +10,16 @@ use std::time::{Duration, Instant};
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::{Engine, host_engine};
 use dtof::scene;
-use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use dtof::settings::Settings;
 use dtof::source::{Geometry, PhotonSource};
 use dtof_core::DepthEvent;
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::sidecar::Sidecar;
 
 const PIXELS: usize = 64;
 
 fn settings() -> Settings {
-    Settings {
-        bins: 128,
-        bin_width_ps: U16F16Number(U16F16::lit("250")),
-        offset_mm: I24F8Number(I24F8::ZERO),
-        gate: None,
-        alpha: U8F8Number(U8F8::lit("8")),
-        min_count: 5,
-        l1: 100,
-        l2: 2000,
-        x: 10,
-        seed: 1,
-    }
+    scene::settings(1)
 }
 
 /// Serves one connection after the other, each with a sidecar fresh from

@@ -7,9 +7,9 @@ use anyhow::{Context, Result, ensure};
 use dtof::device::{Client, DeviceEngine};
 use dtof::engine::{Engine, host_engine};
 use dtof::scene;
-use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use dtof::settings::{Settings, U8F8Number};
 use dtof::source::{Geometry, PhotonSource};
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::fixed::types::U8F8;
 
 use crate::firmware::Board;
 use crate::log;
@@ -76,16 +76,10 @@ fn ends(image: &Path) -> Result<()> {
 /// What decides the events: a setting at which there are many.
 fn settings() -> Settings {
     Settings {
-        bins: 128,
-        bin_width_ps: U16F16Number(U16F16::lit("250")),
-        offset_mm: I24F8Number(I24F8::ZERO),
-        gate: None,
         alpha: U8F8Number(U8F8::lit("4")),
-        min_count: 5,
         l1: 20,
-        l2: 2000,
         x: 4,
-        seed: 1,
+        ..scene::settings(1)
     }
 }
 
@@ -120,7 +114,7 @@ fn agrees(
         statistics == on_host.statistics(),
         "{name}: not the counts of this computer"
     );
-    let photons = statistics.counted + statistics.saturated + statistics.rejected;
+    let photons = statistics.photons();
     println!(
         "{name}: {photons} photons of {} macropixels, {} events, each as on this computer; \
          read every {} ms; {:.0} s, {:?}",

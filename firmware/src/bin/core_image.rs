@@ -238,7 +238,7 @@ fn elements<const BINS: usize, W: CounterWidth>() {
         keep(element.acknowledge(macropixel()));
         statistics += element.pixel(macropixel()).statistics();
     }
-    keep(statistics);
+    keep((statistics, statistics.photons()));
 }
 
 fn gate<const BINS: usize>() -> RangeGate<BINS> {

@@ -11,10 +11,9 @@ use dtof::output::Output;
 use dtof::report::Section;
 use dtof::run::run;
 use dtof::scene;
-use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use dtof::settings::Settings;
 use dtof::source::{Geometry, PhotonSource};
 use dtof_core::PixelAddress;
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 
 use super::print_summary;
 
@@ -60,18 +59,7 @@ impl Demo {
     const CYCLES: u64 = 10_000;
 
     pub fn run(&self) -> Result<()> {
-        let settings = Settings {
-            bins: 128,
-            bin_width_ps: U16F16Number(U16F16::lit("250")),
-            offset_mm: I24F8Number(I24F8::ZERO),
-            gate: None,
-            alpha: U8F8Number(U8F8::lit("8")),
-            min_count: 5,
-            l1: 100,
-            l2: 2000,
-            x: 10,
-            seed: self.seed,
-        };
+        let settings = scene::settings(self.seed);
         let (columns, rows) = if self.device.is_some() {
             (8, 8)
         } else {

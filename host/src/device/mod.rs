@@ -124,14 +124,7 @@ impl Engine for DeviceEngine {
             .iter()
             .map(|pixel| pixel.photons.len() as u64)
             .sum::<u64>();
-        let Statistics {
-            counted,
-            saturated,
-            rejected,
-            gated_out,
-            ..
-        } = self.report.statistics;
-        let accounted = counted + saturated + rejected + gated_out;
+        let accounted = self.report.statistics.photons();
         ensure!(
             accounted == self.sent && self.report.cycles == self.cycles,
             "the device accounts for {accounted} of {} photons and {} of {} laser cycles; {} messages \
