@@ -20,6 +20,7 @@
 extern crate std;
 
 pub mod board;
+pub mod i2c;
 pub mod link;
 pub mod self_test;
 pub mod sensor;
