@@ -3,6 +3,8 @@
 
 use std::env;
 use std::error::Error;
+use std::fs;
+use std::path::Path;
 
 /// The images a board runs, each with the features of the boards it is for.
 const IMAGES: [(&str, &[&str]); 3] = [
@@ -16,6 +18,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=core-image.x");
     println!("cargo::rerun-if-changed=memory");
     println!("cargo::rerun-if-changed=../memory.x");
+
+    tmf882x_image()?;
 
     // The one target of real boards; elsewhere the linker's own layout does.
     if env::var("TARGET")? != "thumbv7em-none-eabihf" {
@@ -46,5 +50,36 @@ fn main() -> Result<(), Box<dyn Error>> {
         // Sections start where the one before ends, not at the next page.
         link(image, "--nmagic");
     }
+    Ok(())
+}
+
+/// Where the vendor's image of the TMF8820/21/28 is: raw bytes, from RAM address
+/// 0x0000 on. Without it the driver says that there is none.
+const IMAGE: &str = "TMF882X_IMAGE";
+
+/// Puts the vendor's image where the sidecar includes it from.
+fn tmf882x_image() -> Result<(), Box<dyn Error>> {
+    println!("cargo::rerun-if-env-changed={IMAGE}");
+    if env::var_os("CARGO_FEATURE_SENSOR_TMF882X").is_none() {
+        return Ok(());
+    }
+    let image = match env::var_os(IMAGE) {
+        None => {
+            println!("cargo::warning={IMAGE} is not set: the sensor has to run its image already");
+            Vec::new()
+        }
+        Some(path) => {
+            let path = Path::new(&path);
+            println!("cargo::rerun-if-changed={}", path.display());
+            let image = fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
+            // The letter a HEX file starts with is in no image's first place.
+            if image.is_empty() || image.starts_with(b":") {
+                return Err(format!("{}: not raw bytes", path.display()).into());
+            }
+            image
+        }
+    };
+    let out = env::var_os("OUT_DIR").ok_or("cargo sets OUT_DIR")?;
+    fs::write(Path::new(&out).join("tmf882x.bin"), image)?;
     Ok(())
 }

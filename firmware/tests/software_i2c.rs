@@ -28,12 +28,24 @@ enum Phase {
     /// Not addressed.
     Idle,
     /// Takes bits, the most significant first.
-    Receive { byte: u8, bits: u8, address: bool },
+    Receive {
+        byte: u8,
+        bits: u8,
+        address: bool,
+    },
     /// Acknowledges; then it sends or takes bytes.
-    Acknowledge { sends: bool },
-    Send { byte: u8, bits: u8 },
+    Acknowledge {
+        sends: bool,
+    },
+    Send {
+        byte: u8,
+        bits: u8,
+    },
     /// Is acknowledged, or not.
-    Acknowledged { byte: u8, high: bool },
+    Acknowledged {
+        byte: u8,
+        high: bool,
+    },
 }
 
 /// Two wires and a device on them.
@@ -420,9 +432,11 @@ fn a_device_stuck_in_a_byte_is_clocked_free() {
         let mut byte = [0xAA];
         assert_eq!(bus.write_read(ADDRESS, &[7], &mut byte), Ok(()));
         assert_eq!(byte, [0]);
-        assert!(wires.borrow().seen.ends_with(&expected(&[
-            Part::Write(vec![7]),
-            Part::Read(1)
-        ])));
+        assert!(
+            wires
+                .borrow()
+                .seen
+                .ends_with(&expected(&[Part::Write(vec![7]), Part::Read(1)]))
+        );
     }
 }

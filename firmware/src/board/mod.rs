@@ -18,6 +18,9 @@ pub mod stm32f405;
 #[cfg(all(feature = "mps2-an386", feature = "stm32f405"))]
 compile_error!("an image is for one board: choose one of mps2-an386 and stm32f405");
 
+#[cfg(all(feature = "sensor-tdc7200", feature = "sensor-tmf882x"))]
+compile_error!("an image is for one sensor: choose one of sensor-tdc7200 and sensor-tmf882x");
+
 use crate::serial::Serial;
 
 /// What the main loop needs of a board.

@@ -29,6 +29,7 @@ mod timer;
 pub mod tmf882x;
 
 use dtof_core::PixelAddress;
+use dtof_core::fixed::types::U16F16;
 
 /// Where a sensor's photons go.
 pub trait PhotonSink {
@@ -50,6 +51,11 @@ pub trait PhotonSink {
 pub trait Sensor {
     /// What can go wrong; the error of the bus is inside.
     type Error;
+
+    /// How wide the bins of the configuration in force are, in picoseconds. A
+    /// sensor that measures times makes its TDC codes that wide from now on; one
+    /// with bins of its own takes no notice.
+    fn set_bin_width(&mut self, _bin_width: U16F16) {}
 
     /// Takes the next step. `now_ms` counts milliseconds and may wrap.
     ///

@@ -26,16 +26,15 @@ impl Sidecar<'_> {
         let gate = RangeGate::new(wanted.gate_first, wanted.gate_last)?;
         let rule = PaperRule::new(U8F8::from_bits(wanted.alpha), minimum);
         let config = PixelConfig::new(wanted.x, wanted.l1, wanted.l2, gate, rule)?;
-        RangeScale::new(
-            U16F16::from_bits(wanted.bin_width),
-            I24F8::from_bits(wanted.offset),
-        )?;
+        let bin_width = U16F16::from_bits(wanted.bin_width);
+        RangeScale::new(bin_width, I24F8::from_bits(wanted.offset))?;
         self.pixels.clear();
         for address in 0..wanted.pixels {
             // There is room: checked above.
             let _ = self.pixels.push(AsyncPixel::new(PixelAddress(address)));
         }
         self.config = Some(config);
+        self.bin_width = bin_width;
         self.source = source;
         self.restart_counts();
         Ok(())

@@ -15,6 +15,7 @@
 mod configuration;
 mod photons;
 mod sensor;
+use dtof_core::fixed::types::U16F16;
 use dtof_core::{
     AER_VERSION, AerEncoder, AerWord, AsyncPixel, DepthEvent, PixelConfig, Statistics,
 };
@@ -51,6 +52,8 @@ pub struct Sidecar<'a> {
     wire_sent: usize,
     pixels: &'a mut VecView<AsyncPixel<BINS>>,
     config: Option<PixelConfig<BINS>>,
+    /// Of the configuration in force, for sensors that measure times.
+    bin_width: U16F16,
     source: Source,
     has_sensor: bool,
     photons: Option<Photons>,
@@ -87,6 +90,7 @@ impl<'a> Sidecar<'a> {
             wire_sent: 0,
             pixels,
             config: None,
+            bin_width: U16F16::ZERO,
             source: Source::Link,
             has_sensor,
             photons: None,

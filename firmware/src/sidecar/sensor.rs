@@ -36,6 +36,7 @@ impl Sidecar<'_> {
             if !self.takes_sensor() {
                 return;
             }
+            sensor.set_bin_width(self.bin_width);
             match sensor.poll(now_ms, self) {
                 Ok(Polled::Idle) => return,
                 Ok(Polled::Working | Polled::Data) => {}

@@ -52,7 +52,8 @@ pub struct Settings {
     /// The reference clock at the pin CLOCK in kHz, 1,000 to 16,000. A clock
     /// that is not a whole number of kHz is not supported.
     pub clock_khz: u16,
-    /// Picoseconds a bin.
+    /// Picoseconds a bin, until [`Sensor::set_bin_width`](crate::sensor::Sensor)
+    /// says otherwise.
     pub bin_width: U16F16,
     /// Where bin 0 starts, in picoseconds after START.
     pub first_bin_ps: u32,
@@ -141,15 +142,15 @@ impl Config {
     ///
     /// # Errors
     /// [`ConfigError`] says what cannot be.
-    pub fn new(settings: Settings) -> Result<Self, ConfigError> {
-        if !(1_000..=16_000).contains(&settings.clock_khz) {
+    pub const fn new(settings: Settings) -> Result<Self, ConfigError> {
+        if settings.clock_khz < 1_000 || settings.clock_khz > 16_000 {
             return Err(ConfigError::Clock);
         }
-        if settings.bin_width == U16F16::ZERO {
+        if settings.bin_width.to_bits() == 0 {
             return Err(ConfigError::ZeroBinWidth);
         }
         // The mask counts clock periods, which only mode 2's overflow does too.
-        let masked = settings.mode == Mode::Two && settings.overflow <= settings.stop_mask;
+        let masked = matches!(settings.mode, Mode::Two) && settings.overflow <= settings.stop_mask;
         if settings.overflow == 0 || masked {
             return Err(ConfigError::Overflow);
         }
@@ -160,6 +161,13 @@ impl Config {
     #[must_use]
     pub const fn settings(&self) -> &Settings {
         &self.0
+    }
+
+    /// Bins of another width from now on. A width of zero changes nothing.
+    pub(super) fn set_bin_width(&mut self, bin_width: U16F16) {
+        if bin_width != U16F16::ZERO {
+            self.0.bin_width = bin_width;
+        }
     }
 
     /// CONFIG1 without `START_MEAS`. The calibration is always forced, so that

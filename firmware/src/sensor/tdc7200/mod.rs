@@ -33,6 +33,7 @@ mod error;
 mod registers;
 mod time;
 
+use dtof_core::fixed::types::U16F16;
 use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
 use embedded_hal::spi::{Operation, SpiDevice};
 
@@ -370,6 +371,10 @@ where
     EN: OutputPin + PinErrorType<Error = INT::Error>,
 {
     type Error = Error<SPI::Error, INT::Error>;
+
+    fn set_bin_width(&mut self, bin_width: U16F16) {
+        self.config.set_bin_width(bin_width);
+    }
 
     /// After an error the device is reset and configured anew, within some 5 ms.
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, SPI, INT> {

@@ -111,18 +111,18 @@ impl Config {
     ///
     /// # Errors
     /// [`ConfigError`] says what cannot be.
-    pub fn new(settings: Settings) -> Result<Self, ConfigError> {
-        if !(0x08..=0x77).contains(&settings.address) {
+    pub const fn new(settings: Settings) -> Result<Self, ConfigError> {
+        if settings.address < 0x08 || settings.address > 0x77 {
             return Err(ConfigError::Address);
         }
         if settings.kilo_iterations == 0 {
             return Err(ConfigError::ZeroIterations);
         }
         let PixelAddress(first) = settings.first_pixel;
-        if first.checked_add(u16::from(CHANNELS) - 2).is_none() {
+        if first.checked_add(CHANNELS as u16 - 2).is_none() {
             return Err(ConfigError::Pixels);
         }
-        if settings.data_timeout_ms <= u32::from(settings.period_ms) {
+        if settings.data_timeout_ms <= settings.period_ms as u32 {
             return Err(ConfigError::Timeout);
         }
         Ok(Self(settings))

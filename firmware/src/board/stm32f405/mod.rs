@@ -16,9 +16,11 @@
 //! The feature `pll-off` leaves the processor at 16 MHz from its internal
 //! oscillator, for emulators in which the PLL never starts. All else stays.
 
+mod sensor_port;
+
 use core::cell::RefCell;
 use core::panic::PanicInfo;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{NVIC, SCB};
@@ -26,12 +28,15 @@ use cortex_m_rt::{ExceptionFrame, exception};
 use critical_section::Mutex;
 use defmt_rtt as _;
 use static_cell::ConstStaticCell;
+use stm32f4xx_hal::gpio::{Edge, PinState, Pull};
 use stm32f4xx_hal::nb;
-use stm32f4xx_hal::pac::{self, Interrupt, USART2, interrupt};
+use stm32f4xx_hal::pac::{self, EXTI, Interrupt, USART2, interrupt};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config as ClockConfig;
 use stm32f4xx_hal::serial::{Config as SerialConfig, Rx, Tx};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
+
+pub use self::sensor_port::SensorPort;
 
 use super::{Board, report};
 use crate::serial::{BoardBuffers, Buffers, Serial, SerialInterrupt};
@@ -48,6 +53,9 @@ struct Port {
 static BUFFERS: ConstStaticCell<BoardBuffers> = ConstStaticCell::new(Buffers::new());
 static PORT: Mutex<RefCell<Option<Port>>> = Mutex::new(RefCell::new(None));
 static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
+static SENSOR_LINE: Mutex<RefCell<Option<EXTI>>> = Mutex::new(RefCell::new(None));
+/// The sensor has something since the main loop slept last.
+static SENSOR_READY: AtomicBool = AtomicBool::new(false);
 
 /// The board, once started.
 pub struct Stm32F405 {
@@ -55,13 +63,13 @@ pub struct Stm32F405 {
 }
 
 impl Stm32F405 {
-    /// Starts clock, timer, serial port and watchdog. Waits for the crystal: a
-    /// board without one stays here.
+    /// Starts clock, timer, serial port, the interrupt of the sensor and the
+    /// watchdog. Waits for the crystal: a board without one stays here.
     ///
     /// # Panics
     /// If called twice.
     #[must_use]
-    pub fn start() -> (Self, Serial<'static>) {
+    pub fn start() -> (Self, Serial<'static>, SensorPort) {
         let (Some(core), Some(device)) = (cortex_m::Peripherals::take(), pac::Peripherals::take())
         else {
             panic!("the board is started twice");
@@ -81,6 +89,8 @@ impl Stm32F405 {
         timer.enable_counter();
 
         let pins = device.GPIOA.split(&mut rcc);
+        let pins_b = device.GPIOB.split(&mut rcc);
+        let pins_c = device.GPIOC.split(&mut rcc);
         let config = SerialConfig::default().baudrate(BAUD.bps());
         let Ok(usart) = device.USART2.serial((pins.pa2, pins.pa3), config, &mut rcc) else {
             panic!("{BAUD} baud cannot be had from this clock");
@@ -89,18 +99,47 @@ impl Stm32F405 {
         rx.listen();
         let (interrupt, serial) = BUFFERS.take().split(Self::start_sending);
         critical_section::with(|cs| PORT.replace(cs, Some(Port { interrupt, tx, rx })));
-        // SAFETY: the handler shares data with the main loop through queues,
-        // atomics and a mutex only, and nothing relies on its being masked.
+
+        // High when the sensor is silent, or is not there.
+        let mut interrupt = pins_c.pc8.into_pull_up_input();
+        let mut exti = device.EXTI;
+        interrupt.make_interrupt_source(&mut device.SYSCFG.constrain(&mut rcc));
+        interrupt.trigger_on_edge(&mut exti, Edge::Falling);
+        interrupt.enable_interrupt(&mut exti);
+        critical_section::with(|cs| SENSOR_LINE.replace(cs, Some(exti)));
+        let high = PinState::High;
+        let sensor = SensorPort {
+            interrupt,
+            enable: pins_c.pc6.into_push_pull_output_in_state(PinState::Low),
+            spi: device.SPI2,
+            cs: pins_b.pb12.into_push_pull_output_in_state(high),
+            sck: pins_b.pb13,
+            miso: pins_b.pb14,
+            mosi: pins_b.pb15,
+            scl: pins
+                .pa8
+                .into_open_drain_output_in_state(high)
+                .internal_resistor(Pull::Up),
+            sda: pins_c
+                .pc9
+                .into_open_drain_output_in_state(high)
+                .internal_resistor(Pull::Up),
+            rcc,
+        };
+
+        // SAFETY: the handlers share data with the main loop through queues,
+        // atomics and mutexes only, and nothing relies on their being masked.
         #[allow(unsafe_code, reason = "there is no other way to unmask")]
         unsafe {
             NVIC::unmask(Interrupt::USART2);
+            NVIC::unmask(Interrupt::EXTI9_5);
         }
 
         let mut watchdog = IndependentWatchdog::new(device.IWDG);
         // A breakpoint is no reason to reset.
         watchdog.stop_on_debug(&device.DBGMCU, true);
         watchdog.start(1000.millis());
-        (Self { watchdog }, serial)
+        (Self { watchdog }, serial, sensor)
     }
 
     /// Reports a panic and resets.
@@ -131,7 +170,8 @@ impl Board for Stm32F405 {
 
     fn wait_for_interrupt(&mut self, has_work: impl FnOnce() -> bool) {
         cortex_m::interrupt::free(|_| {
-            if !has_work() {
+            let sensor_ready = SENSOR_READY.swap(false, Ordering::Relaxed);
+            if !sensor_ready && !has_work() {
                 // An interrupt that is held back ends the sleep all the same.
                 cortex_m::asm::wfi();
             }
@@ -142,6 +182,16 @@ impl Board for Stm32F405 {
 #[exception]
 fn SysTick() {
     MILLISECONDS.fetch_add(1, Ordering::Relaxed);
+}
+
+#[interrupt]
+fn EXTI9_5() {
+    critical_section::with(|cs| {
+        if let Some(exti) = SENSOR_LINE.borrow_ref(cs).as_ref() {
+            exti.pr().write(|w| w.pr8().clear_bit_by_one());
+        }
+    });
+    SENSOR_READY.store(true, Ordering::Relaxed);
 }
 
 #[interrupt]

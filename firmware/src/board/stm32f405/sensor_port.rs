@@ -1,0 +1,104 @@
+//! Where a sensor is connected.
+//!
+//! | pin | TDC7200 | TMF8820/21/28 |
+//! |---|---|---|
+//! | PC6 | ENABLE | EN |
+//! | PC8 | INTB | INT |
+//! | PB12 | CSB | |
+//! | PB13 | SCLK | |
+//! | PB14 | DOUT | |
+//! | PB15 | DIN | |
+//! | PA8 | | SCL |
+//! | PC9 | | SDA |
+//! | 3V | VDD | VDD |
+//! | GND | GND | GND |
+//!
+//! All at 3.3 V. PC8 is pulled up in the controller, and so are PA8 and PC9, but
+//! too weakly for 400 kHz: the bus needs resistors of 1 to 4.7 kΩ to 3.3 V, which
+//! most modules have.
+
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::U16F16;
+use embedded_hal::delay::DelayNs;
+use embedded_hal_bus::spi::ExclusiveDevice;
+use stm32f4xx_hal::gpio::{Input, OpenDrain, Output, Pin};
+use stm32f4xx_hal::pac::SPI2;
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::Rcc;
+use stm32f4xx_hal::spi::{Mode, Phase, Polarity};
+
+use crate::i2c::SoftwareI2c;
+use crate::sensor::Sensor;
+use crate::sensor::tdc7200::{self, Tdc7200};
+use crate::sensor::tmf882x::{self, Tmf882x};
+
+/// The pins of a sensor. One sensor takes them all.
+pub struct SensorPort {
+    pub(super) rcc: Rcc,
+    pub(super) enable: Pin<'C', 6, Output>,
+    pub(super) interrupt: Pin<'C', 8, Input>,
+    pub(super) spi: SPI2,
+    pub(super) cs: Pin<'B', 12, Output>,
+    pub(super) sck: Pin<'B', 13>,
+    pub(super) miso: Pin<'B', 14>,
+    pub(super) mosi: Pin<'B', 15>,
+    pub(super) scl: Pin<'A', 8, Output<OpenDrain>>,
+    pub(super) sda: Pin<'C', 9, Output<OpenDrain>>,
+}
+
+impl SensorPort {
+    /// A TDC7200 with a clock of 8 MHz, on SPI2 at 10.5 MHz: one stop a
+    /// measurement, rising edges, 12 to 500 ns after START, which is where bin 0
+    /// starts. Its photons are those of pixel 0.
+    #[must_use]
+    pub fn tdc7200(mut self) -> impl Sensor {
+        const CONFIG: tdc7200::Config = {
+            let settings = tdc7200::Settings::new(PixelAddress(0), 8_000, U16F16::lit("250"));
+            match tdc7200::Config::new(tdc7200::Settings {
+                // 500 ns, if a turn of the ring oscillator takes 3.5.
+                overflow: 143,
+                ..settings
+            }) {
+                Ok(config) => config,
+                Err(_) => panic!("not a configuration"),
+            }
+        };
+        const MODE_0: Mode = Mode {
+            polarity: Polarity::IdleLow,
+            phase: Phase::CaptureOnFirstTransition,
+        };
+        let pins = (Some(self.sck), Some(self.miso), Some(self.mosi));
+        // A quarter of 42 MHz; without the PLL half of 16 MHz.
+        let bus = self.spi.spi(pins, MODE_0, 11.MHz(), &mut self.rcc);
+        let Ok(device) = ExclusiveDevice::new_no_delay(bus, self.cs);
+        Tdc7200::<_, _, _>::new(device, self.interrupt, self.enable, CONFIG)
+    }
+
+    /// A TMF8820, TMF8821 or TMF8828 on an I²C bus of 400 kHz, map 1. Its nine
+    /// zones are pixels 0 to 8. `image` is the vendor's.
+    #[must_use]
+    pub fn tmf882x(self, image: &'static [u8]) -> impl Sensor {
+        const CONFIG: tmf882x::Config =
+            match tmf882x::Config::new(tmf882x::Settings::new(PixelAddress(0))) {
+                Ok(config) => config,
+                Err(_) => panic!("not a configuration"),
+            };
+        let delay = Delay {
+            cycles_per_us: self.rcc.clocks.sysclk().to_MHz(),
+        };
+        let bus = SoftwareI2c::new(self.scl, self.sda, delay);
+        Tmf882x::<_, _, _>::new(bus, self.interrupt, self.enable, image, CONFIG)
+    }
+}
+
+/// Counts instructions that do nothing.
+struct Delay {
+    cycles_per_us: u32,
+}
+
+impl DelayNs for Delay {
+    fn delay_ns(&mut self, ns: u32) {
+        let cycles = u64::from(ns) * u64::from(self.cycles_per_us) / 1000 + 1;
+        cortex_m::asm::delay(u32::try_from(cycles).unwrap_or(u32::MAX));
+    }
+}
