@@ -195,6 +195,25 @@ fn measures_in_mode_1() {
     assert_eq!(bench.sensor.counts(), counts);
 }
 
+/// 7.061 ns into the histogram are bin 28 of 250 ps and bin 14 of 500 ps.
+#[test]
+fn bins_are_as_wide_as_was_said_last() {
+    let mut bench = armed();
+    for (bin_width, code) in [("500", 14), ("0", 14), ("250", 28)] {
+        let bin_width = U16F16::from_str(bin_width).unwrap();
+        bench.sensor.set_bin_width(bin_width);
+        bench.interrupt.set(false);
+        let accesses = [
+            read(0x02, &[0x19]),
+            read_results(0x10, &[4175]),
+            read_results(0x1b, &[2110, 21121]),
+            write(0x00, ARM_1),
+        ];
+        assert_eq!(bench.poll(&accesses.concat()), Ok(Polled::Data));
+        assert_eq!(bench.sink.take(), [Given::Photon(7, code), Given::End(1)]);
+    }
+}
+
 #[test]
 fn every_setting_reaches_its_register() {
     let mut bench = Bench::<13>::new(Settings {

@@ -4,15 +4,17 @@
 
 mod common;
 
+use std::convert::Infallible;
+
 use common::host::{CONFIGURATION, Call, Host, Scripted};
-use dtof_core::fixed::types::U8F8;
+use dtof_core::fixed::types::{U8F8, U16F16};
 use dtof_core::{
     AsyncPixel, Count, Count24, DepthEvent, Flags, Histogram, LaserCycle, PaperRule, PixelAddress,
     PixelConfig, RangeGate, detect,
 };
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::{self, Configuration, Report};
-use dtof_firmware::sensor::simulated;
+use dtof_firmware::sensor::{PhotonSink, Polled, Sensor, simulated};
 use dtof_firmware::sidecar::Sidecar;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -402,4 +404,40 @@ fn the_simulated_scene_comes_over_a_serial_port() {
     for pixel in 0..16 {
         assert!(host.events.iter().any(|event| event.pixel.0 == pixel));
     }
+}
+
+/// A sensor that notes the bin widths it is told.
+#[derive(Default)]
+struct Told(Vec<U16F16>);
+
+impl Sensor for Told {
+    type Error = Infallible;
+
+    fn set_bin_width(&mut self, bin_width: U16F16) {
+        if self.0.last() != Some(&bin_width) {
+            self.0.push(bin_width);
+        }
+    }
+
+    fn poll(&mut self, _: u32, _: &mut impl PhotonSink) -> Result<Polled, Infallible> {
+        Ok(Polled::Idle)
+    }
+}
+
+#[test]
+fn a_sensor_is_told_the_bin_width_of_each_configuration() {
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, true);
+    let mut host = Host::new(1, 0);
+    let mut sensor = Told::default();
+    for bin_width in [250 << 16, 100 << 16] {
+        let wanted = Configuration {
+            bin_width,
+            source: 1,
+            ..CONFIGURATION
+        };
+        host.configure(&mut device, 0, &wanted);
+        device.poll_sensor(&mut sensor, 0);
+    }
+    assert_eq!(sensor.0, [U16F16::lit("250"), U16F16::lit("100")]);
 }

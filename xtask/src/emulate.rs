@@ -5,15 +5,15 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::firmware::Board;
+use crate::firmware::{Board, Sensor};
 use crate::tools::{DEFMT_PRINT, PROBE_RS, QEMU};
 use crate::{log, qemu};
 
 /// Where the serial port is unless said otherwise.
 const PORT: u16 = 5386;
 
-/// The controller of the Discovery board.
-pub const CHIP: &str = "STM32F407VGTx";
+/// The controller of the Discovery board, as probe-rs calls it.
+const CHIP: &str = "STM32F407VGTx";
 
 /// Runs the sidecar in QEMU until it ends or is interrupted.
 pub fn emulate(root: &Path, arguments: &[&str]) -> Result<()> {
@@ -55,9 +55,16 @@ pub fn emulate(root: &Path, arguments: &[&str]) -> Result<()> {
 }
 
 /// Writes the sidecar onto the board and shows its log until interrupted.
-/// `chip` is probe-rs's name for the controller.
-pub fn flash(root: &Path, chip: &str) -> Result<()> {
-    let image = Board::Stm32F405.sidecar(root, &[])?;
+pub fn flash(root: &Path, arguments: &[&str]) -> Result<()> {
+    let (chip, rest) = match arguments {
+        ["--chip", chip, rest @ ..] => (*chip, rest),
+        rest => (CHIP, rest),
+    };
+    let image = match rest {
+        [] => Board::Stm32F405.sidecar(root, &[])?,
+        [sensor] => Sensor::named(sensor)?.sidecar(root)?,
+        [_, more, ..] => bail!("what is `{more}`?"),
+    };
     PROBE_RS.require()?;
     let status = Command::new(PROBE_RS.program)
         .args(["run", "--non-interactive", "--chip", chip])

@@ -46,13 +46,67 @@ impl Board {
     }
 }
 
+/// What is connected to the real board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sensor {
+    Tdc7200,
+    Tmf882x,
+}
+
+impl Sensor {
+    pub const ALL: [Self; 2] = [Self::Tdc7200, Self::Tmf882x];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tdc7200 => "tdc7200",
+            Self::Tmf882x => "tmf882x",
+        }
+    }
+
+    pub fn feature(self) -> &'static str {
+        match self {
+            Self::Tdc7200 => "sensor-tdc7200",
+            Self::Tmf882x => "sensor-tmf882x",
+        }
+    }
+
+    pub fn named(name: &str) -> Result<Self> {
+        let found = Self::ALL.into_iter().find(|sensor| sensor.name() == name);
+        found.with_context(|| format!("no sensor `{name}`: tdc7200 or tmf882x"))
+    }
+
+    /// The sidecar that takes its photons.
+    pub fn sidecar(self, root: &Path) -> Result<PathBuf> {
+        if self == Self::Tmf882x {
+            ensure!(
+                env::var_os(IMAGE).is_some(),
+                "{IMAGE} has to be the path of the sensor's program, raw bytes from its vendor"
+            );
+        }
+        Board::Stm32F405.sidecar(root, &[self.feature()])
+    }
+}
+
+/// What `firmware/build.rs` takes the program of the TMF8820/21/28 from.
+const IMAGE: &str = "TMF882X_IMAGE";
+
 /// Builds one image and says where it is. Each set of features has a folder of
 /// its own, so that none takes another's place.
 fn build(root: &Path, image: &str, features: &[&str]) -> Result<PathBuf> {
     toolchain::ensure_target(TARGET)?;
     let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
     let folder = root.join(folder);
-    let status = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+    let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    if let Some(image) = env::var_os(IMAGE) {
+        // The build script runs in another folder.
+        let path = PathBuf::from(image);
+        cargo.env(
+            IMAGE,
+            path.canonicalize()
+                .with_context(|| path.display().to_string())?,
+        );
+    }
+    let status = cargo
         .current_dir(root)
         .args(["build", "--quiet", "--locked", "--package", "dtof-firmware"])
         .args(["--bin", image, "--features", &features.join(",")])
@@ -74,8 +128,18 @@ fn build(root: &Path, image: &str, features: &[&str]) -> Result<PathBuf> {
 }
 
 /// Builds the sidecar of a board and says where it is.
-pub fn image(root: &Path, board: &str) -> Result<()> {
-    let path = Board::named(board)?.sidecar(root, &[])?;
+pub fn image(root: &Path, board: &str, sensor: Option<&str>) -> Result<()> {
+    let board = Board::named(board)?;
+    let path = match sensor {
+        None => board.sidecar(root, &[])?,
+        Some(sensor) => {
+            ensure!(
+                board == Board::Stm32F405,
+                "only stm32f405 has a place for a sensor"
+            );
+            Sensor::named(sensor)?.sidecar(root)?
+        }
+    };
     println!("{}", path.display());
     Ok(())
 }

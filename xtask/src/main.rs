@@ -28,11 +28,14 @@ cargo xtask <command>
   check-image   link dtof-core for every target; no panic, float or allocation
   check-source  no floating-point type and no unsafe in core/src
 
-  image BOARD   build the sidecar for mps2-an386 or stm32f405
+  image BOARD [SENSOR]
+                build the sidecar for mps2-an386 or stm32f405; for the latter also
+                with tdc7200 or tmf882x connected instead of simulated photons
   sizes         flash and RAM of each image
   emulate [--port PORT] [exit|panic|fault]
                 run the sidecar in QEMU, its serial port on a TCP port (5386)
-  flash [CHIP]  write the sidecar onto an STM32F405 or STM32F407 and show its log;
+  flash [--chip CHIP] [SENSOR]
+                write the sidecar onto an STM32F405 or STM32F407 and show its log;
                 the chip as probe-rs names it, by default that of the Discovery
   check-boards  the images start, end and echo in QEMU
   self-test     the core works out the same on the target; --bless writes down
@@ -58,11 +61,11 @@ fn run() -> Result<()> {
         }
         ["check-image"] => image::check(root()?),
         ["check-source"] => source::check(root()?),
-        ["image", board] => firmware::image(root()?, board),
+        ["image", board] => firmware::image(root()?, board, None),
+        ["image", board, sensor] => firmware::image(root()?, board, Some(sensor)),
         ["sizes"] => sizes::print(root()?),
         ["emulate", ref rest @ ..] => emulate::emulate(root()?, rest),
-        ["flash"] => emulate::flash(root()?, emulate::CHIP),
-        ["flash", chip] => emulate::flash(root()?, chip),
+        ["flash", ref rest @ ..] => emulate::flash(root()?, rest),
         ["check-boards"] => boards::check(root()?),
         ["self-test"] => self_test::run(root()?),
         ["self-test", "--bless"] => self_test::bless(root()?),
