@@ -19,8 +19,10 @@ use crate::source::{Geometry, PhotonSource, pixel_rng};
 
 pub use surface::{Ball, Fan, Light, Rectangle, Shape, Surface};
 
-/// Signal and background photons a laser cycle in all pixels that a scene may
-/// have.
+/// Signal photons a laser cycle that a pixel may have.
+const MOST_SIGNAL: f64 = 10_000.0;
+
+/// Photons a laser cycle that all pixels together may have.
 const MOST_PHOTONS: f64 = 1e7;
 
 /// Surfaces are this far away, at least, at all times.
@@ -99,7 +101,9 @@ impl Scene {
         let view = self.truth(pixel, cycle);
         Rates {
             background: self.background,
-            signal: view.map_or(0.0, |view| self.signal(&view)),
+            signal: view.map_or(0.0, |view| {
+                self.signal(self.surfaces[view.surface].light, view.range_mm)
+            }),
             position: view.map_or(0.0, |view| view.range_mm / self.mm_per_bin()),
             sigma: self.pulse_sigma_bins,
         }
@@ -112,6 +116,7 @@ impl Scene {
     /// or pixels.
     pub fn photons(&self, seed: u64, cycles: u64) -> Result<SimulatedArray> {
         self.check_motion(cycles)?;
+        self.check_hot_pixels()?;
         let timing = self.timing();
         let pixels = self.addresses()?.map(|address| {
             SimulatedPixel::new(&self.rates(address, 0), self.bins, pixel_rng(seed, address))?
@@ -167,17 +172,30 @@ impl Scene {
         cycle as f64 / (self.laser_rate_mhz * 1e6)
     }
 
-    /// Signal photons a laser cycle.
-    fn signal(&self, view: &View) -> f64 {
-        match self.surfaces[view.surface].light {
+    /// Signal photons a laser cycle from a range.
+    fn signal(&self, light: Light, range_mm: f64) -> f64 {
+        match light {
             Light::Signal(signal) => signal,
             Light::Reflectivity(reflectivity) => {
-                self.signal_at_one_metre * reflectivity / (view.range_mm / 1000.0).powi(2)
+                self.signal_at_one_metre * reflectivity / (range_mm / 1000.0).powi(2)
             }
         }
     }
 
-    /// A surface that comes nearer than this is not a target, and too bright.
+    /// Are the listed hot pixels there?
+    fn check_hot_pixels(&self) -> Result<()> {
+        let listed = self.effects.hot_pixels.iter().flat_map(|hot| &hot.pixels);
+        for pixel in listed {
+            ensure!(
+                usize::from(*pixel) < self.geometry.addresses(),
+                "[hot_pixels]: pixel {pixel} of {}",
+                self.geometry.addresses()
+            );
+        }
+        Ok(())
+    }
+
+    /// Does every surface stay where a target can be, and is none too bright?
     fn check_motion(&self, cycles: u64) -> Result<()> {
         for surface in &self.surfaces {
             let ends = [0.0, self.seconds(cycles)];
@@ -186,6 +204,13 @@ impl Scene {
             ensure!(
                 nearest >= NEAREST_MM,
                 "{}: comes as near as {nearest:.1} mm; must stay {NEAREST_MM} mm away",
+                surface.name
+            );
+            let signal = self.signal(surface.light, nearest);
+            ensure!(
+                signal <= MOST_SIGNAL,
+                "{}: {signal:.0} signal photons a laser cycle from {nearest:.1} mm; must be at most \
+                 {MOST_SIGNAL:.0}",
                 surface.name
             );
         }

@@ -176,6 +176,13 @@ impl SimulatedPixel {
         Ok(())
     }
 
+    /// Photons that have to be drawn in a laser cycle.
+    fn photons_per_cycle(&self) -> f64 {
+        let plain = self.rates.background * f64::from(self.bins) + self.rates.signal;
+        let detector = self.detector.as_ref();
+        detector.map_or(plain, |detector| detector.photons_per_cycle(plain))
+    }
+
     /// Gives `photon` the TDC code of each photon of the next laser cycle.
     pub fn next_cycle(&mut self, mut photon: impl FnMut(u16)) {
         if let Some(detector) = &mut self.detector {
@@ -247,10 +254,10 @@ impl PhotonSource for SimulatedArray {
     }
 
     fn photons_per_cycle(&self) -> f64 {
-        let of = |pixel: &SimulatedPixel| {
-            pixel.rates.background * f64::from(pixel.bins) + pixel.rates.signal
-        };
-        self.pixels.iter().map(of).sum()
+        self.pixels
+            .iter()
+            .map(SimulatedPixel::photons_per_cycle)
+            .sum()
     }
 
     fn next_slice(&mut self, cycles: u16) -> Result<Slice> {

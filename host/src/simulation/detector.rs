@@ -37,6 +37,10 @@ pub(super) struct Detector {
     trap: Option<Trap>,
     jitter: Option<TimingError>,
     hits: usize,
+    /// Photons of the effects in a laser cycle.
+    added: f64,
+    /// Avalanches a photon, at most.
+    avalanches_each: f64,
     /// Of this laser cycle: arrivals, then avalanches, then measured times.
     times: Vec<f64>,
     avalanches: Vec<f64>,
@@ -75,9 +79,13 @@ impl Detector {
         let tail = effects.tail.as_ref();
         let afterpulsing = effects.afterpulsing.as_ref();
         let jitter = effects.jitter.as_ref();
+        let rate = |part: &Option<Background>| part.as_ref().map_or(0.0, |part| part.mean);
+        let glass_rate = cover_glass.map_or(0.0, |glass| glass.signal);
         Ok(Self {
             end,
             period: timing.period,
+            added: rate(&hot) + rate(&gap) + glass_rate,
+            avalanches_each: afterpulsing.map_or(1.0, |after| 1.0 / (1.0 - after.probability)),
             within_bin: rng(Stream::WithinBin),
             second_echo: second_echo
                 .map(|echo| Echo::new(echo, timing, rng(Stream::SecondEcho)))
@@ -104,6 +112,12 @@ impl Detector {
             times: Vec::new(),
             avalanches: Vec::new(),
         })
+    }
+
+    /// Photons and afterpulses in a laser cycle, at most, if the plain model has
+    /// `plain` photons.
+    pub(super) fn photons_per_cycle(&self, plain: f64) -> f64 {
+        (plain + self.added) * self.avalanches_each
     }
 
     /// A laser cycle starts.
@@ -199,6 +213,8 @@ fn avalanche(time: f64, recharge: &mut Recharge, trap: &mut Option<Trap>, all: &
 #[derive(Clone, Debug)]
 struct Background {
     photons: Poisson<f64>,
+    /// Photons a laser cycle.
+    mean: f64,
     from: f64,
     length: f64,
     rng: Pcg64,
@@ -213,6 +229,7 @@ impl Background {
         }
         Ok(Some(Self {
             photons: Poisson::new(rate * length)?,
+            mean: rate * length,
             from,
             length,
             rng,

@@ -1,5 +1,7 @@
 //! Runs the program as a user would.
 
+#![allow(dead_code, reason = "not every test needs all of it")]
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
