@@ -191,7 +191,7 @@ impl SurfaceEntry {
                 Light::Reflectivity(share)
             }
             (None, Some(signal)) => {
-                within("signal", signal, 0.0..=1e6)?;
+                within("signal", signal, 0.0..=10_000.0)?;
                 Light::Signal(signal)
             }
             _ => anyhow::bail!("needs reflectivity or signal, and not both"),

@@ -58,6 +58,12 @@ impl Scratch {
         serde_json::from_str(&self.read("out/summary.json")).unwrap()
     }
 
+    /// `dtof simulate` of a scene file into `out`.
+    pub fn simulate(&self, scene: &Path, more: &[&str]) -> Output {
+        let scene = scene.to_str().unwrap();
+        self.dtof(&[&["simulate", "--scene", scene, "--out", "out"], more].concat())
+    }
+
     /// The program must have failed with one line that says all of `parts`, and
     /// left nothing that could be taken for a result.
     #[track_caller]

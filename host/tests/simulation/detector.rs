@@ -190,6 +190,42 @@ fn afterpulses_come_after_the_dead_time_at_their_own_pace() {
     near_in_blocks("delays", &photons, 1_000_000, delay, expected);
 }
 
+/// What is trapped in one laser cycle is released at its time in a later one.
+#[test]
+fn afterpulses_cross_laser_cycles() {
+    let (signal, probability, decay) = (0.02, 0.05, 100.0_f64);
+    let photons = pixel(
+        &format!(
+            "{NO_GAP}pulse_sigma_bins = 0\n[[surface]]\nsignal = 0.02\nposition_bins = 20.5\n\
+             [afterpulsing]\nprobability = 0.05\ndecay_ps = 25_000\n"
+        ),
+        1_000_000,
+    );
+    let mut pulses = vec![0; 1_000_001];
+    let mut later = vec![0; 1_000_001];
+    for (cycle, code) in &photons {
+        let cycle = usize::try_from(*cycle).unwrap();
+        match code {
+            20 => pulses[cycle] += 1,
+            21.. => later[cycle] += 1,
+            _ => {}
+        }
+    }
+    let pairs: usize = pulses
+        .iter()
+        .zip(&later[1..])
+        .map(|(pulse, later)| pulse * later)
+        .sum();
+    // Afterpulses of all generations come at p/d exp(-(1 - p) t/d) after a pulse;
+    // bins 21 to 127 of the n-th laser cycle after it are 128 n + 0.5 to 107.5.
+    let left = 1.0 - probability;
+    let until = |time: f64| probability / left * (1.0 - (-left * time / decay).exp());
+    let own = |n: f64| until(128.0 * n + 107.5) - until(128.0 * n + 0.5);
+    // And there are those of other pulses.
+    let others: f64 = (0..50).map(|n| signal * own(n.into())).sum();
+    near_count("pairs", pairs, 1e6 * signal * (own(1.0) + others));
+}
+
 #[test]
 fn the_variance_of_jitter_adds() {
     let photons = pixel(
