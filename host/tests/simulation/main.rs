@@ -91,19 +91,19 @@ fn near_counts(what: &str, measured: &[u32], expected: &[f64]) {
     near(what, cube_root, 1.0 - spread, spread.sqrt());
 }
 
-/// `of` the photons of each of 100 blocks of laser cycles, on average. What hangs
-/// together within a block need not be known: the blocks show how far it spreads.
+/// The sum of `values`, each of a laser cycle, over a block of laser cycles, a
+/// hundredth of all. What hangs together within a block need not be known: the
+/// blocks show how far it spreads.
 #[track_caller]
 fn near_in_blocks(
     what: &str,
-    photons: &Photons,
+    values: impl Iterator<Item = (u64, f64)>,
     cycles: u64,
-    of: impl Fn(u16) -> f64,
     expected: f64,
 ) {
     let mut blocks = [0.0; 100];
-    for (cycle, code) in photons {
-        blocks[usize::try_from(cycle * 100 / cycles).unwrap()] += of(*code);
+    for (cycle, value) in values {
+        blocks[usize::try_from(cycle * 100 / cycles).unwrap()] += value;
     }
     let mean = blocks.iter().sum::<f64>() / 100.0;
     let squares: f64 = blocks.iter().map(|block| (block - mean).powi(2)).sum();
