@@ -13,6 +13,15 @@ use super::second_echo::SecondEcho;
 use super::tail::Tail;
 use super::tdc::Tdc;
 
+/// The most picoseconds an effect may last: 100 µs.
+pub(super) const LONGEST_PS: f64 = 1e8;
+
+/// What a share may be.
+pub(super) const SHARE: RangeInclusive<f64> = 0.0..=1.0;
+
+/// Avalanches that have an afterpulse: all of them would never end.
+pub(super) const SHARE_OF_AFTERPULSES: RangeInclusive<f64> = 0.0..=0.9;
+
 /// Every effect is off unless it is here. `docs/scenes.md` lists them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Effects {
@@ -88,13 +97,3 @@ pub fn within(key: &str, value: f64, range: RangeInclusive<f64>) -> Result<()> {
     );
     Ok(())
 }
-
-/// The most picoseconds an effect may last: 100 µs.
-pub(super) const LONGEST_PS: f64 = 1e8;
-
-/// Nothing but a share.
-pub(super) const SHARE: RangeInclusive<f64> = 0.0..=1.0;
-
-/// A share that leaves something: an afterpulse in every avalanche would never
-/// end.
-pub(super) const SHARE_OF_AFTERPULSES: RangeInclusive<f64> = 0.0..=0.9;
