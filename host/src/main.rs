@@ -21,6 +21,8 @@ struct Cli {
 enum Command {
     /// Simulate a static scene and show its events.
     Demo(command::demo::Demo),
+    /// Simulate a scene that a file describes.
+    Simulate(Box<command::simulate::Simulate>),
     /// Turn recorded photons into events.
     Replay(Box<command::replay::Replay>),
     /// Print the events of an AER file as CSV.
@@ -37,6 +39,7 @@ fn main() -> ExitCode {
     let done = match cli.command {
         None => command::demo::Demo::default().run(),
         Some(Command::Demo(demo)) => demo.run(),
+        Some(Command::Simulate(simulate)) => simulate.run(),
         Some(Command::Replay(replay)) => replay.run(),
         Some(Command::Decode(decode)) => decode.run(),
         Some(Command::Monitor(monitor)) => monitor.run(),

@@ -13,8 +13,9 @@ pub const MEAN_OF: usize = 10;
 /// The ranges of one pixel.
 #[derive(Clone, Debug, Default)]
 pub struct PixelHistory {
-    /// The last [`MEAN_OF`] ranges, or fewer, oldest first; in millimetres.
-    recent: VecDeque<f64>,
+    /// Laser cycle and range in millimetres of the last [`MEAN_OF`] events, or
+    /// fewer, oldest first.
+    recent: VecDeque<(u64, f64)>,
     /// All events.
     pub events: u64,
     /// The laser cycle of the first.
@@ -22,17 +23,29 @@ pub struct PixelHistory {
 }
 
 impl PixelHistory {
-    fn push(&mut self, range_mm: f64) {
+    fn push(&mut self, cycle: u64, range_mm: f64) {
         if self.recent.len() == MEAN_OF {
             self.recent.pop_front();
         }
-        self.recent.push_back(range_mm);
+        self.recent.push_back((cycle, range_mm));
     }
 
     /// The range of the last event.
     #[must_use]
     pub fn last_mm(&self) -> Option<f64> {
-        self.recent.back().copied()
+        self.recent.back().map(|(_, range_mm)| *range_mm)
+    }
+
+    /// The laser cycle of the last event.
+    #[must_use]
+    pub fn last_cycle(&self) -> Option<u64> {
+        self.recent.back().map(|(cycle, _)| *cycle)
+    }
+
+    /// Laser cycle and range in millimetres of the last [`MEAN_OF`] events, or
+    /// of as many as there are, oldest first.
+    pub fn recent(&self) -> impl Iterator<Item = (u64, f64)> {
+        self.recent.iter().copied()
     }
 
     /// The mean range of the last [`MEAN_OF`] events, or of as many as there
@@ -41,7 +54,7 @@ impl PixelHistory {
     #[allow(clippy::cast_precision_loss, reason = "at most ten")]
     pub fn mean_mm(&self) -> Option<f64> {
         let count = self.recent.len();
-        (count > 0).then(|| self.recent.iter().sum::<f64>() / count as f64)
+        (count > 0).then(|| self.recent().map(|(_, range_mm)| range_mm).sum::<f64>() / count as f64)
     }
 }
 
@@ -67,7 +80,7 @@ impl Maps {
     /// Takes one event into account.
     pub fn add(&mut self, event: &DepthEvent, scale: &RangeScale) {
         let pixel = &mut self.pixels[usize::from(event.pixel.0)];
-        pixel.push(range_mm(event, scale));
+        pixel.push(event.cycle.0, range_mm(event, scale));
         pixel.events += 1;
         pixel.first_cycle.get_or_insert(event.cycle.0);
     }
@@ -87,8 +100,8 @@ mod tests {
     fn the_last_range_is_the_newest_and_the_mean_that_of_the_last_ten() {
         let mut pixel = PixelHistory::default();
         assert_eq!((pixel.last_mm(), pixel.mean_mm()), (None, None));
-        for range in 1..=12 {
-            pixel.push(range.into());
+        for range in 1..=12u32 {
+            pixel.push(range.into(), range.into());
         }
         assert_eq!(pixel.last_mm(), Some(12.0));
         assert_eq!(pixel.mean_mm(), Some(7.5)); // of 3 to 12

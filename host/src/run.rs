@@ -30,14 +30,14 @@ pub fn run(
 ) -> Result<Summary> {
     let cycles = source.cycles();
     let progress = Progress::new(cycles, quiet);
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "1 to SLICE"
-    )]
-    let most = (SLICE_PHOTONS / source.photons_per_cycle()).clamp(1.0, SLICE.into()) as u16;
     let mut done = 0;
     while done < cycles {
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "1 to SLICE"
+        )]
+        let most = (SLICE_PHOTONS / source.photons_per_cycle()).clamp(1.0, SLICE.into()) as u16;
         let next = u16::try_from(cycles - done).map_or(most, |left| left.min(most));
         let slice = source.next_slice(next)?;
         output.write(&engine.run(&slice)?)?;

@@ -1,102 +1,220 @@
-//! The scene of the demo: a wall, before it a matt box, before that a bright
-//! ball, on an array of any size.
+//! Scenes: what an array of simulated pixels looks at, read from a TOML file.
 //!
-//! Each pixel sees one surface. Signal photons follow the reflectivity and the
-//! inverse square of the distance; the background is the same everywhere.
+//! Each pixel sees one surface, the nearest at its place. Signal photons follow
+//! the reflectivity and the inverse square of the range; the background is the
+//! same everywhere. `docs/scenes.md` lists all keys.
 
-use anyhow::Result;
+mod comparison;
+mod file;
+mod surface;
+
+use anyhow::{Result, ensure};
+use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 
-use crate::maps::{Maps, PixelHistory};
 use crate::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
-use crate::simulation::{Rates, SimulatedArray};
-use crate::source::Geometry;
-use crate::summary::{Row, grouped};
+use crate::simulation::effects::{Effects, Timing};
+use crate::simulation::{MM_PER_PS, Rates, RatesAt, SimulatedArray, SimulatedPixel};
+use crate::source::{Geometry, PhotonSource, pixel_rng};
 
-/// Background photons a bin and laser cycle.
-const BACKGROUND: f64 = 0.02;
-/// Standard deviation of the pulse in bins.
-const PULSE_SIGMA: f64 = 1.0;
-/// Signal photons a laser cycle from a white surface at one metre.
-const SIGNAL_AT_ONE_METRE: f64 = 4.0;
-/// Millimetres of range a picosecond, half the speed of light.
-const MM_PER_PS: f64 = 0.149_896_229;
-/// An event is false if its range lies farther from the truth than this many
-/// bins.
-const FALSE_BEYOND_BINS: f64 = 3.0;
+pub use surface::{Ball, Fan, Light, Rectangle, Shape, Surface};
 
-/// What a pixel looks at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Surface {
-    /// Behind everything, slightly turned: 3.4 m at the left to 3.8 m.
-    Wall,
-    /// 2.4 m away, a fifth as reflective as white.
-    MattBox,
-    /// 1.25 m away at its nearest, nearly white.
-    BrightBall,
+/// Signal photons a laser cycle that a pixel may have.
+const MOST_SIGNAL: f64 = 10_000.0;
+
+/// Photons a laser cycle that all pixels together may have.
+const MOST_PHOTONS: f64 = 1e7;
+
+/// Surfaces are this far away, at least, at all times.
+const NEAREST_MM: f64 = 1.0;
+
+/// A scene on an array.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// The array that looks at it, that of the file unless changed. A pixel's
+    /// place in the scene is its upper left corner.
+    pub geometry: Geometry,
+    /// The array that the places in `surfaces` are given in.
+    pub layout: Geometry,
+    /// Laser cycles.
+    pub cycles: u64,
+    /// Bins of a histogram.
+    pub bins: u16,
+    /// Picoseconds a bin.
+    pub bin_width_ps: f64,
+    /// Laser pulses a microsecond.
+    pub laser_rate_mhz: f64,
+    /// Background photons a bin and laser cycle.
+    pub background: f64,
+    /// Standard deviation of the pulse in bins.
+    pub pulse_sigma_bins: f64,
+    /// Signal photons a laser cycle from a white surface at one metre.
+    pub signal_at_one_metre: f64,
+    /// In the order of the file.
+    pub surfaces: Vec<Surface>,
+    /// What is not plain.
+    pub effects: Effects,
 }
 
-impl Surface {
-    const ALL: [Self; 3] = [Self::Wall, Self::MattBox, Self::BrightBall];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Wall => "wall",
-            Self::MattBox => "matt box",
-            Self::BrightBall => "bright ball",
-        }
-    }
-
-    fn reflectivity(self) -> f64 {
-        match self {
-            Self::Wall => 0.5,
-            Self::MattBox => 0.2,
-            Self::BrightBall => 0.9,
-        }
-    }
-}
-
-/// One pixel's view.
+/// What a pixel sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// What it looks at.
-    pub surface: Surface,
-    /// How far away that is.
+    /// Which of [`Scene::surfaces`].
+    pub surface: usize,
+    /// How far away it is.
     pub range_mm: f64,
 }
 
-/// The whole scene on an array, row by row.
-#[must_use]
-pub fn views(geometry: Geometry) -> Vec<View> {
-    // The scene is laid out on 64×32.
-    let across = 64.0 / f64::from(geometry.columns);
-    let down = 32.0 / f64::from(geometry.rows);
-    let row = |row| {
-        let columns = (0..geometry.columns).map(f64::from);
-        columns.map(move |column| view(column * across, f64::from(row) * down))
-    };
-    (0..geometry.rows).flat_map(row).collect()
-}
+impl Scene {
+    /// The scene of the demo, `scenes/demo.toml`.
+    ///
+    /// # Errors
+    /// Never: it is a part of the program.
+    pub fn demo() -> Result<Self> {
+        Self::parse(include_str!("../../scenes/demo.toml"))
+    }
 
-fn view(column: f64, row: f64) -> View {
-    // A ball of 10 pixels radius, which are 300 mm at its distance.
-    let from_centre = (column - 46.0).hypot(row - 17.0) / 10.0;
-    if from_centre < 1.0 {
-        let depth_mm = 300.0 * (1.0 - from_centre.powi(2)).sqrt();
-        View {
-            surface: Surface::BrightBall,
-            range_mm: 1550.0 - depth_mm,
+    /// What `pixel` sees in laser cycle `cycle`: the truth its events are
+    /// compared with. None if there is nothing at its place.
+    #[must_use]
+    pub fn truth(&self, pixel: PixelAddress, cycle: u64) -> Option<View> {
+        let place = self.place(pixel);
+        let seconds = self.seconds(cycle);
+        let mut nearest: Option<View> = None;
+        for (index, surface) in self.surfaces.iter().enumerate() {
+            let Some(range_mm) = surface.range_mm(place, seconds, self.layout) else {
+                continue;
+            };
+            if nearest.is_none_or(|other| range_mm < other.range_mm) {
+                nearest = Some(View {
+                    surface: index,
+                    range_mm,
+                });
+            }
         }
-    } else if (8.0..28.0).contains(&column) && (10.0..30.0).contains(&row) {
-        View {
-            surface: Surface::MattBox,
-            range_mm: 2400.0,
+        nearest
+    }
+
+    /// What `pixel` receives in laser cycle `cycle`.
+    #[must_use]
+    pub fn rates(&self, pixel: PixelAddress, cycle: u64) -> Rates {
+        let view = self.truth(pixel, cycle);
+        Rates {
+            background: self.background,
+            signal: view.map_or(0.0, |view| {
+                self.signal(self.surfaces[view.surface].light, view.range_mm)
+            }),
+            position: view.map_or(0.0, |view| view.range_mm / self.mm_per_bin()),
+            sigma: self.pulse_sigma_bins,
         }
-    } else {
-        View {
-            surface: Surface::Wall,
-            range_mm: 3400.0 + 400.0 * column / 63.0,
+    }
+
+    /// The photons of `cycles` laser cycles.
+    ///
+    /// # Errors
+    /// If a surface comes too near in that time, or there are too many photons
+    /// or pixels.
+    pub fn photons(&self, seed: u64, cycles: u64) -> Result<SimulatedArray> {
+        self.check_motion(cycles)?;
+        self.check_hot_pixels()?;
+        let timing = self.timing();
+        let pixels = self.addresses()?.map(|address| {
+            SimulatedPixel::new(&self.rates(address, 0), self.bins, pixel_rng(seed, address))?
+                .with_effects(&self.effects, &timing, seed, address)
+        });
+        let pixels = pixels.collect::<Result<_>>()?;
+        let rates_at = self.surfaces.iter().any(Surface::moves).then(|| {
+            let scene = self.clone();
+            Box::new(move |pixel, cycle| scene.rates(pixel, cycle)) as RatesAt
+        });
+        let photons = SimulatedArray::new(self.geometry, pixels, cycles, rates_at);
+        let each_cycle = photons.photons_per_cycle();
+        ensure!(
+            each_cycle <= MOST_PHOTONS,
+            "{each_cycle:.0} photons a laser cycle: more than {MOST_PHOTONS:.0}"
+        );
+        Ok(photons)
+    }
+
+    /// Millimetres of range a bin.
+    #[must_use]
+    pub fn mm_per_bin(&self) -> f64 {
+        self.bin_width_ps * MM_PER_PS
+    }
+
+    /// Picoseconds as bins.
+    fn timing(&self) -> Timing {
+        Timing {
+            bins: self.bins,
+            bin_width_ps: self.bin_width_ps,
+            period: 1e6 / self.laser_rate_mhz / self.bin_width_ps,
         }
+    }
+
+    /// Every pixel of the array.
+    fn addresses(&self) -> Result<impl Iterator<Item = PixelAddress>> {
+        let pixels = self.geometry.addresses();
+        ensure!(pixels <= 65_536, "{pixels} pixels: more than 65,536");
+        Ok((0..=u16::MAX).take(pixels).map(PixelAddress))
+    }
+
+    /// Column and row in the layout.
+    fn place(&self, pixel: PixelAddress) -> [f64; 2] {
+        let Geometry { columns, rows } = self.geometry;
+        let across = f64::from(self.layout.columns) / f64::from(columns);
+        let down = f64::from(self.layout.rows) / f64::from(rows);
+        let (column, row) = (u32::from(pixel.0) % columns, u32::from(pixel.0) / columns);
+        [f64::from(column) * across, f64::from(row) * down]
+    }
+
+    #[allow(clippy::cast_precision_loss, reason = "2^53 laser cycles are years")]
+    fn seconds(&self, cycle: u64) -> f64 {
+        cycle as f64 / (self.laser_rate_mhz * 1e6)
+    }
+
+    /// Signal photons a laser cycle from a range.
+    fn signal(&self, light: Light, range_mm: f64) -> f64 {
+        match light {
+            Light::Signal(signal) => signal,
+            Light::Reflectivity(reflectivity) => {
+                self.signal_at_one_metre * reflectivity / (range_mm / 1000.0).powi(2)
+            }
+        }
+    }
+
+    /// Are the listed hot pixels there?
+    fn check_hot_pixels(&self) -> Result<()> {
+        let listed = self.effects.hot_pixels.iter().flat_map(|hot| &hot.pixels);
+        for pixel in listed {
+            ensure!(
+                usize::from(*pixel) < self.geometry.addresses(),
+                "[hot_pixels]: pixel {pixel} of {}",
+                self.geometry.addresses()
+            );
+        }
+        Ok(())
+    }
+
+    /// Does every surface stay where a target can be, and is none too bright?
+    fn check_motion(&self, cycles: u64) -> Result<()> {
+        for surface in &self.surfaces {
+            let ends = [0.0, self.seconds(cycles)];
+            let nearest = ends.map(|seconds| surface.nearest_mm(seconds, self.layout));
+            let nearest = nearest[0].min(nearest[1]);
+            ensure!(
+                nearest >= NEAREST_MM,
+                "{}: comes as near as {nearest:.1} mm; must stay {NEAREST_MM} mm away",
+                surface.name
+            );
+            let signal = self.signal(surface.light, nearest);
+            ensure!(
+                signal <= MOST_SIGNAL,
+                "{}: {signal:.0} signal photons a laser cycle from {nearest:.1} mm; must be at most \
+                 {MOST_SIGNAL:.0}",
+                surface.name
+            );
+        }
+        Ok(())
     }
 }
 
@@ -118,88 +236,14 @@ pub fn settings(seed: u64) -> Settings {
     }
 }
 
-/// The photons of the scene, `cycles` laser cycles of them.
+/// The photons of the demo's scene on an array, `cycles` laser cycles of them.
 ///
 /// # Errors
-/// Never for the settings of the demo.
+/// If there are more pixels than addresses.
 pub fn photons(geometry: Geometry, settings: &Settings, cycles: u64) -> Result<SimulatedArray> {
-    let mm_per_bin = mm_per_bin(settings);
-    let rates: Vec<Rates> = views(geometry)
-        .iter()
-        .map(|view| Rates {
-            background: BACKGROUND,
-            signal: SIGNAL_AT_ONE_METRE * view.surface.reflectivity()
-                / (view.range_mm / 1000.0).powi(2),
-            position: view.range_mm / mm_per_bin,
-            sigma: PULSE_SIGMA,
-        })
-        .collect();
-    SimulatedArray::new(
+    let scene = Scene {
         geometry,
-        &rates,
-        u16::try_from(settings.bins)?,
-        cycles,
-        settings.seed,
-    )
-}
-
-fn mm_per_bin(settings: &Settings) -> f64 {
-    settings.bin_width_ps.0.to_num::<f64>() * MM_PER_PS
-}
-
-/// How the events compare with the scene, surface by surface.
-#[must_use]
-pub fn against_truth(maps: &Maps, settings: &Settings) -> Vec<Row> {
-    let mm_per_bin = mm_per_bin(settings);
-    let views = views(maps.geometry);
-    let mut rows = Vec::new();
-    for surface in Surface::ALL {
-        let pixels: Vec<(&View, &PixelHistory)> = views
-            .iter()
-            .zip(&maps.pixels)
-            .filter(|(view, _)| view.surface == surface)
-            .collect();
-        let events: u64 = pixels.iter().map(|(_, pixel)| pixel.events).sum();
-        let first = pixels
-            .iter()
-            .filter_map(|(_, pixel)| pixel.first_cycle)
-            .min();
-        let errors = |range: fn(&PixelHistory) -> Option<f64>| {
-            let error =
-                |(view, pixel): &(&View, &PixelHistory)| Some(range(pixel)? - view.range_mm);
-            pixels.iter().filter_map(error).collect::<Vec<f64>>()
-        };
-        let last = errors(PixelHistory::last_mm);
-        let mean = errors(PixelHistory::mean_mm);
-        let limit_mm = FALSE_BEYOND_BINS * mm_per_bin;
-        let false_events = last.iter().filter(|error| error.abs() > limit_mm).count();
-        rows.push((
-            surface.name().to_owned(),
-            format!(
-                "{} events of {} pixels, the first in laser cycle {}",
-                grouped(events),
-                pixels.len(),
-                first.map_or("-".to_owned(), grouped),
-            ),
-        ));
-        if last.is_empty() {
-            continue; // no event, no error
-        }
-        rows.push((
-            format!("{}, rms error", surface.name()),
-            format!(
-                "{:.1} mm last event of each pixel ({false_events} beyond {FALSE_BEYOND_BINS} bins), \
-                 {:.1} mm mean of ten",
-                root_mean_square(&last),
-                root_mean_square(&mean),
-            ),
-        ));
-    }
-    rows
-}
-
-#[allow(clippy::cast_precision_loss, reason = "some thousand pixels")]
-fn root_mean_square(errors: &[f64]) -> f64 {
-    let squares: f64 = errors.iter().map(|error| error * error).sum();
-    (squares / errors.len() as f64).sqrt()
+        ..Scene::demo()?
+    };
+    scene.photons(settings.seed, cycles)
 }

@@ -66,7 +66,8 @@ pub trait PhotonSource {
     /// Laser cycles there are, from 0.
     fn cycles(&self) -> u64;
 
-    /// Photons of all pixels in a laser cycle, about; 0 if that is not known.
+    /// Photons of all pixels in the next laser cycle, about; 0 if that is not
+    /// known.
     fn photons_per_cycle(&self) -> f64 {
         0.0
     }

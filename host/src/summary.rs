@@ -10,12 +10,12 @@ use crate::source::PhotonSource;
 /// What came out, as `summary.json` has it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
-    /// The recording, if it was one.
+    /// The recording or the scene, if it was a file.
     pub input: Option<String>,
     /// Laser cycles that recorded histograms were taken to have lasted: the
     /// shortest and the longest capture.
     pub recorded_cycles: Option<(u64, u64)>,
-    /// Laser cycles replayed.
+    /// Laser cycles.
     pub cycles: u64,
     /// Photons offered to the pixels: counted, saturated, rejected or gated out.
     pub photons: u64,
@@ -91,7 +91,7 @@ impl Summary {
         let row = |name: &str, value: u64| (name.to_owned(), grouped(value));
         let mut rows = Vec::new();
         if let Some(input) = &self.input {
-            rows.push(("recording".to_owned(), input.clone()));
+            rows.push(("input".to_owned(), input.clone()));
         }
         if let Some((shortest, longest)) = self.recorded_cycles {
             let cycles = if shortest == longest {
@@ -105,7 +105,7 @@ impl Summary {
             ));
         }
         rows.extend([
-            row("laser cycles replayed", self.cycles),
+            row("laser cycles", self.cycles),
             row("photons", self.photons),
             row("depth events", self.events),
             (

@@ -5,6 +5,7 @@ pub mod demo;
 pub mod monitor;
 mod operation;
 pub mod replay;
+pub mod simulate;
 
 use std::io::{self, Write};
 use std::path::Path;

@@ -1,5 +1,7 @@
 //! Runs the program as a user would.
 
+#![allow(dead_code, reason = "not every test needs all of it")]
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -54,6 +56,12 @@ impl Scratch {
             String::from_utf8_lossy(&output.stderr)
         );
         serde_json::from_str(&self.read("out/summary.json")).unwrap()
+    }
+
+    /// `dtof simulate` of a scene file into `out`.
+    pub fn simulate(&self, scene: &Path, more: &[&str]) -> Output {
+        let scene = scene.to_str().unwrap();
+        self.dtof(&[&["simulate", "--scene", scene, "--out", "out"], more].concat())
     }
 
     /// The program must have failed with one line that says all of `parts`, and

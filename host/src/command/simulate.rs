@@ -1,0 +1,143 @@
+//! `dtof simulate`: the photons of a scene file through the engine.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use dtof::device::{self, Client, DeviceEngine};
+use dtof::engine::{Engine, host_engine};
+use dtof::output::Output;
+use dtof::report::Section;
+use dtof::run::run;
+use dtof::scene::Scene;
+use dtof::settings::Settings;
+use dtof::source::{Geometry, PhotonSource};
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::{I24F8, U16F16};
+
+use super::operation::Operation;
+use super::print_summary;
+
+#[derive(Args)]
+pub struct Simulate {
+    /// The scene, a TOML file; docs/scenes.md lists its keys
+    #[arg(long, value_name = "FILE")]
+    scene: PathBuf,
+    /// Where the results go
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Macropixels of the array that looks at the scene [default: the file's]
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = array)]
+    array: Option<Geometry>,
+    #[command(flatten)]
+    operation: Operation,
+    /// Decide on a device, not on this computer: `qemu` starts an emulated one, else
+    /// tcp:HOST:PORT or a serial port
+    #[arg(long, value_name = "DEVICE")]
+    device: Option<String>,
+    /// Laser cycles [default: the file's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    cycles: Option<u64>,
+    /// Seed of the simulated photons
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Print nothing but errors
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl Simulate {
+    pub fn run(&self) -> Result<()> {
+        let mut scene = Scene::read(&self.scene)?;
+        scene.geometry = self.array.unwrap_or(scene.geometry);
+        let bin_width_ps = U16F16::from_num(scene.bin_width_ps);
+        let bins = scene.bins.into();
+        let settings = self
+            .operation
+            .settings(bins, bin_width_ps, I24F8::ZERO, self.seed);
+        let file = self.scene.display().to_string();
+        let Geometry { columns, rows } = scene.geometry;
+        let lead = format!("Simulated photons of {file}, {columns}×{rows} macropixels.");
+        Simulation {
+            scene: &scene,
+            file: Some(file),
+            cycles: self.cycles.unwrap_or(scene.cycles),
+            settings: &settings,
+            device: self.device.as_deref(),
+            out: &self.out,
+            lead: &lead,
+            quiet: self.quiet,
+        }
+        .run()
+    }
+}
+
+/// A scene, and what is to be done with its photons.
+pub struct Simulation<'a> {
+    pub scene: &'a Scene,
+    /// The scene's, if it has one.
+    pub file: Option<String>,
+    pub cycles: u64,
+    pub settings: &'a Settings,
+    pub device: Option<&'a str>,
+    pub out: &'a Path,
+    /// What stands at the head of the report.
+    pub lead: &'a str,
+    pub quiet: bool,
+}
+
+impl Simulation<'_> {
+    pub fn run(self) -> Result<()> {
+        let photons = self.scene.photons(self.settings.seed, self.cycles);
+        let mut photons = match &self.file {
+            Some(file) => photons.with_context(|| file.clone())?,
+            None => photons?,
+        };
+        let mut engine = engine(self.device, self.settings, &photons.addresses())?;
+        let mut output = Output::create(self.out, self.settings, photons.geometry())?;
+        let mut summary = run(
+            &mut photons,
+            engine.as_mut(),
+            &mut output,
+            self.settings,
+            self.quiet,
+        )?;
+        summary.input = self.file;
+        let surfaces = self.scene.against_truth(output.maps());
+        let sections = [Section {
+            heading: "Surfaces",
+            rows: &surfaces,
+        }];
+        output.finish(&summary, "Asynchronous depth events", self.lead, &sections)?;
+        if !self.quiet {
+            print_summary(&[summary.rows(), surfaces].concat(), self.out)?;
+        }
+        Ok(())
+    }
+}
+
+/// The engine of this computer, or that of a device.
+fn engine(
+    device: Option<&str>,
+    settings: &Settings,
+    addresses: &[PixelAddress],
+) -> Result<Box<dyn Engine>> {
+    let Some(device) = device else {
+        return host_engine(settings, addresses);
+    };
+    let client = Client::new(device::open(device)?).with_context(|| device.to_owned())?;
+    Ok(Box::new(DeviceEngine::new(client, settings, addresses)?))
+}
+
+/// As `64x32`.
+pub fn array(text: &str) -> Result<Geometry, String> {
+    let sides = text.split_once('x').and_then(|(columns, rows)| {
+        let sides = (columns.parse::<u16>().ok()?, rows.parse::<u16>().ok()?);
+        (sides.0 > 0 && sides.1 > 0).then_some(sides)
+    });
+    let (columns, rows) = sides.ok_or("must be COLUMNSxROWS, as 64x32")?;
+    Ok(Geometry {
+        columns: columns.into(),
+        rows: rows.into(),
+    })
+}

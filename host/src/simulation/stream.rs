@@ -1,0 +1,31 @@
+//! Random numbers for each effect.
+
+use dtof_core::PixelAddress;
+use rand_pcg::Pcg64;
+
+use crate::source::pixel_rng;
+
+/// Who draws.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Stream {
+    /// Where in its bin a background photon lies.
+    WithinBin = 1,
+    /// Background between the histogram and the next laser pulse.
+    Gap,
+    SecondEcho,
+    CoverGlass,
+    Tail,
+    HotPixels,
+    Afterpulsing,
+    Jitter,
+}
+
+impl Stream {
+    /// Its numbers in one pixel: neither those of the plain model nor those of
+    /// another effect.
+    pub(super) fn rng(self, seed: u64, pixel: PixelAddress) -> Pcg64 {
+        // Seeds are expanded by a hash, so that far apart is good enough.
+        let offset = (self as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        pixel_rng(seed.wrapping_add(offset), pixel)
+    }
+}

@@ -1,0 +1,188 @@
+//! `dtof simulate`: scene files and what comes of them.
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use common::Scratch;
+use dtof::scene::Scene;
+
+fn repository(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
+}
+
+#[track_caller]
+fn simulated(scratch: &Scratch, scene: &Path, more: &[&str]) -> serde_json::Value {
+    let output = scratch.simulate(scene, more);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{}: {message}", scene.display());
+    serde_json::from_str(&scratch.read("out/summary.json")).unwrap()
+}
+
+#[test]
+fn the_demos_scene_and_settings_give_the_demos_events() {
+    let scratch = Scratch::new();
+    let demo = ["demo", "--cycles", "2000", "--seed", "7", "--quiet"];
+    assert!(scratch.dtof(&demo).status.success());
+    let settings = [
+        "--alpha", "8", "--l1", "100", "--l2", "2000", "--x", "10", "--cycles", "2000", "--seed",
+        "7", "--quiet",
+    ];
+    let output = scratch.simulate(&repository("scenes/demo.toml"), &settings);
+    assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
+    for name in ["events.csv", "events.aer", "depth-last.svg"] {
+        let read = |folder| fs::read(scratch.path(folder).join(name)).unwrap();
+        assert!(read("out") == read("out/demo"), "{name}");
+    }
+}
+
+#[test]
+fn every_scene_of_the_repository_runs_and_says_what_it_holds() {
+    let scratch = Scratch::new();
+    let mut scenes = 0;
+    for entry in fs::read_dir(repository("scenes")).unwrap() {
+        let path = entry.unwrap().path();
+        let summary = simulated(&scratch, &path, &["--cycles", "500", "--quiet"]);
+        assert_eq!(summary["cycles"], 500);
+        assert_eq!(summary["input"], path.to_str().unwrap());
+        assert!(summary["events"].as_u64() > Some(0), "{}", path.display());
+        assert!(scratch.read("out/report.html").contains("Surfaces"));
+        scenes += 1;
+    }
+    assert_eq!(scenes, 7);
+}
+
+#[test]
+fn the_file_says_how_long_and_the_command_line_may_say_otherwise() {
+    let scratch = Scratch::new();
+    let scene = scratch.file(
+        "scene.toml",
+        "columns = 6\nrows = 4\ncycles = 300\nbins = 64\nbin_width_ps = 92.1\n\
+         [[surface]]\nrange_mm = 500\nreflectivity = 0.5\n",
+    );
+    let summary = simulated(&scratch, &scene, &[]);
+    assert_eq!(
+        (&summary["cycles"], &summary["pixels"]),
+        (&300.into(), &24.into())
+    );
+    assert_eq!(summary["settings"]["bins"], 64);
+    let width = summary["settings"]["bin_width_ps"].as_f64().unwrap();
+    assert!((width - 92.1).abs() < 1.0 / 65_536.0, "{width}");
+    let range: f64 = scratch
+        .read("out/events.csv")
+        .lines()
+        .nth(1)
+        .unwrap()
+        .split(',')
+        .nth(5)
+        .unwrap()
+        .parse()
+        .unwrap();
+    assert!((range - 500.0).abs() < 20.0, "{range}");
+    let summary = simulated(&scratch, &scene, &["--cycles", "200", "--array", "3x2"]);
+    assert_eq!(
+        (&summary["cycles"], &summary["pixels"]),
+        (&200.into(), &6.into())
+    );
+}
+
+/// Motion that the events follow: they are compared with where the target was.
+#[test]
+fn events_of_a_moving_target_are_compared_with_the_truth_of_their_laser_cycle() {
+    let scratch = Scratch::new();
+    let scene = scratch.file(
+        "scene.toml",
+        "cycles = 100_000\nbackground = 0.01\n\
+         [[surface]]\nname = \"rocket\"\nrange_mm = 1000\nsignal = 2\nvelocity_m_per_s = 100\n",
+    );
+    let output = scratch.simulate(&scene, &[]);
+    let printed = String::from_utf8(output.stdout).unwrap();
+    let row = printed
+        .lines()
+        .find(|line| line.contains("rocket, rms error"))
+        .unwrap();
+    let error: f64 = row.split_whitespace().nth(3).unwrap().parse().unwrap();
+    assert!(error < 30.0 && row.contains("(0 beyond 3 bins)"), "{row}");
+    let events = scratch.read("out/events.csv");
+    let range = |line: &str| line.split(',').nth(5).unwrap().parse::<f64>().unwrap();
+    let first = range(events.lines().nth(1).unwrap());
+    let last = range(events.lines().last().unwrap());
+    assert!((last - first - 1000.0).abs() < 60.0, "{first} to {last}");
+}
+
+/// The document has a row for every key, and its examples are scenes.
+#[test]
+fn the_document_lists_every_key_and_its_examples_are_scenes() {
+    let document = fs::read_to_string(repository("docs/scenes.md")).unwrap();
+    let keys_of = |text: &str| -> Vec<String> {
+        let error = Scene::parse(text).unwrap_err().to_string();
+        let known = error.split_once("expected").unwrap().1.to_owned();
+        known
+            .split('`')
+            .skip(1)
+            .step_by(2)
+            .map(str::to_owned)
+            .collect()
+    };
+    let mut keys = keys_of("nonsense = 1\n");
+    assert!(keys.len() > 15, "{keys:?}");
+    for section in keys.clone() {
+        if section == "surface" {
+            keys.extend(keys_of("[[surface]]\nnonsense = 1\n"));
+            for shape in ["rectangle", "ball", "fan"] {
+                keys.extend(keys_of(&format!(
+                    "[[surface]]\n{shape} = {{ nonsense = 1 }}\n"
+                )));
+            }
+        } else if document.contains(&format!("`[{section}]`")) {
+            keys.extend(keys_of(&format!("[{section}]\nnonsense = 1\n")));
+        }
+    }
+    for key in keys {
+        let named = [
+            format!("`{key}`"),
+            format!("`[{key}]`"),
+            format!("`[[{key}]]`"),
+        ];
+        assert!(
+            named.iter().any(|name| document.contains(name)),
+            "{key} is not in the document"
+        );
+    }
+    let examples: Vec<&str> = document
+        .split("```toml\n")
+        .skip(1)
+        .map(|rest| rest.split("```").next().unwrap())
+        .collect();
+    assert!(!examples.is_empty());
+    for example in examples {
+        Scene::parse(example).unwrap_or_else(|error| panic!("{error}\n{example}"));
+    }
+}
+
+/// The defaults of the document are those of the program.
+#[test]
+fn the_documents_defaults_are_those_of_an_empty_file() {
+    let document = fs::read_to_string(repository("docs/scenes.md")).unwrap();
+    let empty = Scene::parse("").unwrap();
+    let mut defaults = 0;
+    // | `key` | default | ...
+    for line in document.lines().filter(|line| line.starts_with("| `")) {
+        let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+        if let (key, Ok(_)) = (
+            cells[1].trim_matches('`'),
+            cells[2].replace(',', "").parse::<f64>(),
+        ) {
+            let text = format!("{key} = {}\n", cells[2].replace(',', "_"));
+            let surface = "[[surface]]\nrange_mm = 1000\nsignal = 1\n";
+            // A key of the file or of a surface.
+            let same = Scene::parse(&text).is_ok_and(|scene| scene == empty)
+                || Scene::parse(&format!("{surface}{text}"))
+                    .is_ok_and(|scene| scene == Scene::parse(surface).unwrap());
+            assert!(same, "{line}");
+            defaults += 1;
+        }
+    }
+    assert_eq!(defaults, 12);
+}
