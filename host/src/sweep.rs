@@ -1,0 +1,80 @@
+//! Monte-Carlo sweeps: many trials at every point of a grid of parameters, in
+//! parts that add up.
+//!
+//! A [`Study`] has points, and for each point and seed one trial. A trial depends
+//! on nothing but those two and gives whole numbers, so that the tallies of any
+//! seeds can be added in any order: a sweep split over machines and merged is the
+//! single run, bit for bit.
+//!
+//! ```text
+//! Study, seeds   [`run`]
+//!   → Part       a file: the seeds that are in it, and the tallies of every point
+//!   → [`merge`]  parts of disjoint seeds as one
+//! ```
+
+mod part;
+mod run;
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+use rand_core::SeedableRng;
+use rand_pcg::Pcg64;
+
+pub use self::part::{Part, PointTally, SeedRange, merge};
+pub use self::run::run;
+
+/// The parameters of a point, by name.
+pub type Point = BTreeMap<String, f64>;
+
+/// Counts of a point, by name. They add up without rounding.
+pub type Tally = BTreeMap<String, u64>;
+
+/// What is swept.
+#[derive(Clone, Copy)]
+pub struct Study {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// What it finds out, in one line.
+    pub about: &'static str,
+    /// Grows when a trial changes: parts of different revisions do not add up.
+    pub revision: u32,
+    /// Seeds of a quick look, from 0.
+    pub few_seeds: u64,
+    /// Seeds of the figures, from 0.
+    pub all_seeds: u64,
+    /// The grid.
+    pub points: fn() -> Vec<Point>,
+    /// The trials of one seed at one point.
+    pub trial: fn(&Point, &mut Pcg64) -> Result<Tally>,
+}
+
+impl Study {
+    /// The random numbers of a seed at a point: independent of every other's.
+    fn rng(&self, point: usize, seed: u64) -> Pcg64 {
+        // The step is odd and about 0.6 of the period, so that places lie far
+        // apart.
+        const STEP: u128 = 0x9e37_79b9_7f4a_7c15_f39c_c060_5ced_c835;
+        let mut rng = Pcg64::seed_from_u64(seed);
+        rng.advance(STEP.wrapping_mul(point as u128 + 1));
+        rng
+    }
+}
+
+/// A point of these parameters.
+#[must_use]
+pub fn point<const N: usize>(parameters: [(&str, f64); N]) -> Point {
+    let parameters = parameters.into_iter();
+    parameters
+        .map(|(name, value)| (name.to_owned(), value))
+        .collect()
+}
+
+/// A tally of these counts.
+#[must_use]
+pub fn tally<const N: usize>(counts: [(&str, u64); N]) -> Tally {
+    let counts = counts.into_iter();
+    counts
+        .map(|(name, count)| (name.to_owned(), count))
+        .collect()
+}

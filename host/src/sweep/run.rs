@@ -1,0 +1,76 @@
+//! Running the seeds of a part.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, ensure};
+use rayon::prelude::*;
+
+use super::{Part, SeedRange, Study, Tally};
+
+/// What was worked out is saved as often.
+const SAVE_EVERY: Duration = Duration::from_secs(10);
+
+/// Works out `seeds` into the file at `path`. If there is a part of them already,
+/// as a run that was ended early leaves it, the rest is added. `progress` is told
+/// how many seeds are done.
+///
+/// # Errors
+/// If the file holds something else, or cannot be written, or a trial fails.
+pub fn run(
+    study: &Study,
+    seeds: SeedRange,
+    path: &Path,
+    mut progress: impl FnMut(u64),
+) -> Result<Part> {
+    let mut part = Part::empty(study);
+    if path.exists() {
+        let before = Part::load(path)?;
+        let inside = |range: &SeedRange| seeds.first <= range.first && range.end <= seeds.end;
+        ensure!(
+            before.seeds().iter().all(inside),
+            "{}: holds seeds that are not asked for",
+            path.display()
+        );
+        part.add(&before)
+            .with_context(|| path.display().to_string())?;
+    }
+    let done = part.seeds().to_vec();
+    let is_left = |seed: &u64| {
+        !done
+            .iter()
+            .any(|range| (range.first..range.end).contains(seed))
+    };
+    let points = (study.points)();
+    // As many trials at once as keep every thread busy.
+    let at_once = (8 * rayon::current_num_threads()).div_ceil(points.len().max(1));
+    let mut saved = Instant::now();
+    let mut left = (seeds.first..seeds.end).filter(is_left);
+    loop {
+        let chunk: Vec<u64> = left.by_ref().take(at_once).collect();
+        if chunk.is_empty() {
+            break;
+        }
+        let trials: Vec<(u64, usize)> = chunk
+            .iter()
+            .flat_map(|&seed| (0..points.len()).map(move |point| (seed, point)))
+            .collect();
+        let tallies: Vec<Tally> = trials
+            .into_par_iter()
+            .map(|(seed, point)| {
+                (study.trial)(&points[point], &mut study.rng(point, seed))
+                    .with_context(|| format!("{}, seed {seed}", study.name))
+            })
+            .collect::<Result<_>>()?;
+        for (&seed, tallies) in chunk.iter().zip(tallies.chunks(points.len())) {
+            part.add_seed(seed, tallies.to_vec())?;
+        }
+        progress(part.seed_count());
+        if saved.elapsed() >= SAVE_EVERY {
+            part.save(path)?;
+            saved = Instant::now();
+        }
+    }
+    part.save(path)?;
+    Ok(part)
+}
