@@ -27,4 +27,5 @@ pub mod settings;
 pub mod simulation;
 pub mod source;
 pub mod summary;
+pub mod theory;
 pub mod tmf8820;
