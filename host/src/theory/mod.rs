@@ -20,3 +20,4 @@ pub mod normal;
 pub mod poisson;
 mod quadrature;
 pub mod rates;
+pub mod single_look;
