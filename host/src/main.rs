@@ -27,6 +27,9 @@ enum Command {
     Decode(command::decode::Decode),
     /// Print the events of a device with a sensor as CSV, as they come.
     Monitor(Box<command::monitor::Monitor>),
+    /// Print the simulated table of false events that `tune` interpolates.
+    #[command(hide = true)]
+    FalseEventTable(command::false_event_table::FalseEventTable),
 }
 
 fn main() -> ExitCode {
@@ -40,6 +43,7 @@ fn main() -> ExitCode {
         Some(Command::Replay(replay)) => replay.run(),
         Some(Command::Decode(decode)) => decode.run(),
         Some(Command::Monitor(monitor)) => monitor.run(),
+        Some(Command::FalseEventTable(table)) => table.run(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

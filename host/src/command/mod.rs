@@ -2,6 +2,7 @@
 
 pub mod decode;
 pub mod demo;
+pub mod false_event_table;
 pub mod monitor;
 mod operation;
 pub mod replay;

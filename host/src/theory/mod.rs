@@ -14,10 +14,13 @@
 //! `f64`. Nothing here is checked for sense: rates are finite and not negative,
 //! probabilities lie strictly between 0 and 1 where an inverse is taken of them.
 
+pub mod exposure;
 pub mod gaussian;
 pub mod known_background;
 pub mod normal;
 pub mod poisson;
 mod quadrature;
 pub mod rates;
+pub mod repeated_looks;
 pub mod single_look;
+pub mod table;
