@@ -27,6 +27,8 @@ enum Command {
     Decode(command::decode::Decode),
     /// Print the events of a device with a sensor as CSV, as they come.
     Monitor(Box<command::monitor::Monitor>),
+    /// Find α and L1 for a wanted rate of false events, and say what to expect.
+    Tune(Box<command::tune::Tune>),
     /// Print the simulated table of false events that `tune` interpolates.
     #[command(hide = true)]
     FalseEventTable(command::false_event_table::FalseEventTable),
@@ -43,6 +45,7 @@ fn main() -> ExitCode {
         Some(Command::Replay(replay)) => replay.run(),
         Some(Command::Decode(decode)) => decode.run(),
         Some(Command::Monitor(monitor)) => monitor.run(),
+        Some(Command::Tune(tune)) => tune.run(),
         Some(Command::FalseEventTable(table)) => table.run(),
     };
     match done {

@@ -6,6 +6,7 @@ pub mod false_event_table;
 pub mod monitor;
 mod operation;
 pub mod replay;
+pub mod tune;
 
 use std::io::{self, Write};
 use std::path::Path;

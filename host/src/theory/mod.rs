@@ -24,3 +24,4 @@ pub mod rates;
 pub mod repeated_looks;
 pub mod single_look;
 pub mod table;
+pub mod tune;

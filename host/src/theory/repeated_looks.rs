@@ -37,25 +37,32 @@ impl<'a> RepeatedLooks<'a> {
         }
     }
 
-    /// The least and the most the probability of a false event in an exposure
-    /// can be: the worst look alone, and the sum over looks (at most 1).
+    /// What the exact laws of the looks say of the exposure.
     #[must_use]
-    pub fn bounds(&self, threshold: &Threshold) -> (f64, f64) {
-        let looks = self.looks.iter();
-        let probabilities = looks.map(|look| look.false_event_probability(threshold));
-        let (worst, sum) = probabilities.fold((0f64, 0f64), |(worst, sum), probability| {
-            (worst.max(probability), sum + probability)
-        });
-        (worst, sum.min(1.0))
+    pub fn bounds(&self, threshold: &Threshold) -> Bounds {
+        let mut bounds = Bounds::default();
+        for look in self.looks {
+            let probability = look.false_event_probability(threshold);
+            bounds.worst_look = bounds.worst_look.max(probability);
+            bounds.sum += probability;
+            bounds.independent -= (-probability).ln_1p();
+        }
+        bounds.sum = bounds.sum.min(1.0);
+        bounds
     }
+}
 
-    /// −ln of the probability of no false event, were the looks independent.
-    /// What is found is a share of this: see [`table`](super::table).
-    #[must_use]
-    pub fn independent_intensity(&self, threshold: &Threshold) -> f64 {
-        let intensity = |look: &SingleLook| -(-look.false_event_probability(threshold)).ln_1p();
-        self.looks.iter().map(intensity).sum()
-    }
+/// Between what the probability of a false event in an exposure lies.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bounds {
+    /// At least: the probability of its worst look.
+    pub worst_look: f64,
+    /// At most: the probabilities of its looks added up, at most 1.
+    pub sum: f64,
+    /// `H`: −ln of the probability of no false event, were the looks
+    /// independent. What is found is a share of this: see
+    /// [`table`](super::table).
+    pub independent: f64,
 }
 
 /// Where repeated looks are simulated: 128 bins, background only.
@@ -73,13 +80,13 @@ pub struct Point {
 pub const BINS: usize = 128;
 /// Photons a reported peak holds at least, the default of the commands.
 pub const MINIMUM_COUNT: u16 = 5;
-/// α from 1 to 10 in quarters.
-pub const ALPHA_STEPS: usize = 37;
+/// α from 1 to 10 in halves.
+pub const ALPHA_STEPS: usize = 19;
 
 /// α number `step`, in 1/256.
 #[must_use]
 pub fn alpha_bits(step: usize) -> u16 {
-    u16::try_from(256 + 64 * step).unwrap_or(u16::MAX)
+    u16::try_from(256 + 128 * step).unwrap_or(u16::MAX)
 }
 
 /// Exposures with a false event.

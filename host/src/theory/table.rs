@@ -28,11 +28,13 @@ const FIRST_MEANS: [f64; 13] = [
 /// The first look, in steps of X laser cycles.
 const FIRSTS: [u32; 5] = [2, 5, 11, 33, 101];
 /// Last look over first look.
-const SPANS: [u32; 6] = [2, 4, 8, 16, 32, 64];
+const SPANS: [u32; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 256, 512];
 /// The highest last look.
-const LAST: u32 = 1000;
-/// The highest mean background: 10-bit counters are far from full.
-const HIGHEST_MEAN: f64 = 800.0;
+const LAST: u32 = 1700;
+/// The highest mean background at the last look: four times 400, as twice the mean
+/// and twice the span must be in the table to interpolate. Counters fill up there, in the
+/// simulation as in the exact law.
+const HIGHEST_MEAN: f64 = 1700.0;
 /// Fewer events say too little of their probability.
 const FEWEST_EVENTS: u64 = 20;
 /// Exposures of one trial.
@@ -51,7 +53,7 @@ pub struct Row {
     pub alpha: u16,
     /// Exposures with a false event.
     pub events: u64,
-    /// `H`, [`RepeatedLooks::independent_intensity`].
+    /// `H`, `independent` of [`Bounds`](super::repeated_looks::Bounds).
     pub intensity: f64,
 }
 
@@ -116,7 +118,7 @@ pub fn rows(point: &Point, tally: &FalseEvents) -> Vec<Row> {
                 last,
                 alpha,
                 events,
-                intensity: looks.independent_intensity(&threshold),
+                intensity: looks.bounds(&threshold).independent,
             });
         }
     }
@@ -215,34 +217,60 @@ impl Table {
         );
         let found = -(-(row.events as f64) / self.exposures as f64).ln_1p();
         let shares = &mut self.shares[mean][first][span];
-        // Higher α, lower intensity: from the back.
-        shares.insert(0, (row.intensity.ln(), (found / row.intensity).ln()));
+        // Higher α, lower intensity: from the back. Two α with the same
+        // thresholds have the same.
+        let independent = row.intensity.ln();
+        if shares.first().is_none_or(|known| independent < known.0) {
+            shares.insert(0, (independent, (found / row.intensity).ln()));
+        }
         self.rows.push(row);
         Ok(())
     }
 
-    /// Of the intensity `independent`, which looks `first` to `last` would have
-    /// were they independent, the share found; `first_mean` photons a bin at
-    /// the first. `None` outside the table, and where it saw too few events.
+    /// What looks `first` to `last` with `first_mean` photons a bin at the
+    /// first come to, if they would have the intensity `independent` were they
+    /// independent. `None` outside the table.
     #[must_use]
-    pub fn share(&self, first_mean: f64, first: u32, last: u32, independent: f64) -> Option<f64> {
+    pub fn look_up(
+        &self,
+        first_mean: f64,
+        first: u32,
+        last: u32,
+        independent: f64,
+    ) -> Option<Found> {
         let span = f64::from(last) / f64::from(first);
         let (mean, mean_part) = place(&FIRST_MEANS, first_mean)?;
         let (first, first_part) = place(&FIRSTS.map(f64::from), first.into())?;
         let (span, span_part) = place(&SPANS.map(f64::from), span)?;
         let independent = independent.ln();
         let mut sum = 0.0;
+        let mut seen = true;
         for corner in 0..8 {
             let [a, b, c] = [corner & 1, corner >> 1 & 1, corner >> 2];
             let part = |upper: usize, part: f64| if upper == 1 { part } else { 1.0 - part };
             let weight = part(a, mean_part) * part(b, first_part) * part(c, span_part);
             if weight > 0.0 {
                 let shares = &self.shares[mean + a][first + b][span + c];
-                sum += weight * at(shares, independent)?;
+                let (found, within) = at(shares, independent)?;
+                sum += weight * found;
+                seen &= within;
             }
         }
-        Some(sum.exp().min(1.0))
+        Some(Found {
+            probability: -(-sum.exp()).exp_m1(),
+            seen,
+        })
     }
+}
+
+/// A probability from the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// That of a false event in an exposure.
+    pub probability: f64,
+    /// Whether events of that kind were seen. If not, it is at most
+    /// `probability`, the least the table saw.
+    pub seen: bool,
 }
 
 fn read_row(line: &str) -> Result<Row> {
@@ -271,17 +299,19 @@ fn place(values: &[f64], value: f64) -> Option<(usize, f64)> {
     Some((upper - 1, (value / low).ln() / (high / low).ln()))
 }
 
-/// The share at ln H `independent`: linear between neighbours, the last one
-/// above all, `None` below all.
-fn at(shares: &Shares, independent: f64) -> Option<f64> {
+/// ln of the intensity found at ln H `independent`, and whether it was seen.
+/// The share is linear between neighbours and that of the highest above all;
+/// below all the intensity is that of the lowest. `None` where nothing was seen.
+fn at(shares: &Shares, independent: f64) -> Option<(f64, bool)> {
     let upper = shares.iter().position(|known| independent <= known.0);
-    match upper {
-        None => shares.last().map(|known| known.1),
-        Some(0) => None,
+    let (share, seen) = match upper {
+        None => (shares.last()?.1, true),
+        Some(0) => return Some((shares[0].0 + shares[0].1, false)),
         Some(upper) => {
             let [low, high] = [shares[upper - 1], shares[upper]];
             let part = (independent - low.0) / (high.0 - low.0);
-            Some(low.1 + part * (high.1 - low.1))
+            (low.1 + part * (high.1 - low.1), true)
         }
-    }
+    };
+    Some((independent + share.min(0.0), seen))
 }
