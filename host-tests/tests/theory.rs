@@ -9,7 +9,6 @@ use dtof::theory::gaussian::{self, MeanCounts};
 use dtof::theory::known_background;
 use dtof::theory::rates::{bin_share, peak_share, signal_for_snr};
 use dtof::theory::single_look::SingleLook;
-use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, Histogram, PaperRule, RangeGate, detect};
 use dtof_host_tests::binomial::plausible;
 use rand_distr::{Distribution, Poisson};

@@ -135,6 +135,10 @@ impl Tune {
                 "simulation: table, seed {}, {} exposures a point",
                 table.seed, table.exposures
             ),
+            Source::TableAtMost => format!(
+                "simulation: at most, the least the table saw, seed {}, {} exposures a point",
+                table.seed, table.exposures
+            ),
             Source::Bound => "formula: upper bound, single looks (exact) added up".to_owned(),
         };
         let exact = |what: &str| format!("formula: {what}, single look (exact)");

@@ -9,6 +9,7 @@
 
 use anyhow::Result;
 use dtof_core::{Count, Threshold};
+use rayon::prelude::*;
 
 use super::exposure::{Exposures, Looks, trial_rng};
 use super::single_look::SingleLook;
@@ -25,7 +26,7 @@ pub struct RepeatedLooks<'a> {
 #[must_use]
 pub fn single_looks(bins: u32, mean_a_step: f64, last: u32) -> Vec<SingleLook> {
     let look = |step: u32| SingleLook::new(bins, mean_a_step * f64::from(step));
-    (1..=last).map(look).collect()
+    (1..=last).into_par_iter().map(look).collect()
 }
 
 impl<'a> RepeatedLooks<'a> {

@@ -138,16 +138,19 @@ pub fn generate(seed: u64, trials: u16) -> Result<String> {
          # seed {seed}\n# exposures {exposures}\n\
          first_mean,first_look,last_look,alpha_256,events,independent_intensity\n"
     );
-    for (index, point) in (0u16..).zip(points()) {
+    let points: Vec<(u16, Point)> = (0..).zip(points()).collect();
+    let rows_of = |(index, point): &(u16, Point)| {
         let first_trial = index.checked_mul(trials).context("too many trials")?;
-        let tally = simulate(seed, first_trial, &point, trials)?;
-        for row in rows(&point, &tally) {
-            writeln!(
-                text,
-                "{},{},{},{},{},{:.4e}",
-                row.first_mean, row.first, row.last, row.alpha, row.events, row.intensity
-            )?;
-        }
+        let tally = simulate(seed, first_trial, point, trials)?;
+        Ok(rows(point, &tally))
+    };
+    let of_points: Vec<Vec<Row>> = points.par_iter().map(rows_of).collect::<Result<_>>()?;
+    for row in of_points.into_iter().flatten() {
+        writeln!(
+            text,
+            "{},{},{},{},{},{:.4e}",
+            row.first_mean, row.first, row.last, row.alpha, row.events, row.intensity
+        )?;
     }
     Ok(text)
 }

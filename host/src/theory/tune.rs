@@ -74,6 +74,8 @@ pub struct Request {
 pub enum Source {
     /// Interpolated from the simulated table.
     Table,
+    /// Not above this, the least the simulated table saw.
+    TableAtMost,
     /// Not above this: the sum of the exact single-look probabilities.
     Bound,
 }
@@ -133,6 +135,9 @@ const EXPOSURES: (u32, u32) = (50, 500);
 const LEAST_DETECTED: f64 = 0.01;
 /// The chance that one of the counters is full at the last look.
 const MOST_SATURATED: f64 = 0.01;
+
+/// Looks of an exposure: half a minute's work.
+const MOST_LOOKS: u16 = 5000;
 
 /// Finds α and L1.
 ///
@@ -209,7 +214,13 @@ fn check(request: &Request) -> Result<()> {
             "--x {x} --l2 {l2}: L2 must be greater than 2 X, so that there is a look"
         );
     }
-    let last = f64::from((l2 - 1) / x * x);
+    let looks = (l2 - 1) / x;
+    ensure!(
+        looks <= MOST_LOOKS,
+        "--x {x} --l2 {l2}: {looks} looks an exposure, at most {MOST_LOOKS} looks are calculated; \
+         raise --x"
+    );
+    let last = f64::from(looks * x);
     // A mean that is far too high need not be tabulated to say so.
     let mean = (background * last).min(5000.0);
     let full = Poisson::new(mean).highest_at_least(Count10::MAX, bins.into());
@@ -265,9 +276,16 @@ fn calibrated(
             None
         };
         // Never below what one look alone gives.
-        let found = found.map(|found| found.probability.max(bounds.worst_look));
         match found {
-            Some(found) if found < bounds.sum => (found, Source::Table, bounds),
+            Some(found) if found.probability < bounds.sum => {
+                let source = if found.seen {
+                    Source::Table
+                } else {
+                    Source::TableAtMost
+                };
+                let probability = found.probability.max(bounds.worst_look);
+                (probability, source, bounds)
+            }
             _ => (bounds.sum, Source::Bound, bounds),
         }
     };
