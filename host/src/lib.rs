@@ -28,4 +28,5 @@ pub mod simulation;
 pub mod source;
 pub mod summary;
 pub mod sweep;
+pub mod theory;
 pub mod tmf8820;

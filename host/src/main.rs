@@ -29,6 +29,15 @@ enum Command {
     Decode(command::decode::Decode),
     /// Print the events of a device with a sensor as CSV, as they come.
     Monitor(Box<command::monitor::Monitor>),
+    /// Find α and L1 for a wanted rate of false events, and say what to expect.
+    Tune(Box<command::tune::Tune>),
+    /// Run Monte-Carlo trials of a study into a part, or list the studies.
+    Sweep(command::sweep::Sweep),
+    /// Add up parts of a sweep.
+    Merge(command::sweep::Merge),
+    /// Print the simulated table of false events that `tune` interpolates.
+    #[command(hide = true)]
+    FalseEventTable(command::false_event_table::FalseEventTable),
 }
 
 fn main() -> ExitCode {
@@ -43,6 +52,10 @@ fn main() -> ExitCode {
         Some(Command::Replay(replay)) => replay.run(),
         Some(Command::Decode(decode)) => decode.run(),
         Some(Command::Monitor(monitor)) => monitor.run(),
+        Some(Command::Tune(tune)) => tune.run(),
+        Some(Command::Sweep(sweep)) => sweep.run(),
+        Some(Command::Merge(merge)) => merge.run(),
+        Some(Command::FalseEventTable(table)) => table.run(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -14,6 +14,7 @@
 
 mod part;
 mod run;
+pub mod studies;
 
 use std::collections::BTreeMap;
 

@@ -2,10 +2,13 @@
 
 pub mod decode;
 pub mod demo;
+pub mod false_event_table;
 pub mod monitor;
 mod operation;
 pub mod replay;
 pub mod simulate;
+pub mod sweep;
+pub mod tune;
 
 use std::io::{self, Write};
 use std::path::Path;

@@ -1,24 +1,25 @@
 //! How often the highest bin is the pulse's (Eq. 7 and its figures).
 
 use anyhow::Result;
+use dtof_core::peak::ComparatorTree;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
 
 use crate::sweep::{Point, Study, Tally, point, tally};
-use crate::theory::rates::{self, Reflection};
+use crate::theory::gaussian::MeanCounts;
+use crate::theory::known_background;
+use crate::theory::rates::{Reflection, peak_share, signal_mean};
 
-/// The paper's: seven background bins and the pulse's, σ = 1.5 bins, the pulse on
-/// an edge.
-pub const BINS: u32 = 8;
-/// Where the pulse lies, in bins.
+/// The paper's histogram: the pulse's bin and seven others (M_B).
+pub const BINS: usize = 8;
+/// The pulse lies on an edge, in bins from the start of bin 0.
 pub const POSITION: f64 = 4.0;
-/// Its standard deviation, in bins.
+/// Its standard deviation in bins.
 pub const SIGMA: f64 = 1.5;
-/// Background photons a bin and laser cycle.
-pub const BACKGROUND: f64 = 0.05;
-/// Histograms a trial.
+/// Histograms of a trial.
 const HISTOGRAMS: u64 = 1000;
 
+/// See [`expected`] for what it is held against.
 pub const STUDY: Study = Study {
     name: "hit-rate",
     about: "how often the highest bin is the pulse's, by SNR and background",
@@ -29,17 +30,84 @@ pub const STUDY: Study = Study {
     trial,
 };
 
-/// SNR 1 to 30 at mean backgrounds from 0.5 to 100 counts a bin.
+/// SNR 1 to 30 at mean backgrounds of 0.1 to 100 counts a bin; with and without
+/// the signal in the bins beside the pulse's, which Eq. 7 leaves out.
 fn points() -> Vec<Point> {
-    let backgrounds = [0.5, 5.0, 30.0, 100.0];
-    let snrs = (1..=30).map(f64::from);
-    let grid = backgrounds
-        .into_iter()
-        .flat_map(|background| snrs.clone().map(move |snr| (background, snr)));
-    grid.map(|(background, snr)| point([("background", background), ("snr", snr)]))
-        .collect()
+    let mut points = Vec::new();
+    for neighbours in [0.0, 1.0] {
+        for background in [0.1, 1.0, 10.0, 30.0, 100.0] {
+            for snr in 1..=30 {
+                points.push(point([
+                    ("neighbours", neighbours),
+                    ("background", background),
+                    ("snr", snr.into()),
+                ]));
+            }
+        }
+    }
+    points
+}
+
+/// Mean counts of each bin.
+fn means(point: &Point) -> [f64; BINS] {
+    let (background, snr) = (point["background"], point["snr"]);
+    // The histogram's signal is N·A, its background N·B.
+    let signal = snr * background.sqrt();
+    let returned = [Reflection {
+        photons: signal,
+        position: POSITION,
+    }];
+    let (target, _) = target();
+    let mut bins = 0..;
+    [(); BINS].map(|()| {
+        let bin = bins.next().unwrap_or_default();
+        let is_lit = point["neighbours"] > 0.0 || bin == target;
+        let signal = if is_lit {
+            signal_mean(bin, 1.0, &returned, SIGMA)
+        } else {
+            0.0
+        };
+        background + signal
+    })
+}
+
+/// The pulse's bin, the lower of the two at the edge, and its share of the pulse.
+fn target() -> (u32, f64) {
+    peak_share(BINS as u32, POSITION, SIGMA)
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    todo!()
+    let laws = means(point).map(Poisson::new);
+    let (target, _) = target();
+    let mut hits = 0;
+    for _ in 0..HISTOGRAMS {
+        let mut counts = [0u32; BINS];
+        for (count, law) in counts.iter_mut().zip(&laws) {
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a whole number of some hundred"
+            )]
+            {
+                *count = law.as_ref().map_err(|error| *error)?.sample(rng) as u32;
+            }
+        }
+        let peak = ComparatorTree::of(&counts).peak();
+        hits += u64::from(u32::from(peak.bin.raw()) == target);
+    }
+    Ok(tally([("histograms", HISTOGRAMS), ("hits", hits)]))
+}
+
+/// Eq. 7 as printed, and the same with Poisson counts, which is exact.
+#[must_use]
+pub fn expected(point: &Point) -> (f64, f64) {
+    let (target, share) = target();
+    let background = point["background"];
+    let gaussian = MeanCounts {
+        background,
+        signal: point["snr"] * background.sqrt() * share,
+        background_bins: BINS as u32 - 1,
+    };
+    let exact = known_background::hit_probability(&means(point), target as usize);
+    (gaussian.hit_probability(), exact.unwrap_or_default())
 }

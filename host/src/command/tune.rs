@@ -1,0 +1,263 @@
+//! `dtof tune`: α and L1 for a wanted rate of false events.
+
+use std::fmt::Write as _;
+use std::io::{self, Write};
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use dtof::theory::gaussian;
+use dtof::theory::rates::{signal_for_snr, snr};
+use dtof::theory::table::Table;
+use dtof::theory::tune::{Request, Source, Tuned, Wanted, tune};
+use serde_json::json;
+
+#[derive(Args)]
+pub struct Tune {
+    /// Background photons a bin and laser cycle (B)
+    #[arg(long, value_name = "B", value_parser = positive)]
+    background: f64,
+    /// Signal photons a laser cycle (A)
+    #[arg(long, value_name = "A", value_parser = positive, required_unless_present = "snr")]
+    signal: Option<f64>,
+    /// Instead: the SNR of the whole exposure, N·A / √(N·B) with N = L2
+    #[arg(long, value_name = "SNR", value_parser = positive, conflicts_with = "signal")]
+    snr: Option<f64>,
+    /// Standard deviation of the pulse in bins
+    #[arg(long, value_name = "BINS", value_parser = positive, required_unless_present = "sigma_ps")]
+    sigma_bins: Option<f64>,
+    /// Instead: in picoseconds
+    #[arg(long, value_name = "PS", value_parser = positive, conflicts_with = "sigma_bins")]
+    sigma_ps: Option<f64>,
+    /// Bins of a histogram, a power of two from 8 to 1024
+    #[arg(long, value_name = "N", default_value_t = 128)]
+    bins: u16,
+    /// Picoseconds a bin
+    #[arg(long, value_name = "PS", default_value_t = 250.0, value_parser = positive)]
+    bin_width_ps: f64,
+    /// False events an exposure of a pixel without a target, at most [default: 0.01]
+    #[arg(long, value_name = "P", value_parser = positive, conflicts_with = "false_per_second")]
+    false_per_exposure: Option<f64>,
+    /// Instead: false events a second
+    #[arg(long, value_name = "R", value_parser = positive, requires = "laser_hz")]
+    false_per_second: Option<f64>,
+    /// Laser cycles a second
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    laser_hz: Option<f64>,
+    /// The exposure a decision must exceed, in laser cycles [default: the one with the shortest
+    /// time to an event]
+    #[arg(long, value_name = "N")]
+    l1: Option<u16>,
+    /// The exposure at which a pixel starts over without an event, in laser cycles
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u16).range(1..))]
+    l2: u16,
+    /// Laser cycles between looks
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..))]
+    x: u16,
+    /// Photons a reported peak holds at least
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1023))]
+    min_count: u16,
+    /// Seed of the simulated exposures
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Millimetres of range a picosecond, half the speed of light.
+const MM_PER_PS: f64 = 0.149_896_229;
+
+/// One result: name in JSON, name for people, value, unit, where it comes from.
+struct Line(&'static str, &'static str, f64, &'static str, String);
+
+impl Tune {
+    pub fn run(&self) -> Result<()> {
+        let request = self.request()?;
+        let table = Table::kept()?;
+        let tuned = tune(&request, &table)?;
+        let lines = self.lines(&request, &tuned, &table);
+        let mut out = io::stdout().lock();
+        if self.json {
+            let fields = lines.iter().map(|Line(name, _, value, unit, source)| {
+                let result = json!({ "value": value, "unit": unit, "source": source });
+                ((*name).to_owned(), result)
+            });
+            let object: serde_json::Map<_, _> = fields.collect();
+            writeln!(out, "{}", serde_json::to_string_pretty(&object)?)?;
+        } else {
+            out.write_all(text(&lines, &request, &tuned).as_bytes())?;
+        }
+        Ok(out.flush()?)
+    }
+
+    fn request(&self) -> Result<Request> {
+        let signal = match (self.signal, self.snr) {
+            (Some(signal), _) => signal,
+            (None, snr) => signal_for_snr(
+                snr.context("--signal or --snr is needed")?,
+                self.background,
+                self.l2.into(),
+            ),
+        };
+        let sigma = match (self.sigma_bins, self.sigma_ps) {
+            (Some(bins), _) => bins,
+            (None, ps) => ps.context("--sigma-bins or --sigma-ps is needed")? / self.bin_width_ps,
+        };
+        ensure!(
+            sigma <= f64::from(self.bins) / 4.0,
+            "a pulse of σ = {sigma} bins does not fit {} bins",
+            self.bins
+        );
+        let wanted = match (self.false_per_second, self.laser_hz) {
+            (Some(per_second), Some(laser_hz)) => Wanted::PerCycle(per_second / laser_hz),
+            _ => Wanted::PerExposure(self.false_per_exposure.unwrap_or(0.01)),
+        };
+        Ok(Request {
+            background: self.background,
+            signal,
+            sigma,
+            bins: self.bins,
+            minimum_count: self.min_count,
+            x: self.x,
+            l1: self.l1,
+            l2: self.l2,
+            wanted,
+            seed: self.seed,
+        })
+    }
+
+    #[allow(clippy::cast_precision_loss)]
+    fn lines(&self, request: &Request, tuned: &Tuned, table: &Table) -> Vec<Line> {
+        let exposures = tuned.detections.exposures;
+        let simulated = format!("simulation: seed {}, {exposures} exposures", request.seed);
+        let false_events = match tuned.source {
+            Source::Table => format!(
+                "simulation: table, seed {}, {} exposures a point",
+                table.seed, table.exposures
+            ),
+            Source::TableAtMost => format!(
+                "simulation: at most, the least the table saw, seed {}, {} exposures a point",
+                table.seed, table.exposures
+            ),
+            Source::Bound => "formula: upper bound, single looks (exact) added up".to_owned(),
+        };
+        let exact = |what: &str| format!("formula: {what}, single look (exact)");
+        let cycles = tuned.cycles_to_event();
+        let mm = tuned.depth_error_bins() * self.bin_width_ps * MM_PER_PS;
+        let alpha = format!("smallest for the false events wanted; {false_events}");
+        let gaussian = gaussian::alpha_min(tuned.wanted, u32::from(request.bins) - 1);
+        let detected = tuned.detections.near as f64 / exposures as f64;
+        let mut lines = vec![
+            Line("alpha", "α", tuned.alpha.to_num(), "", alpha),
+            Line(
+                "l1",
+                "L1",
+                tuned.l1.into(),
+                "laser cycles",
+                match self.l1 {
+                    Some(_) => "as given".to_owned(),
+                    None => format!("shortest time to an event; {simulated}"),
+                },
+            ),
+            Line(
+                "false_events",
+                "false events",
+                tuned.false_events,
+                "an exposure",
+                false_events,
+            ),
+            Line(
+                "at_least",
+                "  at least",
+                tuned.bounds.worst_look,
+                "an exposure",
+                exact("worst look"),
+            ),
+            Line(
+                "at_most",
+                "  at most",
+                tuned.bounds.sum,
+                "an exposure",
+                exact("sum over looks"),
+            ),
+            Line(
+                "cycles_to_event",
+                "time to an event",
+                cycles,
+                "laser cycles",
+                simulated.clone(),
+            ),
+        ];
+        if let Some(laser_hz) = self.laser_hz {
+            let seconds = cycles / laser_hz;
+            lines.push(Line(
+                "seconds_to_event",
+                "",
+                seconds,
+                "s",
+                simulated.clone(),
+            ));
+        }
+        let at_l2 = snr(request.signal, request.background, request.l2.into());
+        lines.extend([
+            Line(
+                "detected",
+                "exposures with one",
+                detected,
+                "",
+                simulated.clone(),
+            ),
+            Line("depth_error_mm", "depth error", mm, "mm rms", simulated),
+            Line(
+                "snr",
+                "SNR at L2",
+                at_l2,
+                "",
+                "formula: N·A/√(N·B)".to_owned(),
+            ),
+            Line(
+                "gaussian_alpha",
+                "α by Eq. 11",
+                gaussian,
+                "",
+                "formula: Eq. 11, one look, background known; not for use".to_owned(),
+            ),
+        ]);
+        lines
+    }
+}
+
+/// For people; the last line is what other commands take.
+fn text(lines: &[Line], request: &Request, tuned: &Tuned) -> String {
+    let mut text = String::new();
+    for Line(_, name, value, unit, source) in lines {
+        let value = format!("{} {unit}", number(*value));
+        let _ = writeln!(text, "{name:<18}  {value:<24}  {source}");
+    }
+    let _ = writeln!(
+        text,
+        "\n--alpha {} --l1 {} --l2 {} --x {} --min-count {}",
+        tuned.alpha, tuned.l1, request.l2, request.x, request.minimum_count
+    );
+    text
+}
+
+/// Whole numbers as they are, others to four significant digits.
+fn number(value: f64) -> String {
+    if value == value.round() && value.abs() < 1e6 {
+        format!("{value}")
+    } else if (0.001..1e6).contains(&value) {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let decimals = (3.0 - value.log10().floor()).max(0.0) as usize;
+        format!("{value:.decimals$}")
+    } else {
+        format!("{value:.3e}")
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok();
+    value
+        .filter(|value| value.is_finite() && *value > 0.0)
+        .ok_or("must be a number above 0".to_owned())
+}

@@ -1,0 +1,377 @@
+//! Simulated exposures, from look to look.
+//!
+//! Between two looks the counts of a bin grow by a Poisson number. Background
+//! is the same everywhere, so its photons of all bins are drawn at once and
+//! thrown into bins, which is the same law and costs a photon, not a bin. The
+//! histogram and the rule are the core's.
+
+use anyhow::{Context, Result};
+use dtof_core::{
+    BinPosition, Count, Count10, CounterWidth, Detection, Histogram, PaperRule, PixelAddress,
+    PixelConfig, RangeGate, background, detect,
+};
+use rand_core::Rng;
+use rand_distr::{Distribution, Poisson};
+use rand_pcg::Pcg64;
+
+use super::rates::bin_share;
+use crate::simulation::Rates;
+use crate::source::pixel_rng;
+
+/// When a pixel looks, counted in steps of X laser cycles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Looks {
+    /// Laser cycles a step (X).
+    pub x: u32,
+    /// The first look with N > L1.
+    pub first: u32,
+    /// The last look with N < L2.
+    pub last: u32,
+}
+
+impl Looks {
+    /// Those of a configuration.
+    #[must_use]
+    pub fn of<const BINS: usize>(config: &PixelConfig<BINS>) -> Self {
+        let [x, l1, l2] = [config.x(), config.l1(), config.l2()].map(u32::from);
+        Self {
+            x,
+            first: l1 / x + 1,
+            last: (l2 - 1) / x,
+        }
+    }
+
+    /// Laser cycles of an exposure without an event: the first look with
+    /// N ≥ L2.
+    #[must_use]
+    pub fn expiry(&self) -> u32 {
+        (self.last + 1) * self.x
+    }
+}
+
+/// The photons of some laser cycles of one pixel.
+#[derive(Clone, Debug)]
+struct Photons {
+    background: Option<Poisson<f64>>,
+    signal: Vec<(u16, Poisson<f64>)>,
+}
+
+impl Photons {
+    /// Of `cycles` laser cycles with `bins` bins, a power of two.
+    fn new(rates: &Rates, bins: u16, cycles: f64) -> Result<Self> {
+        let background = rates.background * f64::from(bins) * cycles;
+        let signal = |bin: u16| {
+            let mean = rates.signal * cycles * bin_share(bin.into(), rates.position, rates.sigma);
+            // One photon in 1e12 exposures does not show.
+            (mean > 1e-12).then(|| Ok((bin, Poisson::new(mean)?)))
+        };
+        let signal = (0..bins).filter_map(signal).collect::<Result<_>>();
+        let background = (background > 0.0).then(|| Poisson::new(background));
+        Ok(Self {
+            background: background.transpose().context("the background")?,
+            signal: signal.context("the signal")?,
+        })
+    }
+
+    fn add_to<const BINS: usize>(&self, histogram: &mut Histogram<BINS>, rng: &mut Pcg64) {
+        // A Poisson sample is a whole number.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let sample = |law: &Poisson<f64>, rng: &mut Pcg64| law.sample(rng) as u64;
+        let background = &self.background;
+        let mut left = background.as_ref().map_or(0, |law| sample(law, rng));
+        // Four uniform bins from one random number: BINS is a power of two.
+        while left > 0 {
+            let mut random = rng.next_u64();
+            for _ in 0..left.min(4) {
+                #[allow(clippy::cast_possible_truncation)]
+                histogram.add((random as usize & (BINS - 1)) as u16);
+                random >>= 16;
+            }
+            left = left.saturating_sub(4);
+        }
+        for (bin, law) in &self.signal {
+            for _ in 0..sample(law, rng) {
+                histogram.add(*bin);
+            }
+        }
+    }
+}
+
+/// Exposures of one pixel at constant rates.
+#[derive(Clone, Debug)]
+pub struct Exposures {
+    looks: Looks,
+    until_first: Photons,
+    between: Photons,
+}
+
+impl Exposures {
+    /// With `bins` bins, a power of two from 8 to 1024.
+    ///
+    /// # Errors
+    /// If a rate is negative or not a number.
+    pub fn new(rates: &Rates, bins: u16, looks: Looks) -> Result<Self> {
+        let photons = |steps: u32| Photons::new(rates, bins, f64::from(steps * looks.x));
+        Ok(Self {
+            looks,
+            until_first: photons(looks.first)?,
+            between: photons(1)?,
+        })
+    }
+
+    /// Calls `look` with the histogram at each look until it returns `true` or
+    /// the exposure expires. Gives the laser cycles it lasted.
+    fn run<const BINS: usize>(
+        &self,
+        rng: &mut Pcg64,
+        mut look: impl FnMut(u32, &Histogram<BINS>) -> bool,
+    ) -> u32 {
+        let mut histogram = Histogram::new();
+        self.until_first.add_to(&mut histogram, rng);
+        for step in self.looks.first..=self.looks.last {
+            if look(step, &histogram) {
+                return step * self.looks.x;
+            }
+            self.between.add_to(&mut histogram, rng);
+        }
+        self.looks.expiry()
+    }
+
+    /// One exposure: the laser cycles it lasted, and its event if there was one.
+    pub fn event<const BINS: usize>(
+        &self,
+        rule: &PaperRule,
+        rng: &mut Pcg64,
+    ) -> (u32, Option<Detection>) {
+        let mut event = None;
+        let cycles = self.run::<BINS>(rng, |_, histogram| {
+            event = detect(histogram, &RangeGate::full(), rule);
+            event.is_some()
+        });
+        (cycles, event)
+    }
+
+    /// One exposure without a rule: for each look of `lasts`, ascending, the
+    /// highest α (in 1/256) that would have given an event by then, if any
+    /// would.
+    pub fn highest_alphas<const BINS: usize>(
+        &self,
+        minimum_count: Count,
+        lasts: &[u32],
+        rng: &mut Pcg64,
+    ) -> Vec<Option<u16>> {
+        let mut highest = None;
+        let mut by_last = Vec::with_capacity(lasts.len());
+        self.run::<BINS>(rng, |step, histogram| {
+            highest = highest.max(highest_alpha(histogram, minimum_count));
+            if lasts.get(by_last.len()) == Some(&step) {
+                by_last.push(highest);
+            }
+            false
+        });
+        by_last
+    }
+}
+
+/// The highest α in 1/256 with which the paper's rule fires on `histogram`.
+///
+/// The rule fires if `256·peak > 256·q + α·⌊√q⌋`, in α's units.
+fn highest_alpha<const BINS: usize>(
+    histogram: &Histogram<BINS>,
+    minimum_count: Count,
+) -> Option<u16> {
+    let peak = histogram.peak();
+    let background = background::quadrant(histogram.counts(), &RangeGate::full(), peak.bin);
+    if peak.count < minimum_count || peak.count <= background {
+        return None;
+    }
+    let excess = (peak.count.raw() - background.raw()) << 8;
+    let root = Count10::square_root(background.raw());
+    // Without a background every α fires.
+    let highest = (excess - 1).checked_div(root).unwrap_or(u32::MAX);
+    Some(u16::try_from(highest).unwrap_or(u16::MAX))
+}
+
+/// The random numbers of one trial.
+#[must_use]
+pub fn trial_rng(seed: u64, trial: u16) -> Pcg64 {
+    pixel_rng(seed, PixelAddress(trial))
+}
+
+/// What some exposures with a target came to; sums of integers, so that they
+/// add up the same in any order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Detections {
+    /// Exposures.
+    pub exposures: u64,
+    /// Laser cycles of all of them.
+    pub cycles: u64,
+    /// Those with an event whose depth lies within [`Self::NEAR_BINS`] of the
+    /// target's.
+    pub near: u64,
+    /// Those with an event elsewhere.
+    pub far: u64,
+    /// Laser cycles of the exposures counted in `near`.
+    pub near_cycles: u64,
+    /// Squared depth errors of the events in `near`, in (1/256 bin)².
+    pub squared_errors: u64,
+}
+
+impl Detections {
+    /// An event farther from the target is a false one.
+    pub const NEAR_BINS: f64 = 3.0;
+
+    /// As many as `exposures`, of trial number `trial`.
+    ///
+    /// # Errors
+    /// If a rate is negative or not a number.
+    pub fn trial<const BINS: usize>(
+        seed: u64,
+        trial: u16,
+        rates: &Rates,
+        looks: Looks,
+        rule: &PaperRule,
+        exposures: u32,
+    ) -> Result<Self> {
+        let bins = u16::try_from(BINS)?;
+        let simulated = Exposures::new(rates, bins, looks)?;
+        let mut rng = trial_rng(seed, trial);
+        let mut sum = Self::default();
+        for _ in 0..exposures {
+            let (cycles, event) = simulated.event::<BINS>(rule, &mut rng);
+            sum.exposures += 1;
+            sum.cycles += u64::from(cycles);
+            let Some(event) = event else { continue };
+            let found = BinPosition::of(event.peak.bin, event.depth.offset);
+            let error = f64::from(found.raw()) - rates.position * 256.0;
+            if error.abs() > Self::NEAR_BINS * 256.0 {
+                sum.far += 1;
+                continue;
+            }
+            sum.near += 1;
+            sum.near_cycles += u64::from(cycles);
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            {
+                sum.squared_errors += error.powi(2).round() as u64;
+            }
+        }
+        Ok(sum)
+    }
+}
+
+impl std::ops::AddAssign for Detections {
+    fn add_assign(&mut self, other: Self) {
+        self.exposures += other.exposures;
+        self.cycles += other.cycles;
+        self.near += other.near;
+        self.far += other.far;
+        self.near_cycles += other.near_cycles;
+        self.squared_errors += other.squared_errors;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dtof_core::fixed::types::U8F8;
+    use dtof_core::{AsyncPixel, LaserCycle, Look};
+
+    use super::*;
+
+    #[test]
+    fn looks_are_those_of_a_pixel() {
+        for (x, l1, l2) in [
+            (1, 1, 3),
+            (4, 40, 2000),
+            (10, 100, 203),
+            (7, 10, 22),
+            (3, 5, 7),
+        ] {
+            let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+            let config = PixelConfig::<8>::new(x, l1, l2, RangeGate::full(), rule).unwrap();
+            let looks = Looks::of(&config);
+            let mut pixel = AsyncPixel::<8>::new(PixelAddress(0));
+            let mut seen = Vec::new();
+            for cycle in 0.. {
+                match pixel.end_laser_cycle(&config, LaserCycle(cycle)) {
+                    Look::NoPeak => seen.push(u32::from(pixel.exposure())),
+                    Look::Expired => {
+                        assert_eq!(cycle + 1, u64::from(looks.expiry()));
+                        break;
+                    }
+                    _ => {}
+                }
+            }
+            let expected: Vec<u32> = (looks.first..=looks.last)
+                .map(|look| look * looks.x)
+                .collect();
+            assert_eq!(seen, expected, "{x} {l1} {l2}");
+        }
+    }
+
+    #[test]
+    fn the_highest_alpha_fires_and_the_next_does_not() {
+        let mut rng = trial_rng(5, 0);
+        let minimum_count = Count::saturating(5);
+        let mut seen = [0; 3];
+        for mean in [0.002, 0.5, 3.0, 60.0] {
+            let rates = Rates {
+                background: mean,
+                signal: 10.0,
+                position: 40.3,
+                sigma: 0.7,
+            };
+            let photons = Photons::new(&rates, 128, 1.0).unwrap();
+            for _ in 0..2000 {
+                let mut histogram = Histogram::<128>::new();
+                photons.add_to(&mut histogram, &mut rng);
+                let fires = |alpha: u16| {
+                    let rule = PaperRule::new(U8F8::from_bits(alpha), minimum_count);
+                    detect(&histogram, &RangeGate::full(), &rule).is_some()
+                };
+                match highest_alpha(&histogram, minimum_count) {
+                    None => {
+                        assert!(!fires(0));
+                        seen[0] += 1;
+                    }
+                    Some(u16::MAX) => {
+                        assert!(fires(u16::MAX));
+                        seen[1] += 1;
+                    }
+                    Some(alpha) => {
+                        assert!(fires(alpha) && !fires(alpha + 1));
+                        seen[2] += 1;
+                    }
+                }
+            }
+        }
+        assert!(seen.iter().all(|&seen| seen > 50), "{seen:?}");
+    }
+
+    #[test]
+    fn counts_have_the_means_of_the_rates() {
+        let rates = Rates {
+            background: 0.05,
+            signal: 2.0,
+            position: 20.0,
+            sigma: 1.5,
+        };
+        let photons = Photons::new(&rates, 64, 10.0).unwrap();
+        let mut rng = trial_rng(1, 1);
+        let mut sums = [0u32; 64];
+        let times = 20_000;
+        for _ in 0..times {
+            let mut histogram = Histogram::<64>::new();
+            photons.add_to(&mut histogram, &mut rng);
+            for (sum, &count) in sums.iter_mut().zip(histogram.counts()) {
+                *sum += u32::from(count);
+            }
+        }
+        for (bin, &sum) in (0..).zip(&sums) {
+            let mean = 0.5 + 20.0 * bin_share(bin, rates.position, rates.sigma);
+            let expected = mean * f64::from(times);
+            // 4.5 standard deviations: one in 2,000 runs, over 64 bins.
+            let deviation = (f64::from(sum) - expected) / expected.sqrt();
+            assert!(deviation.abs() < 4.5, "{bin}: {sum} {expected}");
+        }
+    }
+}

@@ -1,0 +1,320 @@
+//! False events of repeated looks, simulated once and interpolated.
+//!
+//! Were the looks of an exposure independent, a false event would have the
+//! intensity `H = Σ −ln(1 − p_k)` over the exact single-look probabilities, and
+//! the probability `1 − exp(−H)`. As they share photons, the intensity found is
+//! a share of that. The share varies slowly, where the probability itself goes
+//! over orders of magnitude and in steps (α meets an integer root): so the
+//! share is what is interpolated, over the logarithms of the mean background at
+//! the first look, of the first look, of last over first look, and of `H`.
+//!
+//! `repeated_looks.csv` is what `dtof false-event-table` prints.
+
+use std::fmt::Write;
+
+use anyhow::{Context, Result, ensure};
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{Count, Threshold};
+use rayon::prelude::*;
+
+use super::repeated_looks::{
+    ALPHA_STEPS, BINS, FalseEvents, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
+};
+
+/// Mean background photons a bin at the first look.
+const FIRST_MEANS: [f64; 13] = [
+    0.1, 0.2, 0.4, 0.8, 1.6, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 200.0, 300.0,
+];
+/// The first look, in steps of X laser cycles.
+const FIRSTS: [u32; 5] = [2, 5, 11, 33, 101];
+/// Last look over first look.
+const SPANS: [u32; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 256, 512];
+/// The highest last look.
+const LAST: u32 = 1700;
+/// The highest mean background at the last look: four times 400, as twice the mean
+/// and twice the span must be in the table to interpolate. Counters fill up there, in the
+/// simulation as in the exact law.
+const HIGHEST_MEAN: f64 = 1700.0;
+/// Fewer events say too little of their probability.
+const FEWEST_EVENTS: u64 = 20;
+/// Exposures of one trial.
+const TRIAL: u32 = 500;
+
+/// One simulated probability.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// Mean background photons a bin at the first look.
+    pub first_mean: f64,
+    /// The first look, in steps of X laser cycles.
+    pub first: u32,
+    /// The last look.
+    pub last: u32,
+    /// α in 1/256.
+    pub alpha: u16,
+    /// Exposures with a false event.
+    pub events: u64,
+    /// `H`, `independent` of [`Bounds`](super::repeated_looks::Bounds).
+    pub intensity: f64,
+}
+
+/// All points that are simulated.
+#[must_use]
+pub fn points() -> Vec<Point> {
+    let mut points = Vec::new();
+    for first_mean in FIRST_MEANS {
+        for first in FIRSTS {
+            let spans = SPANS.into_iter().filter(|&span| {
+                first * span <= LAST && first_mean * f64::from(span) <= HIGHEST_MEAN
+            });
+            points.push(Point {
+                first_mean,
+                first,
+                lasts: spans.map(|span| first * span).collect(),
+            });
+        }
+    }
+    points
+}
+
+/// Simulates one point, in trials numbered from `first_trial`.
+///
+/// # Errors
+/// If the point is not one, or there are too many trials.
+pub fn simulate(seed: u64, first_trial: u16, point: &Point, trials: u16) -> Result<FalseEvents> {
+    let numbers = first_trial..first_trial.checked_add(trials).context("too many trials")?;
+    let tallies: Vec<FalseEvents> = numbers
+        .into_par_iter()
+        .map(|trial| FalseEvents::trial(seed, trial, point, TRIAL))
+        .collect::<Result<_>>()?;
+    let mut sum = FalseEvents::new(point.lasts.len());
+    for tally in &tallies {
+        sum += tally;
+    }
+    Ok(sum)
+}
+
+/// What is worth keeping of one point.
+#[must_use]
+pub fn rows(point: &Point, tally: &FalseEvents) -> Vec<Row> {
+    let Some(&last) = point.lasts.last() else {
+        return Vec::new();
+    };
+    let bins = u32::try_from(BINS).unwrap_or(u32::MAX);
+    let steps = single_looks(bins, point.first_mean / f64::from(point.first), last);
+    let mut rows = Vec::new();
+    for (&last, events) in point.lasts.iter().zip(&tally.events) {
+        let looks = RepeatedLooks::new(&steps, point.first, last);
+        for (step, &events) in (0..ALPHA_STEPS).zip(events) {
+            let certain = events * 20 > tally.exposures * 19;
+            if events < FEWEST_EVENTS || certain {
+                continue;
+            }
+            let alpha = alpha_bits(step);
+            let minimum_count = Count::saturating(MINIMUM_COUNT.into());
+            let threshold = Threshold::new(U8F8::from_bits(alpha), minimum_count);
+            rows.push(Row {
+                first_mean: point.first_mean,
+                first: point.first,
+                last,
+                alpha,
+                events,
+                intensity: looks.bounds(&threshold).independent,
+            });
+        }
+    }
+    rows
+}
+
+/// Simulates the whole table, `trials` trials of 500 exposures a point, and
+/// gives it as CSV.
+///
+/// # Errors
+/// If there are too many trials.
+pub fn generate(seed: u64, trials: u16) -> Result<String> {
+    let exposures = u32::from(trials) * TRIAL;
+    let mut text = format!(
+        "# False events of repeated looks: {BINS} bins, minimum count {MINIMUM_COUNT}, \
+         written by: dtof false-event-table --seed {seed} --trials {trials}\n\
+         # seed {seed}\n# exposures {exposures}\n\
+         first_mean,first_look,last_look,alpha_256,events,independent_intensity\n"
+    );
+    let points: Vec<(u16, Point)> = (0..).zip(points()).collect();
+    let rows_of = |(index, point): &(u16, Point)| {
+        let first_trial = index.checked_mul(trials).context("too many trials")?;
+        let tally = simulate(seed, first_trial, point, trials)?;
+        Ok(rows(point, &tally))
+    };
+    let of_points: Vec<Vec<Row>> = points.par_iter().map(rows_of).collect::<Result<_>>()?;
+    for row in of_points.into_iter().flatten() {
+        writeln!(
+            text,
+            "{},{},{},{},{},{:.4e}",
+            row.first_mean, row.first, row.last, row.alpha, row.events, row.intensity
+        )?;
+    }
+    Ok(text)
+}
+
+/// The table that is kept.
+const KEPT: &str = include_str!("repeated_looks.csv");
+
+/// ln H and ln of the share of it that was found, ascending in H.
+type Shares = Vec<(f64, f64)>;
+
+/// The table, ready to be asked.
+#[derive(Clone, Debug)]
+pub struct Table {
+    /// Seed it was simulated with.
+    pub seed: u64,
+    /// Exposures simulated at each point.
+    pub exposures: u64,
+    /// Its rows.
+    pub rows: Vec<Row>,
+    /// By mean, first look and span; empty where nothing was simulated.
+    shares: Vec<[[Shares; SPANS.len()]; FIRSTS.len()]>,
+}
+
+impl Table {
+    /// The table in `repeated_looks.csv`.
+    ///
+    /// # Errors
+    /// If the file is damaged.
+    pub fn kept() -> Result<Self> {
+        Self::read(KEPT)
+    }
+
+    fn read(text: &str) -> Result<Self> {
+        let header = |name: &str| {
+            let mut lines = text.lines();
+            let value = lines.find_map(|line| line.strip_prefix("# ")?.strip_prefix(name));
+            value
+                .context("the table says not how it was made")?
+                .trim()
+                .parse::<u64>()
+                .context("the table's header")
+        };
+        let mut table = Self {
+            seed: header("seed")?,
+            exposures: header("exposures")?,
+            rows: Vec::new(),
+            shares: vec![Default::default(); FIRST_MEANS.len()],
+        };
+        for line in text.lines().filter(|line| !line.starts_with('#')).skip(1) {
+            let row = read_row(line).with_context(|| format!("row {line:?}"))?;
+            table.add(row).with_context(|| format!("row {line:?}"))?;
+        }
+        Ok(table)
+    }
+
+    #[allow(clippy::cast_precision_loss, reason = "some ten thousand exposures")]
+    fn add(&mut self, row: Row) -> Result<()> {
+        let mean = FIRST_MEANS.iter().position(|&mean| mean == row.first_mean);
+        let first = FIRSTS.iter().position(|&first| first == row.first);
+        let span = SPANS.iter().position(|span| span * row.first == row.last);
+        let [Some(mean), Some(first), Some(span)] = [mean, first, span] else {
+            anyhow::bail!("not a point of the grid");
+        };
+        ensure!(
+            row.events < self.exposures && row.intensity > 0.0,
+            "not a probability"
+        );
+        let found = -(-(row.events as f64) / self.exposures as f64).ln_1p();
+        let shares = &mut self.shares[mean][first][span];
+        // Higher α, lower intensity: from the back. Two α with the same
+        // thresholds have the same.
+        let independent = row.intensity.ln();
+        if shares.first().is_none_or(|known| independent < known.0) {
+            shares.insert(0, (independent, (found / row.intensity).ln()));
+        }
+        self.rows.push(row);
+        Ok(())
+    }
+
+    /// What looks `first` to `last` with `first_mean` photons a bin at the
+    /// first come to, if they would have the intensity `independent` were they
+    /// independent. `None` outside the table.
+    #[must_use]
+    pub fn look_up(
+        &self,
+        first_mean: f64,
+        first: u32,
+        last: u32,
+        independent: f64,
+    ) -> Option<Found> {
+        let span = f64::from(last) / f64::from(first);
+        let (mean, mean_part) = place(&FIRST_MEANS, first_mean)?;
+        let (first, first_part) = place(&FIRSTS.map(f64::from), first.into())?;
+        let (span, span_part) = place(&SPANS.map(f64::from), span)?;
+        let independent = independent.ln();
+        let mut sum = 0.0;
+        let mut seen = true;
+        for corner in 0..8 {
+            let [a, b, c] = [corner & 1, corner >> 1 & 1, corner >> 2];
+            let part = |upper: usize, part: f64| if upper == 1 { part } else { 1.0 - part };
+            let weight = part(a, mean_part) * part(b, first_part) * part(c, span_part);
+            if weight > 0.0 {
+                let shares = &self.shares[mean + a][first + b][span + c];
+                let (found, within) = at(shares, independent)?;
+                sum += weight * found;
+                seen &= within;
+            }
+        }
+        Some(Found {
+            probability: -(-sum.exp()).exp_m1(),
+            seen,
+        })
+    }
+}
+
+/// A probability from the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// That of a false event in an exposure.
+    pub probability: f64,
+    /// Whether events of that kind were seen. If not, it is at most
+    /// `probability`, the least the table saw.
+    pub seen: bool,
+}
+
+fn read_row(line: &str) -> Result<Row> {
+    let fields: Vec<&str> = line.split(',').collect();
+    let [first_mean, first, last, alpha, events, intensity] = fields[..] else {
+        anyhow::bail!("{} fields, not 6", fields.len());
+    };
+    Ok(Row {
+        first_mean: first_mean.parse()?,
+        first: first.parse()?,
+        last: last.parse()?,
+        alpha: alpha.parse()?,
+        events: events.parse()?,
+        intensity: intensity.parse()?,
+    })
+}
+
+/// Between which two of `values` `value` lies, and how far from the lower one
+/// on a logarithmic scale; `None` outside.
+fn place(values: &[f64], value: f64) -> Option<(usize, f64)> {
+    let upper = values.iter().position(|&known| value <= known)?;
+    if upper == 0 {
+        return (value == values[0]).then_some((0, 0.0));
+    }
+    let [low, high] = [values[upper - 1], values[upper]];
+    Some((upper - 1, (value / low).ln() / (high / low).ln()))
+}
+
+/// ln of the intensity found at ln H `independent`, and whether it was seen.
+/// The share is linear between neighbours and that of the highest above all;
+/// below all the intensity is that of the lowest. `None` where nothing was seen.
+fn at(shares: &Shares, independent: f64) -> Option<(f64, bool)> {
+    let upper = shares.iter().position(|known| independent <= known.0);
+    let (share, seen) = match upper {
+        None => (shares.last()?.1, true),
+        Some(0) => return Some((shares[0].0 + shares[0].1, false)),
+        Some(upper) => {
+            let [low, high] = [shares[upper - 1], shares[upper]];
+            let part = (independent - low.0) / (high.0 - low.0);
+            (low.1 + part * (high.1 - low.1), true)
+        }
+    };
+    Some((independent + share.min(0.0), seen))
+}

@@ -1,0 +1,187 @@
+//! `dtof tune` as a user runs it.
+
+mod common;
+
+use std::process::Output;
+
+use common::Scratch;
+use serde_json::Value;
+
+/// `dtof tune` with the options in `line`.
+fn tune(line: &str) -> Output {
+    let options: Vec<&str> = line.split_whitespace().collect();
+    Scratch::new().dtof(&[&["tune"], &options[..]].concat())
+}
+
+#[track_caller]
+fn text(line: &str) -> String {
+    let output = tune(line);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[track_caller]
+fn json(line: &str) -> Value {
+    serde_json::from_str(&text(&format!("{line} --json"))).unwrap()
+}
+
+fn value(result: &Value, name: &str) -> f64 {
+    result[name]["value"].as_f64().unwrap()
+}
+
+#[track_caller]
+fn refused(line: &str, parts: &[&str]) {
+    let scratch = Scratch::new();
+    scratch.refused(&tune(line), parts);
+}
+
+const PIXEL: &str = "--background 0.05 --signal 0.4 --sigma-bins 0.8";
+
+#[test]
+fn every_line_says_where_it_comes_from() {
+    let text = text(&format!("{PIXEL} --laser-hz 1e7"));
+    let (results, options) = text.split_once("\n\n").unwrap();
+    for line in results.lines() {
+        let sources = ["formula: ", "simulation: "];
+        assert!(sources.iter().any(|source| line.contains(source)), "{line}");
+    }
+    for part in [
+        "seed 1",
+        "exposures a point",
+        "Eq. 11",
+        "mm rms",
+        "laser cycles",
+        " s ",
+    ] {
+        assert!(results.contains(part), "{part}: {results}");
+    }
+    // What `dtof replay` takes.
+    assert!(options.starts_with("--alpha "), "{options}");
+    assert_eq!(options.lines().count(), 1);
+    let l1 = options.split_whitespace().nth(3).unwrap();
+    assert!(l1.parse::<u16>().unwrap() > 0);
+}
+
+#[test]
+fn the_options_it_prints_are_options_of_replay() {
+    let text = text(PIXEL);
+    let options: Vec<&str> = text.lines().last().unwrap().split_whitespace().collect();
+    let scratch = Scratch::new();
+    let photons = scratch.file("photons.csv", "pixel,cycle,bin\n0,1,2\n");
+    let summary = scratch.replayed(&photons, &options);
+    let result = json(PIXEL);
+    assert_eq!(summary["settings"]["alpha"], result["alpha"]["value"]);
+    assert_eq!(
+        value(&result, "l1"),
+        summary["settings"]["l1"].as_f64().unwrap()
+    );
+}
+
+#[test]
+fn fewer_false_events_take_a_higher_alpha_and_longer() {
+    let fixed = format!("{PIXEL} --l1 80");
+    let often = json(&format!("{fixed} --false-per-exposure 0.1"));
+    let seldom = json(&format!("{fixed} --false-per-exposure 0.0001"));
+    assert!(value(&often, "alpha") < value(&seldom, "alpha"));
+    assert!(value(&often, "cycles_to_event") < value(&seldom, "cycles_to_event"));
+    for (result, wanted) in [(&often, 0.1), (&seldom, 0.0001)] {
+        let found = value(result, "false_events");
+        assert!(found <= wanted);
+        assert!(value(result, "at_least") <= found && found <= value(result, "at_most"));
+        // A multiple of 1/256.
+        assert_eq!((value(result, "alpha") * 256.0).fract(), 0.0);
+    }
+    // Too seldom for the table: the bound, which says so.
+    let source = seldom["false_events"]["source"].as_str().unwrap();
+    assert!(source.starts_with("formula: upper bound"), "{source}");
+    let source = often["false_events"]["source"].as_str().unwrap();
+    assert!(source.starts_with("simulation: table"), "{source}");
+}
+
+#[test]
+fn snr_and_picoseconds_say_the_same() {
+    // A = SNR·√(B/L2) = 80 · √(0.05/2000); 200 ps are 0.8 bins.
+    let one = json("--background 0.05 --signal 0.4 --sigma-bins 0.8");
+    let other = json("--background 0.05 --snr 80 --sigma-ps 200");
+    assert_eq!(value(&one, "alpha"), value(&other, "alpha"));
+    assert_eq!(value(&one, "l1"), value(&other, "l1"));
+    assert!((value(&other, "snr") - 80.0).abs() < 1e-9);
+    let [one, other] = [one, other].map(|result| value(&result, "cycles_to_event"));
+    assert!((one / other - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn false_events_a_second_depend_on_the_laser() {
+    // 0.01 an exposure of 2000 laser cycles at 1 MHz are 5 a second.
+    let result = json(&format!(
+        "{PIXEL} --l1 40 --false-per-second 5 --laser-hz 1e6"
+    ));
+    let wanted = json(&format!("{PIXEL} --l1 40 --false-per-exposure 0.01"));
+    // A little higher, as exposures with an event are shorter.
+    let [higher, alpha] = [result.clone(), wanted].map(|result| value(&result, "alpha"));
+    assert!(alpha <= higher && higher < alpha + 0.05, "{alpha} {higher}");
+    let seconds = value(&result, "seconds_to_event") * 1e6;
+    assert!((seconds - value(&result, "cycles_to_event")).abs() < 1e-6);
+}
+
+#[test]
+fn other_numbers_of_bins_are_bounded_by_formula() {
+    let result = json(&format!("{PIXEL} --bins 32"));
+    let source = result["alpha"]["source"].as_str().unwrap();
+    assert!(source.contains("formula: upper bound"), "{source}");
+}
+
+#[test]
+fn what_cannot_be_met_is_refused_in_one_line() {
+    refused(
+        "--background 0.05 --signal 0.001 --sigma-bins 0.8",
+        &["the signal is too weak", "L2 = 2000"],
+    );
+    refused(
+        "--background 1 --signal 1 --sigma-bins 0.8",
+        &["fills the 10-bit counters", "--l2 860"],
+    );
+    refused(
+        "--background 1e300 --signal 1 --sigma-bins 0.8",
+        &["fills the 10-bit counters"],
+    );
+    // One photon and an empty background: no α helps.
+    refused(
+        "--background 0.01 --signal 1 --sigma-bins 0.8 --min-count 1 --l1 8 --false-per-exposure 1e-9",
+        &["no α", "--min-count"],
+    );
+    refused(
+        &format!("{PIXEL} --l1 2000"),
+        &["L2 must be greater than L1"],
+    );
+    refused(
+        &format!("{PIXEL} --l1 3"),
+        &["X must not be greater than L1"],
+    );
+    refused(&format!("{PIXEL} --l2 8"), &["--l2 8", "greater than 2 X"]);
+    refused(
+        &format!("{PIXEL} --bins 100"),
+        &["--bins 100", "power of two"],
+    );
+    refused(&format!("{PIXEL} --false-per-exposure 1"), &["less than 1"]);
+    refused(
+        "--background 0.05 --signal 1 --sigma-bins 100",
+        &["does not fit 128 bins"],
+    );
+}
+
+#[test]
+fn options_that_are_missing_or_no_numbers_are_named() {
+    refused("--background 0.05 --sigma-bins 1", &["--signal"]);
+    refused("--background 0.05 --signal 1", &["--sigma-bins"]);
+    refused("--signal 1 --sigma-bins 1", &["--background"]);
+    refused(&format!("{PIXEL} --snr 5"), &["--snr", "--signal"]);
+    refused(&format!("{PIXEL} --false-per-second 1"), &["--laser-hz"]);
+    for bad in ["0", "-1", "nan", "inf", "x"] {
+        refused(
+            &format!("--background={bad} --signal 1 --sigma-bins 1"),
+            &["--background", "a number above 0"],
+        );
+    }
+}
