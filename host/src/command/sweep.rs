@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 use std::path::PathBuf;
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
@@ -19,6 +20,9 @@ pub struct Sweep {
     /// The part: a new file, or one that an earlier run with the same seeds left
     #[arg(long, value_name = "FILE", requires = "seeds")]
     out: Option<PathBuf>,
+    /// Save the part after so many seconds, for a run that is ended early
+    #[arg(long, value_name = "S", default_value_t = 10)]
+    save_every: u64,
     /// Show no progress
     #[arg(long)]
     quiet: bool,
@@ -52,7 +56,8 @@ impl Sweep {
         bar.set_style(ProgressStyle::with_template(
             "{bar:40} {human_pos} of {human_len} seeds, {eta} left",
         )?);
-        let part = sweep::run(study, seeds, out, |done| bar.set_position(done))?;
+        let save_every = Duration::from_secs(self.save_every);
+        let part = sweep::run(study, seeds, out, save_every, |done| bar.set_position(done))?;
         bar.finish_and_clear();
         show(&part)
     }

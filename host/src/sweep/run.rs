@@ -8,12 +8,9 @@ use rayon::prelude::*;
 
 use super::{Part, SeedRange, Study, Tally};
 
-/// What was worked out is saved as often.
-const SAVE_EVERY: Duration = Duration::from_secs(10);
-
 /// Works out `seeds` into the file at `path`. If there is a part of them already,
-/// as a run that was ended early leaves it, the rest is added. `progress` is told
-/// how many seeds are done.
+/// as a run that was ended early leaves it, the rest is added. It is saved every
+/// `save_every` and at the end; `progress` is told how many seeds are done.
 ///
 /// # Errors
 /// If the file holds something else, or cannot be written, or a trial fails.
@@ -21,6 +18,7 @@ pub fn run(
     study: &Study,
     seeds: SeedRange,
     path: &Path,
+    save_every: Duration,
     mut progress: impl FnMut(u64),
 ) -> Result<Part> {
     let mut part = Part::empty(study);
@@ -66,7 +64,7 @@ pub fn run(
             part.add_seed(seed, tallies.to_vec())?;
         }
         progress(part.seed_count());
-        if saved.elapsed() >= SAVE_EVERY {
+        if saved.elapsed() >= save_every {
             part.save(path)?;
             saved = Instant::now();
         }

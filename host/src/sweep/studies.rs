@@ -1,6 +1,6 @@
 //! The studies there are.
 
-mod hit_rate;
+pub mod hit_rate;
 
 use anyhow::{Context, Result};
 

@@ -10,8 +10,9 @@ use crate::theory::gaussian::MeanCounts;
 use crate::theory::known_background;
 use crate::theory::rates::{Reflection, peak_share, signal_mean};
 
-/// The paper's histogram: the pulse's bin and seven others (M_B).
-pub const BINS: usize = 8;
+/// The paper's histogram: the pulse's bin and seven others (`M_B`).
+pub const BINS: usize = BINS_U32 as usize;
+const BINS_U32: u32 = 8;
 /// The pulse lies on an edge, in bins from the start of bin 0.
 pub const POSITION: f64 = 4.0;
 /// Its standard deviation in bins.
@@ -73,7 +74,7 @@ fn means(point: &Point) -> [f64; BINS] {
 
 /// The pulse's bin, the lower of the two at the edge, and its share of the pulse.
 fn target() -> (u32, f64) {
-    peak_share(BINS as u32, POSITION, SIGMA)
+    peak_share(BINS_U32, POSITION, SIGMA)
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
@@ -106,7 +107,7 @@ pub fn expected(point: &Point) -> (f64, f64) {
     let gaussian = MeanCounts {
         background,
         signal: point["snr"] * background.sqrt() * share,
-        background_bins: BINS as u32 - 1,
+        background_bins: BINS_U32 - 1,
     };
     let exact = known_background::hit_probability(&means(point), target as usize);
     (gaussian.hit_probability(), exact.unwrap_or_default())
