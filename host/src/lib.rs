@@ -10,6 +10,7 @@
 //! ```
 
 pub mod aer_file;
+pub mod chart;
 pub mod device;
 pub mod engine;
 pub mod events_csv;

@@ -1,0 +1,294 @@
+//! Line charts as SVG documents: what was measured as dots with the interval it
+//! lies in, what was worked out as lines.
+
+use anyhow::{Result, ensure};
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
+use plotters::prelude::*;
+
+use crate::picture::one_line;
+
+const SIZE: (u32, u32) = (760, 480);
+const FONT: (&str, u32) = ("sans-serif", 15);
+
+/// A chart.
+#[derive(Clone, Debug)]
+pub struct Chart<'a> {
+    /// Drawn above it.
+    pub title: &'a str,
+    /// What runs to the right.
+    pub x: Axis<'a>,
+    /// What runs upwards.
+    pub y: Axis<'a>,
+    /// What is drawn, in this order.
+    pub series: Vec<Series>,
+}
+
+/// An axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Axis<'a> {
+    /// What it is, with its unit.
+    pub label: &'a str,
+    /// Whether equal steps are equal factors.
+    pub logarithmic: bool,
+    /// From where to where; by the points where not given.
+    pub range: Option<(f64, f64)>,
+}
+
+/// Points that belong together.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Its name in the legend; none for one that continues the one before.
+    pub name: Option<String>,
+    /// Which colour, counted from 0.
+    pub colour: usize,
+    /// How it is drawn.
+    pub style: Style,
+    /// In order of x.
+    pub points: Vec<Point>,
+}
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// Worked out: a line.
+    Line,
+    /// Worked out, of less weight: a thin line.
+    Thin,
+    /// Measured: dots with their intervals.
+    Dots,
+    /// Measured: dots with their intervals, joined.
+    JoinedDots,
+}
+
+/// A point, with an interval if it was measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    /// To the right.
+    pub x: f64,
+    /// Upwards.
+    pub y: f64,
+    /// The interval it lies in.
+    pub interval: Option<(f64, f64)>,
+}
+
+impl Point {
+    /// Worked out.
+    #[must_use]
+    pub const fn exact(x: f64, y: f64) -> Self {
+        Self {
+            x,
+            y,
+            interval: None,
+        }
+    }
+}
+
+/// The range of an axis whose points lie at `values`.
+fn range(axis: &Axis, values: impl Iterator<Item = f64> + Clone) -> Result<(f64, f64)> {
+    if let Some(range) = axis.range {
+        return Ok(range);
+    }
+    let drawn = values.filter(|&value| value.is_finite() && (value > 0.0 || !axis.logarithmic));
+    let low = drawn.clone().fold(f64::INFINITY, f64::min);
+    let high = drawn.fold(f64::NEG_INFINITY, f64::max);
+    ensure!(low <= high, "{}: nothing to draw", axis.label);
+    Ok(match (axis.logarithmic, low < high) {
+        (true, _) => (low / 1.2, high * 1.2),
+        (false, true) => (low.min(0.0), high + (high - low) * 0.05),
+        (false, false) => (low - 1.0, high + 1.0),
+    })
+}
+
+/// Draws `chart` as a complete SVG document. The same chart always gives the same
+/// bytes. What lies outside a given range is not drawn, nor is what a logarithmic
+/// axis has no place for.
+///
+/// # Errors
+/// If there is no point to draw.
+pub fn line_chart(chart: &Chart) -> Result<String> {
+    let points = chart.series.iter().flat_map(|series| &series.points);
+    let heights = points.clone().flat_map(|point| {
+        let (low, high) = point.interval.unwrap_or((point.y, point.y));
+        [point.y, low, high]
+    });
+    let (left, right) = range(&chart.x, points.map(|point| point.x))?;
+    let (low, high) = range(&chart.y, heights)?;
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        area.fill(&WHITE)?;
+        match (chart.x.logarithmic, chart.y.logarithmic) {
+            (false, false) => draw(&area, chart, left..right, low..high)?,
+            (false, true) => draw(&area, chart, left..right, (low..high).log_scale())?,
+            (true, false) => draw(&area, chart, (left..right).log_scale(), low..high)?,
+            (true, true) => draw(
+                &area,
+                chart,
+                (left..right).log_scale(),
+                (low..high).log_scale(),
+            )?,
+        }
+        area.present()?;
+    }
+    Ok(svg)
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+fn draw<X, Y>(area: &Area, chart: &Chart, x: X, y: Y) -> Result<()>
+where
+    X: AsRangedCoord<Value = f64>,
+    X::CoordDescType: ValueFormatter<f64>,
+    Y: AsRangedCoord<Value = f64>,
+    Y::CoordDescType: ValueFormatter<f64>,
+{
+    let mut context = ChartBuilder::on(area)
+        .caption(one_line(chart.title), ("sans-serif", 19))
+        .margin(12)
+        .x_label_area_size(46)
+        .y_label_area_size(72)
+        .build_cartesian_2d(x, y)?;
+    context
+        .configure_mesh()
+        .x_desc(one_line(chart.x.label))
+        .y_desc(one_line(chart.y.label))
+        .x_label_formatter(&number)
+        .y_label_formatter(&number)
+        .label_style(FONT)
+        .axis_desc_style(FONT)
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(BLACK.mix(0.12))
+        .draw()?;
+    for series in &chart.series {
+        let colour = Palette99::pick(series.colour).to_rgba();
+        let points = || series.points.iter().filter(|point| is_drawn(chart, point));
+        let at = |point: &Point| (point.x, point.y);
+        let width = match series.style {
+            Style::Line => Some(2),
+            Style::Thin | Style::JoinedDots => Some(1),
+            Style::Dots => None,
+        };
+        let mut legend = None;
+        if let Some(width) = width {
+            let line = LineSeries::new(points().map(at), colour.stroke_width(width));
+            legend = Some(context.draw_series(line)?);
+        }
+        if matches!(series.style, Style::Dots | Style::JoinedDots) {
+            context.draw_series(points().filter_map(|point| {
+                let (low, high) = point.interval?;
+                let ends = [low, high].map(|end| (point.x, clamped(&chart.y, end)));
+                Some(PathElement::new(ends, colour))
+            }))?;
+            let dots = points().map(|point| Circle::new(at(point), 3, colour.filled()));
+            legend = Some(context.draw_series(dots)?);
+        }
+        if let (Some(legend), Some(name)) = (legend, &series.name) {
+            let is_line = matches!(series.style, Style::Line | Style::Thin);
+            let stroke = colour.stroke_width(width.unwrap_or(1));
+            let (line, dot) = if is_line {
+                (vec![(0, 0), (18, 0)], 0)
+            } else {
+                (Vec::new(), 3)
+            };
+            legend.label(one_line(name)).legend(move |at| {
+                EmptyElement::at(at)
+                    + PathElement::new(line.clone(), stroke)
+                    + Circle::new((9, 0), dot, colour.filled())
+            });
+        }
+    }
+    context
+        .configure_series_labels()
+        .label_font(FONT)
+        .background_style(WHITE.mix(0.85))
+        .border_style(BLACK.mix(0.3))
+        .draw()?;
+    Ok(())
+}
+
+/// Whether the axes have a place for it.
+fn is_drawn(chart: &Chart, point: &Point) -> bool {
+    let fits = |axis: &Axis, value: f64| {
+        value.is_finite()
+            && (value > 0.0 || !axis.logarithmic)
+            && axis
+                .range
+                .is_none_or(|(low, high)| (low..=high).contains(&value))
+    };
+    fits(&chart.x, point.x) && fits(&chart.y, point.y)
+}
+
+/// The end of an interval, drawn to the edge if it lies beyond.
+fn clamped(axis: &Axis, end: f64) -> f64 {
+    match axis.range {
+        Some((low, high)) => end.clamp(low, high),
+        None if axis.logarithmic => end.max(f64::MIN_POSITIVE),
+        None => end,
+    }
+}
+
+/// A number at an axis: no more digits than it takes.
+fn number(value: &f64) -> String {
+    // A grid of tenths is not exact.
+    let rounded = (value * 1e9).round() / 1e9;
+    if rounded != 0.0 && rounded.abs() < 1e-3 {
+        return format!("{value:.0e}");
+    }
+    rounded.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart(logarithmic: bool, points: Vec<Point>) -> Chart<'static> {
+        let axis = |label| Axis {
+            label,
+            logarithmic,
+            range: None,
+        };
+        Chart {
+            title: "A <title> & more",
+            x: axis("x"),
+            y: axis("y"),
+            series: vec![Series {
+                name: Some("series".to_owned()),
+                colour: 0,
+                style: Style::JoinedDots,
+                points,
+            }],
+        }
+    }
+
+    fn dots(svg: &str) -> usize {
+        // One is the legend's.
+        svg.matches("<circle").count() - 1
+    }
+
+    #[test]
+    fn every_point_with_a_place_is_a_dot() {
+        let points: Vec<Point> = [-1.0, 0.0, 1.0, 10.0, f64::NAN]
+            .map(|value| Point::exact(value, value))
+            .to_vec();
+        let linear = line_chart(&chart(false, points.clone())).unwrap();
+        let logarithmic = line_chart(&chart(true, points.clone())).unwrap();
+        assert_eq!((dots(&linear), dots(&logarithmic)), (4, 2));
+        assert!(linear.contains("A &lt;title&gt; &amp; more"));
+        let mut narrow = chart(false, points);
+        narrow.x.range = Some((0.5, 20.0));
+        assert_eq!(dots(&line_chart(&narrow).unwrap()), 2);
+    }
+
+    #[test]
+    fn nothing_to_draw_is_an_error() {
+        assert!(line_chart(&chart(false, vec![])).is_err());
+        assert!(line_chart(&chart(true, vec![Point::exact(0.0, 1.0)])).is_err());
+    }
+
+    #[test]
+    fn numbers_have_no_more_digits_than_they_need() {
+        let texts = [0.0, 0.1 + 0.2, 20.0, 1e-4, -0.5].map(|value| number(&value));
+        assert_eq!(texts, ["0", "0.3", "20", "1e-4", "-0.5"]);
+    }
+}
