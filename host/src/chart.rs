@@ -9,6 +9,16 @@ use plotters::prelude::*;
 use crate::picture::one_line;
 
 const SIZE: (u32, u32) = (760, 480);
+/// Told apart by people who see colours differently, too: those of Okabe and Ito.
+const COLOURS: [RGBColor; 7] = [
+    RGBColor(0x00, 0x72, 0xb2),
+    RGBColor(0xd5, 0x5e, 0x00),
+    RGBColor(0x00, 0x9e, 0x73),
+    RGBColor(0xcc, 0x79, 0xa7),
+    RGBColor(0xe6, 0x9f, 0x00),
+    RGBColor(0x56, 0xb4, 0xe9),
+    RGBColor(0x00, 0x00, 0x00),
+];
 const FONT: (&str, u32) = ("sans-serif", 15);
 
 /// A chart.
@@ -40,7 +50,7 @@ pub struct Axis<'a> {
 pub struct Series {
     /// Its name in the legend; none for one that continues the one before.
     pub name: Option<String>,
-    /// Which colour, counted from 0.
+    /// Which of seven colours, counted from 0; then from the first again.
     pub colour: usize,
     /// How it is drawn.
     pub style: Style,
@@ -161,7 +171,7 @@ where
         .bold_line_style(BLACK.mix(0.12))
         .draw()?;
     for series in &chart.series {
-        let colour = Palette99::pick(series.colour).to_rgba();
+        let colour = COLOURS[series.colour % COLOURS.len()].to_rgba();
         let points = || series.points.iter().filter(|point| is_drawn(chart, point));
         let at = |point: &Point| (point.x, point.y);
         let width = match series.style {

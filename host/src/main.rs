@@ -35,6 +35,8 @@ enum Command {
     Sweep(command::sweep::Sweep),
     /// Add up parts of a sweep.
     Merge(command::sweep::Merge),
+    /// Make the figures of the documentation and the verdicts on the paper's claims.
+    Figures(command::figures::Figures),
     /// Print the simulated table of false events that `tune` interpolates.
     #[command(hide = true)]
     FalseEventTable(command::false_event_table::FalseEventTable),
@@ -55,6 +57,7 @@ fn main() -> ExitCode {
         Some(Command::Tune(tune)) => tune.run(),
         Some(Command::Sweep(sweep)) => sweep.run(),
         Some(Command::Merge(merge)) => merge.run(),
+        Some(Command::Figures(figures)) => figures.run(),
         Some(Command::FalseEventTable(table)) => table.run(),
     };
     match done {

@@ -13,6 +13,7 @@
 //! ```
 
 mod part;
+pub mod results;
 mod run;
 pub mod studies;
 
@@ -21,6 +22,8 @@ use std::collections::BTreeMap;
 use anyhow::Result;
 use rand_core::SeedableRng;
 use rand_pcg::Pcg64;
+
+use self::results::Results;
 
 pub use self::part::{Part, PointTally, SeedRange, merge};
 pub use self::run::run;
@@ -48,6 +51,8 @@ pub struct Study {
     pub points: fn() -> Vec<Point>,
     /// The trials of one seed at one point.
     pub trial: fn(&Point, &mut Pcg64) -> Result<Tally>,
+    /// What all seeds come to.
+    pub results: fn(&Part) -> Result<Results>,
 }
 
 impl Study {

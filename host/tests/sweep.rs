@@ -113,15 +113,19 @@ fn what_does_not_add_up_is_refused() {
         ),
         (
             "revision",
-            &part.replace("\"revision\": 1", "\"revision\": 2"),
+            &part.replace("\"revision\":1", "\"revision\":2"),
             "revision 2",
         ),
         (
             "points",
-            &part.replace("\"snr\": 7.0", "\"snr\": 7.5"),
+            &part.replace("\"snr\":7.0", "\"snr\":7.5"),
             "not the same points",
         ),
-        ("empty", &part.replace("4\n", "0\n"), "no seeds: 0..0"),
+        (
+            "empty",
+            &part.replace("[[0,4]]", "[[0,0]]"),
+            "no seeds: 0..0",
+        ),
     ] {
         scratch.file(name, text);
         scratch.refused(&merge(&["part", name]), &[name, reason]);

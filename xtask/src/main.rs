@@ -2,6 +2,7 @@
 
 mod boards;
 mod emulate;
+mod figures;
 mod firmware;
 mod image;
 mod log;
@@ -38,6 +39,10 @@ cargo xtask <command>
                 write the sidecar onto an STM32F405 or STM32F407 and show its log;
                 the chip as probe-rs names it, by default that of the Discovery
   check-boards  the images start, end and echo in QEMU
+  figures [--all] [--check]
+                work out the figures of the documentation and the verdicts on the
+                paper's claims, from the seeds of a quick look and the kept rest or
+                from all; --check changes nothing and fails if something would change
   self-test     the core works out the same on the target; --bless writes down
                 what it works out here";
 
@@ -67,6 +72,7 @@ fn run() -> Result<()> {
         ["emulate", ref rest @ ..] => emulate::emulate(root()?, rest),
         ["flash", ref rest @ ..] => emulate::flash(root()?, rest),
         ["check-boards"] => boards::check(root()?),
+        ["figures", ref rest @ ..] => figures::make(root()?, rest),
         ["self-test"] => self_test::run(root()?),
         ["self-test", "--bless"] => self_test::bless(root()?),
         ["help" | "--help" | "-h"] => {

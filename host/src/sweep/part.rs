@@ -195,6 +195,25 @@ impl Part {
         Ok(part)
     }
 
+    /// As a file holds it: a line a point.
+    ///
+    /// # Errors
+    /// If a parameter is not finite.
+    pub fn to_json(&self) -> Result<String> {
+        let points: Vec<String> = self
+            .points
+            .iter()
+            .map(serde_json::to_string)
+            .collect::<Result<_, _>>()?;
+        Ok(format!(
+            "{{\"study\":{},\"revision\":{},\"seeds\":{},\"points\":[\n{}\n]}}\n",
+            serde_json::to_string(&self.study)?,
+            self.revision,
+            serde_json::to_string(&self.seeds)?,
+            points.join(",\n")
+        ))
+    }
+
     /// Writes it aside and moves it to `path`, so that a part there is whole.
     ///
     /// # Errors
@@ -206,8 +225,8 @@ impl Part {
             _ => Path::new("."),
         };
         let mut file = NamedTempFile::new_in(folder).with_context(name)?;
-        serde_json::to_writer_pretty(&mut file, self).with_context(name)?;
-        writeln!(file).with_context(name)?;
+        let text = self.to_json().with_context(name)?;
+        file.write_all(text.as_bytes()).with_context(name)?;
         file.persist(path).with_context(name)?;
         Ok(())
     }

@@ -5,7 +5,10 @@ use dtof_core::peak::ComparatorTree;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
 
-use crate::sweep::{Point, Study, Tally, point, tally};
+use crate::chart::{self, Axis, Chart, Series, Style, line_chart};
+use crate::summary::grouped;
+use crate::sweep::results::{Figure, Results};
+use crate::sweep::{Part, Point, Study, Tally, point, tally};
 use crate::theory::gaussian::MeanCounts;
 use crate::theory::known_background;
 use crate::theory::rates::{Reflection, peak_share, signal_mean};
@@ -20,7 +23,7 @@ pub const SIGMA: f64 = 1.5;
 /// Histograms of a trial.
 const HISTOGRAMS: u64 = 1000;
 
-/// See [`expected`] for what it is held against.
+/// Held against Eq. 7 and its exact form.
 pub const STUDY: Study = Study {
     name: "hit-rate",
     about: "how often the highest bin is the pulse's, by SNR and background",
@@ -29,6 +32,7 @@ pub const STUDY: Study = Study {
     all_seeds: 100,
     points,
     trial,
+    results,
 };
 
 /// SNR 1 to 30 at mean backgrounds of 0.1 to 100 counts a bin; with and without
@@ -100,8 +104,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 }
 
 /// Eq. 7 as printed, and the same with Poisson counts, which is exact.
-#[must_use]
-pub fn expected(point: &Point) -> (f64, f64) {
+fn expected(point: &Point) -> (f64, f64) {
     let (target, share) = target();
     let background = point["background"];
     let gaussian = MeanCounts {
@@ -111,4 +114,69 @@ pub fn expected(point: &Point) -> (f64, f64) {
     };
     let exact = known_background::hit_probability(&means(point), target as usize);
     (gaussian.hit_probability(), exact.unwrap_or_default())
+}
+
+fn results(part: &Part) -> Result<Results> {
+    let mut series = Vec::new();
+    for (colour, background) in [1.0, 10.0, 100.0].into_iter().enumerate() {
+        let points = part.at([("neighbours", 0.0), ("background", background)]);
+        let line = |value: fn((f64, f64)) -> f64| {
+            let points = points.clone().map(|point| {
+                let value = value(expected(&point.parameters));
+                chart::Point::exact(point.parameter("snr"), value)
+            });
+            points.collect()
+        };
+        series.push(Series {
+            name: Some(format!("{background} background counts a bin: simulated")),
+            colour,
+            style: Style::Dots,
+            points: points
+                .clone()
+                .map(|point| {
+                    let share = point.share("hits", "histograms");
+                    chart::Point {
+                        x: point.parameter("snr"),
+                        y: share.value,
+                        interval: Some(share.interval),
+                    }
+                })
+                .collect(),
+        });
+        series.push(Series {
+            name: Some("exact".to_owned()),
+            colour,
+            style: Style::Line,
+            points: line(|(_, exact)| exact),
+        });
+        series.push(Series {
+            name: Some("Eq. 7".to_owned()),
+            colour,
+            style: Style::Thin,
+            points: line(|(gaussian, _)| gaussian),
+        });
+    }
+    let axis = |label| Axis {
+        label,
+        logarithmic: false,
+        range: None,
+    };
+    let svg = line_chart(&Chart {
+        title: "The highest bin is the pulse's",
+        x: axis("SNR, N·A / √(N·B)"),
+        y: axis("probability"),
+        series,
+    })?;
+    let histograms = part.one([("snr", 1.0)])?.count("histograms");
+    Ok(Results {
+        figures: vec![Figure {
+            name: "hit-rate",
+            svg,
+            caption: format!(
+                "The hit rate of Eq. 7 as printed, with Poisson counts, and simulated ({} histograms a point)",
+                grouped(histograms)
+            ),
+        }],
+        claims: Vec::new(),
+    })
 }

@@ -1,0 +1,159 @@
+//! What a study comes to: figures, and verdicts on what the paper claims.
+
+use std::fmt;
+
+use anyhow::{Context, Result};
+
+use super::{Part, PointTally};
+
+/// What can be said from all trials of a study.
+#[derive(Clone, Debug, Default)]
+pub struct Results {
+    /// In the order they are shown.
+    pub figures: Vec<Figure>,
+    /// In the order of the paper.
+    pub claims: Vec<Claim>,
+}
+
+/// A picture and what it shows.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    /// The file's name, without its extension.
+    pub name: &'static str,
+    /// An SVG document.
+    pub svg: String,
+    /// What it shows, how it was found, and how sure it is.
+    pub caption: String,
+}
+
+/// Something the paper says, and whether it is so.
+#[derive(Clone, Debug)]
+pub struct Claim {
+    /// What is claimed, and where in the paper.
+    pub claim: &'static str,
+    /// The paper's figure or number.
+    pub paper: &'static str,
+    /// Ours, with its interval or sample size.
+    pub here: String,
+    /// Whether they go together.
+    pub verdict: Verdict,
+    /// Why, or under what condition.
+    pub why: &'static str,
+}
+
+/// How a claim fares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// It is so here as well.
+    Agrees,
+    /// In part, or by another number.
+    Differs,
+    /// It is not so.
+    Refuted,
+}
+
+impl Verdict {
+    /// [`Self::Agrees`] or [`Self::Refuted`].
+    #[must_use]
+    pub const fn of(holds: bool) -> Self {
+        if holds { Self::Agrees } else { Self::Refuted }
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Agrees => "agrees",
+            Self::Differs => "differs",
+            Self::Refuted => "refuted",
+        })
+    }
+}
+
+/// Standard deviations of an interval that holds 99 %.
+const Z_99: f64 = 2.575_829_303_548_9;
+
+/// A share, and the 99 % interval (Wilson's) in which the probability lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Share {
+    /// Successes a trial.
+    pub value: f64,
+    /// From where to where.
+    pub interval: (f64, f64),
+}
+
+impl Share {
+    /// Of `successes` in `trials`.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
+    pub fn new(successes: u64, trials: u64) -> Self {
+        let (trials, successes) = (trials as f64, successes as f64);
+        let value = successes / trials;
+        let z2 = Z_99 * Z_99;
+        let centre = (successes + z2 / 2.0) / (trials + z2);
+        let half = (value * (1.0 - value) * trials + z2 / 4.0).sqrt() * Z_99 / (trials + z2);
+        Self {
+            value,
+            interval: ((centre - half).max(0.0), (centre + half).min(1.0)),
+        }
+    }
+
+    /// Whether the interval holds `probability`.
+    #[must_use]
+    pub fn holds(&self, probability: f64) -> bool {
+        (self.interval.0..=self.interval.1).contains(&probability)
+    }
+}
+
+impl PointTally {
+    /// How many of `trials` were `successes`, both names of counts.
+    #[must_use]
+    pub fn share(&self, successes: &str, trials: &str) -> Share {
+        Share::new(self.count(successes), self.count(trials))
+    }
+
+    /// Whether the point has these parameters.
+    #[must_use]
+    #[allow(clippy::float_cmp, reason = "parameters are as they were written")]
+    pub fn is_at<const N: usize>(&self, parameters: [(&str, f64); N]) -> bool {
+        let mut parameters = parameters.into_iter();
+        parameters.all(|(name, value)| self.parameters.get(name) == Some(&value))
+    }
+}
+
+impl Part {
+    /// The points with these parameters, in the study's order.
+    pub fn at<'a, const N: usize>(
+        &'a self,
+        parameters: [(&'a str, f64); N],
+    ) -> impl Iterator<Item = &'a PointTally> + Clone {
+        let points = self.points().iter();
+        points.filter(move |point| point.is_at(parameters))
+    }
+
+    /// The point with these parameters.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn one<const N: usize>(&self, parameters: [(&str, f64); N]) -> Result<&PointTally> {
+        let found = self.points().iter().find(|point| point.is_at(parameters));
+        found.with_context(|| format!("{}: no point {parameters:?}", self.study()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// From the formula in its usual form, worked out by hand for 10 of 100.
+    #[test]
+    fn the_interval_is_wilsons() {
+        let share = Share::new(10, 100);
+        assert!((share.value - 0.1).abs() < 1e-15);
+        assert!((share.interval.0 - 0.046_6).abs() < 1e-4);
+        assert!((share.interval.1 - 0.201_5).abs() < 1e-4);
+        assert!(share.holds(0.1) && !share.holds(0.04) && !share.holds(0.21));
+        // No success is no proof that there is none.
+        assert!(Share::new(0, 100).holds(0.05) && Share::new(100, 100).holds(0.95));
+    }
+}
