@@ -22,8 +22,9 @@ use super::repeated_looks::{
 };
 
 /// Mean background photons a bin at the first look.
-const FIRST_MEANS: [f64; 13] = [
-    0.1, 0.2, 0.4, 0.8, 1.6, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 200.0, 300.0,
+const FIRST_MEANS: [f64; 18] = [
+    0.1, 0.2, 0.3, 0.4, 0.55, 0.8, 1.1, 1.6, 2.2, 3.0, 4.2, 6.0, 12.0, 25.0, 50.0, 100.0, 200.0,
+    300.0,
 ];
 /// The first look, in steps of X laser cycles.
 const FIRSTS: [u32; 5] = [2, 5, 11, 33, 101];

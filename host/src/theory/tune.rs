@@ -152,11 +152,7 @@ pub fn tune(request: &Request, table: &Table) -> Result<Tuned> {
     let mut best: Option<Tuned> = None;
     let mut reached = false;
     for l1 in candidates(request) {
-        let looks = Looks {
-            x: request.x.into(),
-            first: u32::from(l1 / request.x) + 1,
-            last,
-        };
+        let looks = Looks::new(request.x, l1, request.l2);
         let Some(tuned) = calibrated(request, table, &steps, l1, looks) else {
             continue;
         };
