@@ -227,6 +227,11 @@ fn check(request: &Request) -> Result<()> {
             (860.0 / background).floor()
         );
     }
+    let signal = request.signal;
+    ensure!(
+        signal <= f64::from(Count10::MAX),
+        "a signal of {signal} photons fills a 10-bit counter within a laser cycle"
+    );
     let (Wanted::PerExposure(wanted) | Wanted::PerCycle(wanted)) = request.wanted;
     ensure!(
         wanted > 0.0 && wanted < 1.0,
