@@ -146,6 +146,10 @@ fn what_cannot_be_met_is_refused_in_one_line() {
         "--background 1e300 --signal 1 --sigma-bins 0.8",
         &["fills the 10-bit counters"],
     );
+    refused(
+        "--background 0.05 --signal 1e12 --sigma-bins 0.8",
+        &["fills a 10-bit counter within a laser cycle"],
+    );
     // One photon and an empty background: no α helps.
     refused(
         "--background 0.01 --signal 1 --sigma-bins 0.8 --min-count 1 --l1 8 --false-per-exposure 1e-9",

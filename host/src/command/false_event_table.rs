@@ -12,7 +12,7 @@ pub struct FalseEventTable {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Trials of 500 exposures a point
-    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u16).range(1..=700))]
     trials: u16,
 }
 

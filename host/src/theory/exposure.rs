@@ -8,7 +8,7 @@
 use anyhow::{Context, Result};
 use dtof_core::{
     BinPosition, Count, Count10, CounterWidth, Detection, Histogram, PaperRule, PixelAddress,
-    PixelConfig, RangeGate, background, detect,
+    RangeGate, background, detect,
 };
 use rand_core::Rng;
 use rand_distr::{Distribution, Poisson};
@@ -30,10 +30,11 @@ pub struct Looks {
 }
 
 impl Looks {
-    /// Those of a configuration.
+    /// Those of a [`PixelConfig`](dtof_core::PixelConfig) of these, valid as
+    /// one.
     #[must_use]
-    pub fn of<const BINS: usize>(config: &PixelConfig<BINS>) -> Self {
-        let [x, l1, l2] = [config.x(), config.l1(), config.l2()].map(u32::from);
+    pub fn new(x: u16, l1: u16, l2: u16) -> Self {
+        let [x, l1, l2] = [x, l1, l2].map(u32::from);
         Self {
             x,
             first: l1 / x + 1,
@@ -90,7 +91,8 @@ impl Photons {
             left = left.saturating_sub(4);
         }
         for (bin, law) in &self.signal {
-            for _ in 0..sample(law, rng) {
+            // A counter is full by then.
+            for _ in 0..sample(law, rng).min(1024) {
                 histogram.add(*bin);
             }
         }
@@ -273,7 +275,7 @@ impl std::ops::AddAssign for Detections {
 #[cfg(test)]
 mod tests {
     use dtof_core::fixed::types::U8F8;
-    use dtof_core::{AsyncPixel, LaserCycle, Look};
+    use dtof_core::{AsyncPixel, LaserCycle, Look, PixelConfig};
 
     use super::*;
 
@@ -288,7 +290,7 @@ mod tests {
         ] {
             let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
             let config = PixelConfig::<8>::new(x, l1, l2, RangeGate::full(), rule).unwrap();
-            let looks = Looks::of(&config);
+            let looks = Looks::new(x, l1, l2);
             let mut pixel = AsyncPixel::<8>::new(PixelAddress(0));
             let mut seen = Vec::new();
             for cycle in 0.. {

@@ -47,7 +47,7 @@ pub fn false_positive_rate(background: f64, alpha: f64, background_bins: u32) ->
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 pub fn lowest_above(level: f64) -> u32 {
-    level as u32 + 1 // rounded down; no level is negative
+    (level as u32).saturating_add(1) // rounded down; no level is negative
 }
 
 /// The probability that bin `target` is the peak and holds `lowest` or more.

@@ -6,8 +6,9 @@
 //! | [`gaussian`] | threshold, hit rate, true and false positive rate, limits of α, ROC | Eq. 4, 5, 7 to 11 |
 //! | [`known_background`] | the same with Poisson counts | exact |
 //! | [`single_look`] | false events of one look with the quadrant background | exact |
-//! | [`repeated_looks`] | false events of an exposure: bounds, and a simulated table | bounds, simulation |
-//! | [`exposure`] | simulated exposures, looks only | simulation |
+//! | [`repeated_looks`] | false events of an exposure | bounds, exact |
+//! | [`table`] | what lies between the bounds | simulation |
+//! | [`exposure`] | exposures, from look to look | simulation |
 //! | [`tune`] | settings for a wanted false event rate | all of these |
 //!
 //! Times are in bins from the start of bin 0, counts are mean photons, all in

@@ -205,12 +205,20 @@ mod tests {
         }
     }
 
+    /// The figures of `docs/theory.md`.
     #[test]
     fn the_integer_root_fires_more_often() {
-        let look = SingleLook::new(128, 7.0);
-        let integer = look.false_event_probability(&threshold(3.0, 1));
-        let real = look.real_valued_probability(3.0, 1);
-        assert!(integer > real, "{integer} {real}");
+        for (mean, integer, real) in [
+            (0.4, 0.00015, 0.00013),
+            (2.0, 0.00193, 0.00010),
+            (20.0, 0.00004, 0.00001),
+        ] {
+            let look = SingleLook::new(128, mean);
+            let found = look.false_event_probability(&threshold(4.0, 5));
+            assert!((found - integer).abs() < 5e-6, "{mean}: {found}");
+            let found = look.real_valued_probability(4.0, 5);
+            assert!((found - real).abs() < 5e-6, "{mean}: {found}");
+        }
     }
 
     #[test]

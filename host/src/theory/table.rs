@@ -6,7 +6,8 @@
 //! a share of that. The share varies slowly, where the probability itself goes
 //! over orders of magnitude and in steps (α meets an integer root): so the
 //! share is what is interpolated, over the logarithms of the mean background at
-//! the first look, of the first look, of last over first look, and of `H`.
+//! the first look, of the first look, and of last over first look. Between two
+//! α the larger share is taken.
 //!
 //! `repeated_looks.csv` is what `dtof false-event-table` prints.
 
@@ -22,8 +23,9 @@ use super::repeated_looks::{
 };
 
 /// Mean background photons a bin at the first look.
-const FIRST_MEANS: [f64; 13] = [
-    0.1, 0.2, 0.4, 0.8, 1.6, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 200.0, 300.0,
+const FIRST_MEANS: [f64; 18] = [
+    0.1, 0.2, 0.3, 0.4, 0.55, 0.8, 1.1, 1.6, 2.2, 3.0, 4.2, 6.0, 12.0, 25.0, 50.0, 100.0, 200.0,
+    300.0,
 ];
 /// The first look, in steps of X laser cycles.
 const FIRSTS: [u32; 5] = [2, 5, 11, 33, 101];
@@ -37,6 +39,9 @@ const LAST: u32 = 1700;
 const HIGHEST_MEAN: f64 = 1700.0;
 /// Fewer events say too little of their probability.
 const FEWEST_EVENTS: u64 = 20;
+/// Between its points a probability of the table may be too low by this factor,
+/// no more (`host-tests/tests/theory_exposures.rs`).
+pub const MARGIN: f64 = 1.25;
 /// Exposures of one trial.
 const TRIAL: u32 = 500;
 
@@ -303,18 +308,23 @@ fn place(values: &[f64], value: f64) -> Option<(usize, f64)> {
 }
 
 /// ln of the intensity found at ln H `independent`, and whether it was seen.
-/// The share is linear between neighbours and that of the highest above all;
-/// below all the intensity is that of the lowest. `None` where nothing was seen.
+///
+/// Between two α of the table the share rises, then falls where an integer
+/// threshold is passed: so the larger of the two shares is taken, and the
+/// intensity is never above that of the lower α, nor below what was seen. Above
+/// all the share is that of the lowest α. `None` where nothing was seen.
 fn at(shares: &Shares, independent: f64) -> Option<(f64, bool)> {
+    let found = |(independent, share): (f64, f64)| independent + share.min(0.0);
     let upper = shares.iter().position(|known| independent <= known.0);
-    let (share, seen) = match upper {
-        None => (shares.last()?.1, true),
-        Some(0) => return Some((shares[0].0 + shares[0].1, false)),
+    match upper {
+        None => shares
+            .last()
+            .map(|known| (found((independent, known.1)), true)),
+        Some(0) => Some((found(shares[0]), false)),
         Some(upper) => {
             let [low, high] = [shares[upper - 1], shares[upper]];
-            let part = (independent - low.0) / (high.0 - low.0);
-            (low.1 + part * (high.1 - low.1), true)
+            let share = low.1.max(high.1);
+            Some((found((independent, share)).min(found(high)), true))
         }
-    };
-    Some((independent + share.min(0.0), seen))
+    }
 }

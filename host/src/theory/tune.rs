@@ -2,10 +2,10 @@
 //! them.
 //!
 //! α is the smallest whose probability of a false event in an exposure is not
-//! above the wanted one. That probability comes from the simulated
-//! [`Table`]; where the table saw no events, or was not
-//! made for the settings, from the sum over looks of the exact single-look
-//! probability, which it cannot exceed. Of all L1 the one with the shortest mean
+//! above the wanted one. That probability comes from the simulated [`Table`],
+//! and has to be below by the table's [`MARGIN`]; where the table saw no events,
+//! or was not made for the settings, from the sum over looks of the exact
+//! single-look probability, which it cannot exceed. Of all L1 the one with the shortest mean
 //! time to an event is taken, found by simulating exposures.
 
 use anyhow::{Context, Result, bail, ensure};
@@ -17,7 +17,7 @@ use super::exposure::{Detections, Looks};
 use super::poisson::Poisson;
 use super::repeated_looks::{BINS, Bounds, MINIMUM_COUNT, RepeatedLooks, single_looks};
 use super::single_look::SingleLook;
-use super::table::Table;
+use super::table::{MARGIN, Table};
 use crate::simulation::Rates;
 
 /// The wanted limit on false events of a pixel without a target.
@@ -152,11 +152,7 @@ pub fn tune(request: &Request, table: &Table) -> Result<Tuned> {
     let mut best: Option<Tuned> = None;
     let mut reached = false;
     for l1 in candidates(request) {
-        let looks = Looks {
-            x: request.x.into(),
-            first: u32::from(l1 / request.x) + 1,
-            last,
-        };
+        let looks = Looks::new(request.x, l1, request.l2);
         let Some(tuned) = calibrated(request, table, &steps, l1, looks) else {
             continue;
         };
@@ -231,6 +227,11 @@ fn check(request: &Request) -> Result<()> {
             (860.0 / background).floor()
         );
     }
+    let signal = request.signal;
+    ensure!(
+        signal <= f64::from(Count10::MAX),
+        "a signal of {signal} photons fills a 10-bit counter within a laser cycle"
+    );
     let (Wanted::PerExposure(wanted) | Wanted::PerCycle(wanted)) = request.wanted;
     ensure!(
         wanted > 0.0 && wanted < 1.0,
@@ -289,13 +290,22 @@ fn calibrated(
             _ => (bounds.sum, Source::Bound, bounds),
         }
     };
+    let kept = |alpha: u16| {
+        let (probability, source, bounds) = probability(alpha);
+        let most = match source {
+            Source::Bound => probability,
+            // Whatever the table is off by, not above the bound.
+            Source::Table | Source::TableAtMost => (probability * MARGIN).min(bounds.sum),
+        };
+        most <= wanted
+    };
     let (mut low, mut high) = (0u16, u16::MAX);
-    if probability(high).0 > wanted {
+    if !kept(high) {
         return None;
     }
     while low < high {
         let middle = low + (high - low) / 2;
-        if probability(middle).0 <= wanted {
+        if kept(middle) {
             high = middle;
         } else {
             low = middle + 1;
