@@ -1,6 +1,7 @@
 //! `cargo xtask`: what set-up and checks need beyond cargo itself.
 
 mod boards;
+mod debugger;
 mod emulate;
 mod firmware;
 mod image;
@@ -10,7 +11,10 @@ mod qemu;
 mod self_test;
 mod sizes;
 mod source;
+mod stack;
+mod stack_bound;
 mod symbols;
+mod thumb;
 mod toolchain;
 mod tools;
 
