@@ -33,12 +33,13 @@ cargo xtask <command>
   check-source  no floating-point type and no unsafe in core/src
 
   image BOARD   build the sidecar for mps2-an386 or stm32f405
-  sizes         flash and RAM of each image
+  sizes         flash, RAM and stack of each image
   emulate [--port PORT] [exit|panic|fault]
                 run the sidecar in QEMU, its serial port on a TCP port (5386)
   flash [CHIP]  write the sidecar onto an STM32F405 or STM32F407 and show its log;
                 the chip as probe-rs names it, by default that of the Discovery
-  check-boards  the images start, end and echo in QEMU
+  check-boards  the images start, decide and end in QEMU, and keep to their
+                stack
   self-test     the core works out the same on the target; --bless writes down
                 what it works out here";
 

@@ -114,10 +114,11 @@ pub struct End {
 impl Emulator {
     /// Starts an image with its serial port on a free TCP port; before its first
     /// instruction it waits.
-    pub fn start(board: Board, image: &Path, words: &[&str]) -> Result<Self> {
-        let [port, debugger] = free_ports()?;
-        let mut child = command(board, image, Some(port), words)?
-            .args(["-S", "-gdb", &format!("tcp:127.0.0.1:{debugger}")])
+    pub fn start(board: Board, path: &Path, words: &[&str]) -> Result<Self> {
+        let image = Image::read(path)?;
+        let [port, debugger_port] = free_ports()?;
+        let mut child = command(board, path, Some(port), words)?
+            .args(["-S", "-gdb", &format!("tcp:127.0.0.1:{debugger_port}")])
             .stdout(Stdio::piped())
             .spawn()
             .with_context(|| format!("{} does not start", QEMU.program))?;
@@ -128,16 +129,20 @@ impl Emulator {
             let _ = stdout.read_to_end(&mut bytes);
             bytes
         });
-        let connected = open(&mut child, || Debugger::connect(debugger, PATIENCE));
-        if connected.is_err() {
-            let _ = child.kill();
-            let _ = child.wait();
-        }
+        let debugger = match open(&mut child, || Debugger::connect(debugger_port, PATIENCE)) {
+            Ok(debugger) => debugger,
+            Err(error) => {
+                // It may have ended by itself.
+                let _ = child.kill();
+                let _ = child.wait();
+                return Err(error);
+            }
+        };
         Ok(Self {
             child,
             port,
-            debugger: connected?,
-            image: Image::read(image)?,
+            debugger,
+            image,
             output: Some(output),
         })
     }
@@ -149,7 +154,8 @@ impl Emulator {
         open(&mut self.child, || device::open(&port))
     }
 
-    /// Lets the image run until it ends QEMU.
+    /// Lets the image run until it ends QEMU. With QEMU ends its memory, so the
+    /// image is stopped before whatever it asks of the emulator.
     pub fn wait(mut self) -> Result<End> {
         let start = Instant::now();
         for &address in &self.image.semihosting {

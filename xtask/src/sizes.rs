@@ -33,7 +33,11 @@ pub fn print(root: &Path) -> Result<()> {
             let Sizes { flash, ram } = Sizes::read(&path)?;
             // The self-test writes through tables of functions; it has no bound.
             let stack = match image {
-                "sidecar" => stack_bound::of_image(&path)?.to_string(),
+                "sidecar" => {
+                    let needed = stack_bound::of_image(&path)?;
+                    stack::check_need(board, needed)?;
+                    needed.to_string()
+                }
                 _ => "-".to_owned(),
             };
             let name = board.name();

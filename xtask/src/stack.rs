@@ -23,8 +23,7 @@ const SEMIHOSTING: [u8; 2] = 0xbeab_u16.to_le_bytes();
 
 /// Bytes left to the stack, of the 128 KiB of RAM of the real board.
 pub const RESERVE: u64 = 16 * 1024;
-/// Bytes that may be used or needed of them: a quarter of them more than there
-/// are.
+/// Bytes an image may need of them; the rest is for the report of a panic.
 pub const MOST: u64 = 10 * 1024;
 
 /// What an image says of its stack.
@@ -74,7 +73,16 @@ pub fn check(board: Board, path: &Path, used: &[u64]) -> Result<()> {
         used <= needed,
         "{name}: more stack is used than the machine code should need"
     );
-    ensure!(needed <= MOST, "{name}: more than {MOST} bytes of stack");
+    check_need(board, needed)
+}
+
+/// Holds what an image needs against what there may be.
+pub fn check_need(board: Board, needed: u64) -> Result<()> {
+    ensure!(
+        needed <= MOST,
+        "{}: more than {MOST} bytes of stack needed",
+        board.name()
+    );
     Ok(())
 }
 

@@ -9,9 +9,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::ops::Range;
 use std::path::Path;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 
 use crate::thumb::{self, Effect};
@@ -19,8 +20,8 @@ use crate::thumb::{self, Effect};
 /// What the processor saves when an interrupt comes: 26 words with those of the
 /// floating-point unit, and a word so that the stack stays aligned.
 const EXCEPTION_FRAME: u32 = 27 * 4;
-/// Entries of the vector table: the stack's begin, Reset, then those of the NMI and the
-/// hard fault, which interrupt all others.
+/// Entries of the vector table: those of the NMI and the hard fault, which
+/// interrupt all others, come after the stack's start and Reset.
 const NMI: usize = 2;
 const HARD_FAULT: usize = 3;
 
@@ -96,6 +97,7 @@ impl Needs {
         }
     }
 
+    /// What the function at `address` needs.
     fn of(&mut self, address: u32) -> Result<u32> {
         if let Some(&known) = self.known.get(&address) {
             return Ok(known);
@@ -170,18 +172,18 @@ fn functions(file: &object::File) -> Result<BTreeMap<u32, Function>> {
             };
             let mut at = address;
             while at < end {
-                let index = usize::try_from((at - start) / 2)?;
-                let first = halfwords[index];
                 let is_code = code.range(..=at).next_back().is_none_or(|(_, &code)| code);
-                let wide = is_code && thumb::is_wide(first);
-                let second = halfwords.get(index + 1);
-                let effect = match (wide, second) {
-                    _ if !is_code => Effect::None,
-                    (true, Some(&second)) => thumb::wide(at, first, second),
-                    _ => thumb::narrow(at, first),
+                let rest = halfwords.get(usize::try_from((at - start) / 2)?..);
+                let (effect, bytes) = match rest.unwrap_or_default() {
+                    [_, ..] if !is_code => (Effect::None, 2),
+                    &[first, second, ..] if thumb::is_wide(first) => {
+                        (thumb::wide(at, first, second), 4)
+                    }
+                    &[first, ..] => (thumb::narrow(at, first), 2),
+                    [] => bail!("{name} reaches beyond its section"),
                 };
                 function.add(effect, address..end);
-                at += if wide { 4 } else { 2 };
+                at += bytes;
             }
             functions.insert(address, function);
         }
@@ -190,7 +192,9 @@ fn functions(file: &object::File) -> Result<BTreeMap<u32, Function>> {
 }
 
 impl Function {
-    fn add(&mut self, effect: Effect, own: std::ops::Range<u32>) {
+    /// One instruction more of a function whose addresses are `own`. A jump to its
+    /// start counts as a call.
+    fn add(&mut self, effect: Effect, own: Range<u32>) {
         match effect {
             Effect::None => {}
             Effect::Takes(bytes) => self.takes += bytes,
