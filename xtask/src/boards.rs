@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, ensure};
 use dtof::device::{Client, DeviceEngine};
 use dtof::engine::{Engine, host_engine};
+use dtof::monitor;
 use dtof::scene;
 use dtof::settings::{Settings, U8F8Number};
 use dtof::source::{Geometry, PhotonSource};
@@ -13,14 +14,16 @@ use dtof_core::fixed::types::U8F8;
 
 use crate::firmware::Board;
 use crate::log;
-use crate::qemu::{self, Emulator};
+use crate::qemu::{self, Emulator, End};
 use crate::tools::DEFMT_PRINT;
+use crate::{stack, stack_bound};
 
 /// Runs all of it.
 pub fn check(root: &Path) -> Result<()> {
     let cannot = qemu::cannot_run(Board::Stm32F405)?;
-    let image = Board::Mps2An386.sidecar(root, &[])?;
-    ends(&image)?;
+    let board = Board::Mps2An386;
+    let image = board.sidecar(root, &[])?;
+    let mut used = ends(board, &image)?;
     // A million photons of 64 macropixels.
     let array = Geometry {
         columns: 8,
@@ -28,33 +31,54 @@ pub fn check(root: &Path) -> Result<()> {
     };
     for reads_every in [0, 150] {
         let reads_every = Duration::from_millis(reads_every);
-        agrees(Board::Mps2An386, &image, array, 5300, reads_every)?;
+        used.push(agrees(board, &image, array, 5300, reads_every)?);
     }
+    used.push(senses(board, &image)?);
+    stack::check(board, &image, &used)?;
     match cannot {
         Some(reason) => println!("{reason}"),
         None => {
-            let image = Board::Stm32F405.sidecar(root, &["pll-off"])?;
+            let board = Board::Stm32F405;
+            let image = board.sidecar(root, &["pll-off"])?;
             let array = Geometry {
                 columns: 4,
                 rows: 2,
             };
-            agrees(Board::Stm32F405, &image, array, 200, Duration::ZERO)?;
+            let used = [
+                agrees(board, &image, array, 200, Duration::ZERO)?,
+                senses(board, &image)?,
+            ];
+            stack::check(board, &image, &used)?;
         }
     }
     Ok(())
 }
 
-/// However the image ends, QEMU ends with it, and the reason is to be seen.
-fn ends(image: &Path) -> Result<()> {
+/// However the image ends, QEMU ends with it, and the reason is to be seen. Gives
+/// the bytes of stack each time used.
+fn ends(board: Board, image: &Path) -> Result<Vec<u64>> {
+    let name = board.name();
+    let needed = stack_bound::of_image(image)?;
+    let mut used = Vec::new();
     for (word, success, message) in [
         ("exit", true, "mps2-an386 started"),
         ("panic", false, "as asked for on the command line"),
         ("fault", false, "hard fault at 0x"),
     ] {
-        let (status, output) = Emulator::start(Board::Mps2An386, image, &[word])?.wait()?;
+        let End {
+            status,
+            output,
+            stack,
+        } = Emulator::start(board, image, &[word])?.wait()?;
+        // It may happen where most of the stack is in use.
+        ensure!(
+            needed + stack <= stack::RESERVE,
+            "{name}: no room to report the end by `{word}`"
+        );
+        used.push(stack);
         ensure!(
             status.success() == success,
-            "mps2-an386: `{word}` ends QEMU with {status}"
+            "{name}: `{word}` ends QEMU with {status}"
         );
         if !DEFMT_PRINT.is_there() {
             println!(
@@ -66,11 +90,14 @@ fn ends(image: &Path) -> Result<()> {
         let text = log::decode(image, output)?;
         ensure!(
             text.contains(message),
-            "mps2-an386: `{word}` does not log `{message}` but\n{text}"
+            "{name}: `{word}` does not log `{message}` but\n{text}"
         );
-        println!("mps2-an386: `{word}` ends QEMU with {status} and is logged");
+        println!(
+            "{name}: `{word}` ends QEMU with {status} and is logged; \
+             {stack} bytes of stack"
+        );
     }
-    Ok(())
+    Ok(used)
 }
 
 /// What decides the events: a setting at which there are many.
@@ -84,14 +111,14 @@ fn settings() -> Settings {
 }
 
 /// The demo's scene on a board and on this computer gives the same events and
-/// the same counts, however seldom the host reads.
+/// the same counts, however seldom the host reads. Gives the bytes of stack used.
 fn agrees(
     board: Board,
     image: &Path,
     geometry: Geometry,
     cycles: u16,
     reads_every: Duration,
-) -> Result<()> {
+) -> Result<u64> {
     let name = board.name();
     let mut emulator = Emulator::start(board, image, &[])?;
     let start = Instant::now();
@@ -115,15 +142,39 @@ fn agrees(
         "{name}: not the counts of this computer"
     );
     let photons = statistics.photons();
+    let link = on_board.report().link;
+    let stack = emulator.stop()?;
     println!(
         "{name}: {photons} photons of {} macropixels, {} events, each as on this computer; \
-         read every {} ms; {:.0} s, {:?}",
+         read every {} ms; {:.0} s, {link:?}; {stack} bytes of stack",
         addresses.len(),
         events.len(),
         reads_every.as_millis(),
         start.elapsed().as_secs_f64(),
-        on_board.report().link,
     );
-    emulator.stop()?;
-    Ok(())
+    Ok(stack)
+}
+
+/// The device decides on photons of its own. Gives the bytes of stack used.
+fn senses(board: Board, image: &Path) -> Result<u64> {
+    let name = board.name();
+    let mut emulator = Emulator::start(board, image, &[])?;
+    let mut client = Client::new(emulator.connect()?).context(name)?;
+    let (mut events, mut statistics) = (Vec::new(), Vec::new());
+    let length = Some(Duration::from_secs(3));
+    monitor::monitor(
+        &mut client,
+        &settings(),
+        16,
+        length,
+        &mut events,
+        &mut statistics,
+    )
+    .context(name)?;
+    // Less their header.
+    let events = events.split(|&byte| byte == b'\n').count() - 2;
+    ensure!(events > 0, "{name}: no event of the simulated sensor");
+    let stack = emulator.stop()?;
+    println!("{name}: {events} events of the simulated sensor; {stack} bytes of stack");
+    Ok(stack)
 }

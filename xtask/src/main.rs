@@ -1,6 +1,7 @@
 //! `cargo xtask`: what set-up and checks need beyond cargo itself.
 
 mod boards;
+mod debugger;
 mod emulate;
 mod firmware;
 mod image;
@@ -10,7 +11,10 @@ mod qemu;
 mod self_test;
 mod sizes;
 mod source;
+mod stack;
+mod stack_bound;
 mod symbols;
+mod thumb;
 mod toolchain;
 mod tools;
 
@@ -31,13 +35,14 @@ cargo xtask <command>
   image BOARD [SENSOR]
                 build the sidecar for mps2-an386 or stm32f405; for the latter also
                 with tdc7200 or tmf882x connected instead of simulated photons
-  sizes         flash and RAM of each image
+  sizes         flash, RAM and stack of each image
   emulate [--port PORT] [exit|panic|fault]
                 run the sidecar in QEMU, its serial port on a TCP port (5386)
   flash [--chip CHIP] [SENSOR]
                 write the sidecar onto an STM32F405 or STM32F407 and show its log;
                 the chip as probe-rs names it, by default that of the Discovery
-  check-boards  the images start, end and echo in QEMU
+  check-boards  the images start, decide and end in QEMU, and keep to their
+                stack
   self-test     the core works out the same on the target; --bless writes down
                 what it works out here";
 
