@@ -23,12 +23,15 @@
     clippy::unwrap_used
 )]
 
+mod fault;
 pub mod simulated;
 pub mod tdc7200;
 mod timer;
 pub mod tmf882x;
 
 use dtof_core::PixelAddress;
+
+pub use self::fault::SensorFault;
 
 /// Where a sensor's photons go.
 pub trait PhotonSink {
@@ -48,8 +51,8 @@ pub trait PhotonSink {
 /// at once while the answer is not [`Polled::Idle`], but not without a bound: a
 /// fast sensor may always have more.
 pub trait Sensor {
-    /// What can go wrong; the error of the bus is inside.
-    type Error;
+    /// What can go wrong; the error of the bus is inside. A host is told the kind.
+    type Error: Into<SensorFault>;
 
     /// Takes the next step. `now_ms` counts milliseconds and may wrap.
     ///
