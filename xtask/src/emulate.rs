@@ -57,11 +57,20 @@ pub fn emulate(root: &Path, arguments: &[&str]) -> Result<()> {
 /// Writes the sidecar onto the board and shows its log until interrupted.
 /// `chip` is probe-rs's name for the controller.
 pub fn flash(root: &Path, chip: &str) -> Result<()> {
-    let image = Board::Stm32F405.sidecar(root, &[])?;
+    run_on_board(&Board::Stm32F405.sidecar(root, &[])?, chip)
+}
+
+/// Writes the self-test onto the board in its place and shows what it writes, which
+/// comes through semihosting, until it ends.
+pub fn flash_self_test(root: &Path, chip: &str) -> Result<()> {
+    run_on_board(&Board::Stm32F405.self_test(root)?, chip)
+}
+
+fn run_on_board(image: &Path, chip: &str) -> Result<()> {
     PROBE_RS.require()?;
     let status = Command::new(PROBE_RS.program)
         .args(["run", "--non-interactive", "--chip", chip])
-        .arg(&image)
+        .arg(image)
         .stdin(Stdio::null())
         .status()
         .context("probe-rs does not start")?;

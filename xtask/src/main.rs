@@ -32,8 +32,11 @@ cargo xtask <command>
   sizes         flash and RAM of each image
   emulate [--port PORT] [exit|panic|fault]
                 run the sidecar in QEMU, its serial port on a TCP port (5386)
-  flash [CHIP]  write the sidecar onto an STM32F405 or STM32F407 and show its log;
-                the chip as probe-rs names it, by default that of the Discovery
+  flash [--self-test] [CHIP]
+                write the sidecar onto an STM32F405 or STM32F407 and show its log, or
+                the self-test and show its lines, which should be those of
+                firmware/self-test.out; the chip as probe-rs names it, by default
+                that of the Discovery
   check-boards  the images start, end and echo in QEMU
   self-test     the core works out the same on the target; --bless writes down
                 what it works out here";
@@ -62,6 +65,8 @@ fn run() -> Result<()> {
         ["sizes"] => sizes::print(root()?),
         ["emulate", ref rest @ ..] => emulate::emulate(root()?, rest),
         ["flash"] => emulate::flash(root()?, emulate::CHIP),
+        ["flash", "--self-test"] => emulate::flash_self_test(root()?, emulate::CHIP),
+        ["flash", "--self-test", chip] => emulate::flash_self_test(root()?, chip),
         ["flash", chip] => emulate::flash(root()?, chip),
         ["check-boards"] => boards::check(root()?),
         ["self-test"] => self_test::run(root()?),
