@@ -52,7 +52,7 @@ impl Sidecar<'_> {
     fn sensor_failed(&mut self, fault: SensorFault) {
         self.sensor_errors = self.sensor_errors.saturating_add(1);
         if self.sensor_fault.replace(fault) != Some(fault) {
-            #[cfg(feature = "defmt")]
+            #[cfg(all(target_os = "none", feature = "defmt"))]
             defmt::warn!("sensor: {}", fault);
         }
     }
