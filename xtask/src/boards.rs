@@ -4,15 +4,16 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use dtof::device::{Client, DeviceEngine};
+use dtof::device::{Client, DeviceEngine, configuration};
 use dtof::engine::{Engine, host_engine};
 use dtof::monitor;
 use dtof::scene;
 use dtof::settings::{Settings, U8F8Number};
 use dtof::source::{Geometry, PhotonSource};
 use dtof_core::fixed::types::U8F8;
+use dtof_firmware::sensor::SensorFault;
 
-use crate::firmware::Board;
+use crate::firmware::{Board, Sensor};
 use crate::log;
 use crate::qemu::{self, Emulator, End};
 use crate::tools::DEFMT_PRINT;
@@ -49,6 +50,11 @@ pub fn check(root: &Path) -> Result<()> {
                 senses(board, &image)?,
             ];
             stack::check(board, &image, &used)?;
+            for sensor in Sensor::ALL {
+                let image = board.sidecar(root, &["pll-off", sensor.feature()])?;
+                let used = says_unplugged(board, &image, sensor, array)?;
+                stack::check(board, &image, &[used])?;
+            }
         }
     }
     Ok(())
@@ -121,9 +127,21 @@ fn agrees(
 ) -> Result<u64> {
     let name = board.name();
     let mut emulator = Emulator::start(board, image, &[])?;
-    let start = Instant::now();
     let mut client = Client::new(emulator.connect()?).context(name)?;
     client.reads_every = reads_every;
+    let decided = decides_alike(client, geometry, cycles).context(name)?;
+    let stack = emulator.stop()?;
+    println!(
+        "{name}: {decided}; read every {} ms; {stack} bytes of stack",
+        reads_every.as_millis()
+    );
+    Ok(stack)
+}
+
+/// What the device makes of the demo's photons is what this computer does. Says
+/// how much that was.
+fn decides_alike(client: Client, geometry: Geometry, cycles: u16) -> Result<String> {
+    let start = Instant::now();
     let settings = settings();
     let mut photons = scene::photons(geometry, &settings, cycles.into())?;
     let addresses = photons.addresses();
@@ -131,28 +149,21 @@ fn agrees(
     let mut on_host = host_engine(&settings, &addresses)?;
     let expected = on_host.run(&slice)?;
     let mut on_board = DeviceEngine::new(client, &settings, &addresses)?;
-    let events = on_board.run(&slice).context(name)?;
-    ensure!(
-        events == expected,
-        "{name}: not the events of this computer"
-    );
+    let events = on_board.run(&slice)?;
+    ensure!(events == expected, "not the events of this computer");
     let statistics = on_board.statistics();
     ensure!(
         statistics == on_host.statistics(),
-        "{name}: not the counts of this computer"
+        "not the counts of this computer"
     );
-    let photons = statistics.photons();
-    let link = on_board.report().link;
-    let stack = emulator.stop()?;
-    println!(
-        "{name}: {photons} photons of {} macropixels, {} events, each as on this computer; \
-         read every {} ms; {:.0} s, {link:?}; {stack} bytes of stack",
+    Ok(format!(
+        "{} photons of {} macropixels, {} events, each as on this computer; {:.0} s, {:?}",
+        statistics.photons(),
         addresses.len(),
         events.len(),
-        reads_every.as_millis(),
         start.elapsed().as_secs_f64(),
-    );
-    Ok(stack)
+        on_board.report().link,
+    ))
 }
 
 /// The device decides on photons of its own. Gives the bytes of stack used.
@@ -161,12 +172,11 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
     let mut emulator = Emulator::start(board, image, &[])?;
     let mut client = Client::new(emulator.connect()?).context(name)?;
     let (mut events, mut statistics) = (Vec::new(), Vec::new());
-    let length = Some(Duration::from_secs(3));
     monitor::monitor(
         &mut client,
         &settings(),
         16,
-        length,
+        |elapsed| elapsed >= Duration::from_secs(3),
         &mut events,
         &mut statistics,
     )
@@ -176,5 +186,36 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
     ensure!(events > 0, "{name}: no event of the simulated sensor");
     let stack = emulator.stop()?;
     println!("{name}: {events} events of the simulated sensor; {stack} bytes of stack");
+    Ok(stack)
+}
+
+/// The image of a sensor with nothing connected says so, and decides on photons of
+/// the link afterwards. Gives the bytes of stack used.
+fn says_unplugged(board: Board, image: &Path, sensor: Sensor, array: Geometry) -> Result<u64> {
+    let name = format!("{} with {}", board.name(), sensor.name());
+    let mut emulator = Emulator::start(board, image, &[])?;
+    let mut client = Client::new(emulator.connect()?).with_context(|| name.clone())?;
+    let pixels = u16::try_from(array.addresses())?;
+    client.configure(&configuration(&settings(), pixels, 1)?)?;
+    let since = Instant::now();
+    let report = loop {
+        let report = client.report().with_context(|| name.clone())?;
+        if report.sensor_errors >= 10 {
+            break report;
+        }
+        ensure!(
+            since.elapsed() < Duration::from_secs(10),
+            "{name}: a missing sensor is not noticed"
+        );
+    };
+    let fault = SensorFault::from_number(report.last_sensor_error);
+    let fault = fault.with_context(|| format!("{name}: no reason for {report:?}"))?;
+    ensure!(
+        report.statistics.photons() == 0,
+        "{name}: photons without a sensor"
+    );
+    let decided = decides_alike(client, array, 100).with_context(|| name.clone())?;
+    let stack = emulator.stop()?;
+    println!("{name} unplugged: \"{fault}\"; then {decided}; {stack} bytes of stack");
     Ok(stack)
 }

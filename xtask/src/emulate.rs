@@ -62,13 +62,15 @@ pub fn flash(root: &Path, arguments: &[&str]) -> Result<()> {
     };
     let image = match rest {
         [] => Board::Stm32F405.sidecar(root, &[])?,
+        // What it writes comes through semihosting.
+        ["self-test"] => Board::Stm32F405.self_test(root)?,
         [sensor] => Sensor::named(sensor)?.sidecar(root)?,
         [_, more, ..] => bail!("what is `{more}`?"),
     };
     PROBE_RS.require()?;
     let status = Command::new(PROBE_RS.program)
         .args(["run", "--non-interactive", "--chip", chip])
-        .arg(&image)
+        .arg(image)
         .stdin(Stdio::null())
         .status()
         .context("probe-rs does not start")?;

@@ -38,9 +38,11 @@ cargo xtask <command>
   sizes         flash, RAM and stack of each image
   emulate [--port PORT] [exit|panic|fault]
                 run the sidecar in QEMU, its serial port on a TCP port (5386)
-  flash [--chip CHIP] [SENSOR]
-                write the sidecar onto an STM32F405 or STM32F407 and show its log;
-                the chip as probe-rs names it, by default that of the Discovery
+  flash [--chip CHIP] [SENSOR | self-test]
+                write the sidecar onto an STM32F405 or STM32F407 and show its log, or
+                the self-test and show its lines, which should be those of
+                firmware/self-test.out; the chip as probe-rs names it, by default
+                that of the Discovery
   check-boards  the images start, decide and end in QEMU, and keep to their
                 stack
   self-test     the core works out the same on the target; --bless writes down

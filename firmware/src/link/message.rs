@@ -10,7 +10,7 @@
 //! | 0x82 | host | refused | a [`Refusal`], 1 byte |
 //! | 0x83 | host | events | AER words of 16 bytes |
 //! | 0x84 | host | synchronised | the same, after all that came before it |
-//! | 0x85 | host | statistics | [`Report`], 120 bytes |
+//! | 0x85 | host | statistics | [`Report`], 121 bytes |
 
 use dtof_core::{ConfigError, GateError, RangeScaleError, Statistics};
 use heapless::Vec;
@@ -18,7 +18,7 @@ use heapless::Vec;
 use super::endpoint::LinkCounters;
 
 /// The version both ends announce when a session begins.
-pub const LINK_VERSION: u16 = 1;
+pub const LINK_VERSION: u16 = 2;
 
 /// Host to device: a [`Configuration`].
 pub const CONFIGURE: u8 = 0x01;
@@ -330,13 +330,16 @@ pub struct Report {
     pub unknown: u32,
     /// Errors of the sensor.
     pub sensor_errors: u32,
+    /// The last of them: the number of a
+    /// [`SensorFault`](crate::sensor::SensorFault), 0 before the first.
+    pub last_sensor_error: u8,
     /// The device's end of the link.
     pub link: LinkCounters,
 }
 
 impl Report {
     /// Bytes of the record.
-    pub const BYTES: usize = 10 * 8 + 10 * 4;
+    pub const BYTES: usize = 10 * 8 + 10 * 4 + 1;
 
     /// As it is sent.
     #[must_use]
@@ -386,13 +389,15 @@ impl Report {
         ];
         let wide = wide.into_iter().flat_map(u64::to_le_bytes);
         let narrow = narrow.into_iter().flat_map(u32::to_le_bytes);
-        wide.chain(narrow).collect()
+        let last = [self.last_sensor_error];
+        wide.chain(narrow).chain(last).collect()
     }
 
     /// As it was received, or `None` if it is not as long as the record.
     #[must_use]
     pub fn from_le_bytes(bytes: &[u8]) -> Option<Self> {
-        let (wide, narrow) = bytes.split_at_checked(10 * 8)?;
+        let (&last_sensor_error, numbers) = bytes.split_last()?;
+        let (wide, narrow) = numbers.split_at_checked(10 * 8)?;
         let mut wide = wide
             .chunks_exact(8)
             .filter_map(|eight| Some(u64::from_le_bytes(eight.try_into().ok()?)));
@@ -416,6 +421,7 @@ impl Report {
             overrun: narrow.next()?,
             unknown: narrow.next()?,
             sensor_errors: narrow.next()?,
+            last_sensor_error,
             link: LinkCounters {
                 frames: narrow.next()?,
                 corrupt: narrow.next()?,

@@ -23,6 +23,7 @@
     clippy::unwrap_used
 )]
 
+mod fault;
 pub mod simulated;
 pub mod tdc7200;
 mod timer;
@@ -30,6 +31,8 @@ pub mod tmf882x;
 
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
+
+pub use self::fault::SensorFault;
 
 /// Where a sensor's photons go.
 pub trait PhotonSink {
@@ -49,8 +52,8 @@ pub trait PhotonSink {
 /// at once while the answer is not [`Polled::Idle`], but not without a bound: a
 /// fast sensor may always have more.
 pub trait Sensor {
-    /// What can go wrong; the error of the bus is inside.
-    type Error;
+    /// What can go wrong; the error of the bus is inside. A host is told the kind.
+    type Error: Into<SensorFault>;
 
     /// How wide the bins of the configuration in force are, in picoseconds. A
     /// sensor that measures times makes its TDC codes that wide from now on; one

@@ -26,6 +26,7 @@ use heapless::vec::{Vec, VecView};
 use crate::link::endpoint::{BODY_BYTES, Endpoint, Message};
 use crate::link::frame::{Deframer, FrameError, WIRE_BYTES};
 use crate::link::message::{self, Configuration, LINK_VERSION, Refusal, Report, Source};
+use crate::sensor::SensorFault;
 
 use self::photons::Photons;
 
@@ -71,6 +72,7 @@ pub struct Sidecar<'a> {
     unaddressed: u64,
     unknown: u32,
     sensor_errors: u32,
+    sensor_fault: Option<SensorFault>,
 }
 
 impl<'a> Sidecar<'a> {
@@ -104,6 +106,7 @@ impl<'a> Sidecar<'a> {
             unaddressed: 0,
             unknown: 0,
             sensor_errors: 0,
+            sensor_fault: None,
         }
     }
 
@@ -347,6 +350,7 @@ impl<'a> Sidecar<'a> {
             overrun,
             unknown: self.unknown,
             sensor_errors: self.sensor_errors,
+            last_sensor_error: self.sensor_fault.map_or(0, |fault| fault as u8),
             link: *self.endpoint.counters(),
         }
     }

@@ -1,6 +1,8 @@
 //! `dtof monitor`: the events of a device with a sensor, as they come.
 
 use std::io::{self, BufWriter};
+use std::process;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context, Result};
@@ -11,6 +13,9 @@ use dtof_core::fixed::types::{I24F8, U16F16};
 
 use super::operation::{Operation, number};
 
+/// Ctrl-C was pressed, or the program is asked to end in another way.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
 #[derive(Args)]
 pub struct Monitor {
     /// tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated device
@@ -19,7 +24,7 @@ pub struct Monitor {
     /// Pixels of the sensor, with addresses from 0
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..))]
     pixels: u16,
-    /// End after so many seconds [default: never]
+    /// End after so many seconds [default: at Ctrl-C]
     #[arg(long, value_name = "S")]
     seconds: Option<u32>,
     /// Picoseconds a bin, rounded to 1/65536
@@ -36,18 +41,29 @@ impl Monitor {
     pub fn run(&self) -> Result<()> {
         let name = || self.device.clone();
         let mut client = Client::new(device::open(&self.device)?).with_context(name)?;
+        ctrlc::set_handler(|| {
+            // Who asks a second time does not wait for the device.
+            if INTERRUPTED.swap(true, Ordering::Relaxed) {
+                process::exit(130);
+            }
+        })?;
         let settings = self.operation.settings(
             client.bins().into(),
             self.bin_width_ps,
             self.offset_mm,
             0, // nothing is drawn here
         );
+        let length = self
+            .seconds
+            .map(|seconds| Duration::from_secs(seconds.into()));
         monitor(
             &mut client,
             &settings,
             self.pixels,
-            self.seconds
-                .map(|seconds| Duration::from_secs(seconds.into())),
+            |elapsed| {
+                INTERRUPTED.load(Ordering::Relaxed)
+                    || length.is_some_and(|length| elapsed >= length)
+            },
             &mut BufWriter::new(io::stdout().lock()),
             &mut io::stderr(),
         )
