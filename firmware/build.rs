@@ -64,10 +64,7 @@ fn tmf882x_image() -> Result<(), Box<dyn Error>> {
         return Ok(());
     }
     let image = match env::var_os(IMAGE) {
-        None => {
-            println!("cargo::warning={IMAGE} is not set: the sensor has to run its image already");
-            Vec::new()
-        }
+        None => Vec::new(),
         Some(path) => {
             let path = Path::new(&path);
             println!("cargo::rerun-if-changed={}", path.display());

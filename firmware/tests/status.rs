@@ -13,7 +13,7 @@ use dtof_firmware::link::endpoint::LinkCounters;
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::{self, Configuration, Refusal, Report, Token};
 use dtof_firmware::sensor::tmf882x::{BootCommand, Command, Tmf882x, Waiting};
-use dtof_firmware::sensor::{Sensor, SensorFault, simulated, tdc7200, tmf882x};
+use dtof_firmware::sensor::{About, Sensor, SensorFault, simulated, tdc7200, tmf882x};
 use dtof_firmware::sidecar::Sidecar;
 
 type Pixels = heapless::Vec<AsyncPixel<128>, 9>;
@@ -50,7 +50,7 @@ fn unplug<Chip: Default>(
     said: SensorFault,
 ) {
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, true);
+    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut host = Host::new(1, 0);
     let wanted = Configuration {
         pixels: 9,
@@ -188,7 +188,7 @@ fn session_from(start_ms: u32) -> (Vec<DepthEvent>, LinkCounters) {
     let mut buffers = dtof_firmware::serial::Buffers::<512, 1024>::new();
     let (mut interrupt, mut serial) = buffers.split(|| {});
     let mut pixels = heapless::Vec::<AsyncPixel<128>, 16>::new();
-    let mut device = Sidecar::new(&mut pixels, true);
+    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut sensor = simulated::scene();
     for now_ms in 0..start_ms {
         let lost = serial.lost();
@@ -294,7 +294,7 @@ fn is_refused(host: &mut Host, device: &mut Sidecar, wanted: &[u8], refusal: Ref
 /// Events and counts of photons between which these configurations are asked for.
 fn photons_between(refused: &[(Vec<u8>, Refusal)]) -> (Vec<DepthEvent>, Statistics, u64) {
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, false);
+    let mut device = Sidecar::new(&mut pixels, None);
     let mut host = Host::new(1, 0);
     let wanted = Configuration {
         source: 0,
@@ -330,7 +330,7 @@ fn every_refused_configuration_names_its_reason_and_changes_nothing() {
 #[test]
 fn a_device_that_has_refused_its_first_configuration_waits_for_a_better_one() {
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, false);
+    let mut device = Sidecar::new(&mut pixels, None);
     let mut host = Host::new(1, 0);
     for (wanted, refusal) in refused() {
         is_refused(&mut host, &mut device, &wanted, refusal);

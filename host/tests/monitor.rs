@@ -19,7 +19,7 @@ use dtof_firmware::link::endpoint::LinkCounters;
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::Report;
 use dtof_firmware::sensor::simulated::{self, Pulse, Simulated, SimulatedPixel};
-use dtof_firmware::sensor::{PhotonSink, Polled, Sensor, SensorFault};
+use dtof_firmware::sensor::{About, PhotonSink, Polled, Sensor, SensorFault};
 use dtof_firmware::sidecar::Sidecar;
 
 const PIXELS: u16 = 4;
@@ -70,6 +70,18 @@ struct Noted<S> {
 impl<S: Sensor> Sensor for Noted<S> {
     type Error = S::Error;
 
+    fn about(&self) -> About {
+        self.sensor.about()
+    }
+
+    fn start(&mut self, bin_width: U16F16) {
+        self.sensor.start(bin_width);
+    }
+
+    fn stop(&mut self) {
+        self.sensor.stop();
+    }
+
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, S::Error> {
         self.asked = true;
         self.sensor.poll(now_ms, sink)
@@ -81,6 +93,14 @@ struct Unplugged;
 
 impl Sensor for Unplugged {
     type Error = SensorFault;
+
+    fn about(&self) -> About {
+        About::new(PIXELS)
+    }
+
+    fn start(&mut self, _: U16F16) {}
+
+    fn stop(&mut self) {}
 
     fn poll(&mut self, _: u32, _: &mut impl PhotonSink) -> Result<Polled, SensorFault> {
         Err(SensorFault::NoAnswer)
@@ -125,7 +145,7 @@ fn serve<S: Sensor>(
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(Duration::from_millis(1)))?;
     let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
-    let mut sidecar = Sidecar::new(&mut pixels, has_sensor);
+    let mut sidecar = Sidecar::new(&mut pixels, has_sensor.then(|| sensor.about()));
     let mut deframer = Deframer::new();
     let started = Instant::now();
     while started.elapsed() < lives {

@@ -36,15 +36,25 @@ impl Board {
         found.with_context(|| format!("no board `{name}`: mps2-an386 or stm32f405"))
     }
 
-    /// Builds the sidecar, with these features more.
+    /// Builds the sidecar, with these features more, and without a program for a
+    /// sensor.
     pub fn sidecar(self, root: &Path, features: &[&str]) -> Result<PathBuf> {
+        self.sidecar_with(root, features, None)
+    }
+
+    fn sidecar_with(
+        self,
+        root: &Path,
+        features: &[&str],
+        program: Option<&Path>,
+    ) -> Result<PathBuf> {
         let image = format!("sidecar-{}", self.name());
-        build(root, &image, &[&[self.name()], features].concat())
+        build(root, &image, &[&[self.name()], features].concat(), program)
     }
 
     /// Builds the self-test.
     pub fn self_test(self, root: &Path) -> Result<PathBuf> {
-        build(root, "self-test", &[self.name(), "self-test"])
+        build(root, "self-test", &[self.name(), "self-test"], None)
     }
 }
 
@@ -91,6 +101,9 @@ impl Sensor {
             let name = || format!("{IMAGE}={}", path.display());
             let bytes = fs::read(&path).with_context(name)?;
             check_program(&bytes).with_context(name)?;
+            // The build script runs in another folder.
+            let path = path.canonicalize().with_context(name)?;
+            return Board::Stm32F405.sidecar_with(root, &[self.feature()], Some(&path));
         }
         Board::Stm32F405.sidecar(root, &[self.feature()])
     }
@@ -117,22 +130,15 @@ fn check_program(bytes: &[u8]) -> Result<()> {
 
 /// Builds one image and says where it is. Each set of features has a folder of
 /// its own, so that none takes another's place.
-fn build(root: &Path, image: &str, features: &[&str]) -> Result<PathBuf> {
+fn build(root: &Path, image: &str, features: &[&str], program: Option<&Path>) -> Result<PathBuf> {
     toolchain::ensure_target(TARGET)?;
     let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
     let folder = root.join(folder);
     let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    if let Some(image) = env::var_os(IMAGE)
-        && features.contains(&Sensor::Tmf882x.feature())
-    {
-        // The build script runs in another folder.
-        let path = PathBuf::from(image);
-        cargo.env(
-            IMAGE,
-            path.canonicalize()
-                .with_context(|| path.display().to_string())?,
-        );
-    }
+    match program {
+        Some(path) => cargo.env(IMAGE, path),
+        None => cargo.env_remove(IMAGE),
+    };
     let status = cargo
         .current_dir(root)
         .args(["build", "--locked", "--package", "dtof-firmware"])

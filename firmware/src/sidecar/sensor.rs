@@ -33,11 +33,18 @@ impl Sidecar<'_> {
     /// it has more, up to a bound. Its errors are counted in the report, which names
     /// the last.
     pub fn poll_sensor(&mut self, sensor: &mut impl Sensor, now_ms: u32) {
+        let wanted = self.config.is_some() && self.source == Source::Sensor;
+        if wanted && !self.started {
+            sensor.start(self.bin_width);
+            (self.started, self.running) = (true, true);
+        } else if !wanted && self.running {
+            sensor.stop();
+            self.running = false;
+        }
         for _ in 0..POLLS {
             if !self.takes_sensor() {
                 return;
             }
-            sensor.set_bin_width(self.bin_width);
             match sensor.poll(now_ms, self) {
                 Ok(Polled::Idle) => return,
                 Ok(Polled::Working | Polled::Data) => {}

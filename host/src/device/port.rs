@@ -126,3 +126,19 @@ pub fn tcp(address: &str) -> io::Result<TcpStream> {
     stream.set_read_timeout(Some(PATIENCE))?;
     Ok(stream)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Else the program would end as if all were well.
+    #[test]
+    fn a_port_that_closes_is_not_a_closed_output() {
+        let closed = |kind| patient(Err(io::Error::from(kind))).unwrap_err().kind();
+        assert_eq!(closed(ErrorKind::BrokenPipe), ErrorKind::NotConnected);
+        assert_eq!(
+            closed(ErrorKind::ConnectionReset),
+            ErrorKind::ConnectionReset
+        );
+    }
+}
