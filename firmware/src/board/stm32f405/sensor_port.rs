@@ -13,7 +13,7 @@
 //! | 3V | VDD | VDD |
 //! | GND | GND | GND |
 //!
-//! All at 3.3 V. PC8 is pulled up in the controller, and so are PA8 and PC9, but
+//! All at the board's 3 V. PC8 is pulled up in the controller, and so are PA8 and PC9, but
 //! too weakly for 400 kHz: the bus needs resistors of 1 to 4.7 kΩ to 3.3 V, which
 //! most modules have.
 
