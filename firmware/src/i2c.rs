@@ -105,6 +105,8 @@ where
     }
 
     /// SCL low for its time before, high for its time after.
+    // Once in an image, not once a bit, byte and access: it takes its time anyhow.
+    #[inline(never)]
     fn raise_scl(&mut self) -> Result {
         self.delay.delay_ns(LOW_NS);
         self.scl.set_high().map_err(|_| Error::Pin)?;
@@ -197,6 +199,7 @@ where
     }
 
     /// Operations of one kind after another need no START between them.
+    #[inline(never)]
     fn run(&mut self, address: u8, operations: &mut [Operation<'_>]) -> Result {
         let mut before = None;
         let mut rest = operations.iter_mut().filter(|operation| {

@@ -181,7 +181,7 @@ struct Outcome {
 /// `reads_one_in` milliseconds.
 fn run(script: &Script, one_in: u32, reads_one_in: u32, rng: &mut Pcg32) -> Outcome {
     let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
-    let mut device = Sidecar::new(&mut pixels, false);
+    let mut device = Sidecar::new(&mut pixels, None);
     let mut host = Endpoint::host(7, greeting(0, 0), 0);
     let (mut up, mut down) = (Wire::new(one_in), Wire::new(one_in));
     let (mut up_frames, mut down_frames) = (Deframer::new(), Deframer::new());
@@ -399,7 +399,7 @@ fn a_host_that_restarts_begins_anew_and_gets_every_event() {
     let mut rng = Pcg32::seed_from_u64(4);
     let script = script(2_000, &mut rng);
     let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
-    let mut device = Sidecar::new(&mut pixels, false);
+    let mut device = Sidecar::new(&mut pixels, None);
     for number in 1..20 {
         // Gone in the middle of it, with messages on their way.
         let (events, report, _) = session(&mut device, number, &script, 40);
@@ -419,7 +419,7 @@ fn a_device_that_restarts_is_noticed_and_serves_the_next_session() {
     let mut rng = Pcg32::seed_from_u64(5);
     let script = script(2_000, &mut rng);
     let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
-    let mut device = Sidecar::new(&mut pixels, false);
+    let mut device = Sidecar::new(&mut pixels, None);
     let mut host = Endpoint::host(1, greeting(0, 0), 0);
     let mut wire = [0; WIRE_BYTES];
     let answer = |device: &mut Sidecar<'_>, host: &mut Endpoint, wire: &mut [u8; WIRE_BYTES]| {
@@ -433,7 +433,7 @@ fn a_device_that_restarts_is_noticed_and_serves_the_next_session() {
     };
     // A session of the device's earlier life, which another stands for.
     let mut earlier_pixels = heapless::Vec::<_, 1>::new();
-    let mut earlier = Sidecar::new(&mut earlier_pixels, false);
+    let mut earlier = Sidecar::new(&mut earlier_pixels, None);
     let mut down = Deframer::new();
     let length = host.transmit(0, &mut wire);
     for &byte in &wire[..length] {
@@ -463,7 +463,7 @@ fn the_same_session_number_drawn_again_begins_anew() {
     let mut rng = Pcg32::seed_from_u64(6);
     let script = script(2_000, &mut rng);
     let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
-    let mut device = Sidecar::new(&mut pixels, false);
+    let mut device = Sidecar::new(&mut pixels, None);
     session(&mut device, 7, &script, 40);
     let (events, report, lost) = session(&mut device, 7, &script, 100_000);
     assert!(events == script.events && report.is_some() && !lost);

@@ -1,9 +1,12 @@
 //! The golden frames of `docs/link-format.md`, and what a receiver makes of
 //! bytes that are no frames.
 
+use std::fmt::Display;
+
 use dtof_firmware::link::endpoint::Endpoint;
 use dtof_firmware::link::frame::{Deframer, FrameError, PAYLOAD_BYTES, WIRE_BYTES, encode};
 use dtof_firmware::link::message::{Configuration, PHOTONS, Refusal, Report, Token};
+use dtof_firmware::sensor::SensorFault;
 use dtof_firmware::sidecar::greeting;
 use proptest::prelude::*;
 
@@ -108,18 +111,36 @@ fn what_is_too_long_is_named_so() {
     assert_eq!(found, Some(Some(FrameError::Oversized)));
 }
 
+/// Each of them has a number from 1 on, a line in the document's table that begins
+/// so, and words of its own.
+#[track_caller]
+fn are_documented<T: Display>(all: &[T], number: impl Fn(&T) -> u8, table: &str) {
+    let document = include_str!("../../docs/link-format.md");
+    let (_, rest) = document.split_once(table).unwrap();
+    let (table, _) = rest.split_once("\n\n").unwrap();
+    for (expected, item) in (1..).zip(all) {
+        assert_eq!(number(item), expected);
+        assert!(table.contains(&format!("\n| {expected} | ")), "{expected}");
+    }
+    assert!(!table.contains(&format!("\n| {} | ", all.len() + 1)));
+    let mut words: Vec<String> = all.iter().map(ToString::to_string).collect();
+    words.sort();
+    words.dedup();
+    assert_eq!(words.len(), all.len());
+}
+
 #[test]
 fn every_refusal_has_its_own_number_and_reason() {
     let all: Vec<Refusal> = (0..=255).filter_map(Refusal::from_number).collect();
     assert_eq!(all.len(), 11);
-    for (number, refusal) in (1..).zip(&all) {
-        assert_eq!(*refusal as u8, number);
-        assert!(include_str!("../../docs/link-format.md").contains(&format!("\n| {number} | ")));
-    }
-    let mut reasons: Vec<String> = all.iter().map(ToString::to_string).collect();
-    reasons.sort();
-    reasons.dedup();
-    assert_eq!(reasons.len(), all.len());
+    are_documented(&all, |&refusal| refusal as u8, "\n| reason | |\n");
+}
+
+#[test]
+fn every_sensor_fault_has_its_own_number_and_words() {
+    let all: Vec<SensorFault> = (0..=255).filter_map(SensorFault::from_number).collect();
+    assert_eq!(all.len(), 9);
+    are_documented(&all, |&fault| fault as u8, "\n| last sensor error | |\n");
 }
 
 proptest! {

@@ -8,7 +8,7 @@ use std::rc::Rc;
 
 use common::{Broken, Given, Line, Notes};
 use dtof_core::PixelAddress;
-use dtof_core::fixed::types::U16F16;
+use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_firmware::sensor::tdc7200::{
     CalibrationPeriods, Config, ConfigError, Counts, Edge, Error, Mode, Settings, Stops, Tdc7200,
 };
@@ -197,11 +197,12 @@ fn measures_in_mode_1() {
 
 /// 7.061 ns into the histogram are bin 28 of 250 ps and bin 14 of 500 ps.
 #[test]
-fn bins_are_as_wide_as_was_said_last() {
+fn each_start_brings_it_up_with_bins_of_its_width() {
     let mut bench = armed();
-    for (bin_width, code) in [("500", 14), ("0", 14), ("250", 28)] {
-        let bin_width = U16F16::from_str(bin_width).unwrap();
-        bench.sensor.set_bin_width(bin_width);
+    for (bin_width, code) in [(500, 14), (250, 28)] {
+        bench.sensor.start(U16F16::from_num(bin_width));
+        assert!(!bench.sensor.is_armed());
+        bench.bring_up(MODE_1, ARM_1);
         bench.interrupt.set(false);
         let accesses = [
             read(0x02, &[0x19]),
@@ -211,7 +212,37 @@ fn bins_are_as_wide_as_was_said_last() {
         ];
         assert_eq!(bench.poll(&accesses.concat()), Ok(Polled::Data));
         assert_eq!(bench.sink.take(), [Given::Photon(7, code), Given::End(1)]);
+        bench.interrupt.set(true);
     }
+}
+
+#[test]
+fn stopped_it_is_off_until_it_is_started() {
+    let mut bench = armed();
+    bench.enable.driven.take();
+    bench.sensor.stop();
+    assert_eq!(*bench.enable.driven.borrow(), [false]);
+    bench.sensor.start(U16F16::lit("250"));
+    bench.recover();
+}
+
+/// 240 ns are 35.975 m.
+#[test]
+fn it_says_where_its_bins_start() {
+    let about = armed().sensor.about();
+    assert_eq!((about.pixels, about.bin_width), (8, None));
+    assert_eq!(about.offset, I24F8::from_num(240_000.0 * 0.149_896_229));
+}
+
+#[test]
+fn times_that_mode_1_does_not_measure_are_rejected() {
+    let config = |mode| {
+        let settings = Settings::new(PixelAddress(0), 8_000, U16F16::lit("8000"));
+        Config::new(Settings { mode, ..settings }).unwrap()
+    };
+    let codes = |mode| [11_999, 12_000, 500_000, 500_001].map(|ps| config(mode).code(ps));
+    assert_eq!(codes(Mode::One), [u16::MAX, 1, 62, u16::MAX]);
+    assert_eq!(codes(Mode::Two), [1, 1, 62, 62]);
 }
 
 #[test]

@@ -13,7 +13,7 @@ use common::tmf882x::{Bench, Counts, packet, packets, settings};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{AsyncPixel, Count, Count24, Histogram, PaperRule, RangeGate, detect};
 use dtof_firmware::link::message::Configuration;
-use dtof_firmware::sensor::Sensor;
+use dtof_firmware::sensor::{About, Sensor};
 use dtof_firmware::sidecar::Sidecar;
 use serde_json::Value;
 
@@ -84,7 +84,7 @@ fn the_sidecar_decides_recorded_histograms_as_the_core_does() {
     // The reference is pixel 99, which is none of the sidecar's; the zones are 10
     // to 18, the centre one 14.
     let mut pixels = heapless::Vec::<AsyncPixel<128>, 19>::new();
-    let mut device = Sidecar::new(&mut pixels, true);
+    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut host = Host::new(1, 0);
     let wanted = Configuration {
         alpha: 4 << 8,

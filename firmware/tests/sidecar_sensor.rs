@@ -4,8 +4,6 @@
 
 mod common;
 
-use std::convert::Infallible;
-
 use common::host::{CONFIGURATION, Call, Host, Scripted};
 use dtof_core::fixed::types::{U8F8, U16F16};
 use dtof_core::{
@@ -13,8 +11,8 @@ use dtof_core::{
     PixelConfig, RangeGate, detect,
 };
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
-use dtof_firmware::link::message::{self, Configuration, Report};
-use dtof_firmware::sensor::{PhotonSink, Polled, Sensor, simulated};
+use dtof_firmware::link::message::{self, Configuration, Refusal, Report};
+use dtof_firmware::sensor::{About, PhotonSink, Polled, Sensor, SensorFault, simulated};
 use dtof_firmware::sidecar::Sidecar;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -98,7 +96,7 @@ fn offered(report: &Report) -> u64 {
 fn a_host_that_reads_gets_the_events_of_the_pixels() {
     let script = script(5_000);
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, true);
+    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut host = Host::new(1, 0);
     let mut sensor = sensor(&script);
     host.configure(&mut device, 0, &CONFIGURATION);
@@ -116,10 +114,10 @@ fn a_host_that_reads_gets_the_events_of_the_pixels() {
 }
 
 #[test]
-fn a_host_that_does_not_read_lengthens_exposures_and_loses_no_event() {
+fn a_host_that_does_not_read_for_ten_seconds_lengthens_exposures_and_loses_no_event() {
     let script = script(20_000);
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, true);
+    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut host = Host::new(1, 0);
     let mut sensor = sensor(&script);
     host.configure(
@@ -133,8 +131,8 @@ fn a_host_that_does_not_read_lengthens_exposures_and_loses_no_event() {
     for now_ms in 0..20_000 {
         device.poll_sensor(&mut sensor, now_ms);
         host.exchange(&mut device, now_ms);
-        // Reads for a while, stops for a while, reads again.
-        if !(2_000..4_000).contains(&now_ms) {
+        // Reads for a while, stops for ten seconds, reads again.
+        if !(2_000..12_000).contains(&now_ms) {
             host.read(4);
         }
     }
@@ -154,7 +152,7 @@ fn a_host_that_does_not_read_lengthens_exposures_and_loses_no_event() {
         }
         let deferred = of_pixel().filter(|event| event.flags.contains(Flags::DEFERRED));
         let longest = deferred.map(|event| event.exposure).max().unwrap();
-        assert!(longest > 1_000, "pixel {pixel}: {longest}");
+        assert!(longest > 10_000, "pixel {pixel}: {longest}");
     }
 }
 
@@ -162,7 +160,7 @@ fn a_host_that_does_not_read_lengthens_exposures_and_loses_no_event() {
 fn questions_are_answered_though_the_sensor_fills_the_link() {
     let script = script(20_000);
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, true);
+    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut host = Host::new(1, 0);
     let mut sensor = sensor(&script);
     host.configure(&mut device, 0, &CONFIGURATION);
@@ -206,7 +204,7 @@ fn questions_are_answered_though_the_sensor_fills_the_link() {
 fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
     let script = script(10_000);
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, true);
+    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut unused = sensor(&script);
     let mut wire = [0; WIRE_BYTES];
     for now_ms in 0..10_000 {
@@ -251,7 +249,7 @@ fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
 fn a_configuration_waits_for_the_events_of_the_one_before() {
     let script = script(3_000);
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, true);
+    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut host = Host::new(1, 0);
     let mut sensor = sensor(&script);
     host.configure(&mut device, 0, &CONFIGURATION);
@@ -280,7 +278,7 @@ fn histogram(bin: usize) -> Box<[u32; 128]> {
 #[test]
 fn a_histogram_is_decided_once_within_the_gate() {
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, true);
+    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut host = Host::new(1, 0);
     let wanted = Configuration {
         gate_first: 10,
@@ -302,6 +300,7 @@ fn a_histogram_is_decided_once_within_the_gate() {
     }
     let report = host.report(&mut device, 3);
     assert_eq!(report.sensor_errors, 2);
+    assert_eq!(report.last_sensor_error, SensorFault::Data as u8);
     assert_eq!((report.cycles, report.unaddressed), (4, 128));
     let statistics = report.statistics;
     assert_eq!(
@@ -335,7 +334,7 @@ fn a_histogram_is_decided_once_within_the_gate() {
 #[test]
 fn histograms_without_room_for_an_event_are_counted_as_deferred() {
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, true);
+    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut host = Host::new(1, 0);
     host.configure(&mut device, 0, &CONFIGURATION);
     let mut sensor = Scripted((0..1_000).map(|_| Some(vec![Call::Histogram(0, histogram(40))])));
@@ -358,7 +357,7 @@ fn the_simulated_scene_comes_over_a_serial_port() {
     let mut buffers = Buffers::new();
     let (mut interrupt, mut serial) = buffers.split(|| {});
     let mut pixels = heapless::Vec::<AsyncPixel<128>, 16>::new();
-    let mut device = Sidecar::new(&mut pixels, true);
+    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut sensor = simulated::scene();
     let mut host = Host::new(1, 0);
     let mut frames = Deframer::new();
@@ -406,38 +405,120 @@ fn the_simulated_scene_comes_over_a_serial_port() {
     }
 }
 
-/// A sensor that notes the bin widths it is told.
+/// A sensor that notes what it is told.
 #[derive(Default)]
-struct Told(Vec<U16F16>);
+struct Told(Vec<Order>);
+
+#[derive(Debug, PartialEq)]
+enum Order {
+    Start(U16F16),
+    Poll,
+    Stop,
+}
 
 impl Sensor for Told {
-    type Error = Infallible;
+    type Error = SensorFault;
 
-    fn set_bin_width(&mut self, bin_width: U16F16) {
-        if self.0.last() != Some(&bin_width) {
-            self.0.push(bin_width);
+    fn about(&self) -> About {
+        About {
+            bin_width: Some(U16F16::lit("160")),
+            ..About::new(3)
         }
     }
 
-    fn poll(&mut self, _: u32, _: &mut impl PhotonSink) -> Result<Polled, Infallible> {
+    fn start(&mut self, bin_width: U16F16) {
+        self.0.push(Order::Start(bin_width));
+    }
+
+    fn stop(&mut self) {
+        self.0.push(Order::Stop);
+    }
+
+    fn poll(&mut self, _: u32, _: &mut impl PhotonSink) -> Result<Polled, SensorFault> {
+        self.0.push(Order::Poll);
         Ok(Polled::Idle)
     }
 }
 
 #[test]
-fn a_sensor_is_told_the_bin_width_of_each_configuration() {
+fn a_sensor_is_started_for_each_configuration_and_stopped_once() {
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, true);
-    let mut host = Host::new(1, 0);
     let mut sensor = Told::default();
-    for bin_width in [250 << 16, 100 << 16] {
+    let mut device = Sidecar::new(&mut pixels, Some(sensor.about()));
+    let mut host = Host::new(1, 0);
+    device.poll_sensor(&mut sensor, 0);
+    let wanted = |bin_width: u32, source| Configuration {
+        bin_width: bin_width << 16,
+        source,
+        ..CONFIGURATION
+    };
+    for configuration in [
+        wanted(160, 1),
+        wanted(150, 1),
+        wanted(250, 0),
+        wanted(250, 0),
+    ] {
+        host.configure(&mut device, 0, &configuration);
+        device.poll_sensor(&mut sensor, 0);
+        device.poll_sensor(&mut sensor, 1);
+    }
+    let start = |bin_width| Order::Start(U16F16::from_num(bin_width));
+    let (poll, stop) = (|| Order::Poll, Order::Stop);
+    let expected = [start(160), poll(), poll(), start(150), poll(), poll(), stop];
+    assert_eq!(sensor.0, expected);
+
+    // A new session stops it, too.
+    host.configure(&mut device, 0, &wanted(160, 1));
+    device.poll_sensor(&mut sensor, 2);
+    sensor.0.clear();
+    let mut next = Host::new(2, 0);
+    next.report(&mut device, 3);
+    device.poll_sensor(&mut sensor, 3);
+    assert_eq!(sensor.0, [Order::Stop]);
+}
+
+#[test]
+fn bins_that_are_not_the_sensors_are_refused() {
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, Some(Told::default().about()));
+    let mut host = Host::new(1, 0);
+    // A sixteenth of 160 ps to either side.
+    for (bin_width, taken) in [(149, false), (150, true), (170, true), (171, false)] {
         let wanted = Configuration {
-            bin_width,
+            bin_width: bin_width << 16,
             source: 1,
             ..CONFIGURATION
         };
+        let answer = host.answer(&mut device, 0, message::CONFIGURE, &wanted.to_le_bytes());
+        let expected = if taken {
+            vec![]
+        } else {
+            vec![Refusal::BinWidth as u8]
+        };
+        assert_eq!(answer, expected, "{bin_width} ps");
+        // Photons of the link have the bins of whoever sends them.
+        let wanted = Configuration {
+            source: 0,
+            ..wanted
+        };
         host.configure(&mut device, 0, &wanted);
-        device.poll_sensor(&mut sensor, 0);
     }
-    assert_eq!(sensor.0, [U16F16::lit("250"), U16F16::lit("100")]);
+}
+
+#[test]
+fn the_host_is_told_what_the_sensor_is() {
+    let told = Told::default().about();
+    let mut pixels = Pixels::new();
+    let mut host = Host::new(1, 0);
+    let mut device = Sidecar::new(&mut pixels, Some(told));
+    let body = host.answer(&mut device, 0, message::SENSOR_REQUEST, &[]);
+    assert_eq!(body, [3, 0, 0, 0, 160, 0, 0, 0, 0, 0]);
+    assert_eq!(message::about_from_le_bytes(&body), Some(Some(told)));
+
+    let mut pixels = Pixels::new();
+    let mut host = Host::new(1, 0);
+    let mut device = Sidecar::new(&mut pixels, None);
+    let body = host.answer(&mut device, 0, message::SENSOR_REQUEST, &[]);
+    assert_eq!(message::about_from_le_bytes(&body), Some(None));
+    assert_eq!(message::about_from_le_bytes(&body[1..]), None);
 }

@@ -5,8 +5,10 @@ use std::io::{self, ErrorKind, Write};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use dtof_core::{DepthEvent, RangeScale};
+use dtof_core::{DepthEvent, RangeScale, Statistics};
+use dtof_firmware::link::endpoint::LinkCounters;
 use dtof_firmware::link::message::Report;
+use dtof_firmware::sensor::SensorFault;
 
 use crate::device::{Client, configuration};
 use crate::events_csv;
@@ -15,10 +17,13 @@ use crate::settings::Settings;
 /// How often there are statistics.
 const EVERY: Duration = Duration::from_secs(1);
 
-/// Has the device take photons from its sensor for `length`, or without end, and
-/// writes its events as CSV to `events` as they come, and a line of statistics a
-/// second to `statistics`. Ends early when nobody reads them any more. The
-/// device's sensor is switched off then.
+/// Has the device take photons from its sensor and writes its events as CSV to
+/// `events` as they come, and a line of statistics a second to `statistics`: rates,
+/// and of what was lost or went wrong all that did, counted from the beginning.
+///
+/// Ends when `done`, asked again and again, says so of the time it has taken, or
+/// when nobody reads the output any more. The device takes no photons from its
+/// sensor then.
 ///
 /// # Errors
 /// If the device refuses the settings or is gone, or what is written cannot be.
@@ -26,7 +31,7 @@ pub fn monitor(
     client: &mut Client,
     settings: &Settings,
     pixels: u16,
-    length: Option<Duration>,
+    done: impl Fn(Duration) -> bool,
     events: &mut impl Write,
     statistics: &mut impl Write,
 ) -> Result<()> {
@@ -35,14 +40,13 @@ pub fn monitor(
     let started = Instant::now();
     let mut figures = Figures {
         since: started,
-        retransmitted: client.counters().retransmitted,
+        here: *client.counters(),
         first: client.report()?,
-        last: Report::default(),
+        last: Statistics::default(),
     };
-    let done = || length.is_some_and(|length| started.elapsed() >= length);
     let mut open = still_open(header(events))?;
     let mut asked = false;
-    while open && !done() {
+    while open && !done(started.elapsed()) {
         if !asked && figures.since.elapsed() >= EVERY {
             client.request_report()?;
             asked = true;
@@ -50,7 +54,7 @@ pub fn monitor(
         let report = client.poll_report()?;
         open = still_open(write(events, &client.take_events(), &scale))?;
         if let Some(report) = report {
-            open &= still_open(writeln!(statistics, "{}", figures.line(client, report)))?;
+            open &= still_open(writeln!(statistics, "{}", figures.line(client, &report)))?;
             asked = false;
         }
     }
@@ -64,7 +68,7 @@ pub fn monitor(
                 break report;
             }
         };
-        open &= still_open(writeln!(statistics, "{}", figures.line(client, report)))?;
+        open &= still_open(writeln!(statistics, "{}", figures.line(client, &report)))?;
     }
     // After the answer there are no more events.
     client.configure(&configuration(settings, pixels, 0)?)?;
@@ -102,37 +106,96 @@ fn still_open(written: io::Result<()>) -> io::Result<bool> {
 struct Figures {
     /// When the last line was.
     since: Instant,
-    /// What this end had sent again at the beginning.
-    retransmitted: u32,
+    /// What this end had counted at the beginning.
+    here: LinkCounters,
     /// What the device had counted at the beginning.
     first: Report,
-    /// What the device had counted at the last line.
-    last: Report,
+    /// Events and photons at the last line.
+    last: Statistics,
 }
 
 impl Figures {
-    /// Rates since the last line, counts since the beginning.
+    /// Rates since the last line.
     #[allow(clippy::cast_precision_loss, reason = "rates to look at")]
-    fn line(&mut self, client: &Client, report: Report) -> String {
+    fn line(&mut self, client: &Client, report: &Report) -> String {
         let seconds = self.since.elapsed().as_secs_f64();
         let rate = |now: u64, before: u64| now.saturating_sub(before) as f64 / seconds;
-        let (now, last, first) = (&report.statistics, &self.last.statistics, &self.first);
-        let line = format!(
-            "events/s {:.0}, photons/s {:.0}, deferred {}, lost bytes {}, retransmissions {}, sensor errors {}",
+        let (now, last) = (&report.statistics, &self.last);
+        let mut line = format!(
+            "events/s {:.0}, photons/s {:.0}",
             rate(now.events, last.events),
             rate(now.photons(), last.photons()),
-            now.deferred,
-            report.overrun.wrapping_sub(first.overrun),
-            (client.counters().retransmitted - self.retransmitted).wrapping_add(
-                report
-                    .link
-                    .retransmitted
-                    .wrapping_sub(first.link.retransmitted)
-            ),
-            report.sensor_errors.wrapping_sub(first.sensor_errors),
         );
+        line += &losses(report, &self.first, &since(client.counters(), &self.here));
         self.since = Instant::now();
-        self.last = report;
+        self.last = *now;
         line
+    }
+}
+
+/// What went wrong since the device had counted `first`, each with a comma before
+/// it; what did not is left out. `here` is what this end of the link has counted.
+#[must_use]
+pub fn losses(report: &Report, first: &Report, here: &LinkCounters) -> String {
+    let Statistics {
+        saturated,
+        rejected,
+        gated_out,
+        deferred,
+        expired,
+        expired_deferred,
+        ..
+    } = report.statistics;
+    let there = since(&report.link, &first.link);
+    let both = |count: fn(&LinkCounters) -> u32| u64::from(count(&there)) + u64::from(count(here));
+    let sensor_errors = report.sensor_errors.wrapping_sub(first.sensor_errors);
+    let counts = [
+        ("saturated", saturated),
+        ("rejected", rejected),
+        ("gated out", gated_out),
+        ("unaddressed", report.unaddressed),
+        ("deferred", deferred),
+        ("expired", expired),
+        ("expired and deferred", expired_deferred),
+        (
+            "lost bytes",
+            report.overrun.wrapping_sub(first.overrun).into(),
+        ),
+        ("corrupt frames", both(|link| link.corrupt)),
+        ("oversized frames", both(|link| link.oversized)),
+        ("foreign frames", both(|link| link.foreign)),
+        ("out of order", both(|link| link.out_of_order)),
+        ("duplicates", both(|link| link.duplicate)),
+        ("retransmissions", both(|link| link.retransmitted)),
+        (
+            "unknown messages",
+            report.unknown.wrapping_sub(first.unknown).into(),
+        ),
+        ("sensor errors", sensor_errors.into()),
+    ];
+    let mut line = String::new();
+    for (name, count) in counts.into_iter().filter(|&(_, count)| count > 0) {
+        line += &format!(", {name} {count}");
+    }
+    if sensor_errors > 0 {
+        let number = report.last_sensor_error;
+        line += &match SensorFault::from_number(number) {
+            Some(fault) => format!(" (last: {fault})"),
+            None => format!(" (last: number {number})"),
+        };
+    }
+    line
+}
+
+/// What was counted since `first`.
+fn since(now: &LinkCounters, first: &LinkCounters) -> LinkCounters {
+    LinkCounters {
+        frames: now.frames.wrapping_sub(first.frames),
+        corrupt: now.corrupt.wrapping_sub(first.corrupt),
+        oversized: now.oversized.wrapping_sub(first.oversized),
+        foreign: now.foreign.wrapping_sub(first.foreign),
+        out_of_order: now.out_of_order.wrapping_sub(first.out_of_order),
+        duplicate: now.duplicate.wrapping_sub(first.duplicate),
+        retransmitted: now.retransmitted.wrapping_sub(first.retransmitted),
     }
 }

@@ -41,7 +41,7 @@ fn serve(stream: &mut TcpStream, lives: Option<Duration>) {
         .set_read_timeout(Some(Duration::from_millis(1)))
         .unwrap();
     let mut pixels = heapless::Vec::<_, PIXELS>::new();
-    let mut sidecar = Sidecar::new(&mut pixels, false);
+    let mut sidecar = Sidecar::new(&mut pixels, None);
     let mut deframer = Deframer::new();
     let started = Instant::now();
     loop {

@@ -1,22 +1,25 @@
 //! `dtof monitor` on the firmware's sidecar with a simulated sensor, behind a TCP
 //! port of this computer.
 
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::num::NonZeroU16;
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use dtof::device::{self, Client};
 use dtof::events_csv;
-use dtof::monitor::monitor;
+use dtof::monitor::{losses, monitor};
 use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
 use dtof_core::fixed::types::{I24F8, U0F32, U8F8, U8F24, U16F16};
 use dtof_core::{AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig};
+use dtof_firmware::link::endpoint::LinkCounters;
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
+use dtof_firmware::link::message::Report;
 use dtof_firmware::sensor::simulated::{self, Pulse, Simulated, SimulatedPixel};
-use dtof_firmware::sensor::{PhotonSink, Sensor};
+use dtof_firmware::sensor::{About, PhotonSink, Polled, Sensor, SensorFault};
 use dtof_firmware::sidecar::Sidecar;
 
 const PIXELS: u16 = 4;
@@ -58,31 +61,102 @@ fn sensor(pixels: &[SimulatedPixel]) -> Simulated<'_> {
     Simulated::new(pixels, PULSE, settings)
 }
 
-/// A device that hangs up after `lives`.
-fn device(has_sensor: bool, lives: Duration) -> String {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let name = format!("tcp:{}", listener.local_addr().unwrap());
-    thread::spawn(move || {
-        let (mut stream, _) = listener.accept().unwrap();
-        let _ = serve(&mut stream, has_sensor, lives);
-    });
-    name
+/// A sensor, and whether it has been asked.
+struct Noted<S> {
+    sensor: S,
+    asked: bool,
 }
 
-fn serve(stream: &mut TcpStream, has_sensor: bool, lives: Duration) -> io::Result<()> {
+impl<S: Sensor> Sensor for Noted<S> {
+    type Error = S::Error;
+
+    fn about(&self) -> About {
+        self.sensor.about()
+    }
+
+    fn start(&mut self, bin_width: U16F16) {
+        self.sensor.start(bin_width);
+    }
+
+    fn stop(&mut self) {
+        self.sensor.stop();
+    }
+
+    fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, S::Error> {
+        self.asked = true;
+        self.sensor.poll(now_ms, sink)
+    }
+}
+
+/// A sensor nobody finds on its bus.
+struct Unplugged;
+
+impl Sensor for Unplugged {
+    type Error = SensorFault;
+
+    fn about(&self) -> About {
+        About::new(PIXELS)
+    }
+
+    fn start(&mut self, _: U16F16) {}
+
+    fn stop(&mut self) {}
+
+    fn poll(&mut self, _: u32, _: &mut impl PhotonSink) -> Result<Polled, SensorFault> {
+        Err(SensorFault::NoAnswer)
+    }
+}
+
+/// A device that hangs up after `lives`.
+fn device(has_sensor: bool, lives: Duration) -> String {
+    device_of(sensor(scene().leak()), has_sensor, lives).0
+}
+
+/// A device with this sensor, and whether it asks the sensor no more when the host
+/// is gone.
+fn device_of(
+    sensor: impl Sensor + Send + 'static,
+    has_sensor: bool,
+    lives: Duration,
+) -> (String, Receiver<bool>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let name = format!("tcp:{}", listener.local_addr().unwrap());
+    let (sender, rests) = mpsc::channel();
+    thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let sensor = Noted {
+            sensor,
+            asked: false,
+        };
+        if let Ok(resting) = serve(&mut stream, sensor, has_sensor, lives) {
+            let _ = sender.send(resting);
+        }
+    });
+    (name, rests)
+}
+
+/// Until the host is gone; says whether the sensor is asked no more then.
+fn serve<S: Sensor>(
+    stream: &mut TcpStream,
+    mut sensor: Noted<S>,
+    has_sensor: bool,
+    lives: Duration,
+) -> io::Result<bool> {
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(Duration::from_millis(1)))?;
     let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
-    let mut sidecar = Sidecar::new(&mut pixels, has_sensor);
-    let scene = scene();
-    let mut sensor = sensor(&scene);
+    let mut sidecar = Sidecar::new(&mut pixels, has_sensor.then(|| sensor.about()));
     let mut deframer = Deframer::new();
     let started = Instant::now();
     while started.elapsed() < lives {
         let now = u32::try_from(started.elapsed().as_millis()).unwrap();
         let mut bytes = [0; 1024];
         let length = match stream.read(&mut bytes) {
-            Ok(0) => return Ok(()),
+            Ok(0) => {
+                sensor.asked = false;
+                sidecar.poll_sensor(&mut sensor, now);
+                return Ok(!sensor.asked);
+            }
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => 0,
             read => read?,
         };
@@ -103,7 +177,7 @@ fn serve(stream: &mut TcpStream, has_sensor: bool, lives: Duration) -> io::Resul
             stream.write_all(&wire[..length])?;
         }
     }
-    Ok(())
+    Err(ErrorKind::TimedOut.into())
 }
 
 /// Pixels whose link takes every event at once.
@@ -166,13 +240,13 @@ fn client(name: &str) -> Client {
 fn events_come_out_as_the_pixels_report_them_and_statistics_once_a_second() {
     let mut client = client(&device(true, Duration::from_secs(60)));
     let (mut events, mut statistics) = (Vec::new(), Vec::new());
-    let length = Some(Duration::from_millis(3_800));
+    let length = Duration::from_millis(3_800);
     let started = Instant::now();
     monitor(
         &mut client,
         &settings(),
         PIXELS,
-        length,
+        |elapsed| elapsed >= length,
         &mut events,
         &mut statistics,
     )
@@ -191,12 +265,75 @@ fn events_come_out_as_the_pixels_report_them_and_statistics_once_a_second() {
         let rate: u32 = rates.split(',').next().unwrap().parse().unwrap();
         assert!(rate > 0 && line.contains("photons/s "), "{line}");
         // A pause of this computer may repeat a message, but nothing else.
-        assert!(line.contains("deferred 0, lost bytes 0, "), "{line}");
-        assert!(line.ends_with("sensor errors 0"), "{line}");
+        for loss in line.split(", ").skip(2) {
+            assert!(
+                loss.starts_with("retransmissions ") || loss.starts_with("duplicates "),
+                "{line}"
+            );
+        }
     }
     // The sensor rests.
     thread::sleep(Duration::from_millis(100));
     assert_eq!(client.report().unwrap().cycles, 0);
+}
+
+#[test]
+fn every_loss_is_shown_and_only_losses() {
+    // A report whose numbers are `number` in one field after the other, little-endian.
+    let report = |number: fn(u64) -> u64| {
+        let wide = (0..10).flat_map(|at| number(at).to_le_bytes());
+        let narrow = (10..20).flat_map(|at| u32::try_from(number(at)).unwrap().to_le_bytes());
+        let bytes: Vec<u8> = wide.chain(narrow).chain([1]).collect();
+        Report::from_le_bytes(&bytes).unwrap()
+    };
+    let none = LinkCounters::default();
+    assert_eq!(losses(&report(|_| 0), &report(|_| 0), &none), "");
+    // The counts of the link and of the sensor began before.
+    assert_eq!(
+        losses(&report(|at| 101 + at), &report(|_| 100), &none),
+        ", saturated 103, rejected 104, gated out 105, unaddressed 110, deferred 107, expired 108, \
+         expired and deferred 109, lost bytes 11, corrupt frames 15, oversized frames 16, \
+         foreign frames 17, out of order 18, duplicates 19, retransmissions 20, \
+         unknown messages 12, sensor errors 13 (last: no answer)"
+    );
+    // Errors of before are not this one's.
+    assert_eq!(losses(&report(|_| 0), &Report::default(), &none), "");
+
+    // Each end sees other frames.
+    let here = LinkCounters {
+        frames: 1,
+        corrupt: 2,
+        oversized: 3,
+        foreign: 4,
+        out_of_order: 5,
+        duplicate: 6,
+        retransmitted: 7,
+    };
+    assert_eq!(
+        losses(&report(|_| 0), &report(|_| 0), &here),
+        ", corrupt frames 2, oversized frames 3, foreign frames 4, out of order 5, duplicates 6, \
+         retransmissions 7"
+    );
+}
+
+#[test]
+fn a_sensor_that_does_not_answer_is_named() {
+    let (name, _rests) = device_of(Unplugged, true, Duration::from_secs(60));
+    let (mut events, mut statistics) = (Vec::new(), Vec::new());
+    monitor(
+        &mut client(&name),
+        &settings(),
+        PIXELS,
+        |elapsed| elapsed >= Duration::from_secs(1),
+        &mut events,
+        &mut statistics,
+    )
+    .unwrap();
+    let statistics = String::from_utf8(statistics).unwrap();
+    let line = statistics.lines().next().unwrap();
+    assert!(line.starts_with("events/s 0, photons/s 0, "), "{line}");
+    assert!(line.contains(", sensor errors "), "{line}");
+    assert!(line.ends_with(" (last: no answer)"), "{line}");
 }
 
 /// Takes so many bytes, then nobody reads any more.
@@ -224,7 +361,7 @@ fn a_reader_that_has_seen_enough_ends_it() {
             &mut client,
             &settings(),
             PIXELS,
-            None,
+            |_| false,
             &mut events,
             &mut statistics,
         )
@@ -240,7 +377,7 @@ fn a_device_that_goes_or_has_no_sensor_is_an_error() {
         &mut gone,
         &settings(),
         PIXELS,
-        None,
+        |_| false,
         &mut events,
         &mut statistics,
     );
@@ -254,12 +391,39 @@ fn a_device_that_goes_or_has_no_sensor_is_an_error() {
         &mut without,
         &settings(),
         PIXELS,
-        None,
+        |_| false,
         &mut events,
         &mut statistics,
     );
     let error = format!("{:#}", error.unwrap_err());
     assert!(error.contains("the device has no sensor"), "{error}");
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_stops_the_sensor() {
+    for signal in ["-INT", "-TERM"] {
+        let lives = Duration::from_secs(60);
+        let (name, rests) = device_of(sensor(scene().leak()), true, lives);
+        let mut monitor = Command::new(env!("CARGO_BIN_EXE_dtof"))
+            .args(["monitor", "--pixels", "4", "--device", &name])
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut events = BufReader::new(monitor.stdout.take().unwrap()).lines();
+        for _ in 0..10 {
+            events.next().unwrap().unwrap();
+        }
+        let id = monitor.id().to_string();
+        let sent = Command::new("kill").args([signal, &id]).status().unwrap();
+        assert!(sent.success());
+        // What comes until then is whole.
+        for row in events {
+            assert_eq!(row.unwrap().split(',').count(), 9);
+        }
+        assert!(monitor.wait().unwrap().success());
+        assert!(rests.recv_timeout(lives).unwrap());
+    }
 }
 
 #[test]

@@ -4,23 +4,27 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use dtof::device::{Client, DeviceEngine};
+use dtof::device::{Client, DeviceEngine, configuration};
 use dtof::engine::{Engine, host_engine};
+use dtof::monitor;
 use dtof::scene;
 use dtof::settings::{Settings, U8F8Number};
 use dtof::source::{Geometry, PhotonSource};
 use dtof_core::fixed::types::U8F8;
+use dtof_firmware::sensor::SensorFault;
 
-use crate::firmware::Board;
+use crate::firmware::{Board, Sensor};
 use crate::log;
-use crate::qemu::{self, Emulator};
+use crate::qemu::{self, Emulator, End};
 use crate::tools::DEFMT_PRINT;
+use crate::{stack, stack_bound};
 
 /// Runs all of it.
 pub fn check(root: &Path) -> Result<()> {
     let cannot = qemu::cannot_run(Board::Stm32F405)?;
-    let image = Board::Mps2An386.sidecar(root, &[])?;
-    ends(&image)?;
+    let board = Board::Mps2An386;
+    let image = board.sidecar(root, &[])?;
+    let mut used = ends(board, &image)?;
     // A million photons of 64 macropixels.
     let array = Geometry {
         columns: 8,
@@ -28,33 +32,59 @@ pub fn check(root: &Path) -> Result<()> {
     };
     for reads_every in [0, 150] {
         let reads_every = Duration::from_millis(reads_every);
-        agrees(Board::Mps2An386, &image, array, 5300, reads_every)?;
+        used.push(agrees(board, &image, array, 5300, reads_every)?);
     }
+    used.push(senses(board, &image)?);
+    stack::check(board, &image, &used)?;
     match cannot {
         Some(reason) => println!("{reason}"),
         None => {
-            let image = Board::Stm32F405.sidecar(root, &["pll-off"])?;
+            let board = Board::Stm32F405;
+            let image = board.sidecar(root, &["pll-off"])?;
             let array = Geometry {
                 columns: 4,
                 rows: 2,
             };
-            agrees(Board::Stm32F405, &image, array, 200, Duration::ZERO)?;
+            let used = [
+                agrees(board, &image, array, 200, Duration::ZERO)?,
+                senses(board, &image)?,
+            ];
+            stack::check(board, &image, &used)?;
+            for sensor in Sensor::ALL {
+                let image = board.sidecar(root, &["pll-off", sensor.feature()])?;
+                let used = says_unplugged(board, &image, sensor, array)?;
+                stack::check(board, &image, &[used])?;
+            }
         }
     }
     Ok(())
 }
 
-/// However the image ends, QEMU ends with it, and the reason is to be seen.
-fn ends(image: &Path) -> Result<()> {
+/// However the image ends, QEMU ends with it, and the reason is to be seen. Gives
+/// the bytes of stack each time used.
+fn ends(board: Board, image: &Path) -> Result<Vec<u64>> {
+    let name = board.name();
+    let needed = stack_bound::of_image(image)?;
+    let mut used = Vec::new();
     for (word, success, message) in [
         ("exit", true, "mps2-an386 started"),
         ("panic", false, "as asked for on the command line"),
         ("fault", false, "hard fault at 0x"),
     ] {
-        let (status, output) = Emulator::start(Board::Mps2An386, image, &[word])?.wait()?;
+        let End {
+            status,
+            output,
+            stack,
+        } = Emulator::start(board, image, &[word])?.wait()?;
+        // It may happen where most of the stack is in use.
+        ensure!(
+            needed + stack <= stack::RESERVE,
+            "{name}: no room to report the end by `{word}`"
+        );
+        used.push(stack);
         ensure!(
             status.success() == success,
-            "mps2-an386: `{word}` ends QEMU with {status}"
+            "{name}: `{word}` ends QEMU with {status}"
         );
         if !DEFMT_PRINT.is_there() {
             println!(
@@ -66,11 +96,14 @@ fn ends(image: &Path) -> Result<()> {
         let text = log::decode(image, output)?;
         ensure!(
             text.contains(message),
-            "mps2-an386: `{word}` does not log `{message}` but\n{text}"
+            "{name}: `{word}` does not log `{message}` but\n{text}"
         );
-        println!("mps2-an386: `{word}` ends QEMU with {status} and is logged");
+        println!(
+            "{name}: `{word}` ends QEMU with {status} and is logged; \
+             {stack} bytes of stack"
+        );
     }
-    Ok(())
+    Ok(used)
 }
 
 /// What decides the events: a setting at which there are many.
@@ -84,19 +117,31 @@ fn settings() -> Settings {
 }
 
 /// The demo's scene on a board and on this computer gives the same events and
-/// the same counts, however seldom the host reads.
+/// the same counts, however seldom the host reads. Gives the bytes of stack used.
 fn agrees(
     board: Board,
     image: &Path,
     geometry: Geometry,
     cycles: u16,
     reads_every: Duration,
-) -> Result<()> {
+) -> Result<u64> {
     let name = board.name();
     let mut emulator = Emulator::start(board, image, &[])?;
-    let start = Instant::now();
     let mut client = Client::new(emulator.connect()?).context(name)?;
     client.reads_every = reads_every;
+    let decided = decides_alike(client, geometry, cycles).context(name)?;
+    let stack = emulator.stop()?;
+    println!(
+        "{name}: {decided}; read every {} ms; {stack} bytes of stack",
+        reads_every.as_millis()
+    );
+    Ok(stack)
+}
+
+/// What the device makes of the demo's photons is what this computer does. Says
+/// how much that was.
+fn decides_alike(client: Client, geometry: Geometry, cycles: u16) -> Result<String> {
+    let start = Instant::now();
     let settings = settings();
     let mut photons = scene::photons(geometry, &settings, cycles.into())?;
     let addresses = photons.addresses();
@@ -104,26 +149,73 @@ fn agrees(
     let mut on_host = host_engine(&settings, &addresses)?;
     let expected = on_host.run(&slice)?;
     let mut on_board = DeviceEngine::new(client, &settings, &addresses)?;
-    let events = on_board.run(&slice).context(name)?;
-    ensure!(
-        events == expected,
-        "{name}: not the events of this computer"
-    );
+    let events = on_board.run(&slice)?;
+    ensure!(events == expected, "not the events of this computer");
     let statistics = on_board.statistics();
     ensure!(
         statistics == on_host.statistics(),
-        "{name}: not the counts of this computer"
+        "not the counts of this computer"
     );
-    let photons = statistics.photons();
-    println!(
-        "{name}: {photons} photons of {} macropixels, {} events, each as on this computer; \
-         read every {} ms; {:.0} s, {:?}",
+    Ok(format!(
+        "{} photons of {} macropixels, {} events, each as on this computer; {:.0} s, {:?}",
+        statistics.photons(),
         addresses.len(),
         events.len(),
-        reads_every.as_millis(),
         start.elapsed().as_secs_f64(),
         on_board.report().link,
+    ))
+}
+
+/// The device decides on photons of its own. Gives the bytes of stack used.
+fn senses(board: Board, image: &Path) -> Result<u64> {
+    let name = board.name();
+    let mut emulator = Emulator::start(board, image, &[])?;
+    let mut client = Client::new(emulator.connect()?).context(name)?;
+    let (mut events, mut statistics) = (Vec::new(), Vec::new());
+    monitor::monitor(
+        &mut client,
+        &settings(),
+        16,
+        |elapsed| elapsed >= Duration::from_secs(3),
+        &mut events,
+        &mut statistics,
+    )
+    .context(name)?;
+    // Less their header.
+    let events = events.split(|&byte| byte == b'\n').count() - 2;
+    ensure!(events > 0, "{name}: no event of the simulated sensor");
+    let stack = emulator.stop()?;
+    println!("{name}: {events} events of the simulated sensor; {stack} bytes of stack");
+    Ok(stack)
+}
+
+/// The image of a sensor with nothing connected says so, and decides on photons of
+/// the link afterwards. Gives the bytes of stack used.
+fn says_unplugged(board: Board, image: &Path, sensor: Sensor, array: Geometry) -> Result<u64> {
+    let name = format!("{} with {}", board.name(), sensor.name());
+    let mut emulator = Emulator::start(board, image, &[])?;
+    let mut client = Client::new(emulator.connect()?).with_context(|| name.clone())?;
+    let pixels = u16::try_from(array.addresses())?;
+    client.configure(&configuration(&settings(), pixels, 1)?)?;
+    let since = Instant::now();
+    let report = loop {
+        let report = client.report().with_context(|| name.clone())?;
+        if report.sensor_errors >= 10 {
+            break report;
+        }
+        ensure!(
+            since.elapsed() < Duration::from_secs(10),
+            "{name}: a missing sensor is not noticed"
+        );
+    };
+    let fault = SensorFault::from_number(report.last_sensor_error);
+    let fault = fault.with_context(|| format!("{name}: no reason for {report:?}"))?;
+    ensure!(
+        report.statistics.photons() == 0,
+        "{name}: photons without a sensor"
     );
-    emulator.stop()?;
-    Ok(())
+    let decided = decides_alike(client, array, 100).with_context(|| name.clone())?;
+    let stack = emulator.stop()?;
+    println!("{name} unplugged: \"{fault}\"; then {decided}; {stack} bytes of stack");
+    Ok(stack)
 }

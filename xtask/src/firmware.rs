@@ -1,6 +1,8 @@
 //! The images a board runs: `cargo xtask image`.
 
 use std::env;
+use std::fs;
+use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -34,15 +36,25 @@ impl Board {
         found.with_context(|| format!("no board `{name}`: mps2-an386 or stm32f405"))
     }
 
-    /// Builds the sidecar, with these features more.
+    /// Builds the sidecar, with these features more, and without a program for a
+    /// sensor.
     pub fn sidecar(self, root: &Path, features: &[&str]) -> Result<PathBuf> {
+        self.sidecar_with(root, features, None)
+    }
+
+    fn sidecar_with(
+        self,
+        root: &Path,
+        features: &[&str],
+        program: Option<&Path>,
+    ) -> Result<PathBuf> {
         let image = format!("sidecar-{}", self.name());
-        build(root, &image, &[&[self.name()], features].concat())
+        build(root, &image, &[&[self.name()], features].concat(), program)
     }
 
     /// Builds the self-test.
     pub fn self_test(self, root: &Path) -> Result<PathBuf> {
-        build(root, "self-test", &[self.name(), "self-test"])
+        build(root, "self-test", &[self.name(), "self-test"], None)
     }
 }
 
@@ -71,6 +83,10 @@ impl Sensor {
     }
 
     pub fn named(name: &str) -> Result<Self> {
+        let name = match name {
+            "tmf8820" | "tmf8821" | "tmf8828" => "tmf882x",
+            name => name,
+        };
         let found = Self::ALL.into_iter().find(|sensor| sensor.name() == name);
         found.with_context(|| format!("no sensor `{name}`: tdc7200 or tmf882x"))
     }
@@ -78,10 +94,16 @@ impl Sensor {
     /// The sidecar that takes its photons.
     pub fn sidecar(self, root: &Path) -> Result<PathBuf> {
         if self == Self::Tmf882x {
-            ensure!(
-                env::var_os(IMAGE).is_some(),
-                "{IMAGE} has to be the path of the sensor's program, raw bytes from its vendor"
-            );
+            let path = env::var_os(IMAGE).map(PathBuf::from);
+            let path = path.with_context(|| {
+                format!("{IMAGE} has to name the sensor's program, raw bytes from its vendor")
+            })?;
+            let name = || format!("{IMAGE}={}", path.display());
+            let bytes = fs::read(&path).with_context(name)?;
+            check_program(&bytes).with_context(name)?;
+            // The build script runs in another folder.
+            let path = path.canonicalize().with_context(name)?;
+            return Board::Stm32F405.sidecar_with(root, &[self.feature()], Some(&path));
         }
         Board::Stm32F405.sidecar(root, &[self.feature()])
     }
@@ -90,25 +112,37 @@ impl Sensor {
 /// What `firmware/build.rs` takes the program of the TMF8820/21/28 from.
 const IMAGE: &str = "TMF882X_IMAGE";
 
+/// Whether this may be a program of the TMF8820/21/28, whose bootloader counts
+/// addresses in 16 bits.
+fn check_program(bytes: &[u8]) -> Result<()> {
+    ensure!(!bytes.is_empty(), "an empty file");
+    ensure!(
+        bytes.len() <= 1 << 16,
+        "{} bytes: more than the sensor holds",
+        bytes.len()
+    );
+    ensure!(
+        !bytes.is_ascii(),
+        "a text file, not raw bytes; of a HEX file `objcopy -I ihex -O binary` makes them"
+    );
+    Ok(())
+}
+
 /// Builds one image and says where it is. Each set of features has a folder of
 /// its own, so that none takes another's place.
-fn build(root: &Path, image: &str, features: &[&str]) -> Result<PathBuf> {
+fn build(root: &Path, image: &str, features: &[&str], program: Option<&Path>) -> Result<PathBuf> {
     toolchain::ensure_target(TARGET)?;
     let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
     let folder = root.join(folder);
     let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    if let Some(image) = env::var_os(IMAGE) {
-        // The build script runs in another folder.
-        let path = PathBuf::from(image);
-        cargo.env(
-            IMAGE,
-            path.canonicalize()
-                .with_context(|| path.display().to_string())?,
-        );
-    }
+    match program {
+        Some(path) => cargo.env(IMAGE, path),
+        None => cargo.env_remove(IMAGE),
+    };
     let status = cargo
         .current_dir(root)
-        .args(["build", "--quiet", "--locked", "--package", "dtof-firmware"])
+        .args(["build", "--locked", "--package", "dtof-firmware"])
+        .args((!io::stderr().is_terminal()).then_some("--quiet"))
         .args(["--bin", image, "--features", &features.join(",")])
         .args(["--target", TARGET, "--profile", PROFILE, "--target-dir"])
         .arg(&folder)
@@ -121,9 +155,9 @@ fn build(root: &Path, image: &str, features: &[&str]) -> Result<PathBuf> {
         bail!("{image} was built, but is not at {}", built.display());
     }
     let kept = folder.join(TARGET).join("images");
-    std::fs::create_dir_all(&kept).with_context(|| kept.display().to_string())?;
+    fs::create_dir_all(&kept).with_context(|| kept.display().to_string())?;
     let kept = kept.join(format!("{image}+{}", features.join("+")));
-    std::fs::copy(&built, &kept).with_context(|| kept.display().to_string())?;
+    fs::copy(&built, &kept).with_context(|| kept.display().to_string())?;
     Ok(kept)
 }
 
@@ -142,4 +176,19 @@ pub fn image(root: &Path, board: &str, sensor: Option<&str>) -> Result<()> {
     };
     println!("{}", path.display());
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_is_raw_bytes_that_fit() {
+        assert!(check_program(&[0, 0x20, 0xff]).is_ok());
+        assert!(check_program(&vec![0xff; 1 << 16]).is_ok());
+        assert!(check_program(&vec![0xff; (1 << 16) + 1]).is_err());
+        assert!(check_program(b"").is_err());
+        assert!(check_program(b":10000000").is_err());
+        assert!(check_program(b"const unsigned char image[] = {").is_err());
+    }
 }

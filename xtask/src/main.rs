@@ -1,6 +1,7 @@
 //! `cargo xtask`: what set-up and checks need beyond cargo itself.
 
 mod boards;
+mod debugger;
 mod emulate;
 mod figures;
 mod firmware;
@@ -11,7 +12,10 @@ mod qemu;
 mod self_test;
 mod sizes;
 mod source;
+mod stack;
+mod stack_bound;
 mod symbols;
+mod thumb;
 mod toolchain;
 mod tools;
 
@@ -32,13 +36,16 @@ cargo xtask <command>
   image BOARD [SENSOR]
                 build the sidecar for mps2-an386 or stm32f405; for the latter also
                 with tdc7200 or tmf882x connected instead of simulated photons
-  sizes         flash and RAM of each image
+  sizes         flash, RAM and stack of each image
   emulate [--port PORT] [exit|panic|fault]
                 run the sidecar in QEMU, its serial port on a TCP port (5386)
-  flash [--chip CHIP] [SENSOR]
-                write the sidecar onto an STM32F405 or STM32F407 and show its log;
-                the chip as probe-rs names it, by default that of the Discovery
-  check-boards  the images start, end and echo in QEMU
+  flash [--chip CHIP] [SENSOR | self-test]
+                write the sidecar onto an STM32F405 or STM32F407 and show its log, or
+                the self-test and show its lines, which should be those of
+                firmware/self-test.out; the chip as probe-rs names it, by default
+                that of the Discovery
+  check-boards  the images start, decide and end in QEMU, and keep to their
+                stack
   figures [--all] [--check]
                 work out the figures of the documentation and the verdicts on the
                 paper's claims, from the seeds of a quick look and the kept rest or

@@ -11,11 +11,17 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use dtof::device::{self, Port};
 
+use crate::debugger::Debugger;
 use crate::firmware::Board;
+use crate::stack::{self, Image};
 use crate::tools::QEMU;
 
 /// How long anything may take that takes no time.
 const PATIENCE: Duration = Duration::from_secs(20);
+
+/// What an image asks for that ends: `SYS_EXIT` and `SYS_EXIT_EXTENDED` of
+/// Arm's semihosting.
+const SYS_EXIT: [u32; 2] = [0x18, 0x20];
 
 /// QEMU's version: major and minor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,21 +92,33 @@ pub fn command(board: Board, image: &Path, port: Option<u16>, words: &[&str]) ->
     Ok(command)
 }
 
-/// A running emulator, ended when dropped.
+/// An emulator, ended when dropped. It is under a debugger's control, so that
+/// the stack can be read before it ends.
 pub struct Emulator {
     child: Child,
     port: u16,
+    debugger: Debugger,
+    image: Image,
     output: Option<JoinHandle<Vec<u8>>>,
 }
 
+/// How an image has ended its emulator.
+pub struct End {
+    pub status: ExitStatus,
+    /// What was printed.
+    pub output: Vec<u8>,
+    /// Bytes of the stack that were used.
+    pub stack: u64,
+}
+
 impl Emulator {
-    /// Starts an image with its serial port on a free TCP port.
-    pub fn start(board: Board, image: &Path, words: &[&str]) -> Result<Self> {
-        // Free now; should another take it meanwhile, QEMU ends at once.
-        let port = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?
-            .local_addr()?
-            .port();
-        let mut child = command(board, image, Some(port), words)?
+    /// Starts an image with its serial port on a free TCP port; before its first
+    /// instruction it waits.
+    pub fn start(board: Board, path: &Path, words: &[&str]) -> Result<Self> {
+        let image = Image::read(path)?;
+        let [port, debugger_port] = free_ports()?;
+        let mut child = command(board, path, Some(port), words)?
+            .args(["-S", "-gdb", &format!("tcp:127.0.0.1:{debugger_port}")])
             .stdout(Stdio::piped())
             .spawn()
             .with_context(|| format!("{} does not start", QEMU.program))?;
@@ -111,55 +129,117 @@ impl Emulator {
             let _ = stdout.read_to_end(&mut bytes);
             bytes
         });
+        let debugger = match open(&mut child, || Debugger::connect(debugger_port, PATIENCE)) {
+            Ok(debugger) => debugger,
+            Err(error) => {
+                // It may have ended by itself.
+                let _ = child.kill();
+                let _ = child.wait();
+                return Err(error);
+            }
+        };
         Ok(Self {
             child,
             port,
+            debugger,
+            image,
             output: Some(output),
         })
     }
 
-    /// Connects to the serial port.
+    /// Lets the image run and connects to its serial port.
     pub fn connect(&mut self) -> Result<Box<dyn Port>> {
-        let start = Instant::now();
-        loop {
-            let error = match device::open(&format!("tcp:127.0.0.1:{}", self.port)) {
-                Ok(port) => return Ok(port),
-                Err(error) => error,
-            };
-            if let Some(status) = self.child.try_wait()? {
-                bail!("QEMU ended at once: {status}");
-            }
-            if start.elapsed() > PATIENCE {
-                return Err(error).context("QEMU does not open its serial port");
-            }
-            thread::sleep(Duration::from_millis(20));
-        }
+        self.debugger.resume()?;
+        let port = format!("tcp:127.0.0.1:{}", self.port);
+        open(&mut self.child, || device::open(&port))
     }
 
-    /// Waits until the image ends QEMU; how it did, and what was printed.
-    pub fn wait(mut self) -> Result<(ExitStatus, Vec<u8>)> {
+    /// Lets the image run until it ends QEMU. With QEMU ends its memory, so the
+    /// image is stopped before whatever it asks of the emulator.
+    pub fn wait(mut self) -> Result<End> {
         let start = Instant::now();
+        for &address in &self.image.semihosting {
+            self.debugger.set_breakpoint(address, true)?;
+        }
         loop {
+            self.debugger.resume()?;
+            self.debugger.wait_for_stop()?;
+            let registers = self.debugger.registers()?;
+            if SYS_EXIT.contains(&registers[0]) {
+                break;
+            }
+            if start.elapsed() > PATIENCE {
+                bail!("the image does not end after {PATIENCE:?}");
+            }
+            let address = registers[15].into();
+            self.debugger.set_breakpoint(address, false)?;
+            self.debugger.step()?;
+            self.debugger.set_breakpoint(address, true)?;
+        }
+        let stack = self.stack()?;
+        for &address in &self.image.semihosting {
+            self.debugger.set_breakpoint(address, false)?;
+        }
+        self.debugger.resume()?;
+        let status = loop {
             if let Some(status) = self.child.try_wait()? {
-                return Ok((status, self.output()));
+                break status;
             }
             if start.elapsed() > PATIENCE {
                 bail!("the image does not end after {PATIENCE:?}");
             }
             thread::sleep(Duration::from_millis(20));
+        };
+        Ok(End {
+            status,
+            output: self
+                .output
+                .take()
+                .and_then(|output| output.join().ok())
+                .unwrap_or_default(),
+            stack,
+        })
+    }
+
+    /// Ends QEMU; bytes of the stack that were used.
+    pub fn stop(mut self) -> Result<u64> {
+        self.debugger.interrupt()?;
+        self.stack()
+    }
+
+    /// Bytes of the stack that were used.
+    fn stack(&mut self) -> Result<u64> {
+        let memory = self.debugger.memory(self.image.stack.clone())?;
+        Ok(stack::high_water(&memory))
+    }
+}
+
+/// Two TCP ports that are free now; should another take one meanwhile, QEMU ends
+/// at once.
+fn free_ports() -> Result<[u16; 2]> {
+    let bind = || TcpListener::bind((Ipv4Addr::LOCALHOST, 0));
+    let (first, second) = (bind()?, bind()?);
+    Ok([first.local_addr()?.port(), second.local_addr()?.port()])
+}
+
+/// Opens what QEMU is about to open.
+fn open<T, E: Into<anyhow::Error>>(
+    child: &mut Child,
+    open: impl Fn() -> Result<T, E>,
+) -> Result<T> {
+    let start = Instant::now();
+    loop {
+        let error = match open() {
+            Ok(opened) => return Ok(opened),
+            Err(error) => error,
+        };
+        if let Some(status) = child.try_wait()? {
+            bail!("QEMU ended at once: {status}");
         }
-    }
-
-    /// Ends QEMU; what was printed.
-    pub fn stop(mut self) -> Result<Vec<u8>> {
-        self.child.kill()?;
-        self.child.wait()?;
-        Ok(self.output())
-    }
-
-    fn output(&mut self) -> Vec<u8> {
-        let output = self.output.take().and_then(|output| output.join().ok());
-        output.unwrap_or_default()
+        if start.elapsed() > PATIENCE {
+            return Err(error.into()).context("QEMU does not open its ports");
+        }
+        thread::sleep(Duration::from_millis(20));
     }
 }
 

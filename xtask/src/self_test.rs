@@ -8,7 +8,8 @@ use anyhow::{Context, Result, ensure};
 use dtof_firmware::self_test;
 
 use crate::firmware::Board;
-use crate::qemu::{self, Emulator};
+use crate::qemu::{self, Emulator, End};
+use crate::stack;
 
 const EXPECTED: &str = "firmware/self-test.out";
 
@@ -27,7 +28,11 @@ pub fn run(root: &Path) -> Result<()> {
 fn run_on(board: Board, root: &Path, expected: &str) -> Result<()> {
     let name = board.name();
     let image = board.self_test(root)?;
-    let (status, output) = Emulator::start(board, &image, &[])?.wait()?;
+    let End {
+        status,
+        output,
+        stack,
+    } = Emulator::start(board, &image, &[])?.wait()?;
 
     let differences = differences(expected, &String::from_utf8_lossy(&output));
     for line in &differences {
@@ -38,8 +43,9 @@ fn run_on(board: Board, root: &Path, expected: &str) -> Result<()> {
         "{name}: differs from {EXPECTED}, see above"
     );
     ensure!(status.success(), "{name}: QEMU: {status}");
+    ensure!(stack <= stack::MOST, "{name}: {stack} bytes of stack");
     println!(
-        "{name}: {} lines as in {EXPECTED}",
+        "{name}: {} lines as in {EXPECTED}; {stack} bytes of stack",
         expected.lines().count()
     );
     Ok(())

@@ -11,6 +11,7 @@ use core::panic::PanicInfo;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use dtof_core::AsyncPixel;
 use dtof_firmware::board::{mps2_an386::Mps2An386, turn};
+use dtof_firmware::sensor::Sensor;
 use dtof_firmware::sensor::simulated;
 use dtof_firmware::sidecar::{BINS, Sidecar};
 use heapless::Vec;
@@ -24,8 +25,8 @@ fn main() -> ! {
     let (mut board, mut serial) = Mps2An386::start();
     defmt::info!("mps2-an386 started");
     board.obey_command_line();
-    let mut sidecar = Sidecar::new(PIXELS.take(), true);
     let mut sensor = simulated::scene();
+    let mut sidecar = Sidecar::new(PIXELS.take(), Some(sensor.about()));
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
             let lost = serial.lost();

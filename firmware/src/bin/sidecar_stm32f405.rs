@@ -11,6 +11,7 @@ use core::panic::PanicInfo;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use dtof_core::AsyncPixel;
 use dtof_firmware::board::{stm32f405::Stm32F405, turn};
+use dtof_firmware::sensor::Sensor;
 #[cfg(not(any(feature = "sensor-tdc7200", feature = "sensor-tmf882x")))]
 use dtof_firmware::sensor::simulated;
 use dtof_firmware::sidecar::{BINS, Sidecar};
@@ -25,13 +26,13 @@ fn main() -> ! {
     #[allow(unused_variables, reason = "the simulated sensor is not connected")]
     let (mut board, mut serial, port) = Stm32F405::start();
     defmt::info!("stm32f405 started");
-    let mut sidecar = Sidecar::new(PIXELS.take(), true);
     #[cfg(feature = "sensor-tdc7200")]
     let mut sensor = port.tdc7200();
     #[cfg(feature = "sensor-tmf882x")]
     let mut sensor = port.tmf882x(include_bytes!(concat!(env!("OUT_DIR"), "/tmf882x.bin")));
     #[cfg(not(any(feature = "sensor-tdc7200", feature = "sensor-tmf882x")))]
     let mut sensor = simulated::scene();
+    let mut sidecar = Sidecar::new(PIXELS.take(), Some(sensor.about()));
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
             let lost = serial.lost();

@@ -6,19 +6,23 @@
 //! | 0x02 | device | photons | [`Token`]s |
 //! | 0x03 | device | synchronise | anything |
 //! | 0x04 | device | statistics request | none |
+//! | 0x05 | device | sensor request | none |
 //! | 0x81 | host | configured | none |
 //! | 0x82 | host | refused | a [`Refusal`], 1 byte |
 //! | 0x83 | host | events | AER words of 16 bytes |
 //! | 0x84 | host | synchronised | the same, after all that came before it |
-//! | 0x85 | host | statistics | [`Report`], 120 bytes |
+//! | 0x85 | host | statistics | [`Report`], 121 bytes |
+//! | 0x86 | host | sensor | [`About`], 10 bytes |
 
+use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{ConfigError, GateError, RangeScaleError, Statistics};
 use heapless::Vec;
 
 use super::endpoint::LinkCounters;
+use crate::sensor::About;
 
 /// The version both ends announce when a session begins.
-pub const LINK_VERSION: u16 = 1;
+pub const LINK_VERSION: u16 = 2;
 
 /// Host to device: a [`Configuration`].
 pub const CONFIGURE: u8 = 0x01;
@@ -28,6 +32,8 @@ pub const PHOTONS: u8 = 0x02;
 pub const SYNCHRONISE: u8 = 0x03;
 /// Host to device: send a [`Report`].
 pub const STATISTICS_REQUEST: u8 = 0x04;
+/// Host to device: say what the sensor is.
+pub const SENSOR_REQUEST: u8 = 0x05;
 /// Device to host: the configuration is in force.
 pub const CONFIGURED: u8 = 0x81;
 /// Device to host: the configuration is not; a [`Refusal`].
@@ -38,6 +44,37 @@ pub const EVENTS: u8 = 0x83;
 pub const SYNCHRONISED: u8 = 0x84;
 /// Device to host: a [`Report`].
 pub const STATISTICS: u8 = 0x85;
+/// Device to host: what [`about_to_le_bytes`] makes.
+pub const SENSOR: u8 = 0x86;
+
+/// Bytes of what a device says of its sensor.
+pub const ABOUT_BYTES: usize = 10;
+
+/// What a device says of its sensor, or that it has none: no pixels.
+#[must_use]
+pub fn about_to_le_bytes(sensor: Option<&About>) -> [u8; ABOUT_BYTES] {
+    let Some(about) = sensor else {
+        return [0; ABOUT_BYTES];
+    };
+    let [a, b] = about.pixels.to_le_bytes();
+    let [c, d, e, f] = about.bin_width.unwrap_or_default().to_le_bytes();
+    let [g, h, i, j] = about.offset.to_le_bytes();
+    [a, b, c, d, e, f, g, h, i, j]
+}
+
+/// As it was received: the sensor, or that there is none. `None` if it is not as
+/// long as that.
+#[must_use]
+pub fn about_from_le_bytes(bytes: &[u8]) -> Option<Option<About>> {
+    let [a, b, c, d, e, f, g, h, i, j]: [u8; ABOUT_BYTES] = bytes.try_into().ok()?;
+    let pixels = u16::from_le_bytes([a, b]);
+    let bin_width = U16F16::from_le_bytes([c, d, e, f]);
+    Some((pixels > 0).then_some(About {
+        pixels,
+        bin_width: (bin_width > 0).then_some(bin_width),
+        offset: I24F8::from_le_bytes([g, h, i, j]),
+    }))
+}
 
 /// What a photons message is made of. Tokens begin at pixel 0 in each message
 /// and after each end of a laser cycle, and do not reach over the end of a
@@ -239,10 +276,12 @@ pub enum Refusal {
     MinimumCount = 10,
     /// The device has no sensor.
     NoSensor = 11,
+    /// The bins of the sensor are not as wide as that.
+    BinWidth = 12,
 }
 
 impl Refusal {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 12] = [
         Self::Unknown,
         Self::ZeroX,
         Self::XAboveL1,
@@ -254,6 +293,7 @@ impl Refusal {
         Self::Pixels,
         Self::MinimumCount,
         Self::NoSensor,
+        Self::BinWidth,
     ];
 
     /// From its number on the wire.
@@ -279,6 +319,7 @@ impl core::fmt::Display for Refusal {
             Self::Pixels => f.write_str("the device does not have that many pixels"),
             Self::MinimumCount => f.write_str("the minimum peak count must be from 1 to 1023"),
             Self::NoSensor => f.write_str("the device has no sensor"),
+            Self::BinWidth => f.write_str("the bins of the sensor are not as wide as that"),
         }
     }
 }
@@ -330,13 +371,16 @@ pub struct Report {
     pub unknown: u32,
     /// Errors of the sensor.
     pub sensor_errors: u32,
+    /// The last of them: the number of a
+    /// [`SensorFault`](crate::sensor::SensorFault), 0 before the first.
+    pub last_sensor_error: u8,
     /// The device's end of the link.
     pub link: LinkCounters,
 }
 
 impl Report {
     /// Bytes of the record.
-    pub const BYTES: usize = 10 * 8 + 10 * 4;
+    pub const BYTES: usize = 10 * 8 + 10 * 4 + 1;
 
     /// As it is sent.
     #[must_use]
@@ -386,13 +430,15 @@ impl Report {
         ];
         let wide = wide.into_iter().flat_map(u64::to_le_bytes);
         let narrow = narrow.into_iter().flat_map(u32::to_le_bytes);
-        wide.chain(narrow).collect()
+        let last = [self.last_sensor_error];
+        wide.chain(narrow).chain(last).collect()
     }
 
     /// As it was received, or `None` if it is not as long as the record.
     #[must_use]
     pub fn from_le_bytes(bytes: &[u8]) -> Option<Self> {
-        let (wide, narrow) = bytes.split_at_checked(10 * 8)?;
+        let (&last_sensor_error, numbers) = bytes.split_last()?;
+        let (wide, narrow) = numbers.split_at_checked(10 * 8)?;
         let mut wide = wide
             .chunks_exact(8)
             .filter_map(|eight| Some(u64::from_le_bytes(eight.try_into().ok()?)));
@@ -416,6 +462,7 @@ impl Report {
             overrun: narrow.next()?,
             unknown: narrow.next()?,
             sensor_errors: narrow.next()?,
+            last_sensor_error,
             link: LinkCounters {
                 frames: narrow.next()?,
                 corrupt: narrow.next()?,

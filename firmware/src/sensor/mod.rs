@@ -23,13 +23,16 @@
     clippy::unwrap_used
 )]
 
+mod fault;
 pub mod simulated;
 pub mod tdc7200;
 mod timer;
 pub mod tmf882x;
 
 use dtof_core::PixelAddress;
-use dtof_core::fixed::types::U16F16;
+use dtof_core::fixed::types::{I24F8, U16F16};
+
+pub use self::fault::SensorFault;
 
 /// Where a sensor's photons go.
 pub trait PhotonSink {
@@ -49,13 +52,21 @@ pub trait PhotonSink {
 /// at once while the answer is not [`Polled::Idle`], but not without a bound: a
 /// fast sensor may always have more.
 pub trait Sensor {
-    /// What can go wrong; the error of the bus is inside.
-    type Error;
+    /// What can go wrong; the error of the bus is inside. A host is told the kind.
+    type Error: Into<SensorFault>;
 
-    /// How wide the bins of the configuration in force are, in picoseconds. A
-    /// sensor that measures times makes its TDC codes that wide from now on; one
-    /// with bins of its own takes no notice.
-    fn set_bin_width(&mut self, _bin_width: U16F16) {}
+    /// What a host has to know of it.
+    fn about(&self) -> About;
+
+    /// A configuration comes into force: whatever is under way is given up, and
+    /// what the next polls give begins anew. A sensor that measures times makes its
+    /// TDC codes `bin_width` picoseconds wide, which is above 0; for one with bins
+    /// of its own it is about theirs.
+    fn start(&mut self, bin_width: U16F16);
+
+    /// Nothing is asked before the next [`Self::start`]: as far as it can at once
+    /// and without an answer, the sensor rests.
+    fn stop(&mut self);
 
     /// Takes the next step. `now_ms` counts milliseconds and may wrap.
     ///
@@ -63,6 +74,39 @@ pub trait Sensor {
     /// What went wrong. The sensor is brought up again by the polls that
     /// follow.
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Self::Error>;
+}
+
+/// What a host has to know of a sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct About {
+    /// Its pixels have addresses below this.
+    pub pixels: u16,
+    /// How wide its bins are, in picoseconds; `None` if as wide as the
+    /// configuration says.
+    pub bin_width: Option<U16F16>,
+    /// The range of the start of bin 0 in millimetres, as far as it is known.
+    pub offset: I24F8,
+}
+
+impl About {
+    /// Bins of any width, from the laser pulse on.
+    #[must_use]
+    pub const fn new(pixels: u16) -> Self {
+        Self {
+            pixels,
+            bin_width: None,
+            offset: I24F8::ZERO,
+        }
+    }
+
+    /// Whether bins of the width of a configuration are this sensor's: within a
+    /// sixteenth, which leaves room for a calibration.
+    #[must_use]
+    pub fn has_bins_of(&self, bin_width: U16F16) -> bool {
+        self.bin_width
+            .is_none_or(|own| own.abs_diff(bin_width) <= own / 16)
+    }
 }
 
 /// What a poll came to.

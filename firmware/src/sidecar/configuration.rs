@@ -10,10 +10,12 @@ impl Sidecar<'_> {
     /// Validates a configuration and takes it on, all pixels at the beginning of
     /// an exposure. The one before stays if it is refused.
     pub(super) fn configure(&mut self, wanted: &Configuration) -> Result<(), Refusal> {
-        let source = match (wanted.source, wanted.rule) {
-            (0, 0) => Source::Link,
-            (1, 0) if self.has_sensor => Source::Sensor,
-            (1, 0) => return Err(Refusal::NoSensor),
+        let bin_width = U16F16::from_bits(wanted.bin_width);
+        let source = match (wanted.source, wanted.rule, self.sensor) {
+            (0, 0, _) => Source::Link,
+            (1, 0, Some(sensor)) if sensor.has_bins_of(bin_width) => Source::Sensor,
+            (1, 0, Some(_)) => return Err(Refusal::BinWidth),
+            (1, 0, None) => return Err(Refusal::NoSensor),
             _ => return Err(Refusal::Unknown),
         };
         let minimum = Count::saturating(wanted.minimum_count.into());
@@ -26,7 +28,6 @@ impl Sidecar<'_> {
         let gate = RangeGate::new(wanted.gate_first, wanted.gate_last)?;
         let rule = PaperRule::new(U8F8::from_bits(wanted.alpha), minimum);
         let config = PixelConfig::new(wanted.x, wanted.l1, wanted.l2, gate, rule)?;
-        let bin_width = U16F16::from_bits(wanted.bin_width);
         RangeScale::new(bin_width, I24F8::from_bits(wanted.offset))?;
         self.pixels.clear();
         for address in 0..wanted.pixels {
@@ -36,6 +37,7 @@ impl Sidecar<'_> {
         self.config = Some(config);
         self.bin_width = bin_width;
         self.source = source;
+        self.started = false;
         self.restart_counts();
         Ok(())
     }

@@ -26,6 +26,8 @@ use heapless::vec::{Vec, VecView};
 use crate::link::endpoint::{BODY_BYTES, Endpoint, Message};
 use crate::link::frame::{Deframer, FrameError, WIRE_BYTES};
 use crate::link::message::{self, Configuration, LINK_VERSION, Refusal, Report, Source};
+use crate::sensor::About;
+use crate::sensor::SensorFault;
 
 use self::photons::Photons;
 
@@ -55,7 +57,11 @@ pub struct Sidecar<'a> {
     /// Of the configuration in force, for sensors that measure times.
     bin_width: U16F16,
     source: Source,
-    has_sensor: bool,
+    sensor: Option<About>,
+    /// The sensor has been started and not been stopped.
+    running: bool,
+    /// It was started for the configuration in force.
+    started: bool,
     photons: Option<Photons>,
     /// Waits for room in the window; nothing else is done before it.
     answer: Option<Answer>,
@@ -71,13 +77,14 @@ pub struct Sidecar<'a> {
     unaddressed: u64,
     unknown: u32,
     sensor_errors: u32,
+    sensor_fault: Option<SensorFault>,
 }
 
 impl<'a> Sidecar<'a> {
-    /// Waits for a host. `pixels` is the room for them, `has_sensor` says whether
-    /// photons may come from anywhere but the link.
+    /// Waits for a host. `pixels` is the room for them, `sensor` what is to be known
+    /// of the sensor if photons may come from anywhere but the link.
     #[must_use]
-    pub fn new(pixels: &'a mut VecView<AsyncPixel<BINS>>, has_sensor: bool) -> Self {
+    pub fn new(pixels: &'a mut VecView<AsyncPixel<BINS>>, sensor: Option<About>) -> Self {
         pixels.clear();
         let room = u16::try_from(pixels.capacity()).unwrap_or(u16::MAX);
         #[allow(clippy::cast_possible_truncation, reason = "128")]
@@ -92,7 +99,9 @@ impl<'a> Sidecar<'a> {
             config: None,
             bin_width: U16F16::ZERO,
             source: Source::Link,
-            has_sensor,
+            sensor,
+            running: false,
+            started: false,
             photons: None,
             answer: None,
             encoder: AerEncoder::new(),
@@ -104,6 +113,7 @@ impl<'a> Sidecar<'a> {
             unaddressed: 0,
             unknown: 0,
             sensor_errors: 0,
+            sensor_fault: None,
         }
     }
 
@@ -224,6 +234,10 @@ impl<'a> Sidecar<'a> {
                 None
             }
             message::SYNCHRONISE => Some((message::SYNCHRONISED, message.body)),
+            message::SENSOR_REQUEST => {
+                let about = message::about_to_le_bytes(self.sensor.as_ref());
+                Some((message::SENSOR, about.into_iter().collect()))
+            }
             message::STATISTICS_REQUEST => {
                 let report = self.report(overrun).to_le_bytes();
                 Some((message::STATISTICS, report.into_iter().collect()))
@@ -347,6 +361,7 @@ impl<'a> Sidecar<'a> {
             overrun,
             unknown: self.unknown,
             sensor_errors: self.sensor_errors,
+            last_sensor_error: self.sensor_fault.map_or(0, |fault| fault as u8),
             link: *self.endpoint.counters(),
         }
     }

@@ -5,7 +5,7 @@ use embedded_io::{Read, ReadReady, Write, WriteReady};
 
 use super::{BINS, Sidecar, has_room_for_event};
 use crate::link::message::{self, Source};
-use crate::sensor::{PhotonSink, Polled, Sensor};
+use crate::sensor::{PhotonSink, Polled, Sensor, SensorFault};
 
 /// Polls of the sensor one after the other. A sensor that always has more must
 /// not keep the link waiting.
@@ -13,7 +13,7 @@ const POLLS: usize = 4;
 
 impl Sidecar<'_> {
     /// [`Self::poll`], and `sensor` while a configuration takes photons from it.
-    /// Its errors are counted in the report.
+    /// Its errors are counted in the report, which names the last.
     ///
     /// # Errors
     /// Those of `serial`.
@@ -30,21 +30,38 @@ impl Sidecar<'_> {
     }
 
     /// Asks `sensor` while a configuration takes photons from it, and again while
-    /// it has more, up to a bound. Its errors are counted in the report.
+    /// it has more, up to a bound. Its errors are counted in the report, which names
+    /// the last.
     pub fn poll_sensor(&mut self, sensor: &mut impl Sensor, now_ms: u32) {
+        let wanted = self.config.is_some() && self.source == Source::Sensor;
+        if wanted && !self.started {
+            sensor.start(self.bin_width);
+            (self.started, self.running) = (true, true);
+        } else if !wanted && self.running {
+            sensor.stop();
+            self.running = false;
+        }
         for _ in 0..POLLS {
             if !self.takes_sensor() {
                 return;
             }
-            sensor.set_bin_width(self.bin_width);
             match sensor.poll(now_ms, self) {
                 Ok(Polled::Idle) => return,
                 Ok(Polled::Working | Polled::Data) => {}
-                Err(_) => {
-                    self.sensor_errors = self.sensor_errors.saturating_add(1);
+                Err(error) => {
+                    self.sensor_failed(error.into());
                     return;
                 }
             }
+        }
+    }
+
+    /// Counts an error, and logs one of another kind than the last.
+    fn sensor_failed(&mut self, fault: SensorFault) {
+        self.sensor_errors = self.sensor_errors.saturating_add(1);
+        if self.sensor_fault.replace(fault) != Some(fault) {
+            #[cfg(all(target_os = "none", feature = "defmt"))]
+            defmt::warn!("sensor: {}", fault);
         }
     }
 

@@ -1,10 +1,11 @@
 //! A host on a good wire, and a sensor that gives what a script says.
 
+use dtof_core::fixed::types::U16F16;
 use dtof_core::{AerDecoder, AerRecord, AerWord, DepthEvent, PixelAddress};
 use dtof_firmware::link::endpoint::Endpoint;
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::{self, Configuration, Report};
-use dtof_firmware::sensor::{PhotonSink, Polled, Sensor};
+use dtof_firmware::sensor::{About, PhotonSink, Polled, Sensor, SensorFault};
 use dtof_firmware::sidecar::{Sidecar, greeting};
 
 /// A configuration that takes photons from the sensor.
@@ -135,10 +136,23 @@ pub enum Call {
 pub struct Scripted<I>(pub I);
 
 impl<I: Iterator<Item = Option<Vec<Call>>>> Sensor for Scripted<I> {
-    type Error = ();
+    type Error = SensorFault;
 
-    fn poll(&mut self, _: u32, sink: &mut impl PhotonSink) -> Result<Polled, ()> {
-        for call in self.0.next().unwrap_or(Some(Vec::new())).ok_or(())? {
+    fn about(&self) -> About {
+        About::new(256)
+    }
+
+    fn start(&mut self, _: U16F16) {}
+
+    fn stop(&mut self) {}
+
+    fn poll(&mut self, _: u32, sink: &mut impl PhotonSink) -> Result<Polled, SensorFault> {
+        for call in self
+            .0
+            .next()
+            .unwrap_or(Some(Vec::new()))
+            .ok_or(SensorFault::Data)?
+        {
             match call {
                 Call::Photon(pixel, code) => sink.photon(PixelAddress(pixel), code),
                 Call::End(cycles) => sink.end_laser_cycles(cycles),

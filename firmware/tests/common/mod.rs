@@ -4,6 +4,7 @@
 #![allow(dead_code, reason = "no test uses all of it")]
 
 pub mod host;
+pub mod plug;
 pub mod tmf882x;
 
 use std::cell::{Cell, RefCell};

@@ -1,6 +1,8 @@
 //! `dtof monitor`: the events of a device with a sensor, as they come.
 
 use std::io::{self, BufWriter};
+use std::process;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context, Result};
@@ -8,26 +10,30 @@ use clap::Args;
 use dtof::device::{self, Client};
 use dtof::monitor::monitor;
 use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_firmware::sensor::About;
 
 use super::operation::{Operation, number};
+
+/// Ctrl-C was pressed, or the program is asked to end in another way.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 #[derive(Args)]
 pub struct Monitor {
     /// tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated device
     #[arg(long, value_name = "DEVICE")]
     device: String,
-    /// Pixels of the sensor, with addresses from 0
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..))]
-    pixels: u16,
-    /// End after so many seconds [default: never]
+    /// Pixels of the sensor, with addresses from 0 [default: as the device says]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pixels: Option<u16>,
+    /// End after so many seconds [default: at Ctrl-C]
     #[arg(long, value_name = "S")]
     seconds: Option<u32>,
-    /// Picoseconds a bin, rounded to 1/65536
-    #[arg(long, value_name = "PS", value_parser = number::<U16F16>, default_value = "250", allow_hyphen_values = true)]
-    bin_width_ps: U16F16,
-    /// Millimetres added to every range, rounded to 1/256
-    #[arg(long, value_name = "MM", value_parser = number::<I24F8>, default_value = "0", allow_hyphen_values = true)]
-    offset_mm: I24F8,
+    /// Picoseconds a bin, rounded to 1/65536 [default: as the device says, 250 if any will do]
+    #[arg(long, value_name = "PS", value_parser = number::<U16F16>, allow_hyphen_values = true)]
+    bin_width_ps: Option<U16F16>,
+    /// Millimetres added to every range, rounded to 1/256 [default: as the device says]
+    #[arg(long, value_name = "MM", value_parser = number::<I24F8>, allow_hyphen_values = true)]
+    offset_mm: Option<I24F8>,
     #[command(flatten)]
     operation: Operation,
 }
@@ -36,18 +42,34 @@ impl Monitor {
     pub fn run(&self) -> Result<()> {
         let name = || self.device.clone();
         let mut client = Client::new(device::open(&self.device)?).with_context(name)?;
+        ctrlc::set_handler(|| {
+            // Who asks a second time does not wait for the device.
+            if INTERRUPTED.swap(true, Ordering::Relaxed) {
+                process::exit(130);
+            }
+        })?;
+        // A device without a sensor says so when it is configured.
+        let sensor = client.sensor().with_context(name)?;
+        let sensor = sensor.unwrap_or(About::new(client.pixels()));
+        let pixels = self.pixels.unwrap_or(sensor.pixels.min(client.pixels()));
+        let any = const { U16F16::lit("250") };
         let settings = self.operation.settings(
             client.bins().into(),
-            self.bin_width_ps,
-            self.offset_mm,
+            self.bin_width_ps.or(sensor.bin_width).unwrap_or(any),
+            self.offset_mm.unwrap_or(sensor.offset),
             0, // nothing is drawn here
         );
+        let length = self
+            .seconds
+            .map(|seconds| Duration::from_secs(seconds.into()));
         monitor(
             &mut client,
             &settings,
-            self.pixels,
-            self.seconds
-                .map(|seconds| Duration::from_secs(seconds.into())),
+            pixels,
+            |elapsed| {
+                INTERRUPTED.load(Ordering::Relaxed)
+                    || length.is_some_and(|length| elapsed >= length)
+            },
             &mut BufWriter::new(io::stdout().lock()),
             &mut io::stderr(),
         )

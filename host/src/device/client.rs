@@ -7,6 +7,7 @@ use dtof_core::{AER_VERSION, AerDecoder, AerRecord, AerWord, DepthEvent};
 use dtof_firmware::link::endpoint::{Endpoint, LinkCounters, Message};
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::{self, Configuration, LINK_VERSION, Refusal, Report};
+use dtof_firmware::sensor::About;
 use dtof_firmware::sidecar::greeting;
 
 use super::port::Port;
@@ -106,6 +107,21 @@ impl Client {
             }
             kind => bail!("the device answers with message {kind:#04x}"),
         }
+    }
+
+    /// What the device's sensor is, if it has one.
+    ///
+    /// # Errors
+    /// If the device is gone.
+    pub fn sensor(&mut self) -> Result<Option<About>> {
+        self.send(message::SENSOR_REQUEST, &[])?;
+        let answer = self.answer()?;
+        ensure!(
+            answer.kind == message::SENSOR,
+            "the device answers with message {:#04x}",
+            answer.kind
+        );
+        message::about_from_le_bytes(&answer.body).context("the device says nothing of its sensor")
     }
 
     /// Waits until the device has done all it was sent, and gives its events.

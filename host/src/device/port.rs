@@ -1,7 +1,7 @@
 //! Ports a device can be behind.
 
 use std::io::{self, ErrorKind, Read, Write};
-use std::net::TcpStream;
+use std::net::{TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
@@ -32,7 +32,7 @@ pub trait Port {
 
 impl Port for TcpStream {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.write_all(bytes)
+        self.write_all(bytes).map_err(gone)
     }
 
     fn receive(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
@@ -73,7 +73,15 @@ fn patient(result: io::Result<usize>) -> io::Result<usize> {
         {
             Ok(0)
         }
-        result => result,
+        result => result.map_err(gone),
+    }
+}
+
+/// A port that closes is not a reader of the output that has seen enough.
+fn gone(error: io::Error) -> io::Error {
+    match error.kind() {
+        ErrorKind::BrokenPipe => io::Error::new(ErrorKind::NotConnected, "the port is gone"),
+        _ => error,
     }
 }
 
@@ -101,8 +109,36 @@ pub fn open(name: &str) -> Result<Box<dyn Port>> {
 /// # Errors
 /// If nobody listens.
 pub fn tcp(address: &str) -> io::Result<TcpStream> {
-    let stream = TcpStream::connect(address)?;
+    let mut failed = None;
+    let mut connected = None;
+    for address in address.to_socket_addrs()? {
+        match TcpStream::connect_timeout(&address, STUCK) {
+            Ok(stream) => {
+                connected = Some(stream);
+                break;
+            }
+            Err(error) => failed = Some(error),
+        }
+    }
+    let unknown = || failed.unwrap_or_else(|| ErrorKind::AddrNotAvailable.into());
+    let stream = connected.ok_or_else(unknown)?;
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(PATIENCE))?;
     Ok(stream)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Else the program would end as if all were well.
+    #[test]
+    fn a_port_that_closes_is_not_a_closed_output() {
+        let closed = |kind| patient(Err(io::Error::from(kind))).unwrap_err().kind();
+        assert_eq!(closed(ErrorKind::BrokenPipe), ErrorKind::NotConnected);
+        assert_eq!(
+            closed(ErrorKind::ConnectionReset),
+            ErrorKind::ConnectionReset
+        );
+    }
 }

@@ -1,7 +1,7 @@
 //! An emulated device of one's own: `cargo xtask emulate` in this workspace.
 
 use std::env;
-use std::io;
+use std::io::{self, IsTerminal};
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -36,13 +36,18 @@ impl Emulator {
         command
             .current_dir(workspace)
             .args(["xtask", "emulate", "--port", &number.to_string()])
-            .stdin(Stdio::null())
+            // However this program ends, the other end of the pipe then does.
+            .args(["--until", "end-of-input"])
+            .stdin(Stdio::piped())
             .stdout(Stdio::null());
         #[cfg(unix)]
         {
             use std::os::unix::process::CommandExt;
             // Of its own, so that the emulator ends with the cargo that ran it.
             command.process_group(0);
+        }
+        if io::stderr().is_terminal() {
+            eprintln!("starting the emulator; its image may have to be built first");
         }
         let mut cargo = command.spawn().context("cargo does not start")?;
         let since = Instant::now();
@@ -86,6 +91,14 @@ impl Drop for Emulator {
 
 /// Ends cargo and all it has started.
 fn end(cargo: &mut Child) {
+    drop(cargo.stdin.take());
+    let since = Instant::now();
+    while since.elapsed() < Duration::from_secs(2) {
+        if !matches!(cargo.try_wait(), Ok(None)) {
+            return;
+        }
+        thread::sleep(Duration::from_millis(10));
+    }
     // The minus sign names the group. Where there is no `kill`, cargo alone ends.
     let group = format!("-{}", cargo.id());
     let _ = Command::new("kill").args(["-TERM", "--", &group]).status();

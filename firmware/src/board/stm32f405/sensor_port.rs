@@ -13,7 +13,7 @@
 //! | 3V | VDD | VDD |
 //! | GND | GND | GND |
 //!
-//! All at 3.3 V. PC8 is pulled up in the controller, and so are PA8 and PC9, but
+//! All at the board's 3 V. PC8 is pulled up in the controller, and so are PA8 and PC9, but
 //! too weakly for 400 kHz: the bus needs resistors of 1 to 4.7 kΩ to 3.3 V, which
 //! most modules have.
 
@@ -48,13 +48,16 @@ pub struct SensorPort {
 
 impl SensorPort {
     /// A TDC7200 with a clock of 8 MHz, on SPI2 at 10.5 MHz: one stop a
-    /// measurement, rising edges, 12 to 500 ns after START, which is where bin 0
-    /// starts. Its photons are those of pixel 0.
+    /// measurement, rising edges. Bin 0 starts 12 ns after START, the least it can
+    /// measure. Its photons are those of pixel 0.
     #[must_use]
     pub fn tdc7200(mut self) -> impl Sensor {
         const CONFIG: tdc7200::Config = {
             let settings = tdc7200::Settings::new(PixelAddress(0), 8_000, U16F16::lit("250"));
             match tdc7200::Config::new(tdc7200::Settings {
+                // A bin that can never hold a photon would be taken for one without
+                // background.
+                first_bin_ps: 12_000,
                 // 500 ns, if a turn of the ring oscillator takes 3.5.
                 overflow: 143,
                 ..settings

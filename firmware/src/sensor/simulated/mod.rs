@@ -58,11 +58,11 @@ use core::fmt;
 use core::num::NonZeroU16;
 
 use dtof_core::PixelAddress;
-use dtof_core::fixed::types::{U0F32, U8F24};
+use dtof_core::fixed::types::{U0F32, U8F24, U16F16};
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
-use super::{PhotonSink, Polled, Sensor};
+use super::{About, PhotonSink, Polled, Sensor};
 
 pub use self::poisson::Poisson;
 pub use self::scene::scene;
@@ -229,6 +229,18 @@ impl<'a> Simulated<'a> {
 
 impl Sensor for Simulated<'_> {
     type Error = Infallible;
+
+    fn about(&self) -> About {
+        let addresses = self.pixels.iter().map(|pixel| pixel.address.0);
+        About::new(addresses.max().map_or(0, |last| last.saturating_add(1)))
+    }
+
+    fn start(&mut self, _: U16F16) {
+        self.last_ms = None;
+        self.due = 0;
+    }
+
+    fn stop(&mut self) {}
 
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Infallible> {
         let cycles = self.cycles(now_ms);

@@ -1,9 +1,10 @@
 //! How a TDC7200 measures.
 
 use core::fmt;
+use core::ops::RangeInclusive;
 
 use dtof_core::PixelAddress;
-use dtof_core::fixed::types::U16F16;
+use dtof_core::fixed::types::{I24F8, U16F16};
 
 use super::registers::{FORCE_CAL, MEAS_MODE_2, PARITY_EN, START_EDGE, STOP_EDGE};
 use super::time::CalibrationPeriods;
@@ -18,6 +19,9 @@ pub enum Mode {
     /// Ring oscillator and reference clock, for 250 ns to 8 ms.
     Two,
 }
+
+/// What mode 1 measures, in picoseconds (section 6.6 of the data sheet).
+const MODE_1_PS: RangeInclusive<i64> = 12_000..=500_000;
 
 /// CONFIG2 field `NUM_STOP`: after how many stops a measurement is complete.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -52,7 +56,7 @@ pub struct Settings {
     /// The reference clock at the pin CLOCK in kHz, 1,000 to 16,000. A clock
     /// that is not a whole number of kHz is not supported.
     pub clock_khz: u16,
-    /// Picoseconds a bin, until [`Sensor::set_bin_width`](crate::sensor::Sensor)
+    /// Picoseconds a bin, until [`Sensor::start`](crate::sensor::Sensor::start)
     /// says otherwise.
     pub bin_width: U16F16,
     /// Where bin 0 starts, in picoseconds after START.
@@ -163,11 +167,19 @@ impl Config {
         &self.0
     }
 
-    /// Bins of another width from now on. A width of zero changes nothing.
+    /// Bins of another width from now on, which is above zero.
     pub(super) fn set_bin_width(&mut self, bin_width: U16F16) {
-        if bin_width != U16F16::ZERO {
-            self.0.bin_width = bin_width;
-        }
+        self.0.bin_width = bin_width.max(U16F16::DELTA);
+    }
+
+    /// The range of the start of bin 0, rounded to the nearest 1/256 mm.
+    pub(super) fn offset(&self) -> I24F8 {
+        /// Half the speed of light in m/s, so in millimetres per 10⁹ ps.
+        const HALF_C: u64 = 149_896_229;
+        // 32 + 28 + 8 bits would be too many; no laser pulse is 4 ms old.
+        let range = u128::from(self.0.first_bin_ps) * u128::from(HALF_C) * 256;
+        let rounded = (range + 500_000_000) / 1_000_000_000;
+        I24F8::from_bits(i32::try_from(rounded).unwrap_or(i32::MAX))
     }
 
     /// CONFIG1 without `START_MEAS`. The calibration is always forced, so that
@@ -204,10 +216,13 @@ impl Config {
     }
 
     /// The bin of a time in picoseconds after START, rounded down. A time
-    /// before bin 0 gives `u16::MAX`, as does one past it, so that either is
-    /// counted as rejected.
+    /// before bin 0 gives `u16::MAX`, as does one past the last or one that mode 1
+    /// does not measure (12 to 500 ns), so that each is counted as rejected.
     #[must_use]
     pub fn code(&self, time_ps: i64) -> u16 {
+        if self.0.mode == Mode::One && !MODE_1_PS.contains(&time_ps) {
+            return u16::MAX;
+        }
         let Ok(since) = u64::try_from(time_ps - i64::from(self.0.first_bin_ps)) else {
             return u16::MAX;
         };

@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use crate::sensor::SensorFault;
+
 /// An error of the bus (`B`), of a pin (`P`) or of the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -87,3 +89,27 @@ impl<B: fmt::Debug, P: fmt::Debug> fmt::Display for Error<B, P> {
 }
 
 impl<B: fmt::Debug, P: fmt::Debug> core::error::Error for Error<B, P> {}
+
+impl<B, P> From<Error<B, P>> for SensorFault {
+    fn from(error: Error<B, P>) -> Self {
+        match error {
+            Error::Bus(_) => Self::Bus,
+            Error::Pin(_) => Self::Pin,
+            // What a bus reads that nothing drives.
+            Error::NoAnswer
+            | Error::WrongChip {
+                config2: 0x00,
+                int_mask: 0x00,
+            }
+            | Error::WrongChip {
+                config2: 0xff,
+                int_mask: 0xff,
+            } => Self::NoAnswer,
+            Error::WrongChip { .. } => Self::WrongChip,
+            Error::NotTaken { .. } => Self::NotTaken,
+            Error::Timeout => Self::Timeout,
+            Error::StuckInterrupt { .. } => Self::StuckInterrupt,
+            Error::Parity { .. } | Error::Calibration { .. } => Self::Data,
+        }
+    }
+}

@@ -43,7 +43,7 @@ use self::registers::{
     INT_STATUS, OVER, RESULTS, START_MEAS, TIME1, VALUE, WRITE,
 };
 use super::timer::Since;
-use super::{PhotonSink, Polled, Sensor};
+use super::{About, PhotonSink, Polled, Sensor};
 
 pub use self::config::{Config, ConfigError, Edge, Mode, Settings, Stops};
 pub use self::error::Error;
@@ -372,8 +372,24 @@ where
 {
     type Error = Error<SPI::Error, INT::Error>;
 
-    fn set_bin_width(&mut self, bin_width: U16F16) {
+    fn about(&self) -> About {
+        let settings = self.config.settings();
+        About {
+            pixels: settings.pixel.0.saturating_add(1),
+            bin_width: None,
+            offset: self.config.offset(),
+        }
+    }
+
+    fn start(&mut self, bin_width: U16F16) {
         self.config.set_bin_width(bin_width);
+        self.state = State::Off;
+    }
+
+    /// ENABLE goes low. An error of the pin shows at the next start.
+    fn stop(&mut self) {
+        let _ = self.enable.set_low();
+        self.state = State::Off;
     }
 
     /// After an error the device is reset and configured anew, within some 5 ms.

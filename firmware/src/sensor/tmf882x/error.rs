@@ -3,6 +3,7 @@
 use core::fmt;
 
 use super::registers::{BootCommand, Command};
+use crate::sensor::SensorFault;
 
 /// What was waited for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,3 +122,24 @@ impl<B: fmt::Debug, P: fmt::Debug> fmt::Display for Error<B, P> {
 }
 
 impl<B: fmt::Debug, P: fmt::Debug> core::error::Error for Error<B, P> {}
+
+impl<B, P> From<Error<B, P>> for SensorFault {
+    fn from(error: Error<B, P>) -> Self {
+        match error {
+            Error::Nack(_) => Self::NoAnswer,
+            Error::Bus(_) => Self::Bus,
+            Error::Pin(_) => Self::Pin,
+            Error::WrongChip { .. } | Error::WrongApplication { .. } => Self::WrongChip,
+            Error::Timeout(Waiting::Histogram) => Self::Timeout,
+            Error::Timeout(_)
+            | Error::Bootloader { .. }
+            | Error::Refused { .. }
+            | Error::WrongPage { .. } => Self::NotTaken,
+            Error::StuckInterrupt { .. } => Self::StuckInterrupt,
+            Error::NoImage => Self::NoImage,
+            Error::ForeignResult { .. } | Error::WrongSize { .. } | Error::OutOfOrder { .. } => {
+                Self::Data
+            }
+        }
+    }
+}

@@ -59,6 +59,7 @@ mod error;
 mod frame;
 mod registers;
 
+use dtof_core::fixed::types::{I24F8, U16F16};
 use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
 use embedded_hal::i2c::{ErrorKind, ErrorType, I2c};
 
@@ -71,7 +72,7 @@ use self::registers::{
     SPAD_MAP_ID,
 };
 use super::timer::Since;
-use super::{PhotonSink, Polled, Sensor};
+use super::{About, PhotonSink, Polled, Sensor};
 
 pub use self::config::{Config, ConfigError, Settings, SpadMap};
 pub use self::error::{Error, Waiting};
@@ -204,6 +205,15 @@ where
     /// Gives the bus and the pins (INT, ENABLE) back.
     pub fn release(self) -> (I2C, INT, EN) {
         (self.i2c, self.interrupt, self.enable)
+    }
+
+    /// Where to begin again: only a sensor that measures is known to be well.
+    const fn off(&self) -> State {
+        match self.state {
+            State::Off { reset } => State::Off { reset },
+            State::Measuring { .. } => State::Off { reset: false },
+            _ => State::Off { reset: true },
+        }
     }
 
     fn step(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, I2C, INT> {
@@ -510,8 +520,30 @@ where
 {
     type Error = Error<I2C::Error, INT::Error>;
 
+    /// Bin width and offset are those fitted to the public log of one TMF8820.
+    fn about(&self) -> About {
+        const ZONES: u16 = 9;
+        About {
+            pixels: self.config.settings().first_pixel.0.saturating_add(ZONES),
+            bin_width: Some(U16F16::lit("92.1")),
+            offset: I24F8::lit("-179.5"),
+        }
+    }
+
+    fn start(&mut self, _: U16F16) {
+        self.state = self.off();
+    }
+
+    /// Tells the sensor to stop; if that fails, the next start sees to it.
+    fn stop(&mut self) {
+        if self.is_measuring() {
+            let _ = self.write(&[CMD_STAT, Command::Stop as u8]);
+        }
+        self.state = self.off();
+    }
+
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, I2C, INT> {
-        let was_measuring = self.is_measuring();
+        let off = self.off();
         let polled = self.step(now_ms, sink);
         if let Err(error) = &polled {
             count(&mut self.counts.errors);
@@ -519,9 +551,7 @@ where
                 Error::ForeignResult { .. }
                 | Error::WrongSize { .. }
                 | Error::OutOfOrder { .. } => self.state,
-                _ => State::Off {
-                    reset: !was_measuring,
-                },
+                _ => off,
             };
         }
         polled

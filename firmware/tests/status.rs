@@ -1,0 +1,349 @@
+//! What a host learns when something is wrong, and that all goes on when it is
+//! right again: a sensor that is unplugged, no host, configurations that cannot
+//! be. A host that stops reading is in `sidecar_sensor.rs`.
+
+mod common;
+
+use common::host::{CONFIGURATION, Host};
+use common::plug::{Answers, Bus, Tdc, Tmf};
+use common::{Broken, Line};
+use dtof_core::fixed::types::U16F16;
+use dtof_core::{AsyncPixel, DepthEvent, PixelAddress, Statistics};
+use dtof_firmware::link::endpoint::LinkCounters;
+use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
+use dtof_firmware::link::message::{self, Configuration, Refusal, Report, Token};
+use dtof_firmware::sensor::tmf882x::{BootCommand, Command, Tmf882x, Waiting};
+use dtof_firmware::sensor::{About, Sensor, SensorFault, simulated, tdc7200, tmf882x};
+use dtof_firmware::sidecar::Sidecar;
+
+type Pixels = heapless::Vec<AsyncPixel<128>, 9>;
+
+/// A second with `sensor` and a host that reads; what the device says then. The
+/// sensor is asked three times a millisecond, as by a busy main loop.
+fn second<Chip: Default>(
+    sensor: &mut impl Sensor,
+    bus: &Bus<Chip>,
+    device: &mut Sidecar,
+    host: &mut Host,
+    now_ms: &mut u32,
+) -> Report {
+    for _ in 0..1000 {
+        *now_ms += 1;
+        for _ in 0..3 {
+            let before = bus.transfers();
+            device.poll_sensor(sensor, *now_ms);
+            // Four polls; that which configures a TDC7200 takes 19.
+            assert!(bus.transfers() - before <= 4 * 19);
+        }
+        host.exchange(device, *now_ms);
+        host.read(8);
+    }
+    host.report(device, *now_ms)
+}
+
+/// The sensor gives data, is unplugged for a minute, and gives data again.
+fn unplug<Chip: Default>(
+    mut sensor: impl Sensor,
+    bus: &Bus<Chip>,
+    how: Answers,
+    most_a_second: u32,
+    said: SensorFault,
+) {
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
+    let mut host = Host::new(1, 0);
+    let wanted = Configuration {
+        pixels: 9,
+        ..CONFIGURATION
+    };
+    host.configure(&mut device, 0, &wanted);
+    let mut now_ms = 0;
+    let mut second = || {
+        let report = second(&mut sensor, bus, &mut device, &mut host, &mut now_ms);
+        let events = host.events.len() as u64;
+        assert_eq!(report.statistics.events, events);
+        (report, events)
+    };
+    let (report, events) = second();
+    assert!(events > 10, "{report:?}");
+    assert_eq!((report.sensor_errors, report.last_sensor_error), (0, 0));
+
+    bus.plug(how);
+    let (mut before, mut errors) = (report.statistics, 0);
+    for of_the_minute in 0..60 {
+        let transfers = bus.transfers();
+        let (report, _) = second();
+        let new = report.sensor_errors - errors;
+        errors = report.sensor_errors;
+        assert!(new <= most_a_second, "{new} errors");
+        // Until it is noticed that no interrupt comes takes a second at most.
+        if of_the_minute >= 2 {
+            assert!(new > 0);
+            assert_eq!(report.last_sensor_error, said as u8);
+            assert_eq!(report.statistics, before);
+        }
+        // At most two accesses each time it is brought up.
+        assert!(bus.transfers() - transfers <= 2 * most_a_second);
+        before = report.statistics;
+    }
+
+    bus.plug(Answers::Sensor);
+    let (report, _) = second();
+    let errors = report.sensor_errors;
+    let (report, after) = second();
+    assert!(after > before.events + 10, "{report:?}");
+    // What was wrong last is still known, but it is not wrong any more.
+    assert_eq!(report.sensor_errors, errors);
+    assert_eq!(report.last_sensor_error, said as u8);
+}
+
+#[test]
+fn an_unplugged_tdc7200_is_reported_and_found_again() {
+    for (how, said) in [
+        (Answers::Error, SensorFault::Bus),
+        (Answers::Ones, SensorFault::NoAnswer),
+    ] {
+        let bus = Bus::<Tdc>::new();
+        let settings = tdc7200::Settings {
+            first_bin_ps: 240_000,
+            ..tdc7200::Settings::new(PixelAddress(0), 8_000, U16F16::lit("250"))
+        };
+        let config = tdc7200::Config::new(settings).unwrap();
+        let enable = Line::new(false);
+        let sensor =
+            tdc7200::Tdc7200::<_, _, _>::new(bus.clone(), bus.interrupt.clone(), enable, config);
+        unplug(sensor, &bus, how, 200, said);
+    }
+}
+
+#[test]
+fn an_unplugged_tmf882x_is_reported_and_found_again() {
+    let bus = Bus::<Tmf>::new();
+    let config = tmf882x::Config::new(tmf882x::Settings::new(PixelAddress(0))).unwrap();
+    let enable = Line::new(false);
+    let sensor = Tmf882x::<_, _, _>::new(
+        bus.clone(),
+        bus.interrupt.clone(),
+        enable,
+        &[1, 2, 3],
+        config,
+    );
+    unplug(sensor, &bus, Answers::Error, 60, SensorFault::NoAnswer);
+}
+
+#[test]
+fn every_error_of_a_driver_is_of_its_kind() {
+    type OfTdc = tdc7200::Error<Broken, Broken>;
+    type OfTmf = tmf882x::Error<Broken, Broken>;
+    let wrong = |config2, int_mask| OfTdc::WrongChip { config2, int_mask };
+    for (error, kind) in [
+        (OfTdc::Bus(Broken), SensorFault::Bus),
+        (OfTdc::Pin(Broken), SensorFault::Pin),
+        (OfTdc::NoAnswer, SensorFault::NoAnswer),
+        (wrong(0, 0), SensorFault::NoAnswer),
+        (wrong(0xff, 0xff), SensorFault::NoAnswer),
+        (wrong(0x40, 0xff), SensorFault::WrongChip),
+        (OfTdc::Timeout, SensorFault::Timeout),
+        (OfTdc::Parity { register: 0x10 }, SensorFault::Data),
+        (
+            OfTdc::StuckInterrupt { status: 8 },
+            SensorFault::StuckInterrupt,
+        ),
+    ] {
+        assert_eq!(SensorFault::from(error), kind, "{error}");
+    }
+    let command = Command::Measure;
+    let status = 2;
+    for (error, kind) in [
+        (OfTmf::Nack(Broken), SensorFault::NoAnswer),
+        (OfTmf::Bus(Broken), SensorFault::Bus),
+        (OfTmf::Pin(Broken), SensorFault::Pin),
+        (OfTmf::WrongChip { id: 7 }, SensorFault::WrongChip),
+        (OfTmf::WrongApplication { id: 7 }, SensorFault::WrongChip),
+        (OfTmf::Timeout(Waiting::Histogram), SensorFault::Timeout),
+        (OfTmf::Timeout(Waiting::PowerUp), SensorFault::NotTaken),
+        (
+            OfTmf::Bootloader {
+                command: BootCommand::WriteRam,
+                answer: [2, 0, 0xFD],
+            },
+            SensorFault::NotTaken,
+        ),
+        (OfTmf::Refused { command, status }, SensorFault::NotTaken),
+        (
+            OfTmf::StuckInterrupt { status },
+            SensorFault::StuckInterrupt,
+        ),
+        (OfTmf::NoImage, SensorFault::NoImage),
+        (OfTmf::WrongSize { size: 1 }, SensorFault::Data),
+    ] {
+        assert_eq!(SensorFault::from(error), kind, "{error}");
+    }
+}
+
+/// Two seconds of the simulated scene over a serial port for a host that comes at
+/// `start_ms`, the device being on from 0: all its events, and what the device had
+/// noticed on the link.
+fn session_from(start_ms: u32) -> (Vec<DepthEvent>, LinkCounters) {
+    let mut buffers = dtof_firmware::serial::Buffers::<512, 1024>::new();
+    let (mut interrupt, mut serial) = buffers.split(|| {});
+    let mut pixels = heapless::Vec::<AsyncPixel<128>, 16>::new();
+    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
+    let mut sensor = simulated::scene();
+    for now_ms in 0..start_ms {
+        let lost = serial.lost();
+        let Ok(()) = device.poll_with(&mut sensor, &mut serial, lost, now_ms);
+        assert_eq!(interrupt.next_to_send(), None);
+    }
+    let mut host = Host::new(1, start_ms);
+    let mut frames = Deframer::new();
+    let mut wire = [0; WIRE_BYTES];
+    let wanted = Configuration {
+        pixels: 16,
+        l1: 40,
+        l2: 2_000,
+        ..CONFIGURATION
+    };
+    for now_ms in start_ms..start_ms + 2_000 {
+        if now_ms == start_ms + 10 {
+            host.ask(message::CONFIGURE, &wanted.to_le_bytes());
+        }
+        let length = host.endpoint.transmit(now_ms, &mut wire);
+        wire[..length]
+            .iter()
+            .for_each(|&byte| interrupt.on_receive(byte));
+        let lost = serial.lost();
+        let Ok(()) = device.poll_with(&mut sensor, &mut serial, lost, now_ms);
+        for byte in std::iter::from_fn(|| interrupt.next_to_send()) {
+            if let Some(frame) = frames.push(byte) {
+                host.endpoint.receive(frame, now_ms);
+            }
+        }
+        host.read(4);
+    }
+    assert_eq!(host.answers[0].0, message::CONFIGURED);
+    (host.events, *device.endpoint().counters())
+}
+
+#[test]
+fn a_host_that_comes_after_a_minute_gets_what_it_would_have_got_at_once() {
+    let (events, counters) = session_from(60_000);
+    assert!(events.len() > 500);
+    let clean = LinkCounters {
+        frames: counters.frames,
+        ..LinkCounters::default()
+    };
+    assert_eq!(counters, clean);
+    assert!(events == session_from(0).0);
+}
+
+/// What makes a good configuration bad.
+type Change = fn(&mut Configuration);
+
+/// A configuration of each kind that cannot be, for eight pixels without a sensor.
+fn refused() -> Vec<(Vec<u8>, Refusal)> {
+    let good = Configuration {
+        source: 0,
+        ..CONFIGURATION
+    };
+    let mut all = vec![(good.to_le_bytes()[1..].to_vec(), Refusal::Unknown)];
+    let bad: [(Change, Refusal); 15] = [
+        (|bad| bad.source = 2, Refusal::Unknown),
+        (|bad| bad.rule = 1, Refusal::Unknown),
+        (|bad| bad.x = 0, Refusal::ZeroX),
+        (|bad| bad.x = 21, Refusal::XAboveL1),
+        (|bad| bad.l2 = 20, Refusal::L2NotAboveL1),
+        (|bad| bad.l2 = 24, Refusal::NoLook),
+        (|bad| bad.gate_last = 128, Refusal::GatePastLastBin),
+        (|bad| bad.gate_first = 121, Refusal::GateTooNarrow),
+        (|bad| bad.bin_width = 0, Refusal::Range),
+        (|bad| bad.offset = i32::MAX, Refusal::Range),
+        (|bad| bad.pixels = 0, Refusal::Pixels),
+        (|bad| bad.pixels = 10, Refusal::Pixels),
+        (|bad| bad.minimum_count = 0, Refusal::MinimumCount),
+        (|bad| bad.minimum_count = 1024, Refusal::MinimumCount),
+        (|bad| bad.source = 1, Refusal::NoSensor),
+    ];
+    for (make_bad, refusal) in bad {
+        let mut wanted = good;
+        make_bad(&mut wanted);
+        all.push((wanted.to_le_bytes().to_vec(), refusal));
+    }
+    all
+}
+
+/// Photons of six laser cycles, two pixels that see a surface.
+fn photons() -> Vec<u8> {
+    let cycle = [
+        Token::Photon { code: 20 },
+        Token::Advance { pixels: 7 },
+        Token::Photon { code: 90 },
+        Token::EndOfCycles { cycles: 1 },
+    ];
+    let tokens = cycle.into_iter().cycle().take(6 * cycle.len());
+    tokens.flat_map(|token| token.to_bytes().to_vec()).collect()
+}
+
+#[track_caller]
+fn is_refused(host: &mut Host, device: &mut Sidecar, wanted: &[u8], refusal: Refusal) {
+    let reason = host.answer(device, 0, message::CONFIGURE, wanted);
+    assert_eq!(host.answers.last().unwrap().0, message::REFUSED);
+    assert_eq!(reason, [refusal as u8], "{refusal}");
+}
+
+/// Events and counts of photons between which these configurations are asked for.
+fn photons_between(refused: &[(Vec<u8>, Refusal)]) -> (Vec<DepthEvent>, Statistics, u64) {
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, None);
+    let mut host = Host::new(1, 0);
+    let wanted = Configuration {
+        source: 0,
+        ..CONFIGURATION
+    };
+    host.configure(&mut device, 0, &wanted);
+    for turn in 0..100 {
+        host.ask(message::PHOTONS, &photons());
+        if let Some((wanted, refusal)) = refused.get(turn % refused.len().max(1)) {
+            is_refused(&mut host, &mut device, wanted, *refusal);
+        }
+        host.exchange(&mut device, 0);
+        host.read(4);
+    }
+    let report = host.report(&mut device, 0);
+    assert_eq!(report.unknown, 0);
+    (host.events, report.statistics, report.cycles)
+}
+
+#[test]
+fn every_refused_configuration_names_its_reason_and_changes_nothing() {
+    let all = refused();
+    let mut numbers: Vec<u8> = all.iter().map(|&(_, refusal)| refusal as u8).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    assert_eq!(numbers, Vec::from_iter(1..=11));
+
+    let undisturbed = photons_between(&[]);
+    assert_eq!((undisturbed.0.len(), undisturbed.2), (2 * 25, 600));
+    assert_eq!(photons_between(&all), undisturbed);
+}
+
+#[test]
+fn a_device_that_has_refused_its_first_configuration_waits_for_a_better_one() {
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, None);
+    let mut host = Host::new(1, 0);
+    for (wanted, refusal) in refused() {
+        is_refused(&mut host, &mut device, &wanted, refusal);
+    }
+    // There are no pixels for photons yet.
+    host.ask(message::PHOTONS, &photons());
+    let report = host.report(&mut device, 0);
+    assert_eq!((report.unknown, report.cycles), (1, 0));
+    let wanted = Configuration {
+        source: 0,
+        ..CONFIGURATION
+    };
+    host.configure(&mut device, 0, &wanted);
+    host.ask(message::PHOTONS, &photons());
+    assert_eq!(host.report(&mut device, 0).cycles, 6);
+}

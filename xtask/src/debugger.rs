@@ -1,0 +1,170 @@
+//! What a debugger does, by GDB's remote protocol, which QEMU speaks: read
+//! memory and registers, run, stop. It needs no code in the image.
+
+use std::io::{BufReader, Read, Write};
+use std::net::{Ipv4Addr, TcpStream};
+use std::ops::Range;
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail, ensure};
+
+/// Bytes in one answer; QEMU allows 2048.
+const PIECE: u64 = 1024;
+
+/// A processor under control.
+pub struct Debugger(BufReader<TcpStream>);
+
+impl Debugger {
+    /// Connects. QEMU stops the processor then, if it runs. `patience` is how long
+    /// an answer may take.
+    pub fn connect(port: u16, patience: Duration) -> std::io::Result<Self> {
+        let stream = TcpStream::connect((Ipv4Addr::LOCALHOST, port))?;
+        stream.set_nodelay(true)?;
+        stream.set_read_timeout(Some(patience))?;
+        Ok(Self(BufReader::new(stream)))
+    }
+
+    /// Lets the processor run.
+    pub fn resume(&mut self) -> Result<()> {
+        self.send("c")
+    }
+
+    /// Stops the processor while it runs.
+    pub fn interrupt(&mut self) -> Result<()> {
+        self.0.get_mut().write_all(&[3])?;
+        self.wait_for_stop()
+    }
+
+    /// Stops before the instruction at `address` from now on, or no longer.
+    pub fn set_breakpoint(&mut self, address: u64, on: bool) -> Result<()> {
+        let letter = if on { 'Z' } else { 'z' };
+        self.send(&format!("{letter}0,{address:x},2"))?;
+        self.done()
+    }
+
+    /// One instruction.
+    pub fn step(&mut self) -> Result<()> {
+        self.send("s")?;
+        self.wait_for_stop()
+    }
+
+    /// Until the processor stops.
+    pub fn wait_for_stop(&mut self) -> Result<()> {
+        let packet = self.receive()?;
+        ensure!(is_stop(&packet), "the debugger says `{packet}`");
+        Ok(())
+    }
+
+    /// The core registers: 0 to 12, 13 the stack pointer, 15 the next instruction.
+    pub fn registers(&mut self) -> Result<[u32; 16]> {
+        self.send("g")?;
+        let bytes = bytes(&self.reply()?)?;
+        let (words, _) = bytes.as_chunks();
+        let words = words.get(..16).context("not all registers")?;
+        let words: Vec<u32> = words.iter().map(|word| u32::from_le_bytes(*word)).collect();
+        words.try_into().ok().context("not 16 registers")
+    }
+
+    /// What lies at these addresses.
+    pub fn memory(&mut self, addresses: Range<u64>) -> Result<Vec<u8>> {
+        let mut memory = Vec::new();
+        let mut address = addresses.start;
+        while address < addresses.end {
+            let length = PIECE.min(addresses.end - address);
+            self.send(&format!("m{address:x},{length:x}"))?;
+            let piece = bytes(&self.reply()?)?;
+            ensure!(
+                piece.len() as u64 == length,
+                "not all memory at {address:#x}"
+            );
+            memory.extend(piece);
+            address += length;
+        }
+        Ok(memory)
+    }
+
+    fn done(&mut self) -> Result<()> {
+        let reply = self.reply()?;
+        ensure!(reply == "OK", "the debugger says `{reply}`");
+        Ok(())
+    }
+
+    /// The answer to what was sent. Some versions of QEMU say before it that the
+    /// processor has stopped when the debugger came.
+    fn reply(&mut self) -> Result<String> {
+        loop {
+            let packet = self.receive()?;
+            if !is_stop(&packet) {
+                return Ok(packet);
+            }
+        }
+    }
+
+    fn send(&mut self, content: &str) -> Result<()> {
+        let packet = format!("${content}#{:02x}", checksum(content.as_bytes()));
+        self.0.get_mut().write_all(packet.as_bytes())?;
+        Ok(())
+    }
+
+    /// The next packet; TCP damages none.
+    fn receive(&mut self) -> Result<String> {
+        while self.byte()? != b'$' {}
+        let mut content = Vec::new();
+        loop {
+            match self.byte()? {
+                b'#' => break,
+                // QEMU repeats nothing by count, and what it sends here needs no
+                // escape.
+                byte @ (b'*' | b'}') => bail!("the debugger sends {byte:#04x}"),
+                byte => content.push(byte),
+            }
+        }
+        let _checksum = [self.byte()?, self.byte()?];
+        self.0.get_mut().write_all(b"+")?;
+        Ok(String::from_utf8(content)?)
+    }
+
+    fn byte(&mut self) -> Result<u8> {
+        let mut byte = [0];
+        self.0
+            .read_exact(&mut byte)
+            .context("no answer of QEMU's debugger")?;
+        Ok(byte[0])
+    }
+}
+
+/// Whether a packet says that the processor has stopped.
+fn is_stop(packet: &str) -> bool {
+    packet.starts_with(['T', 'S'])
+}
+
+fn checksum(content: &[u8]) -> u8 {
+    content.iter().fold(0, |sum, byte| sum.wrapping_add(*byte))
+}
+
+/// Bytes written as hexadecimal digits.
+fn bytes(digits: &str) -> Result<Vec<u8>> {
+    let (pairs, rest) = digits.as_bytes().as_chunks::<2>();
+    let byte = |pair: &[u8; 2]| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok();
+    let bytes: Option<Vec<u8>> = pairs.iter().map(byte).collect();
+    let bytes = bytes.filter(|_| rest.is_empty());
+    bytes.with_context(|| format!("the debugger says `{digits}`"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reads_hexadecimal_digits() {
+        assert_eq!(bytes("00ff7a").unwrap(), [0, 255, 0x7a]);
+        assert!(bytes("E22").unwrap_err().to_string().contains("E22"));
+        assert!(bytes("").unwrap().is_empty());
+    }
+
+    #[test]
+    fn adds_up_a_packet() {
+        assert_eq!(checksum(b"OK"), 0x9a);
+        assert_eq!(checksum(b"m20000000,400"), 0xaf);
+    }
+}

@@ -1,0 +1,125 @@
+//! What an image has used of its stack.
+//!
+//! Before `main`, cortex-m-rt paints the stack. The stack grows downwards, so
+//! that all above the lowest word that has lost its paint has been used. What a
+//! function reserves and never writes to keeps its paint; it does not count
+//! unless something below it was written to. So what a run has used is held
+//! against what the machine code can need ([`stack_bound`]).
+
+use std::fs;
+use std::ops::Range;
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
+
+use crate::firmware::Board;
+use crate::stack_bound;
+
+/// cortex-m-rt's `STACK_PAINT_VALUE`.
+const PAINT: [u8; 4] = 0xcccc_cccc_u32.to_le_bytes();
+/// `bkpt #0xab`: the image asks the debugger or emulator for something.
+const SEMIHOSTING: [u8; 2] = 0xbeab_u16.to_le_bytes();
+
+/// Bytes left to the stack, of the 128 KiB of RAM of the real board.
+pub const RESERVE: u64 = 24 * 1024;
+/// Bytes an image may need of them; the rest is for the report of a panic.
+pub const MOST: u64 = 12 * 1024;
+
+/// What an image says of its stack.
+pub struct Image {
+    /// From where it ends to where it begins, which is above.
+    pub stack: Range<u64>,
+    /// Where it may ask the emulator for something.
+    pub semihosting: Vec<u64>,
+}
+
+impl Image {
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = fs::read(path).with_context(|| path.display().to_string())?;
+        let file = object::File::parse(&*bytes)?;
+        let address = |name| {
+            let symbol = file.symbol_by_name(name);
+            let symbol = symbol.with_context(|| format!("no symbol {name} in the image"))?;
+            anyhow::Ok(symbol.address())
+        };
+        let stack = address("_stack_end")?..address("_stack_start")?;
+        let mut semihosting = Vec::new();
+        for section in file.sections() {
+            if section.kind() == SectionKind::Text {
+                let pairs = section.data()?.chunks(2);
+                let addresses = (section.address()..).step_by(2);
+                let found = addresses
+                    .zip(pairs)
+                    .filter(|(_, pair)| *pair == SEMIHOSTING);
+                semihosting.extend(found.map(|(address, _)| address));
+            }
+        }
+        Ok(Self { stack, semihosting })
+    }
+}
+
+/// Holds what runs of an image have used against what it may use and what its
+/// machine code can need.
+pub fn check(board: Board, path: &Path, used: &[u64]) -> Result<()> {
+    let name = board.name();
+    let used = used.iter().max().copied().unwrap_or_default();
+    let needed = stack_bound::of_image(path)?;
+    println!(
+        "{name}: {used} bytes of stack used at most, {needed} needed at most; {RESERVE} are left \
+         to it"
+    );
+    ensure!(
+        used <= needed,
+        "{name}: more stack is used than the machine code should need"
+    );
+    check_need(board, needed)
+}
+
+/// Holds what an image needs against what there may be.
+pub fn check_need(board: Board, needed: u64) -> Result<()> {
+    ensure!(
+        needed <= MOST,
+        "{}: more than {MOST} bytes of stack needed",
+        board.name()
+    );
+    Ok(())
+}
+
+/// Bytes of the stack that have been used: those from the lowest word that has
+/// lost its paint. `memory` is all of it, lowest address first.
+pub fn high_water(memory: &[u8]) -> u64 {
+    let painted = memory.chunks(4).take_while(|word| *word == PAINT);
+    (memory.len() - 4 * painted.count()) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A stack of these words, the lowest first.
+    fn stack(words: &[u32]) -> Vec<u8> {
+        words.iter().flat_map(|word| word.to_le_bytes()).collect()
+    }
+
+    const P: u32 = 0xcccc_cccc;
+
+    #[test]
+    fn finds_the_lowest_word_without_paint() {
+        assert_eq!(high_water(&stack(&[P, P, 7, 8])), 8);
+        assert_eq!(high_water(&stack(&[P, P, P, 0xcccc_cccd])), 4);
+        assert_eq!(high_water(&stack(&[P, 0x00cc_cccc, P, P])), 12);
+    }
+
+    #[test]
+    fn all_paint_is_nothing_used_and_no_paint_all_of_it() {
+        assert_eq!(high_water(&stack(&[P; 4])), 0);
+        assert_eq!(high_water(&stack(&[0; 4])), 16);
+        assert_eq!(high_water(&[]), 0);
+    }
+
+    #[test]
+    fn paint_above_used_words_counts_as_used() {
+        assert_eq!(high_water(&stack(&[P, 1, P, P, 2])), 16);
+    }
+}

@@ -1,0 +1,252 @@
+//! The most stack an image can need, from its machine code.
+//!
+//! A function takes the sum of all its instructions take, and the most of what
+//! any function needs it goes to. Interrupts come on top. Recursion, a stack
+//! pointer set otherwise, and a function only known when it runs have no such
+//! bound and are an error; except behind a panic, whose report calls through
+//! tables: the bound is that up to the panic handler. Compiled functions end in
+//! a jump or return, never by running on into the next.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::ops::Range;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail, ensure};
+use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
+
+use crate::thumb::{self, Effect};
+
+/// What the processor saves when an interrupt comes: 26 words with those of the
+/// floating-point unit, and a word so that the stack stays aligned.
+const EXCEPTION_FRAME: u32 = 27 * 4;
+/// Entries of the vector table: those of the NMI and the hard fault, which
+/// interrupt all others, come after the stack's start and Reset.
+const NMI: usize = 2;
+const HARD_FAULT: usize = 3;
+
+/// Bytes of stack an image can need: the main loop, a handler of an interrupt on
+/// it (all have the same priority), and on that the hard fault's and the NMI's.
+pub fn of_image(path: &Path) -> Result<u64> {
+    let bytes = fs::read(path).with_context(|| path.display().to_string())?;
+    let file = object::File::parse(&*bytes)?;
+    let table = file.section_by_name(".vector_table");
+    let table = table.context("no vector table in the image")?;
+    let (vectors, _) = table.data()?.as_chunks();
+    let vectors: Vec<u32> = vectors
+        .iter()
+        .map(|word| u32::from_le_bytes(*word))
+        .collect();
+    let mut needs = Needs {
+        functions: functions(&file)?,
+        known: BTreeMap::new(),
+        under_way: Vec::new(),
+    };
+    needs.resolve_defmt_rtt();
+    let mut bound = 0;
+    let mut handlers = 0;
+    for (index, &vector) in vectors.iter().enumerate().skip(1) {
+        // Reserved entries are 0.
+        if vector == 0 {
+            continue;
+        }
+        let need = needs.of(vector & !1)?;
+        match index {
+            1 => bound += need,
+            NMI | HARD_FAULT => bound += EXCEPTION_FRAME + need,
+            _ => handlers = handlers.max(EXCEPTION_FRAME + need),
+        }
+    }
+    Ok((bound + handlers).into())
+}
+
+/// A function, as far as the stack is concerned.
+#[derive(Debug, Default)]
+struct Function {
+    name: String,
+    takes: u32,
+    goes_to: BTreeSet<u32>,
+    /// Whether it goes where nobody knows before it runs.
+    goes_anywhere: bool,
+    sets_stack_pointer: bool,
+}
+
+/// What functions need with all they go to.
+struct Needs {
+    functions: BTreeMap<u32, Function>,
+    known: BTreeMap<u32, u32>,
+    under_way: Vec<u32>,
+}
+
+impl Needs {
+    /// The functions defmt asks of a logger call in defmt-rtt one of two, by the
+    /// channel's mode.
+    fn resolve_defmt_rtt(&mut self) {
+        let writes = |(_, function): &(&u32, &Function)| function.name.contains("blocking_write");
+        let found = self.functions.iter().filter(writes);
+        let writers: Vec<u32> = found.map(|(&address, _)| address).collect();
+        if writers.is_empty() {
+            return;
+        }
+        let logger = |function: &&mut Function| function.name.starts_with("_defmt_");
+        for function in self.functions.values_mut().filter(logger) {
+            if function.goes_anywhere {
+                function.goes_anywhere = false;
+                function.goes_to.extend(&writers);
+            }
+        }
+    }
+
+    /// What the function at `address` needs.
+    fn of(&mut self, address: u32) -> Result<u32> {
+        if let Some(&known) = self.known.get(&address) {
+            return Ok(known);
+        }
+        let function = self.functions.get(&address);
+        let function = function.with_context(|| format!("no function at {address:#x}"))?;
+        let name = function.name.clone();
+        if name.contains("rust_begin_unwind") {
+            return Ok(0);
+        }
+        ensure!(!self.under_way.contains(&address), "{name} calls itself");
+        ensure!(
+            !function.goes_anywhere,
+            "{name} calls what is only known when it runs"
+        );
+        ensure!(
+            !function.sets_stack_pointer,
+            "{name} sets the stack pointer"
+        );
+        let takes = function.takes;
+        self.under_way.push(address);
+        let mut most = 0;
+        for to in function.goes_to.clone() {
+            most = most.max(self.of(to).with_context(|| format!("called by {name}"))?);
+        }
+        self.under_way.pop();
+        self.known.insert(address, takes + most);
+        Ok(takes + most)
+    }
+}
+
+/// Every function of the image by its address.
+fn functions(file: &object::File) -> Result<BTreeMap<u32, Function>> {
+    // Some of assembly have no size: they reach to the next.
+    let mut names: BTreeMap<u32, (&str, u32)> = BTreeMap::new();
+    // Where machine code begins and ends among constants.
+    let mut code = BTreeMap::new();
+    for symbol in file.symbols() {
+        let address = u32::try_from(symbol.address())?;
+        match symbol.name()? {
+            name if name.starts_with("$t") => _ = code.insert(address, true),
+            name if name.starts_with("$d") => _ = code.insert(address, false),
+            name if symbol.kind() == SymbolKind::Text => {
+                let size = u32::try_from(symbol.size())?;
+                let entry = names.entry(address & !1).or_insert((name, size));
+                entry.1 = entry.1.max(size);
+            }
+            _ => {}
+        }
+    }
+    let mut functions = BTreeMap::new();
+    for section in file.sections() {
+        if section.kind() != SectionKind::Text || section.name()? == ".vector_table" {
+            continue;
+        }
+        let start = u32::try_from(section.address())?;
+        let (halfwords, _) = section.data()?.as_chunks();
+        let halfwords: Vec<u16> = halfwords
+            .iter()
+            .map(|pair| u16::from_le_bytes(*pair))
+            .collect();
+        let end = start + 2 * u32::try_from(halfwords.len())?;
+        for (&address, &(name, size)) in names.range(start..end) {
+            let next = names.range(address + 1..end).next();
+            let end = match size {
+                0 => next.map_or(end, |(&next, _)| next),
+                size => address + size,
+            };
+            let mut function = Function {
+                name: name.to_owned(),
+                ..Function::default()
+            };
+            let mut at = address;
+            while at < end {
+                let is_code = code.range(..=at).next_back().is_none_or(|(_, &code)| code);
+                let rest = halfwords.get(usize::try_from((at - start) / 2)?..);
+                let (effect, bytes) = match rest.unwrap_or_default() {
+                    [_, ..] if !is_code => (Effect::None, 2),
+                    &[first, second, ..] if thumb::is_wide(first) => {
+                        (thumb::wide(at, first, second), 4)
+                    }
+                    &[first, ..] => (thumb::narrow(at, first), 2),
+                    [] => bail!("{name} reaches beyond its section"),
+                };
+                function.add(effect, address..end);
+                at += bytes;
+            }
+            functions.insert(address, function);
+        }
+    }
+    Ok(functions)
+}
+
+impl Function {
+    /// One instruction more of a function whose addresses are `own`. A jump to its
+    /// start counts as a call.
+    fn add(&mut self, effect: Effect, own: Range<u32>) {
+        match effect {
+            Effect::None => {}
+            Effect::Takes(bytes) => self.takes += bytes,
+            Effect::GoesTo(to) if to != own.start && own.contains(&to) => {}
+            Effect::GoesTo(to) => _ = self.goes_to.insert(to),
+            Effect::GoesAnywhere => self.goes_anywhere = true,
+            Effect::SetsStackPointer => self.sets_stack_pointer = true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What the first of these functions needs, each at its index with what it
+    /// takes and goes to. The last is the panic handler.
+    fn need(functions: &[(u32, &[u32])], unbounded: Option<u32>) -> Result<u32> {
+        let last = functions.len() - 1;
+        let function = |(index, (takes, goes_to)): (usize, &(u32, &[u32]))| Function {
+            name: ["function", "rust_begin_unwind"][usize::from(index == last)].to_owned(),
+            takes: *takes,
+            goes_to: goes_to.iter().copied().collect(),
+            goes_anywhere: unbounded == u32::try_from(index).ok(),
+            sets_stack_pointer: false,
+        };
+        let functions = functions.iter().enumerate().map(function);
+        let mut needs = Needs {
+            functions: (0..).zip(functions).collect(),
+            known: BTreeMap::new(),
+            under_way: Vec::new(),
+        };
+        needs.of(0)
+    }
+
+    #[test]
+    fn adds_up_the_deepest_way() {
+        let functions: [(u32, &[u32]); 5] =
+            [(8, &[1, 2]), (100, &[3]), (50, &[3, 4]), (7, &[]), (0, &[])];
+        assert_eq!(need(&functions, None).unwrap(), 115);
+    }
+
+    #[test]
+    fn ends_at_the_panic_handler_and_only_there() {
+        let functions: [(u32, &[u32]); 3] = [(8, &[1]), (4, &[2]), (1000, &[0])];
+        assert_eq!(need(&functions, Some(2)).unwrap(), 12);
+        assert!(need(&functions, Some(1)).is_err());
+    }
+
+    #[test]
+    fn recursion_has_no_bound() {
+        assert!(need(&[(8, &[1]), (4, &[0]), (0, &[])], None).is_err());
+        assert!(need(&[(8, &[7]), (0, &[])], None).is_err());
+    }
+}
