@@ -29,7 +29,7 @@ const HELP: &str = "\
 cargo xtask <command>
 
   setup         install what rust-toolchain.toml names and is not there yet;
-                QEMU and defmt-print as well if that needs no question
+                QEMU, defmt-print and GNU parallel as well if that needs no question
   check-image   link dtof-core for every target; no panic, float or allocation
   check-source  no floating-point type and no unsafe in core/src
 

@@ -21,6 +21,12 @@ pub const DEFMT_PRINT: Tool = Tool {
     install: "cargo install --locked defmt-print",
 };
 
+/// For sweeps in parts, as `docs/sweeps.md` has them.
+pub const PARALLEL: Tool = Tool {
+    program: "parallel",
+    install: "sudo apt-get install --yes parallel",
+};
+
 pub const PROBE_RS: Tool = Tool {
     program: "probe-rs",
     install: "cargo install --locked probe-rs-tools",
@@ -55,28 +61,34 @@ impl Tool {
     }
 }
 
-/// Installs the emulator and the log's decoder if they are missing and that
-/// needs no question; else says what to type. Nothing else needs them, so that
-/// this never fails.
+/// Installs the emulator, the log's decoder and GNU parallel if they are missing
+/// and that needs no question; else says what to type. Nothing else needs them, so
+/// that this never fails.
 pub fn set_up() {
-    install(&QEMU, || {
-        let is_root = Command::new("id").arg("-u").output().ok()?.stdout == b"0\n";
-        if !(is_root && Path::new("/etc/debian_version").exists()) {
-            return None;
-        }
-        // A new machine may never have heard of its packages.
-        let install = "apt-get update --quiet && apt-get install --yes --quiet \
-                       --no-install-recommends qemu-system-arm";
-        let mut apt = Command::new("sh");
-        apt.env("DEBIAN_FRONTEND", "noninteractive");
-        apt.args(["-c", install]);
-        Some(apt)
-    });
+    install(&QEMU, || debian_package("qemu-system-arm"));
+    install(&PARALLEL, || debian_package("parallel"));
     install(&DEFMT_PRINT, || {
         let mut cargo = Command::new("cargo");
         cargo.args(["install", "--locked", "--quiet", "defmt-print"]);
         Some(cargo)
     });
+}
+
+/// How root installs a package on Debian.
+fn debian_package(name: &str) -> Option<Command> {
+    let is_root = Command::new("id").arg("-u").output().ok()?.stdout == b"0\n";
+    if !(is_root && Path::new("/etc/debian_version").exists()) {
+        return None;
+    }
+    // A new machine may never have heard of its packages.
+    let install = format!(
+        "apt-get update --quiet && \
+         apt-get install --yes --quiet --no-install-recommends {name}"
+    );
+    let mut apt = Command::new("sh");
+    apt.env("DEBIAN_FRONTEND", "noninteractive");
+    apt.args(["-c", &install]);
+    Some(apt)
 }
 
 fn install(tool: &Tool, command: impl FnOnce() -> Option<Command>) {
