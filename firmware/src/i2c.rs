@@ -30,7 +30,7 @@ const RISE_LOOK_NS: u32 = 100;
 /// Then it is looked at after each `LOW_NS`.
 const RISE_LOOKS: u32 = 10;
 /// What the devices may hold SCL low in a transaction, all bits together: what
-/// SMBus allows one in a message (`T_LOW:SEXT`). The pauses are counted, not the
+/// `SMBus` allows one in a message (`T_LOW:SEXT`). The pauses are counted, not the
 /// looks between them.
 const HELD_NS: u32 = 25_000_000;
 /// Clocks after which a device that was interrupted while it sent has let go of
