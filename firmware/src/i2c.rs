@@ -145,6 +145,7 @@ where
         Ok(())
     }
 
+    #[inline(never)]
     fn lower_scl(&mut self) -> Result {
         self.scl.set_low().map_err(|_| Error::Pin)?;
         self.delay.delay_ns(HOLD_NS);
@@ -161,6 +162,7 @@ where
     }
 
     /// The bit on SDA during a clock.
+    #[inline(never)]
     fn clock(&mut self) -> Result<bool> {
         self.raise_scl()?;
         let bit = self.sda()?;

@@ -35,6 +35,8 @@ impl<F: FnMut() -> u32> SystickDelay<F> {
         }
     }
 
+    // Once in an image: whoever waits has the time for a call.
+    #[inline(never)]
     fn wait(&mut self, ns: u32) {
         let start = (self.now)();
         let cycles = (ns * self.cycles_per_us).div_ceil(1000);
@@ -44,6 +46,7 @@ impl<F: FnMut() -> u32> SystickDelay<F> {
 }
 
 impl<F: FnMut() -> u32> DelayNs for SystickDelay<F> {
+    #[inline(never)]
     fn delay_ns(&mut self, ns: u32) {
         let mut left = ns;
         while left > PIECE_NS {
