@@ -189,6 +189,17 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
     Ok(stack)
 }
 
+/// What a sensor that is not there is taken for. The emulator has no pins, so that
+/// all of them read as zeros: a TDC7200 that does not answer, and an I²C bus that
+/// nothing pulls up. On a real board its resistors pull it up, and both are "no
+/// answer".
+fn unplugged(sensor: Sensor) -> SensorFault {
+    match sensor {
+        Sensor::Tdc7200 => SensorFault::NoAnswer,
+        Sensor::Tmf882x => SensorFault::Bus,
+    }
+}
+
 /// The image of a sensor with nothing connected says so, and decides on photons of
 /// the link afterwards. Gives the bytes of stack used.
 fn says_unplugged(board: Board, image: &Path, sensor: Sensor, array: Geometry) -> Result<u64> {
@@ -210,6 +221,8 @@ fn says_unplugged(board: Board, image: &Path, sensor: Sensor, array: Geometry) -
     };
     let fault = SensorFault::from_number(report.last_sensor_error);
     let fault = fault.with_context(|| format!("{name}: no reason for {report:?}"))?;
+    let expected = unplugged(sensor);
+    ensure!(fault == expected, "{name}: \"{fault}\", not \"{expected}\"");
     ensure!(
         report.statistics.photons() == 0,
         "{name}: photons without a sensor"
