@@ -61,7 +61,7 @@ mod registers;
 
 use dtof_core::fixed::types::{I24F8, U16F16};
 use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
-use embedded_hal::i2c::{ErrorKind, ErrorType, I2c};
+use embedded_hal::i2c::{ErrorKind, ErrorType, I2c, NoAcknowledgeSource};
 
 use self::bootloader::{Answer, MAX_DATA, Message, SEED};
 use self::frame::{Assembly, NoPacket, OutOfOrder, PACKET, Packet, Taken};
@@ -505,9 +505,11 @@ fn count(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }
 
+/// Who does not acknowledge a byte has acknowledged the address: somebody is there.
 fn bus_error<B: embedded_hal::i2c::Error, P>(error: B) -> Error<B, P> {
+    use NoAcknowledgeSource::{Address, Unknown};
     match error.kind() {
-        ErrorKind::NoAcknowledge(_) => Error::Nack(error),
+        ErrorKind::NoAcknowledge(Address | Unknown) => Error::Nack(error),
         _ => Error::Bus(error),
     }
 }
