@@ -525,10 +525,12 @@ where
     /// Bin width and offset are those fitted to the public log of one TMF8820.
     fn about(&self) -> About {
         const ZONES: u16 = 9;
+        const BIN_WIDTH: U16F16 = U16F16::lit("92.1");
+        const OFFSET: I24F8 = I24F8::lit("-179.5");
         About {
             pixels: self.config.settings().first_pixel.0.saturating_add(ZONES),
-            bin_width: Some(U16F16::lit("92.1")),
-            offset: I24F8::lit("-179.5"),
+            bin_width: Some(BIN_WIDTH),
+            offset: OFFSET,
         }
     }
 
