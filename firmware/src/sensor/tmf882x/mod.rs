@@ -547,7 +547,7 @@ where
     }
 
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, I2C, INT> {
-        let off = self.off();
+        let was_measuring = self.is_measuring();
         let polled = self.step(now_ms, sink);
         if let Err(error) = &polled {
             count(&mut self.counts.errors);
@@ -555,7 +555,9 @@ where
                 Error::ForeignResult { .. }
                 | Error::WrongSize { .. }
                 | Error::OutOfOrder { .. } => self.state,
-                _ => off,
+                _ => State::Off {
+                    reset: !was_measuring,
+                },
             };
         }
         polled
