@@ -2,6 +2,7 @@
 
 pub mod gaussian_error;
 pub mod hit_rate;
+pub mod hyperparameters;
 pub mod paper_setting;
 pub mod roc;
 
