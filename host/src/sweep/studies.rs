@@ -11,7 +11,12 @@ use anyhow::{Context, Result};
 use super::Study;
 
 /// In the order of the paper.
-pub const ALL: &[Study] = &[hit_rate::STUDY, gaussian_error::STUDY, roc::STUDY];
+pub const ALL: &[Study] = &[
+    hit_rate::STUDY,
+    gaussian_error::STUDY,
+    roc::STUDY,
+    hyperparameters::STUDY,
+];
 
 /// The study of that name.
 ///

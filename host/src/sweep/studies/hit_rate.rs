@@ -77,8 +77,8 @@ fn exact(means: &[f64]) -> (f64, f64) {
 
 /// The SNR from which on `hit_rate`, which grows with it, is 99 %.
 fn snr_of_99_percent(hit_rate: impl Fn(f64) -> f64) -> f64 {
-    let (mut low, mut high) = (0.0, 200.0);
-    while high - low > 1e-3 {
+    let (mut low, mut high) = (0.0, 2000.0);
+    while high - low > 1e-2 {
         let middle = f64::midpoint(low, high);
         if hit_rate(middle) < 0.99 {
             low = middle;
