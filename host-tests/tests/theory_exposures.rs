@@ -5,6 +5,7 @@ use dtof::engine::host_engine;
 use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
 use dtof::simulation::{Rates, SimulatedArray};
 use dtof::source::{Geometry, PhotonSource};
+use dtof::theory::exposure::trial_rng;
 use dtof::theory::repeated_looks::{
     ALPHA_STEPS, FalseEvents, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
 };
@@ -246,7 +247,7 @@ fn tuned_settings_keep_their_word_in_the_engine() {
 #[test]
 fn a_trial_is_a_pure_function() {
     let point = &table::points()[7];
-    let trial = |seed, number| FalseEvents::trial(seed, number, point, 20).unwrap();
+    let trial = |seed, number| FalseEvents::trial(point, 20, &mut trial_rng(seed, number)).unwrap();
     assert_eq!(trial(1, 3), trial(1, 3));
     assert_ne!(trial(1, 3), trial(1, 4));
     assert_ne!(trial(1, 3), trial(2, 3));

@@ -15,6 +15,17 @@ pub struct Results {
     pub figures: Vec<Figure>,
     /// In the order of the paper.
     pub claims: Vec<Claim>,
+    /// For programs.
+    pub tables: Vec<Table>,
+}
+
+/// Numbers kept in a file.
+#[derive(Clone, Debug)]
+pub struct Table {
+    /// The file's name, without its extension.
+    pub name: &'static str,
+    /// Its content.
+    pub csv: String,
 }
 
 /// A picture and what it shows.

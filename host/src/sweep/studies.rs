@@ -1,5 +1,6 @@
 //! The studies there are.
 
+pub mod false_events;
 pub mod gaussian_error;
 pub mod hit_rate;
 pub mod hyperparameters;
@@ -15,6 +16,7 @@ pub const ALL: &[Study] = &[
     hit_rate::STUDY,
     gaussian_error::STUDY,
     roc::STUDY,
+    false_events::STUDY,
     hyperparameters::STUDY,
 ];
 

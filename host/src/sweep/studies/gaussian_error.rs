@@ -146,6 +146,7 @@ fn results(part: &Part) -> Result<Results> {
             },
         ],
         claims: claims(part),
+        tables: Vec::new(),
     })
 }
 
@@ -281,7 +282,11 @@ fn rates(part: &Part, rate: Rate) -> Result<String> {
         } else {
             "The pulse's bin passes: simulated, exact, Eq. 8 (thin)"
         },
-        x: Axis::logarithmic("mean background counts a bin"),
+        x: Axis {
+            // With room for the legend.
+            range: Some((0.09, 1500.0)),
+            ..Axis::logarithmic("mean background counts a bin")
+        },
         y: Axis {
             logarithmic: is_false,
             range: is_false.then_some((1e-7, 1.0)),
@@ -306,7 +311,11 @@ fn ratio() -> Result<String> {
     });
     line_chart(&Chart {
         title: "False positive rate: Eq. 10 over exact",
-        x: Axis::logarithmic("mean background counts a bin"),
+        x: Axis {
+            // With room for the legend.
+            range: Some((0.09, 1500.0)),
+            ..Axis::logarithmic("mean background counts a bin")
+        },
         y: Axis::logarithmic("Gaussian / exact"),
         series: series.collect(),
     })

@@ -142,6 +142,7 @@ fn results(part: &Part) -> Result<Results> {
             },
         ],
         claims: claims(part)?,
+        tables: Vec::new(),
     })
 }
 
@@ -271,7 +272,11 @@ fn chart(part: &Part, neighbours: f64) -> Result<String> {
         } else {
             "The highest bin is the pulse's: simulated, exact, Eq. 7 (thin)"
         },
-        x: Axis::linear("SNR, N·A / √(N·B)"),
+        x: Axis {
+            // With room for the legend.
+            range: Some((0.0, 42.0)),
+            ..Axis::linear("SNR, N·A / √(N·B)")
+        },
         y: Axis::linear("probability"),
         series,
     })

@@ -223,6 +223,7 @@ fn results(part: &Part) -> Result<Results> {
     Ok(Results {
         figures: figures(main)?,
         claims,
+        tables: Vec::new(),
     })
 }
 

@@ -116,6 +116,7 @@ fn results(part: &Part) -> Result<Results> {
             ),
         }],
         claims: claims(part),
+        tables: Vec::new(),
     })
 }
 
@@ -224,7 +225,11 @@ fn chart(part: &Part) -> Result<String> {
     }
     line_chart(&Chart {
         title: "ROC by SNR: simulated, exact, Gaussian (thin)",
-        x: Axis::linear("false positive rate"),
+        x: Axis {
+            // With room for the legend.
+            range: Some((0.0, 1.25)),
+            ..Axis::linear("false positive rate")
+        },
         y: Axis::linear("true positive rate"),
         series,
     })
