@@ -321,7 +321,7 @@ fn time_and_depth_error_are_those_of_the_engine() {
 #[test]
 fn a_trial_is_a_pure_function() {
     let point = &table::points()[7];
-    let trial = |seed, number| FalseEvents::trial(seed, number, point, 20).unwrap();
+    let trial = |seed, number| FalseEvents::trial(point, 20, &mut trial_rng(seed, number)).unwrap();
     assert_eq!(trial(1, 3), trial(1, 3));
     assert_ne!(trial(1, 3), trial(1, 4));
     assert_ne!(trial(1, 3), trial(2, 3));

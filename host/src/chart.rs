@@ -45,6 +45,27 @@ pub struct Axis<'a> {
     pub range: Option<(f64, f64)>,
 }
 
+impl<'a> Axis<'a> {
+    /// Equal steps are equal distances, all points fit.
+    #[must_use]
+    pub const fn linear(label: &'a str) -> Self {
+        Self {
+            label,
+            logarithmic: false,
+            range: None,
+        }
+    }
+
+    /// Equal factors are equal distances, all points fit.
+    #[must_use]
+    pub const fn logarithmic(label: &'a str) -> Self {
+        Self {
+            logarithmic: true,
+            ..Self::linear(label)
+        }
+    }
+}
+
 /// Points that belong together.
 #[derive(Clone, Debug)]
 pub struct Series {

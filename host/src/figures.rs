@@ -65,6 +65,10 @@ pub fn documents(
             let path = format!("figures/{}.svg", figure.name);
             documents.push((path.into(), figure.svg.clone()));
         }
+        for table in &results.tables {
+            let path = format!("figures/data/{}.csv", table.name);
+            documents.push((path.into(), table.csv.clone()));
+        }
     }
     documents.push(("figures/README.md".into(), captions(&all)?));
     documents.push(("paper-claims.md".into(), claims(&all)?));

@@ -37,9 +37,6 @@ enum Command {
     Merge(command::sweep::Merge),
     /// Make the figures of the documentation and the verdicts on the paper's claims.
     Figures(command::figures::Figures),
-    /// Print the simulated table of false events that `tune` interpolates.
-    #[command(hide = true)]
-    FalseEventTable(command::false_event_table::FalseEventTable),
 }
 
 fn main() -> ExitCode {
@@ -58,7 +55,6 @@ fn main() -> ExitCode {
         Some(Command::Sweep(sweep)) => sweep.run(),
         Some(Command::Merge(merge)) => merge.run(),
         Some(Command::Figures(figures)) => figures.run(),
-        Some(Command::FalseEventTable(table)) => table.run(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

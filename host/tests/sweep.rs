@@ -109,12 +109,12 @@ fn what_does_not_add_up_is_refused() {
         (
             "study",
             &part.replace(STUDY, "other"),
-            "other (revision 1) does not add to hit-rate",
+            "other (revision 2) does not add to hit-rate",
         ),
         (
             "revision",
-            &part.replace("\"revision\":1", "\"revision\":2"),
-            "revision 2",
+            &part.replace("\"revision\":2", "\"revision\":3"),
+            "revision 3",
         ),
         (
             "points",

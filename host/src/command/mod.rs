@@ -2,7 +2,6 @@
 
 pub mod decode;
 pub mod demo;
-pub mod false_event_table;
 pub mod figures;
 pub mod monitor;
 mod operation;

@@ -131,13 +131,10 @@ impl Tune {
         let exposures = tuned.detections.exposures;
         let simulated = format!("simulation: seed {}, {exposures} exposures", request.seed);
         let false_events = match tuned.source {
-            Source::Table => format!(
-                "simulation: table, seed {}, {} exposures a point",
-                table.seed, table.exposures
-            ),
+            Source::Table => format!("simulation: table, {} exposures a point", table.exposures),
             Source::TableAtMost => format!(
-                "simulation: at most, the least the table saw, seed {}, {} exposures a point",
-                table.seed, table.exposures
+                "simulation: at most, the least the table saw, {} exposures a point",
+                table.exposures
             ),
             Source::Bound => "formula: upper bound, single looks (exact) added up".to_owned(),
         };

@@ -5,6 +5,8 @@ use std::fmt;
 use anyhow::{Context, Result};
 
 use super::{Part, PointTally};
+use crate::chart;
+use crate::theory::poisson::Poisson;
 
 /// What can be said from all trials of a study.
 #[derive(Clone, Debug, Default)]
@@ -13,6 +15,17 @@ pub struct Results {
     pub figures: Vec<Figure>,
     /// In the order of the paper.
     pub claims: Vec<Claim>,
+    /// For programs.
+    pub tables: Vec<Table>,
+}
+
+/// Numbers kept in a file.
+#[derive(Clone, Debug)]
+pub struct Table {
+    /// The file's name, without its extension.
+    pub name: &'static str,
+    /// Its content.
+    pub csv: String,
 }
 
 /// A picture and what it shows.
@@ -71,7 +84,7 @@ impl fmt::Display for Verdict {
 }
 
 /// Standard deviations of an interval that holds 99 %.
-const Z_99: f64 = 2.575_829_303_548_9;
+pub const Z_99: f64 = 2.575_829_303_548_9;
 
 /// A share, and the 99 % interval (Wilson's) in which the probability lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,6 +115,48 @@ impl Share {
     #[must_use]
     pub fn holds(&self, probability: f64) -> bool {
         (self.interval.0..=self.interval.1).contains(&probability)
+    }
+
+    /// A point of a chart, above `x`.
+    #[must_use]
+    pub const fn at(&self, x: f64) -> chart::Point {
+        chart::Point {
+            x,
+            y: self.value,
+            interval: Some(self.interval),
+        }
+    }
+}
+
+/// Shares beside what was predicted for them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Comparison {
+    /// How many were compared.
+    pub points: u32,
+    /// How many predictions lie outside the share's 99 % interval.
+    pub outside: u32,
+    /// The largest difference.
+    pub largest: f64,
+}
+
+impl Comparison {
+    /// Of shares with the probabilities predicted.
+    #[must_use]
+    pub fn of(pairs: impl IntoIterator<Item = (Share, f64)>) -> Self {
+        let mut comparison = Self::default();
+        for (share, predicted) in pairs {
+            comparison.points += 1;
+            comparison.outside += u32::from(!share.holds(predicted));
+            comparison.largest = comparison.largest.max((share.value - predicted).abs());
+        }
+        comparison
+    }
+
+    /// Whether right predictions lie outside as often, or more often, in more than
+    /// one of a thousand studies: one interval in a hundred is wrong.
+    #[must_use]
+    pub fn is_chance(&self) -> bool {
+        Poisson::new(f64::from(self.points) / 100.0).at_least(self.outside) > 1e-3
     }
 }
 
@@ -155,5 +210,16 @@ mod tests {
         assert!(share.holds(0.1) && !share.holds(0.04) && !share.holds(0.21));
         // No success is no proof that there is none.
         assert!(Share::new(0, 100).holds(0.05) && Share::new(100, 100).holds(0.95));
+    }
+
+    /// With 100 points one lies outside on average: P(≥ 6) = 6e-4, P(≥ 5) = 4e-3.
+    #[test]
+    fn a_few_points_lie_outside_by_chance() {
+        let of = |outside: usize| {
+            let predicted = |index| if index < outside { 0.9 } else { 0.5 };
+            Comparison::of((0..100).map(|index| (Share::new(50, 100), predicted(index))))
+        };
+        assert_eq!((of(5).points, of(5).outside, of(5).largest), (100, 5, 0.4));
+        assert!(of(0).is_chance() && of(5).is_chance() && !of(6).is_chance());
     }
 }

@@ -9,9 +9,10 @@
 
 use anyhow::Result;
 use dtof_core::{Count, Threshold};
+use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use super::exposure::{Exposures, Looks, trial_rng};
+use super::exposure::{Exposures, Looks};
 use super::single_look::SingleLook;
 use crate::simulation::Rates;
 
@@ -109,12 +110,11 @@ impl FalseEvents {
         }
     }
 
-    /// `exposures` of them, trial number `trial` of `point`. The same arguments
-    /// give the same tally.
+    /// `exposures` of them at `point`.
     ///
     /// # Errors
     /// If the mean is negative or not a number.
-    pub fn trial(seed: u64, trial: u16, point: &Point, exposures: u32) -> Result<Self> {
+    pub fn trial(point: &Point, exposures: u32, rng: &mut Pcg64) -> Result<Self> {
         let rates = Rates {
             background: point.first_mean / f64::from(point.first),
             signal: 0.0,
@@ -128,10 +128,9 @@ impl FalseEvents {
         };
         let simulated = Exposures::new(&rates, u16::try_from(BINS)?, looks)?;
         let minimum_count = Count::saturating(MINIMUM_COUNT.into());
-        let mut rng = trial_rng(seed, trial);
         let mut tally = Self::new(point.lasts.len());
         for _ in 0..exposures {
-            let highest = simulated.highest_alphas::<BINS>(minimum_count, &point.lasts, &mut rng);
+            let highest = simulated.highest_alphas::<BINS>(minimum_count, &point.lasts, rng);
             for (events, highest) in tally.events.iter_mut().zip(highest) {
                 let Some(highest) = highest else { continue };
                 for (step, events) in events.iter_mut().enumerate() {

@@ -9,7 +9,8 @@
 //! the first look, of the first look, and of last over first look. Between two
 //! α the larger share is taken.
 //!
-//! `repeated_looks.csv` is what `dtof false-event-table` prints.
+//! `docs/figures/data/repeated_looks.csv` is made by `dtof figures`, from the study
+//! `false-events`.
 
 use std::fmt::Write;
 
@@ -18,6 +19,7 @@ use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, Threshold};
 use rayon::prelude::*;
 
+use super::exposure::trial_rng;
 use super::repeated_looks::{
     ALPHA_STEPS, BINS, FalseEvents, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
 };
@@ -89,7 +91,7 @@ pub fn simulate(seed: u64, first_trial: u16, point: &Point, trials: u16) -> Resu
     let numbers = first_trial..first_trial.checked_add(trials).context("too many trials")?;
     let tallies: Vec<FalseEvents> = numbers
         .into_par_iter()
-        .map(|trial| FalseEvents::trial(seed, trial, point, TRIAL))
+        .map(|trial| FalseEvents::trial(point, TRIAL, &mut trial_rng(seed, trial)))
         .collect::<Result<_>>()?;
     let mut sum = FalseEvents::new(point.lasts.len());
     for tally in &tallies {
@@ -130,26 +132,22 @@ pub fn rows(point: &Point, tally: &FalseEvents) -> Vec<Row> {
     rows
 }
 
-/// Simulates the whole table, `trials` trials of 500 exposures a point, and
-/// gives it as CSV.
+/// The table of points and their tallies, all of as many exposures, as CSV.
 ///
 /// # Errors
-/// If there are too many trials.
-pub fn generate(seed: u64, trials: u16) -> Result<String> {
-    let exposures = u32::from(trials) * TRIAL;
+/// If there is no point.
+pub fn csv(tallies: &[(Point, FalseEvents)]) -> Result<String> {
+    let (_, first) = tallies.first().context("no points")?;
     let mut text = format!(
         "# False events of repeated looks: {BINS} bins, minimum count {MINIMUM_COUNT}, \
-         written by: dtof false-event-table --seed {seed} --trials {trials}\n\
-         # seed {seed}\n# exposures {exposures}\n\
-         first_mean,first_look,last_look,alpha_256,events,independent_intensity\n"
+         made by: dtof figures\n# exposures {}\n\
+         first_mean,first_look,last_look,alpha_256,events,independent_intensity\n",
+        first.exposures
     );
-    let points: Vec<(u16, Point)> = (0..).zip(points()).collect();
-    let rows_of = |(index, point): &(u16, Point)| {
-        let first_trial = index.checked_mul(trials).context("too many trials")?;
-        let tally = simulate(seed, first_trial, point, trials)?;
-        Ok(rows(point, &tally))
-    };
-    let of_points: Vec<Vec<Row>> = points.par_iter().map(rows_of).collect::<Result<_>>()?;
+    let of_points: Vec<Vec<Row>> = tallies
+        .par_iter()
+        .map(|(point, tally)| rows(point, tally))
+        .collect();
     for row in of_points.into_iter().flatten() {
         writeln!(
             text,
@@ -161,7 +159,7 @@ pub fn generate(seed: u64, trials: u16) -> Result<String> {
 }
 
 /// The table that is kept.
-const KEPT: &str = include_str!("repeated_looks.csv");
+const KEPT: &str = include_str!("../../../docs/figures/data/repeated_looks.csv");
 
 /// ln H and ln of the share of it that was found, ascending in H.
 type Shares = Vec<(f64, f64)>;
@@ -169,8 +167,6 @@ type Shares = Vec<(f64, f64)>;
 /// The table, ready to be asked.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// Seed it was simulated with.
-    pub seed: u64,
     /// Exposures simulated at each point.
     pub exposures: u64,
     /// Its rows.
@@ -199,7 +195,6 @@ impl Table {
                 .context("the table's header")
         };
         let mut table = Self {
-            seed: header("seed")?,
             exposures: header("exposures")?,
             rows: Vec::new(),
             shares: vec![Default::default(); FIRST_MEANS.len()],
