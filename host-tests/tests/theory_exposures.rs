@@ -3,8 +3,8 @@
 
 use dtof::engine::host_engine;
 use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
-use dtof::simulation::{Rates, SimulatedArray};
-use dtof::source::{Geometry, PhotonSource};
+use dtof::simulation::{Rates, SimulatedArray, SimulatedPixel};
+use dtof::source::{Geometry, PhotonSource, pixel_rng};
 use dtof::theory::exposure::trial_rng;
 use dtof::theory::repeated_looks::{
     ALPHA_STEPS, FalseEvents, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
@@ -12,7 +12,7 @@ use dtof::theory::repeated_looks::{
 use dtof::theory::table::{self, Row, Table};
 use dtof::theory::tune::{Request, Wanted, tune};
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
-use dtof_core::{Count, Threshold};
+use dtof_core::{Count, PixelAddress, Threshold};
 use dtof_host_tests::binomial::{alike, plausible};
 
 /// The chance that a test fails for nothing.
@@ -199,19 +199,19 @@ fn tuned_settings_keep_their_word_in_the_engine() {
             columns: side,
             rows: side,
         };
-        let rates = vec![
-            Rates {
-                background,
-                signal: 0.0,
-                position: 0.0,
-                sigma: 1.0,
-            };
-            geometry.addresses()
-        ];
+        let rates = Rates {
+            background,
+            signal: 0.0,
+            position: 0.0,
+            sigma: 1.0,
+        };
+        let pixels = (0..=u16::MAX).take(geometry.addresses()).map(|address| {
+            let rng = pixel_rng(settings.seed, PixelAddress(address));
+            SimulatedPixel::new(&rates, 128, rng).unwrap()
+        });
         // Until each pixel has ended its first exposure.
         let cycles = tuned.looks.expiry();
-        let mut photons =
-            SimulatedArray::new(geometry, &rates, 128, cycles.into(), settings.seed).unwrap();
+        let mut photons = SimulatedArray::new(geometry, pixels.collect(), cycles.into(), None);
         let mut engine = host_engine(&settings, &photons.addresses()).unwrap();
         let slice = photons.next_slice(u16::try_from(cycles).unwrap()).unwrap();
         let mut events = engine.run(&slice).unwrap();
