@@ -71,7 +71,7 @@ impl fmt::Display for Verdict {
 }
 
 /// Standard deviations of an interval that holds 99 %.
-const Z_99: f64 = 2.575_829_303_548_9;
+pub(super) const Z_99: f64 = 2.575_829_303_548_9;
 
 /// A share, and the 99 % interval (Wilson's) in which the probability lies.
 #[derive(Clone, Copy, Debug, PartialEq)]

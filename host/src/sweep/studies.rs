@@ -1,13 +1,27 @@
 //! The studies there are.
 
+pub mod depth_step;
+pub mod fan_motion;
 pub mod hit_rate;
+pub mod latency;
+mod one_pixel;
+pub mod radial_motion;
+mod ranks;
+pub mod static_scene;
 
 use anyhow::{Context, Result};
 
 use super::Study;
 
 /// In the order of the paper.
-pub const ALL: &[Study] = &[hit_rate::STUDY];
+pub const ALL: &[Study] = &[
+    hit_rate::STUDY,
+    static_scene::STUDY,
+    depth_step::STUDY,
+    radial_motion::STUDY,
+    fan_motion::STUDY,
+    latency::STUDY,
+];
 
 /// The study of that name.
 ///
