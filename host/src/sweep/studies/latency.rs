@@ -225,7 +225,7 @@ mod tests {
     fn no_event_comes_before_the_first_look() {
         use rand_core::SeedableRng;
         for (l1, before, at) in [(20.0, 20, 24), (40.0, 40, 44)] {
-            let point = point([("l1", l1), ("background", 0.02), ("snr", 64.0)]);
+            let point = point([("l1", l1), ("background", 0.02), ("snr", 250.0)]);
             let tally = trial(&point, &mut Pcg64::seed_from_u64(1)).unwrap();
             assert!(!tally.contains_key(&format!("waited by {before}")));
             assert_eq!(tally[&format!("waited by {at}")], EVENTS);
