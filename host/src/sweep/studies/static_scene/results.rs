@@ -67,7 +67,7 @@ fn by_signal(
         x: Axis {
             label: "signal photons a laser cycle, mean of a surface",
             logarithmic: true,
-            range: Some((0.03, 10.0)),
+            range: Some((0.03, 40.0)),
         },
         y: Axis {
             label: y_axis.0,
