@@ -1,11 +1,18 @@
 //! The studies there are.
 
+pub mod depth_step;
 pub mod false_events;
+pub mod fan_motion;
 pub mod gaussian_error;
 pub mod hit_rate;
 pub mod hyperparameters;
+pub mod latency;
+mod one_pixel;
 pub mod paper_setting;
+pub mod radial_motion;
+mod ranks;
 pub mod roc;
+pub mod static_scene;
 
 use anyhow::{Context, Result};
 
@@ -18,6 +25,11 @@ pub const ALL: &[Study] = &[
     roc::STUDY,
     false_events::STUDY,
     hyperparameters::STUDY,
+    static_scene::STUDY,
+    depth_step::STUDY,
+    radial_motion::STUDY,
+    fan_motion::STUDY,
+    latency::STUDY,
 ];
 
 /// The study of that name.
