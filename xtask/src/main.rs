@@ -1,5 +1,6 @@
 //! `cargo xtask`: what set-up and checks need beyond cargo itself.
 
+mod bench;
 mod boards;
 mod emulate;
 mod firmware;
@@ -39,7 +40,9 @@ cargo xtask <command>
                 the chip as probe-rs names it, by default that of the Discovery
   check-boards  the images start, end and echo in QEMU
   self-test     the core works out the same on the target; --bless writes down
-                what it works out here";
+                what it works out here
+  bench         instructions the core's operations take on the target; writes
+                docs/bench/instructions.csv, or with --check compares with it";
 
 fn main() -> ExitCode {
     match run() {
@@ -69,6 +72,8 @@ fn run() -> Result<()> {
         ["check-boards"] => boards::check(root()?),
         ["self-test"] => self_test::run(root()?),
         ["self-test", "--bless"] => self_test::bless(root()?),
+        ["bench"] => bench::run(root()?),
+        ["bench", "--check"] => bench::check(root()?),
         ["help" | "--help" | "-h"] => {
             println!("{HELP}");
             Ok(())

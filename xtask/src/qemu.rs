@@ -96,11 +96,22 @@ pub struct Emulator {
 impl Emulator {
     /// Starts an image with its serial port on a free TCP port.
     pub fn start(board: Board, image: &Path, words: &[&str]) -> Result<Self> {
+        Self::start_with(board, image, words, &[])
+    }
+
+    /// The same with these arguments more for QEMU.
+    pub fn start_with(
+        board: Board,
+        image: &Path,
+        words: &[&str],
+        arguments: &[&str],
+    ) -> Result<Self> {
         // Free now; should another take it meanwhile, QEMU ends at once.
         let port = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?
             .local_addr()?
             .port();
         let mut child = command(board, image, Some(port), words)?
+            .args(arguments)
             .stdout(Stdio::piped())
             .spawn()
             .with_context(|| format!("{} does not start", QEMU.program))?;

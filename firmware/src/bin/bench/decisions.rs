@@ -1,0 +1,67 @@
+//! Decisions: with the peak kept while counting, and on a histogram that arrives
+//! whole from elsewhere.
+
+use dtof_core::peak::ComparatorTree;
+use dtof_core::{Count10, LaserCycle, background, detect};
+
+use crate::counter::{Counter, Operation};
+use crate::report::Report;
+use crate::scene::{CYCLES, EXPOSURES, State};
+
+/// Measures all.
+pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
+    let rows: [(&str, Operation, bool); 5] = [
+        ("kept peak; no event", kept, false),
+        ("kept peak; event and depth", kept, true),
+        ("look; no event", look, false),
+        ("whole histogram; no event", whole, false),
+        ("whole histogram; event", whole, true),
+    ];
+    for (variant, way, event) in rows {
+        let (mut total, mut runs) = (0, 0);
+        for number in 0..EXPOSURES {
+            state.counted(number, event);
+            state.wait_for_last_look();
+            // Noise may fire, if seldom.
+            if fires(state) == event {
+                total += counter.measure(way, state, CYCLES.into());
+                runs += 1;
+            }
+        }
+        report.line("decision", variant, total, runs);
+    }
+    for (variant, way) in [
+        ("kept peak; slowest no event", kept as Operation),
+        ("whole histogram; slowest no event", whole),
+    ] {
+        state.late_background();
+        report.line("decision", variant, counter.measure(way, state, 0), 1);
+    }
+}
+
+fn fires(state: &State) -> bool {
+    let config = &state.config;
+    detect(&state.histogram, config.gate(), config.rule()).is_some()
+}
+
+extern "C" fn kept(state: &mut State, _: u32) -> u32 {
+    let config = &state.config;
+    match detect(&state.histogram, config.gate(), config.rule()) {
+        Some(detection) => detection.depth.offset.raw().unsigned_abs().into(),
+        None => 0,
+    }
+}
+
+extern "C" fn look(state: &mut State, cycle: u32) -> u32 {
+    let cycle = LaserCycle(cycle.into());
+    state.pixel.end_laser_cycle(&state.config, cycle) as u32
+}
+
+extern "C" fn whole(state: &mut State, _: u32) -> u32 {
+    let gate = state.config.gate();
+    let peak = ComparatorTree::of(&state.foreign).peak();
+    let background = background::quadrant(&state.foreign, gate, peak.bin);
+    let threshold = state.config.rule().threshold();
+    let exceeded = threshold.is_exceeded::<Count10>(peak.count, background);
+    if exceeded { background.raw() } else { 0 }
+}
