@@ -18,6 +18,7 @@
 //! ```
 
 use core::fmt;
+use core::ops::Range;
 
 /// First and last bin that may hold the peak, both inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,6 +99,12 @@ impl<const BINS: usize> RangeGate<BINS> {
     pub const fn contains(&self, bin: u16) -> bool {
         // One comparison: bins before the first wrap to the far end.
         bin.wrapping_sub(self.first) < self.end - self.first
+    }
+
+    /// The gated bins, as a range of indices.
+    #[inline]
+    pub(crate) const fn bins(&self) -> Range<usize> {
+        self.first as usize..self.end as usize
     }
 
     /// Where the four quadrants of the gated bins start, and where the last one

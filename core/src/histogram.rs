@@ -109,6 +109,9 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         BINS.ilog2()
     };
 
+    /// Whether the key of a count too high may not fit 32 bits.
+    const KEY_MAY_OVERFLOW: bool = Self::LOG2_BINS + W::BITS == 32;
+
     /// An empty histogram.
     #[must_use]
     pub const fn new() -> Self {
@@ -128,26 +131,104 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     /// counter stays full and the photon is counted as saturated.
     #[inline]
     pub fn add(&mut self, code: u16) {
-        let Some(counter) = self.counts.get_mut(usize::from(code)) else {
-            self.rejected = self.rejected.saturating_add(1);
-            return;
-        };
-        let count: u32 = (*counter).into();
-        if count >= W::MAX {
-            self.saturated = self.saturated.saturating_add(1);
-            return;
-        }
-        *counter = W::counter(count + 1);
-        self.total = self.total.wrapping_add(1);
-        self.peak_key = self.peak_key.max(Self::key(count + 1, code.into()));
+        self.add_gated(code, &RangeGate::full());
     }
 
     /// Counts one photon for each TDC code, as [`Self::add`] does.
     #[inline]
     pub fn add_batch(&mut self, codes: &[u16]) {
-        for &code in codes {
-            self.add(code);
+        self.add_gated_batch(codes, &RangeGate::full());
+    }
+
+    /// Counts one photon, as [`Self::add`] does, if its bin is gated. Returns the
+    /// photons left out by the gate, 0 or 1.
+    #[inline]
+    pub(crate) fn add_gated(&mut self, code: u16, gate: &RangeGate<BINS>) -> u32 {
+        let Some(counter) = self.counts.get_mut(usize::from(code)) else {
+            self.rejected = self.rejected.saturating_add(1);
+            return 0;
+        };
+        if !gate.contains(code) {
+            return 1;
         }
+        let mut saturated = 0;
+        Self::count_photon(counter, code, &mut self.peak_key, &mut saturated);
+        if saturated > 0 {
+            self.saturated = self.saturated.saturating_add(1);
+        } else {
+            self.total = self.total.wrapping_add(1);
+        }
+        0
+    }
+
+    /// Counts one photon for each TDC code whose bin is gated. Returns the photons
+    /// left out by the gate.
+    #[inline]
+    pub(crate) fn add_gated_batch(&mut self, codes: &[u16], gate: &RangeGate<BINS>) -> u32 {
+        // Bins from 0 on save an instruction a photon.
+        if *gate == RangeGate::full() {
+            self.add_gated_inlined(codes, &RangeGate::full())
+        } else {
+            self.add_gated_inlined(codes, gate)
+        }
+    }
+
+    #[inline(always)]
+    fn add_gated_inlined(&mut self, codes: &[u16], gate: &RangeGate<BINS>) -> u32 {
+        // Here and not in `self`, so that they stay in registers.
+        let (mut peak_key, mut saturated, mut rejected, mut gated_out) = (self.peak_key, 0, 0, 0);
+        let counters = self.counts.get_mut(gate.bins()).unwrap_or_default();
+        let first = usize::from(gate.first());
+        let mut count = |&code: &u16| {
+            // One comparison: bins before the first wrap to the far end.
+            match counters.get_mut(usize::from(code).wrapping_sub(first)) {
+                Some(counter) => {
+                    Self::count_photon(counter, code, &mut peak_key, &mut saturated);
+                }
+                None if usize::from(code) < BINS => gated_out += 1,
+                None => rejected += 1,
+            }
+        };
+        // Eight a turn, so that the loop itself costs little.
+        let (eights, rest) = codes.as_chunks::<8>();
+        for eight in eights {
+            eight.iter().for_each(&mut count);
+        }
+        rest.iter().for_each(count);
+
+        self.peak_key = peak_key;
+        let lost = saturated + rejected + gated_out;
+        #[allow(clippy::cast_possible_truncation)] // fewer than 2³² photons
+        let counted = (codes.len() as u32).wrapping_sub(lost);
+        self.total = self.total.wrapping_add(counted);
+        if lost > 0 {
+            self.saturated = self.saturated.saturating_add(saturated);
+            self.rejected = self.rejected.saturating_add(rejected);
+        }
+        gated_out
+    }
+
+    /// Counts one photon in the counter of its bin, unless that is full.
+    #[inline(always)]
+    fn count_photon(
+        counter: &mut W::Counter,
+        code: u16,
+        peak_key: &mut u32,
+        saturated: &mut u32,
+    ) {
+        let mut count = (*counter).into() + 1;
+        let key = Self::key(count, code.into());
+        // No bin is higher than the peak, so that only what would be a new peak
+        // can be too high for its counter.
+        if key > *peak_key || Self::KEY_MAY_OVERFLOW {
+            if count > W::MAX {
+                count = W::MAX;
+                *saturated += 1;
+            } else {
+                *peak_key = key.max(*peak_key);
+            }
+        }
+        *counter = W::counter(count);
     }
 
     /// Adds the gated bins of a whole mini-frame, such as the 5-laser-cycle
@@ -161,7 +242,7 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         frame: &[C; BINS],
         gate: &RangeGate<BINS>,
     ) -> u32 {
-        let gated = usize::from(gate.first())..usize::from(gate.last()) + 1;
+        let gated = gate.bins();
         let counters = self.counts.get_mut(gated.clone()).unwrap_or_default();
         let photons = frame.get(gated.clone()).unwrap_or_default();
         let (mut total, mut saturated, mut peak_key) = (0u32, 0u32, self.peak_key);

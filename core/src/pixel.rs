@@ -294,18 +294,18 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// Counts one photon with the TDC code `code` in the present laser cycle.
     #[inline]
     pub fn count<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, code: u16) {
-        if config.gate.contains(code) || usize::from(code) >= BINS {
-            self.histogram.add(code); // which counts a code past the last bin
-        } else {
-            self.statistics.gated_out += 1;
+        let gated_out = self.histogram.add_gated(code, &config.gate);
+        if gated_out > 0 {
+            self.statistics.gated_out += u64::from(gated_out);
         }
     }
 
     /// Counts one photon for each TDC code, as [`Self::count`] does.
     #[inline]
     pub fn count_batch<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, codes: &[u16]) {
-        for &code in codes {
-            self.count(config, code);
+        let gated_out = self.histogram.add_gated_batch(codes, &config.gate);
+        if gated_out > 0 {
+            self.statistics.gated_out += u64::from(gated_out);
         }
     }
 
