@@ -25,27 +25,69 @@ use crate::units::{BinIndex, Count};
 ///
 /// Costs one pass over half of the gated bins. Counts beyond [`Count::MAX`]
 /// are taken as [`Count::MAX`].
-#[inline]
+// Kept apart from the looks that end without it.
+#[inline(never)]
 #[must_use]
 pub fn quadrant<C: Copy + Into<u32>, const BINS: usize>(
     counts: &[C; BINS],
     gate: &RangeGate<BINS>,
     peak: BinIndex,
 ) -> Count {
-    let [start, first_quarter, middle, third_quarter, end] = gate.quadrant_starts();
-    let (from, between, to) = if peak.raw() < middle {
-        (middle, third_quarter, end)
-    } else {
-        (start, first_quarter, middle)
-    };
-    highest(counts, from, between).min(highest(counts, between, to))
+    let [lower, upper] = quadrants_without(counts, gate, peak);
+    Count::saturating(highest(lower).min(highest(upper)))
 }
 
-/// The highest count from bin `from` up to, not including, bin `to`.
-#[inline]
-fn highest<C: Copy + Into<u32>>(counts: &[C], from: u16, to: u16) -> Count {
-    let bins = counts.get(usize::from(from)..usize::from(to));
-    let counts = bins.unwrap_or_default().iter();
+/// Whether [`quadrant`] is `level` or more.
+///
+/// Costs less: it ends at the first such count of each quadrant.
+#[inline(always)]
+#[must_use]
+pub fn quadrant_reaches<C: Copy + Into<u32>, const BINS: usize>(
+    counts: &[C; BINS],
+    gate: &RangeGate<BINS>,
+    peak: BinIndex,
+    level: u32,
+) -> bool {
+    let [lower, upper] = quadrants_without(counts, gate, peak);
+    reaches(lower, level) && reaches(upper, level)
+}
+
+/// The two quadrants of the half without the peak.
+#[inline(always)]
+fn quadrants_without<'a, C, const BINS: usize>(
+    counts: &'a [C; BINS],
+    gate: &RangeGate<BINS>,
+    peak: BinIndex,
+) -> [&'a [C]; 2] {
+    let gated = counts.get(gate.bins()).unwrap_or_default();
+    // Rounded down twice, this is where `RangeGate::quadrant_starts` says.
+    let middle = gated.len() / 2;
+    let (lower, upper) = gated.split_at_checked(middle).unwrap_or_default();
+    let peak_in_lower = usize::from(peak.raw()) < gate.bins().start + middle;
+    let half = if peak_in_lower { upper } else { lower };
+    half.split_at_checked(half.len() / 2)
+        .unwrap_or_default()
+        .into()
+}
+
+/// The highest count.
+#[inline(always)]
+fn highest<C: Copy + Into<u32>>(counts: &[C]) -> u32 {
     // Not `max()`, which carries a reference along with each count.
-    Count::saturating(counts.fold(0, |highest, &count| count.into().max(highest)))
+    let higher = |highest: u32, &count: &C| count.into().max(highest);
+    let (fours, rest) = counts.as_chunks::<4>();
+    let highest = fours.iter().fold(0, |highest, [a, b, c, d]| {
+        higher(higher(higher(higher(highest, a), b), c), d)
+    });
+    rest.iter().fold(highest, higher)
+}
+
+/// Whether a count is `level` or more.
+#[inline(always)]
+fn reaches<C: Copy + Into<u32>>(counts: &[C], level: u32) -> bool {
+    let reaches = |&count: &C| count.into() >= level;
+    // Four a turn, so that the loop itself costs little.
+    let (fours, rest) = counts.as_chunks::<4>();
+    let one_of = |[a, b, c, d]: &[C; 4]| reaches(a) || reaches(b) || reaches(c) || reaches(d);
+    fours.iter().any(one_of) || rest.iter().any(reaches)
 }

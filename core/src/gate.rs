@@ -82,6 +82,7 @@ impl<const BINS: usize> RangeGate<BINS> {
     }
 
     /// The first bin that may hold the peak.
+    #[inline]
     #[must_use]
     pub const fn first(&self) -> u16 {
         self.first
@@ -101,7 +102,13 @@ impl<const BINS: usize> RangeGate<BINS> {
         bin.wrapping_sub(self.first) < self.end - self.first
     }
 
-    /// The gated bins, as a range of indices.
+    /// Whether it leaves out nothing.
+    #[inline]
+    pub(crate) const fn is_full(&self) -> bool {
+        self.first == 0 && self.end as usize == BINS
+    }
+
+    /// The gated bins, as indices.
     #[inline]
     pub(crate) const fn bins(&self) -> Range<usize> {
         self.first as usize..self.end as usize

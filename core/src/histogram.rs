@@ -21,7 +21,7 @@
 //! ```
 
 use crate::gate::RangeGate;
-use crate::isqrt::isqrt;
+use crate::isqrt::{isqrt, root_below};
 use crate::peak::Peak;
 use crate::units::{BinIndex, Count};
 
@@ -49,6 +49,11 @@ pub trait CounterWidth: sealed::Sealed {
     /// The floor of the square root of any count, with as many iterations as
     /// the width needs: 5 for 10 bits, 8 for 16, 12 for 24.
     fn square_root(count: u32) -> u32;
+
+    /// The largest root of a count of this width for which
+    /// `root² + alpha·root < level`, and what is left of `level`; `alpha` and
+    /// `level` in 1/256.
+    fn root_below(level: u32, alpha: u32) -> (u32, u32);
 }
 
 /// 10-bit counters (0..=1023), those of the paper's FPGA and the default.
@@ -76,6 +81,10 @@ macro_rules! counter_width {
             #[inline]
             fn square_root(count: u32) -> u32 {
                 isqrt::<{ <$name as CounterWidth>::BITS.div_ceil(2) }>(count)
+            }
+            #[inline]
+            fn root_below(level: u32, alpha: u32) -> (u32, u32) {
+                root_below::<{ <$name as CounterWidth>::BITS.div_ceil(2) }>(level, alpha)
             }
         }
     };
@@ -166,7 +175,7 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     #[inline]
     pub(crate) fn add_gated_batch(&mut self, codes: &[u16], gate: &RangeGate<BINS>) -> u32 {
         // Bins from 0 on save an instruction a photon.
-        if *gate == RangeGate::full() {
+        if gate.is_full() {
             self.add_gated_inlined(codes, &RangeGate::full())
         } else {
             self.add_gated_inlined(codes, gate)
@@ -275,9 +284,10 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     #[must_use]
     pub fn peak(&self) -> Peak {
         // The inverse of `key`: the count rounds up, the bin is what is missing.
-        let count = (self.peak_key >> Self::LOG2_BINS)
-            + u32::from(self.peak_key & ((1 << Self::LOG2_BINS) - 1) != 0);
-        let bin = (count << Self::LOG2_BINS).wrapping_sub(self.peak_key);
+        // Nothing is limited; to say how wide they are saves the test for it.
+        let last_bin = (1 << Self::LOG2_BINS) - 1;
+        let count = (self.peak_key.wrapping_add(last_bin) >> Self::LOG2_BINS) & W::MAX;
+        let bin = self.peak_key.wrapping_neg() & last_bin;
         Peak {
             bin: BinIndex::saturating((bin & 0x3ff) as u16),
             count: Count::saturating(count),

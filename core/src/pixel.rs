@@ -169,9 +169,23 @@ pub struct Detection {
 ///
 /// `histogram` holds gated bins only, as [`Histogram::add_frame`] with the same
 /// gate and [`AsyncPixel::count`] see to. A peak outside the gate is none.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn detect<const BINS: usize, W: CounterWidth, R: DetectionRule>(
+    histogram: &Histogram<BINS, W>,
+    gate: &RangeGate<BINS>,
+    rule: &R,
+) -> Option<Detection> {
+    // Without a gate, halves and quadrants are known when compiled.
+    if gate.is_full() {
+        detect_gated(histogram, &RangeGate::full(), rule)
+    } else {
+        detect_gated(histogram, gate, rule)
+    }
+}
+
+#[inline(always)]
+fn detect_gated<const BINS: usize, W: CounterWidth, R: DetectionRule>(
     histogram: &Histogram<BINS, W>,
     gate: &RangeGate<BINS>,
     rule: &R,

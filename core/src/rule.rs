@@ -52,15 +52,21 @@ impl PaperRule {
 }
 
 impl DetectionRule for PaperRule {
-    #[inline]
+    #[inline(always)]
     fn detect<const BINS: usize, W: CounterWidth>(
         &self,
         histogram: &Histogram<BINS, W>,
         gate: &RangeGate<BINS>,
         peak: Peak,
     ) -> Option<Count> {
-        let background = background::quadrant(histogram.counts(), gate, peak.bin);
-        let exceeded = self.threshold.is_exceeded::<W>(peak.count, background);
-        exceeded.then_some(background)
+        if peak.count < self.threshold.minimum_count() {
+            return None;
+        }
+        // Most looks end here, without the background itself.
+        let lowest = self.threshold.lowest_background::<W>(peak.count);
+        if background::quadrant_reaches(histogram.counts(), gate, peak.bin, lowest) {
+            return None;
+        }
+        Some(background::quadrant(histogram.counts(), gate, peak.bin))
     }
 }
