@@ -20,6 +20,8 @@
 //! assert_eq!((histogram.total(), histogram.rejected()), (4, 1));
 //! ```
 
+use core::sync::atomic::{Ordering, compiler_fence};
+
 use crate::gate::RangeGate;
 use crate::isqrt::{isqrt, root_below};
 use crate::peak::Peak;
@@ -334,7 +336,14 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     /// Empties the histogram for the next exposure.
     #[inline]
     pub fn clear(&mut self) {
-        self.counts.fill(W::ZERO);
+        // Not `fill`, which calls `memset`: that takes twice as long. The fence, which
+        // is no instruction, keeps the compiler from making it one all the same.
+        let (blocks, rest) = self.counts.as_chunks_mut::<8>();
+        for block in blocks {
+            *block = [W::ZERO; 8];
+            compiler_fence(Ordering::Release);
+        }
+        rest.fill(W::ZERO);
         self.peak_key = 0;
         self.total = 0;
         self.rejected = 0;

@@ -253,6 +253,17 @@ impl Statistics {
     pub const fn photons(&self) -> u64 {
         self.counted + self.saturated + self.rejected + self.gated_out
     }
+
+    /// Adds those of an exposure.
+    #[inline]
+    fn add_photons_of<const BINS: usize, W: CounterWidth>(
+        &mut self,
+        histogram: &Histogram<BINS, W>,
+    ) {
+        self.counted += u64::from(histogram.total());
+        self.saturated += u64::from(histogram.saturated());
+        self.rejected += u64::from(histogram.rejected());
+    }
 }
 
 impl AddAssign for Statistics {
@@ -453,17 +464,14 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// What the pixel has done so far, the present exposure included.
     #[must_use]
     pub fn statistics(&self) -> Statistics {
-        let histogram = &self.histogram;
         let mut statistics = self.statistics;
-        statistics.counted += u64::from(histogram.total());
-        statistics.saturated += u64::from(histogram.saturated());
-        statistics.rejected += u64::from(histogram.rejected());
+        statistics.add_photons_of(&self.histogram);
         statistics
     }
 
     /// Begins a new exposure.
     fn restart(&mut self) {
-        self.statistics = self.statistics();
+        self.statistics.add_photons_of(&self.histogram);
         self.histogram.clear();
         self.exposure = 0;
         self.deferred = false;
