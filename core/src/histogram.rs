@@ -257,18 +257,24 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         let counters = self.counts.get_mut(gated.clone()).unwrap_or_default();
         let photons = frame.get(gated.clone()).unwrap_or_default();
         let (mut total, mut saturated, mut peak_key) = (0u32, 0u32, self.peak_key);
-        for ((counter, &photons), bin) in counters.iter_mut().zip(photons).zip(gate.first()..) {
+        // The bin, as it stands in a key.
+        let mut bin = u32::from(gate.first());
+        for (counter, &photons) in counters.iter_mut().zip(photons) {
             let photons: u32 = photons.into();
-            if photons == 0 {
-                continue;
+            if photons > 0 {
+                let before: u32 = (*counter).into();
+                let mut count = before.saturating_add(photons);
+                total = total.wrapping_add(photons);
+                if count > W::MAX {
+                    let lost = photons - W::MAX.saturating_sub(before);
+                    count = W::MAX;
+                    total = total.wrapping_sub(lost);
+                    saturated = saturated.saturating_add(lost);
+                }
+                *counter = W::counter(count);
+                peak_key = peak_key.max(Self::key(count, bin));
             }
-            let before: u32 = (*counter).into();
-            let taken = photons.min(W::MAX.saturating_sub(before));
-            let count = before + taken;
-            *counter = W::counter(count);
-            saturated = saturated.saturating_add(photons - taken);
-            total = total.wrapping_add(taken);
-            peak_key = peak_key.max(Self::key(count, bin.into()));
+            bin += 1;
         }
         self.total = self.total.wrapping_add(total);
         self.saturated = self.saturated.saturating_add(saturated);
