@@ -19,6 +19,7 @@
 //! ```
 
 use crate::gate::RangeGate;
+use crate::photon_count::PhotonCount;
 use crate::units::{BinIndex, Count};
 
 /// The paper's quadrant estimate over the gated bins.
@@ -28,13 +29,13 @@ use crate::units::{BinIndex, Count};
 // Kept apart from the looks that end without it.
 #[inline(never)]
 #[must_use]
-pub fn quadrant<C: Copy + Into<u32>, const BINS: usize>(
+pub fn quadrant<C: PhotonCount, const BINS: usize>(
     counts: &[C; BINS],
     gate: &RangeGate<BINS>,
     peak: BinIndex,
 ) -> Count {
     let [lower, upper] = quadrants_without(counts, gate, peak);
-    Count::saturating(highest(lower).min(highest(upper)))
+    Count::saturating(C::highest(lower).min(C::highest(upper)))
 }
 
 /// Whether [`quadrant`] is `level` or more.
@@ -42,14 +43,14 @@ pub fn quadrant<C: Copy + Into<u32>, const BINS: usize>(
 /// Costs less: it ends at the first such count of each quadrant.
 #[inline(always)]
 #[must_use]
-pub fn quadrant_reaches<C: Copy + Into<u32>, const BINS: usize>(
+pub fn quadrant_reaches<C: PhotonCount, const BINS: usize>(
     counts: &[C; BINS],
     gate: &RangeGate<BINS>,
     peak: BinIndex,
     level: u32,
 ) -> bool {
     let [lower, upper] = quadrants_without(counts, gate, peak);
-    reaches(lower, level) && reaches(upper, level)
+    C::any_reaches(lower, level) && C::any_reaches(upper, level)
 }
 
 /// The two quadrants of the half without the peak.
@@ -59,35 +60,26 @@ fn quadrants_without<'a, C, const BINS: usize>(
     gate: &RangeGate<BINS>,
     peak: BinIndex,
 ) -> [&'a [C]; 2] {
-    let gated = counts.get(gate.bins()).unwrap_or_default();
-    // Rounded down twice, this is where `RangeGate::quadrant_starts` says.
-    let middle = gated.len() / 2;
-    let (lower, upper) = gated.split_at_checked(middle).unwrap_or_default();
-    let peak_in_lower = usize::from(peak.raw()) < gate.bins().start + middle;
-    let half = if peak_in_lower { upper } else { lower };
-    half.split_at_checked(half.len() / 2)
-        .unwrap_or_default()
-        .into()
+    let [lower, upper] = halves(counts.get(gate.bins()).unwrap_or_default());
+    let in_lower = usize::from(peak.raw()) < gate.bins().start + lower.len();
+    halves(if in_lower { upper } else { lower })
 }
 
-/// The highest count.
+/// The quadrants of the gated bins, as [`RangeGate::quadrant_starts`] has them.
 #[inline(always)]
-fn highest<C: Copy + Into<u32>>(counts: &[C]) -> u32 {
-    // Not `max()`, which carries a reference along with each count.
-    let higher = |highest: u32, &count: &C| count.into().max(highest);
-    let (fours, rest) = counts.as_chunks::<4>();
-    let highest = fours.iter().fold(0, |highest, [a, b, c, d]| {
-        higher(higher(higher(higher(highest, a), b), c), d)
-    });
-    rest.iter().fold(highest, higher)
+pub(crate) fn quadrants<'a, C, const BINS: usize>(
+    counts: &'a [C; BINS],
+    gate: &RangeGate<BINS>,
+) -> [&'a [C]; 4] {
+    let [lower, upper] = halves(counts.get(gate.bins()).unwrap_or_default());
+    let ([a, b], [c, d]) = (halves(lower), halves(upper));
+    [a, b, c, d]
 }
 
-/// Whether a count is `level` or more.
+/// Of an odd number the second has one more; halved twice this gives `n/4`, `n/2`
+/// and `3n/4`, each rounded down.
 #[inline(always)]
-fn reaches<C: Copy + Into<u32>>(counts: &[C], level: u32) -> bool {
-    let reaches = |&count: &C| count.into() >= level;
-    // Four a turn, so that the loop itself costs little.
-    let (fours, rest) = counts.as_chunks::<4>();
-    let one_of = |[a, b, c, d]: &[C; 4]| reaches(a) || reaches(b) || reaches(c) || reaches(d);
-    fours.iter().any(one_of) || rest.iter().any(reaches)
+fn halves<C>(bins: &[C]) -> [&[C]; 2] {
+    let halves = bins.split_at_checked(bins.len() / 2);
+    halves.unwrap_or_default().into()
 }

@@ -25,6 +25,7 @@ use core::sync::atomic::{Ordering, compiler_fence};
 use crate::gate::RangeGate;
 use crate::isqrt::{isqrt, root_below};
 use crate::peak::Peak;
+use crate::photon_count::PhotonCount;
 use crate::units::{BinIndex, Count};
 
 mod sealed {
@@ -37,7 +38,7 @@ mod sealed {
 /// iterations for wider counts.
 pub trait CounterWidth: sealed::Sealed {
     /// The integer that holds one counter.
-    type Counter: Copy + Ord + Into<u32> + core::fmt::Debug;
+    type Counter: PhotonCount + Ord + core::fmt::Debug;
     /// An empty counter.
     const ZERO: Self::Counter;
     /// Bits a counter uses; it saturates at `2^BITS - 1`.

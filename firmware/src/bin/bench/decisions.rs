@@ -1,8 +1,7 @@
 //! Decisions: with the peak kept while counting, and on a histogram that arrives
 //! whole from elsewhere.
 
-use dtof_core::peak::ComparatorTree;
-use dtof_core::{Count10, LaserCycle, background, detect};
+use dtof_core::{Count10, LaserCycle, detect};
 
 use crate::counter::{Counter, Operation};
 use crate::report::Report;
@@ -58,10 +57,11 @@ extern "C" fn look(state: &mut State, cycle: u32) -> u32 {
 }
 
 extern "C" fn whole(state: &mut State, _: u32) -> u32 {
-    let gate = state.config.gate();
-    let peak = ComparatorTree::of(&state.foreign).peak();
-    let background = background::quadrant(&state.foreign, gate, peak.bin);
-    let threshold = state.config.rule().threshold();
-    let exceeded = threshold.is_exceeded::<Count10>(peak.count, background);
-    if exceeded { background.raw() } else { 0 }
+    let config = &state.config;
+    let detected = config
+        .rule()
+        .detect_whole::<Count10, _>(&state.foreign, config.gate());
+    detected.map_or(0, |(peak, background)| {
+        u32::from(peak.bin.raw()) + background.raw()
+    })
 }
