@@ -99,7 +99,8 @@ impl<const BINS: usize> RangeGate<BINS> {
     #[must_use]
     pub const fn contains(&self, bin: u16) -> bool {
         // One comparison: bins before the first wrap to the far end.
-        bin.wrapping_sub(self.first) < self.end - self.first
+        let first = self.first as u32;
+        (bin as u32).wrapping_sub(first) < self.end as u32 - first
     }
 
     /// Whether it leaves out nothing.

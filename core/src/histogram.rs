@@ -203,8 +203,15 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         };
         // Eight a turn, so that the loop itself costs little.
         let (eights, rest) = codes.as_chunks::<8>();
-        for eight in eights {
-            eight.iter().for_each(&mut count);
+        for [a, b, c, d, e, f, g, h] in eights {
+            count(a);
+            count(b);
+            count(c);
+            count(d);
+            count(e);
+            count(f);
+            count(g);
+            count(h);
         }
         rest.iter().for_each(count);
 
@@ -222,12 +229,7 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
 
     /// Counts one photon in the counter of its bin, unless that is full.
     #[inline(always)]
-    fn count_photon(
-        counter: &mut W::Counter,
-        code: u16,
-        peak_key: &mut u32,
-        saturated: &mut u32,
-    ) {
+    fn count_photon(counter: &mut W::Counter, code: u16, peak_key: &mut u32, saturated: &mut u32) {
         let mut count = (*counter).into() + 1;
         let key = Self::key(count, code.into());
         // No bin is higher than the peak, so that only what would be a new peak
@@ -258,9 +260,8 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         let counters = self.counts.get_mut(gated.clone()).unwrap_or_default();
         let photons = frame.get(gated.clone()).unwrap_or_default();
         let (mut total, mut saturated, mut peak_key) = (0u32, 0u32, self.peak_key);
-        // The bin, as it stands in a key.
-        let mut bin = u32::from(gate.first());
-        for (counter, &photons) in counters.iter_mut().zip(photons) {
+        let bins = u32::from(gate.first())..;
+        for (bin, (counter, &photons)) in bins.zip(counters.iter_mut().zip(photons)) {
             let photons: u32 = photons.into();
             if photons > 0 {
                 let before: u32 = (*counter).into();
@@ -275,7 +276,6 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
                 *counter = W::counter(count);
                 peak_key = peak_key.max(Self::key(count, bin));
             }
-            bin += 1;
         }
         self.total = self.total.wrapping_add(total);
         self.saturated = self.saturated.saturating_add(saturated);

@@ -81,7 +81,12 @@ impl PaperRule {
     ) -> Option<(Peak, Count)> {
         let [first, second, third, fourth] = background::quadrants(counts, gate);
         let highest = W::Counter::highest;
-        let [a, b, c, d] = [highest(first), highest(second), highest(third), highest(fourth)];
+        let [a, b, c, d] = [
+            highest(first),
+            highest(second),
+            highest(third),
+            highest(fourth),
+        ];
         let (highest, background) = if a.max(b) >= c.max(d) {
             (a.max(b), c.min(d))
         } else {

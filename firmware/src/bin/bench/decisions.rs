@@ -7,10 +7,13 @@ use crate::counter::{Counter, Operation};
 use crate::report::Report;
 use crate::scene::{CYCLES, EXPOSURES, State};
 
+const WITH_GATE: &str = "kept peak; no event; gate";
+
 /// Measures all.
 pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
-    let rows: [(&str, Operation, bool); 5] = [
+    let rows: [(&str, Operation, bool); 6] = [
         ("kept peak; no event", kept, false),
+        (WITH_GATE, kept, false),
         ("kept peak; event and depth", kept, true),
         ("look; no event", look, false),
         ("whole histogram; no event", whole, false),
@@ -20,6 +23,9 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
         let (mut total, mut runs) = (0, 0);
         for number in 0..EXPOSURES {
             state.counted(number, event);
+            if variant == WITH_GATE {
+                state.count_gated();
+            }
             state.wait_for_last_look();
             // Noise may fire, if seldom.
             if fires(state) == event {
@@ -40,12 +46,12 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
 
 fn fires(state: &State) -> bool {
     let config = &state.config;
-    detect(&state.histogram, config.gate(), config.rule()).is_some()
+    detect(state.pixel.histogram(), config.gate(), config.rule()).is_some()
 }
 
 extern "C" fn kept(state: &mut State, _: u32) -> u32 {
     let config = &state.config;
-    match detect(&state.histogram, config.gate(), config.rule()) {
+    match detect(state.pixel.histogram(), config.gate(), config.rule()) {
         Some(detection) => detection.depth.offset.raw().unsigned_abs().into(),
         None => 0,
     }

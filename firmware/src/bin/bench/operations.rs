@@ -20,12 +20,19 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
     }
     report.line("photon", "AsyncPixel::count", total, photons);
 
-    let rows: [(&str, &str, Operation, Prepare, u32); 9] = [
+    let rows: [(&str, &str, Operation, Prepare, u32); 10] = [
         (
             "photon",
             "AsyncPixel::count_batch",
             count_batch,
             empty,
+            photons,
+        ),
+        (
+            "photon",
+            "AsyncPixel::count_batch; gate",
+            count_batch,
+            gated,
             photons,
         ),
         ("photon", "Histogram::add_batch", add_batch, empty, photons),
@@ -58,6 +65,11 @@ type Prepare = fn(&mut State, u32);
 
 fn empty(state: &mut State, number: u32) {
     state.empty(number, true);
+}
+
+fn gated(state: &mut State, number: u32) {
+    state.empty(number, true);
+    state.config = state.gated;
 }
 
 fn with_target(state: &mut State, number: u32) {

@@ -23,6 +23,8 @@ pub const EXPOSURES: u32 = 64;
 pub struct State {
     /// X = 4, L1 = 40, α = 4, at least 5 photons.
     pub config: PixelConfig<BINS>,
+    /// The same with a gate whose quadrants do not start at even bins.
+    pub gated: PixelConfig<BINS>,
     /// L2 = 44, and no peak is high enough.
     pub never_fires: PixelConfig<BINS>,
     pub codes: [u16; PHOTONS as usize],
@@ -37,8 +39,9 @@ pub struct State {
 impl State {
     pub fn new() -> Option<Self> {
         Some(Self {
-            config: Self::config(40, 2000, 5).ok()?,
-            never_fires: Self::config(4, CYCLES, 1023).ok()?,
+            config: Self::config(40, 2000, 5, RangeGate::full()).ok()?,
+            gated: Self::config(40, 2000, 5, RangeGate::new(3, 124).ok()?).ok()?,
+            never_fires: Self::config(4, CYCLES, 1023, RangeGate::full()).ok()?,
             codes: [0; PHOTONS as usize],
             pixel: AsyncPixel::new(PixelAddress(7)),
             histogram: Histogram::new(),
@@ -49,12 +52,18 @@ impl State {
     }
 
     /// `minimum` photons in a reported peak.
-    pub fn config(l1: u16, l2: u16, minimum: u32) -> Result<PixelConfig<BINS>, ConfigError> {
+    fn config(
+        l1: u16,
+        l2: u16,
+        minimum: u32,
+        gate: RangeGate<BINS>,
+    ) -> Result<PixelConfig<BINS>, ConfigError> {
         let rule = PaperRule::new(const { U8F8::lit("4") }, Count::saturating(minimum));
-        PixelConfig::new(4, l1, l2, RangeGate::full(), rule)
+        PixelConfig::new(4, l1, l2, gate, rule)
     }
 
-    /// The photons of exposure `number`, about six a laser cycle, and empty pixels and histograms.
+    /// The photons of exposure `number`, about six a laser cycle, and empty pixels
+    /// and histograms.
     ///
     /// Background photons are evenly spread, 1.7 or 2 a bin. With a target every
     /// sixth photon lies in its bin or, one of these in four, in the next.
@@ -73,7 +82,7 @@ impl State {
                 below(128)
             };
         }
-        if let Ok(config) = Self::config(40, 2000, 5) {
+        if let Ok(config) = Self::config(40, 2000, 5, RangeGate::full()) {
             self.config = config;
         }
         self.pixel = AsyncPixel::new(PixelAddress(7));
@@ -90,6 +99,13 @@ impl State {
         self.foreign = *self.histogram.counts();
     }
 
+    /// Counts the pixel's photons again, through a gate.
+    pub fn count_gated(&mut self) {
+        self.config = self.gated;
+        self.pixel = AsyncPixel::new(PixelAddress(7));
+        self.pixel.count_batch(&self.config, &self.codes);
+    }
+
     /// Lets all laser cycles but the last pass.
     pub fn wait_for_last_look(&mut self) {
         for cycle in 0..CYCLES - 1 {
@@ -102,10 +118,11 @@ impl State {
     /// Few photons but the peak's, those the background rule needs where it comes
     /// to last.
     pub fn late_background(&mut self) {
-        self.histogram.clear();
+        self.empty(0, false);
         for (bin, photons) in [(5, 12), (95, 6), (127, 6)] {
             for _ in 0..photons {
                 self.histogram.add(bin);
+                self.pixel.count(&self.config, bin);
             }
         }
         self.foreign = *self.histogram.counts();
