@@ -82,6 +82,7 @@
 mod aer;
 pub mod background;
 mod depth;
+mod detection;
 mod event;
 mod flags;
 mod gate;
@@ -100,6 +101,7 @@ pub use fixed;
 
 pub use aer::{AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord};
 pub use depth::{Depth, RangeScale, RangeScaleError, centre_of_mass};
+pub use detection::{Detection, detect};
 pub use event::{DepthEvent, EventSlot};
 pub use flags::Flags;
 pub use gate::{GateError, RangeGate};
@@ -107,7 +109,7 @@ pub use histogram::{Count10, Count16, Count24, CounterWidth, Histogram};
 pub use isqrt::isqrt;
 pub use peak::Peak;
 pub use photon_count::PhotonCount;
-pub use pixel::{AsyncPixel, ConfigError, Detection, Look, PixelConfig, Statistics, detect};
+pub use pixel::{AsyncPixel, ConfigError, Look, PixelConfig, Statistics};
 pub use processing_element::{Macropixel, ProcessingElement};
 pub use rule::{DetectionRule, PaperRule};
 pub use threshold::Threshold;

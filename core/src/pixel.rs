@@ -34,14 +34,13 @@
 use core::fmt;
 use core::ops::AddAssign;
 
-use crate::depth::{Depth, centre_of_mass};
+use crate::detection::detect;
 use crate::event::{DepthEvent, EventSlot};
 use crate::flags::Flags;
 use crate::gate::RangeGate;
 use crate::histogram::{Count10, CounterWidth, Histogram};
-use crate::peak::Peak;
 use crate::rule::{DetectionRule, PaperRule};
-use crate::units::{Count, LaserCycle, PixelAddress};
+use crate::units::{LaserCycle, PixelAddress};
 
 /// How pixels operate: one configuration for many. Valid by construction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,57 +149,6 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
     pub const fn rule(&self) -> &R {
         &self.rule
     }
-}
-
-/// A peak that stands clear of the background.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Detection {
-    /// The highest bin.
-    pub peak: Peak,
-    /// The background a bin, as the rule estimates it.
-    pub background: Count,
-    /// Where in its bins the pulse lies.
-    pub depth: Depth,
-}
-
-/// One decision on one histogram: peak, background, threshold, depth. What a
-/// pixel does at each look, on its own for histograms that arrive whole.
-///
-/// `histogram` holds gated bins only, as [`Histogram::add_frame`] with the same
-/// gate and [`AsyncPixel::count`] see to. A peak outside the gate is none.
-#[inline(always)]
-#[must_use]
-pub fn detect<const BINS: usize, W: CounterWidth, R: DetectionRule>(
-    histogram: &Histogram<BINS, W>,
-    gate: &RangeGate<BINS>,
-    rule: &R,
-) -> Option<Detection> {
-    // Without a gate, halves and quadrants are known when compiled.
-    if gate.is_full() {
-        detect_gated(histogram, &RangeGate::full(), rule)
-    } else {
-        detect_gated(histogram, gate, rule)
-    }
-}
-
-#[inline(always)]
-fn detect_gated<const BINS: usize, W: CounterWidth, R: DetectionRule>(
-    histogram: &Histogram<BINS, W>,
-    gate: &RangeGate<BINS>,
-    rule: &R,
-) -> Option<Detection> {
-    let peak = histogram.peak();
-    if !gate.contains(peak.bin.raw()) {
-        return None;
-    }
-    let background = rule.detect(histogram, gate, peak)?;
-    let depth = centre_of_mass(histogram, gate, peak, background);
-    Some(Detection {
-        peak,
-        background,
-        depth,
-    })
 }
 
 /// What the end of a laser cycle brought.
