@@ -170,6 +170,7 @@ fn thresholds<W: CounterWidth>() {
     keep((threshold.alpha(), threshold.minimum_count()));
     keep(threshold.level::<W>(count()));
     keep(threshold.is_exceeded::<W>(count(), count()));
+    keep(threshold.lowest_background::<W>(count()));
 }
 
 #[inline(never)]
@@ -190,6 +191,13 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
             count: count(),
         };
         keep(background::quadrant(histogram.counts(), &gate, peak.bin));
+        keep(background::quadrant_reaches(
+            histogram.counts(),
+            &gate,
+            peak.bin,
+            word(),
+        ));
+        keep(rule().detect_whole::<W, BINS>(histogram.counts(), &gate));
         keep(centre_of_mass(&histogram, &gate, peak, count()));
         if more() {
             histogram.clear();
