@@ -2,18 +2,22 @@
 //!
 //! ```
 //! use dtof_core::fixed::types::U8F8;
-//! use dtof_core::{Count, Histogram, PaperRule, RangeGate, detect};
+//! use dtof_core::{Count, DepthEstimator, Histogram, PaperRule, RangeGate, detect};
 //!
 //! let rule = PaperRule::new(const { U8F8::lit("4") }, Count::saturating(5));
 //! let mut histogram = Histogram::<128>::new();
 //! histogram.add_batch(&[60, 60, 60, 60, 7]);
-//! assert_eq!(detect(&histogram, &RangeGate::full(), &rule), None);
+//! let estimator = DepthEstimator::default();
+//! assert_eq!(detect(&histogram, &RangeGate::full(), &rule, estimator), None);
 //! histogram.add(60);
-//! let detection = detect(&histogram, &RangeGate::full(), &rule).unwrap();
+//! let detection = detect(&histogram, &RangeGate::full(), &rule, estimator).unwrap();
 //! assert_eq!((detection.peak.bin.raw(), detection.background.raw()), (60, 0));
 //! ```
 
-use crate::depth::{Depth, centre_of_mass};
+use fixed::types::U24F8;
+
+use crate::depth::Depth;
+use crate::estimator::DepthEstimator;
 use crate::gate::RangeGate;
 use crate::histogram::{CounterWidth, Histogram};
 use crate::peak::Peak;
@@ -26,7 +30,7 @@ use crate::units::Count;
 pub struct Detection {
     /// The highest bin.
     pub peak: Peak,
-    /// The background a bin, as the rule estimates it.
+    /// The background a bin, as the rule estimates it, rounded to whole counts.
     pub background: Count,
     /// Where in its bins the pulse lies.
     pub depth: Depth,
@@ -44,12 +48,13 @@ pub fn detect<const BINS: usize, W: CounterWidth, R: DetectionRule>(
     histogram: &Histogram<BINS, W>,
     gate: &RangeGate<BINS>,
     rule: &R,
+    estimator: DepthEstimator,
 ) -> Option<Detection> {
     // Without a gate, halves and quadrants are known when compiled.
     if gate.is_full() {
-        detect_gated(histogram, &RangeGate::full(), rule)
+        detect_gated(histogram, &RangeGate::full(), rule, estimator)
     } else {
-        detect_gated(histogram, gate, rule)
+        detect_gated(histogram, gate, rule, estimator)
     }
 }
 
@@ -58,16 +63,23 @@ fn detect_gated<const BINS: usize, W: CounterWidth, R: DetectionRule>(
     histogram: &Histogram<BINS, W>,
     gate: &RangeGate<BINS>,
     rule: &R,
+    estimator: DepthEstimator,
 ) -> Option<Detection> {
     let peak = histogram.peak();
     if !gate.contains(peak.bin.raw()) {
         return None;
     }
     let background = rule.detect(histogram, gate, peak)?;
-    let depth = centre_of_mass(histogram, gate, peak, background);
+    let depth = estimator.estimate(histogram, gate, peak, background);
     Some(Detection {
         peak,
-        background,
+        background: rounded(background),
         depth,
     })
+}
+
+/// To the nearest whole count, halves up.
+#[inline]
+fn rounded(background: U24F8) -> Count {
+    Count::saturating((background.to_bits() >> 8) + (background.to_bits() >> 7 & 1))
 }

@@ -35,6 +35,7 @@ use core::fmt;
 use core::ops::AddAssign;
 
 use crate::detection::detect;
+use crate::estimator::DepthEstimator;
 use crate::event::{DepthEvent, EventSlot};
 use crate::flags::Flags;
 use crate::gate::RangeGate;
@@ -51,6 +52,7 @@ pub struct PixelConfig<const BINS: usize, R: DetectionRule = PaperRule> {
     l2: u16,
     gate: RangeGate<BINS>,
     rule: R,
+    estimator: DepthEstimator,
 }
 
 /// A configuration that cannot be used.
@@ -117,7 +119,15 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
             l2,
             gate,
             rule,
+            estimator: DepthEstimator::CentreOfMass3,
         })
+    }
+
+    /// The same with another depth estimator than the paper's
+    /// [`DepthEstimator::CentreOfMass3`].
+    #[must_use]
+    pub const fn with_estimator(self, estimator: DepthEstimator) -> Self {
+        Self { estimator, ..self }
     }
 
     /// Laser cycles between looks.
@@ -148,6 +158,12 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
     #[must_use]
     pub const fn rule(&self) -> &R {
         &self.rule
+    }
+
+    /// How the depth of an event is found.
+    #[must_use]
+    pub const fn estimator(&self) -> DepthEstimator {
+        self.estimator
     }
 }
 
@@ -353,7 +369,12 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             self.deferred = true;
             return Look::Deferred;
         }
-        let Some(detection) = detect(&self.histogram, &config.gate, &config.rule) else {
+        let Some(detection) = detect(
+            &self.histogram,
+            &config.gate,
+            &config.rule,
+            config.estimator,
+        ) else {
             return Look::NoPeak;
         };
         let mut flags = detection.depth.flags;

@@ -5,7 +5,7 @@
 //! [`PixelConfig`](crate::PixelConfig) as its type parameter; histogram, pixel,
 //! depth and events stay the same.
 
-use fixed::types::U8F8;
+use fixed::types::{U8F8, U24F8};
 
 use crate::background;
 use crate::gate::RangeGate;
@@ -18,14 +18,21 @@ use crate::units::{BinIndex, Count};
 /// Decides from one histogram. Implementations hold their configuration only,
 /// which is copied; all state is in the histogram.
 pub trait DetectionRule: Copy {
-    /// The background a bin if `peak`, the highest of the gated bins, is a
-    /// detection; `None` if it is not.
+    /// The background a bin, in counts, if `peak`, the highest of the gated bins,
+    /// is a detection; `None` if it is not. [`whole_background`] makes it one.
     fn detect<const BINS: usize, W: CounterWidth>(
         &self,
         histogram: &Histogram<BINS, W>,
         gate: &RangeGate<BINS>,
         peak: Peak,
-    ) -> Option<Count>;
+    ) -> Option<U24F8>;
+}
+
+/// A background of whole counts, as [`DetectionRule::detect`] gives it. Exact.
+#[inline]
+#[must_use]
+pub const fn whole_background(background: Count) -> U24F8 {
+    U24F8::from_bits(background.raw() << U24F8::FRAC_NBITS)
 }
 
 /// The paper's rule: the peak bin against the quadrant background plus α of its
@@ -120,7 +127,7 @@ impl DetectionRule for PaperRule {
         histogram: &Histogram<BINS, W>,
         gate: &RangeGate<BINS>,
         peak: Peak,
-    ) -> Option<Count> {
+    ) -> Option<U24F8> {
         if peak.count < self.threshold.minimum_count() {
             return None;
         }
@@ -129,6 +136,7 @@ impl DetectionRule for PaperRule {
         if background::quadrant_reaches(histogram.counts(), gate, peak.bin, lowest) {
             return None;
         }
-        Some(background::quadrant(histogram.counts(), gate, peak.bin))
+        let background = background::quadrant(histogram.counts(), gate, peak.bin);
+        Some(whole_background(background))
     }
 }

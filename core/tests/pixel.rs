@@ -7,7 +7,7 @@
     reason = "small numbers"
 )]
 
-use dtof_core::fixed::types::U8F8;
+use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::{
     AsyncPixel, BinIndex, ConfigError, Count, Count10, CounterWidth, DepthEvent, DetectionRule,
     EventSlot, Flags, Histogram, LaserCycle, Look, PaperRule, Peak, PixelAddress, PixelConfig,
@@ -568,8 +568,8 @@ impl DetectionRule for EverySecond {
         histogram: &Histogram<BINS, W>,
         _: &RangeGate<BINS>,
         _: Peak,
-    ) -> Option<Count> {
-        (histogram.total() == 2).then_some(Count::saturating(1))
+    ) -> Option<U24F8> {
+        (histogram.total() == 2).then_some(U24F8::lit("1.25"))
     }
 }
 

@@ -4,8 +4,8 @@
 
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    Count, Count10, Count16, Count24, CounterWidth, DetectionRule, Histogram, PaperRule, Peak,
-    RangeGate, background, detect,
+    Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DetectionRule, Histogram,
+    PaperRule, Peak, RangeGate, background, detect, whole_background,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -53,8 +53,11 @@ fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) -> u32 {
 
         let expected = as_written(&rule, &histogram, &gate);
         let background = rule.detect(&histogram, &gate, histogram.peak());
-        assert_eq!(background, expected.map(|(_, background)| background));
-        let detection = detect(&histogram, &gate, &rule);
+        assert_eq!(
+            background,
+            expected.map(|(_, background)| whole_background(background))
+        );
+        let detection = detect(&histogram, &gate, &rule, DepthEstimator::default());
         let detected = detection.map(|detection| (detection.peak, detection.background));
         assert_eq!(detected, expected);
         let whole = rule.detect_whole::<W, BINS>(histogram.counts(), &gate);

@@ -46,12 +46,23 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
 
 fn fires(state: &State) -> bool {
     let config = &state.config;
-    detect(state.pixel.histogram(), config.gate(), config.rule()).is_some()
+    detect(
+        state.pixel.histogram(),
+        config.gate(),
+        config.rule(),
+        config.estimator(),
+    )
+    .is_some()
 }
 
 extern "C" fn kept(state: &mut State, _: u32) -> u32 {
     let config = &state.config;
-    match detect(state.pixel.histogram(), config.gate(), config.rule()) {
+    match detect(
+        state.pixel.histogram(),
+        config.gate(),
+        config.rule(),
+        config.estimator(),
+    ) {
         Some(detection) => detection.depth.offset.raw().unsigned_abs().into(),
         None => 0,
     }

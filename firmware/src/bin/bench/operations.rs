@@ -2,7 +2,8 @@
 
 use core::hint::black_box;
 
-use dtof_core::{Count, LaserCycle, Look, centre_of_mass};
+use dtof_core::fixed::types::U24F8;
+use dtof_core::{LaserCycle, Look, centre_of_mass};
 
 use crate::counter::{Counter, Operation};
 use crate::report::Report;
@@ -120,7 +121,7 @@ extern "C" fn add_frame(state: &mut State, _: u32) -> u32 {
 extern "C" fn depth(state: &mut State, _: u32) -> u32 {
     let peak = state.histogram.peak();
     let gate = state.config.gate();
-    let depth = centre_of_mass(&state.histogram, gate, peak, Count::saturating(3));
+    let depth = centre_of_mass(&state.histogram, gate, peak, const { U24F8::lit("3") });
     depth.offset.raw().unsigned_abs().into()
 }
 
