@@ -1,11 +1,15 @@
 //! The studies there are.
 
+pub mod depth_error;
 pub mod false_events;
+pub mod false_rate;
 pub mod gaussian_error;
 pub mod hit_rate;
 pub mod hyperparameters;
 pub mod paper_setting;
+pub mod passage;
 pub mod roc;
+pub mod time_to_detect;
 
 use anyhow::{Context, Result};
 
@@ -18,6 +22,9 @@ pub const ALL: &[Study] = &[
     roc::STUDY,
     false_events::STUDY,
     hyperparameters::STUDY,
+    false_rate::STUDY,
+    time_to_detect::STUDY,
+    depth_error::STUDY,
 ];
 
 /// The study of that name.

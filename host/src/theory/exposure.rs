@@ -7,8 +7,8 @@
 
 use anyhow::{Context, Result};
 use dtof_core::{
-    BinPosition, Count, Count10, CounterWidth, Detection, Histogram, PaperRule, PixelAddress,
-    RangeGate, background, detect,
+    BinPosition, Count, Count10, CounterWidth, DepthEstimator, Detection, Histogram, PaperRule,
+    PixelAddress, RangeGate, background, detect,
 };
 use rand_core::Rng;
 use rand_distr::{Distribution, Poisson};
@@ -174,7 +174,12 @@ impl Exposures {
     ) -> (u32, Option<Detection>) {
         let mut event = None;
         let cycles = self.run::<BINS>(rng, |_, histogram| {
-            event = detect(histogram, &RangeGate::full(), rule);
+            event = detect(
+                histogram,
+                &RangeGate::full(),
+                rule,
+                DepthEstimator::default(),
+            );
             event.is_some()
         });
         (cycles, event)
@@ -355,7 +360,13 @@ mod tests {
                 photons.add_to(&mut histogram, &mut rng);
                 let fires = |alpha: u16| {
                     let rule = PaperRule::new(U8F8::from_bits(alpha), minimum_count);
-                    detect(&histogram, &RangeGate::full(), &rule).is_some()
+                    detect(
+                        &histogram,
+                        &RangeGate::full(),
+                        &rule,
+                        DepthEstimator::default(),
+                    )
+                    .is_some()
                 };
                 match highest_alpha(&histogram, minimum_count) {
                     None => {

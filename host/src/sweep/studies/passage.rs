@@ -5,9 +5,7 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{
-    Count, Count16, DetectionRule, Histogram, PaperRule, Peak, RangeGate, WindowRule,
-};
+use dtof_core::{Count, Count16, DetectionRule, Histogram, PaperRule, Peak, RangeGate, WindowRule};
 use rand_pcg::Pcg64;
 
 use crate::sweep::{PointTally, Tally};
@@ -80,10 +78,10 @@ pub struct Ladder {
 }
 
 impl Ladder {
-    /// Thresholds from `first` to `last`, `steps` of them to 1.
+    /// Thresholds from `first` to `last`, counted in steps of which `steps` make 1.
     #[must_use]
     pub fn new(method: Method, first: u32, last: u32, steps: u32) -> Self {
-        let thresholds = first * steps..=last * steps;
+        let thresholds = first..=last;
         Self {
             method,
             thresholds: thresholds
