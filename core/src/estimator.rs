@@ -1,7 +1,8 @@
 //! Which depth estimator: chosen when configured, to the width of the pulse.
 
-use fixed::types::U24F8;
+use fixed::types::{U8F8, U24F8};
 
+use crate::centred_window::CentredWindow;
 use crate::depth::{Depth, centre_of_mass};
 use crate::gate::RangeGate;
 use crate::histogram::{CounterWidth, Histogram};
@@ -14,9 +15,18 @@ pub enum DepthEstimator {
     /// The paper's: [`centre_of_mass`] of three bins.
     #[default]
     CentreOfMass3,
+    /// The centre of mass of a window that suits the pulse and lies evenly about it.
+    CentredWindow(CentredWindow),
 }
 
 impl DepthEstimator {
+    /// What suits a pulse of the standard deviation `sigma` in bins: a
+    /// [`CentredWindow::for_pulse`].
+    #[must_use]
+    pub const fn for_pulse(sigma: U8F8) -> Self {
+        Self::CentredWindow(CentredWindow::for_pulse(sigma))
+    }
+
     /// The depth of `peak`, less the `background` a bin.
     #[inline]
     #[must_use]
@@ -29,6 +39,7 @@ impl DepthEstimator {
     ) -> Depth {
         match self {
             Self::CentreOfMass3 => centre_of_mass(histogram, gate, peak, background),
+            Self::CentredWindow(window) => window.estimate(histogram, gate, peak, background),
         }
     }
 }

@@ -81,6 +81,7 @@
 
 mod aer;
 pub mod background;
+mod centred_window;
 mod depth;
 mod detection;
 mod estimator;
@@ -102,6 +103,7 @@ mod window;
 pub use fixed;
 
 pub use aer::{AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord};
+pub use centred_window::CentredWindow;
 pub use depth::{Depth, RangeScale, RangeScaleError, centre_of_mass};
 pub use detection::{Detection, detect};
 pub use estimator::DepthEstimator;

@@ -1,15 +1,15 @@
 //! A calibrated detection rule: all photons of the pulse against all the others.
 //!
-//! With `S` the photons in a window of `w` bins that holds the peak, and `λ` the
-//! mean of the gated bins outside it, the peak is a detection if
+//! With `S` the photons in a window of `w` bins, of all that hold the peak bin the one
+//! with most, and `λ` the mean of the gated bins outside it, the peak is a detection if
 //!
 //! ```text
 //! S > wλ + z·√(wλ) + z²/6
 //! ```
 //!
 //! The last term is for the skew of small counts: with it one `z` gives the same
-//! false positive rate from fractions of a count a bin to hundreds, where the α
-//! of the paper's rule has to follow the background. The total of the histogram
+//! rate of false events from fractions of a count a bin to hundreds, and for every
+//! width, where the α of the paper's rule has to follow the background. The total of the histogram
 //! is known, so that `λ` takes no pass over the bins.
 //!
 //! With `B` gated bins and `T` photons in them, multiplied by the `n = B - w`
@@ -74,9 +74,7 @@ impl WindowRule {
     /// A window of `width` bins, `z` standard deviations above the background and
     /// at least `minimum_count` photons in the window.
     ///
-    /// The window of an odd width has the peak in its middle; one of an even width
-    /// has one bin more on the side that holds more photons. At the ends of the
-    /// gate it is moved inwards. To suit the pulse: 2 bins up to a standard
+    /// To suit the pulse: 2 bins up to a standard
     /// deviation of 0.6 bins, 3 near 1, 5 near 1.5.
     ///
     /// # Errors
@@ -110,7 +108,7 @@ impl WindowRule {
         self.minimum_count
     }
 
-    /// The photons in the window: at most 7 · 2²⁴.
+    /// The most photons in a gated window that holds the peak bin: at most 7 · 2²⁴.
     #[inline(always)]
     fn window_sum<const BINS: usize, W: CounterWidth>(
         &self,
@@ -119,19 +117,23 @@ impl WindowRule {
         peak: Peak,
     ) -> u32 {
         let width = u16::from(self.width);
-        let highest_start = gate.last() + 1 - width;
-        let start = |before: u16| {
-            let start = peak.bin.raw().saturating_sub(before);
-            start.max(gate.first()).min(highest_start)
+        let (bin, last) = (peak.bin.raw(), gate.last());
+        let first_start = (bin + 1).saturating_sub(width).max(gate.first());
+        let last_start = bin.min((last + 1).saturating_sub(width));
+        let bins = |start: u16, end: u16| {
+            let bins = histogram.counts().get(start.into()..end.into());
+            bins.unwrap_or_default().iter()
         };
-        let sum = |start: u16| {
-            let window = usize::from(start)..usize::from(start + width);
-            let window = histogram.counts().get(window).unwrap_or_default();
-            window.iter().map(|&count| count.into()).sum::<u32>()
-        };
-        let first = start(width / 2);
-        let second = start((width - 1) / 2);
-        sum(first).max(sum(second))
+        let mut sum = bins(first_start, first_start + width)
+            .fold(0, |sum: u32, &count| sum.wrapping_add(count.into()));
+        let mut highest = sum;
+        let left = bins(first_start, last_start);
+        let entered = bins(first_start + width, last_start + width);
+        for (&left, &entered) in left.zip(entered) {
+            sum = sum.wrapping_add(entered.into()).wrapping_sub(left.into());
+            highest = highest.max(sum);
+        }
+        highest
     }
 }
 

@@ -29,11 +29,11 @@ use core::sync::atomic::AtomicU32;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::peak::ComparatorTree;
 use dtof_core::{
-    AerDecoder, AerEncoder, AerWord, AsyncPixel, BinIndex, BinPosition, Count, Count10, Count16,
-    Count24, CounterWidth, DepthEstimator, DepthEvent, EventSlot, Flags, Histogram, LaserCycle,
-    Macropixel, PaperRule, Peak, PixelAddress, PixelConfig, ProcessingElement, RangeGate,
-    RangeScale, Statistics, SubBinOffset, Threshold, WindowRule, background, centre_of_mass,
-    detect, isqrt, whole_background,
+    AerDecoder, AerEncoder, AerWord, AsyncPixel, BinIndex, BinPosition, CentredWindow, Count,
+    Count10, Count16, Count24, CounterWidth, DepthEstimator, DepthEvent, EventSlot, Flags,
+    Histogram, LaserCycle, Macropixel, PaperRule, Peak, PixelAddress, PixelConfig,
+    ProcessingElement, RangeGate, RangeScale, Statistics, SubBinOffset, Threshold, WindowRule,
+    background, centre_of_mass, detect, isqrt, whole_background,
 };
 
 #[allow(unsafe_code, reason = "the linker knows the entry by this name")]
@@ -276,7 +276,15 @@ fn window_rule() -> Option<WindowRule> {
 }
 
 fn estimator() -> DepthEstimator {
-    DepthEstimator::CentreOfMass3
+    let estimator = DepthEstimator::for_pulse(alpha());
+    match CentredWindow::new(alpha()) {
+        Some(window) => {
+            keep(window.half_width());
+            DepthEstimator::CentredWindow(window)
+        }
+        None if more() => estimator,
+        None => DepthEstimator::CentreOfMass3,
+    }
 }
 
 /// Of any fraction, and whole.
