@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use dtof_core::fixed::types::{U4F12, U24F8};
+use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
 use dtof_core::{
     BinPosition, Count, Count10, DepthEstimator, DetectionRule, Histogram, Peak, RangeGate,
     SubBinOffset, WindowRule, background, whole_background,
@@ -34,57 +34,75 @@ pub const STUDY: Study = Study {
     name: "depth-error",
     about: "depth error against the Cramér-Rao bound, by pulse, signal and background",
     revision: 1,
-    few_seeds: 15,
-    all_seeds: 150,
+    few_seeds: 30,
+    all_seeds: 300,
     points,
     trial,
     results,
 };
 
 /// How a depth is found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
     /// The middle of the highest bin.
     HighestBin,
     /// The paper's: centre of mass of three bins less the quadrant background.
     Paper,
-    /// An estimator less the mean of the bins outside a window.
-    Core(DepthEstimator),
+    /// The same less the mean of the bins outside a window.
+    CentreOfMass3,
+    /// The centred window for a pulse of this standard deviation, in bins.
+    CentredWindow(f64),
+    /// The centred window for the pulse there is.
+    OwnWindow,
 }
 
 impl Method {
     /// All, and their names in tallies.
-    pub const ALL: [(Self, &str); 3] = [
+    pub const ALL: [(Self, &str); 7] = [
         (Self::HighestBin, "highest"),
         (Self::Paper, "paper"),
-        (Self::Core(DepthEstimator::CentreOfMass3), "mass3"),
+        (Self::CentreOfMass3, "mass3"),
+        (Self::CentredWindow(0.5), "centred0.5"),
+        (Self::CentredWindow(1.0), "centred1.0"),
+        (Self::CentredWindow(1.5), "centred1.5"),
+        (Self::OwnWindow, "centred"),
     ];
 
     /// Its name in a legend.
     #[must_use]
-    pub const fn label(self) -> &'static str {
+    pub fn label(self) -> String {
         match self {
-            Self::HighestBin => "highest bin",
-            Self::Paper => "centre of mass of 3, quadrant background",
-            Self::Core(DepthEstimator::CentreOfMass3) => "centre of mass of 3",
+            Self::HighestBin => "highest bin".to_owned(),
+            Self::Paper => "centre of mass of 3, quadrant background".to_owned(),
+            Self::CentreOfMass3 => "centre of mass of 3, mean background".to_owned(),
+            Self::CentredWindow(sigma) => format!("centred window for σ {sigma}"),
+            Self::OwnWindow => "centred window for the pulse's σ".to_owned(),
         }
     }
 
-    /// Where the pulse lies.
-    fn position(self, histogram: &Histogram<BINS>, peak: Peak) -> BinPosition {
+    /// Where the pulse, whose standard deviation is `sigma`, lies.
+    fn position(self, histogram: &Histogram<BINS>, peak: Peak, sigma: f64) -> BinPosition {
         let gate = RangeGate::full();
         let estimate = |estimator: DepthEstimator, background| {
             estimator
                 .estimate(histogram, &gate, peak, background)
                 .offset
         };
+        let centred = |sigma: f64| {
+            let estimator = DepthEstimator::for_pulse(U8F8::saturating_from_num(sigma));
+            estimate(estimator, mean_background(histogram, peak))
+        };
+        let mass = |background| estimate(DepthEstimator::CentreOfMass3, background);
         let offset = match self {
             Self::HighestBin => SubBinOffset::CENTRE,
-            Self::Paper => {
-                let background = background::quadrant(histogram.counts(), &gate, peak.bin);
-                estimate(DepthEstimator::CentreOfMass3, whole_background(background))
-            }
-            Self::Core(estimator) => estimate(estimator, mean_background(histogram, peak)),
+            Self::Paper => mass(whole_background(background::quadrant(
+                histogram.counts(),
+                &gate,
+                peak.bin,
+            ))),
+            Self::CentreOfMass3 => mass(mean_background(histogram, peak)),
+            Self::CentredWindow(for_sigma) => centred(for_sigma),
+            Self::OwnWindow => centred(sigma),
         };
         BinPosition::of(peak.bin, offset)
     }
@@ -148,7 +166,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         }
         for (method, name) in Method::ALL {
             let error = method
-                .position(&histogram, peak)
+                .position(&histogram, peak, sigma)
                 .raw()
                 .abs_diff(place.cast_signed());
             count(name, u64::from(error).pow(2));
@@ -197,7 +215,7 @@ fn results(part: &Part) -> Result<Results> {
             }
         };
         series.push(Series {
-            name: Some(method.label().to_owned()),
+            name: Some(method.label()),
             colour,
             style: Style::JoinedDots,
             points: SIGMAS.map(dot).to_vec(),
@@ -206,7 +224,7 @@ fn results(part: &Part) -> Result<Results> {
     let svg = line_chart(&Chart {
         title: "Depth error over the Cramér-Rao bound",
         x: Axis {
-            range: Some((0.3, 2.3)),
+            range: Some((0.3, 2.6)),
             ..Axis::linear("pulse σ (bins)")
         },
         y: Axis {
@@ -215,16 +233,10 @@ fn results(part: &Part) -> Result<Results> {
         },
         series,
     })?;
-    let best: Vec<String> = SIGMAS
-        .iter()
-        .map(|&sigma| {
-            let means = Method::ALL.map(|(_, name)| summary(part, sigma, name).0);
-            format!(
-                "{:.2} at {sigma}",
-                means.into_iter().fold(f64::INFINITY, f64::min)
-            )
-        })
-        .collect();
+    let own = SIGMAS.map(|sigma| {
+        let (mean, (_, largest)) = summary(part, sigma, "centred");
+        format!("{mean:.2} at {sigma} (at most {largest:.2})")
+    });
     let histograms = part
         .points()
         .first()
@@ -236,9 +248,9 @@ fn results(part: &Part) -> Result<Results> {
             caption: format!(
                 "Root mean square depth error over the Cramér-Rao bound (shape known, amplitude and background not), \
                  averaged over positions in a bin: 30 to 200 signal photons on 0.5 to 5 background counts a bin; \
-                 bars from the least to the largest of the 16 combinations. The best estimator has {} ({} histograms \
+                 bars from the least to the largest of the 16 combinations. The centred window for the pulse's σ has {} ({} histograms \
                  a combination)",
-                best.join(", "),
+                own.join(", "),
                 grouped(histograms)
             ),
         }],
