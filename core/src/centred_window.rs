@@ -26,7 +26,7 @@
 //! use dtof_core::{CentredWindow, Histogram, RangeGate};
 //!
 //! let mut histogram = Histogram::<128>::new();
-//! histogram.add_batch(&[39, 40, 40, 40, 41, 41, 41, 42]); // evenly about 41.0
+//! histogram.add_batch(&[40, 40, 40, 41, 41, 41]); // evenly about 41.0
 //! let window = CentredWindow::for_pulse(const { U8F8::lit("0.75") });
 //! let gate = RangeGate::full();
 //! let depth = window.estimate(&histogram, &gate, histogram.peak(), U24F8::ZERO);

@@ -4,19 +4,21 @@
 //! with most, and `λ` the mean of the gated bins outside it, the peak is a detection if
 //!
 //! ```text
-//! S > wλ + z·√(wλ) + z²/6
+//! S > wλ + z·√(wλ·(1 + w/n)) + z²/6·(1 - w/n)
 //! ```
 //!
+//! with `n` the number of these bins, from which `λ` is known no better than it is; most
+//! often there are many and what is in brackets is nearly 1.
 //! The last term is for the skew of small counts: with it one `z` gives the same
 //! rate of false events from fractions of a count a bin to hundreds, and for every
 //! width, where the α of the paper's rule has to follow the background. The total of the histogram
 //! is known, so that `λ` takes no pass over the bins.
 //!
-//! With `B` gated bins and `T` photons in them, multiplied by the `n = B - w`
-//! bins outside and squared, this is
+//! With `B = n + w` gated bins and `T` photons in them, multiplied by `n` and squared,
+//! this is
 //!
 //! ```text
-//! (B·S - w·T - n·z²/6)² > z²·n·w·(T - S)      if what is squared is positive
+//! (B·S - w·T - z²/6·(n - w))² > z²·B·w·(T - S)      if what is squared is positive
 //! ```
 //!
 //! without a division or a root.
@@ -156,14 +158,13 @@ impl DetectionRule for WindowRule {
 
         // In 1/16 counts: 14 bits.
         let z_squared = u32::from(self.z.to_bits()) * u32::from(self.z.to_bits());
-        let skew = u64::from(bins_outside * ((z_squared / 6) >> 20));
+        let skew = bins_outside.saturating_sub(width) * ((z_squared / 6) >> 20);
         let all = u64::from(bins) * u64::from(inside);
         let above = (all << 4)
-            .checked_sub(((u64::from(width) * u64::from(histogram.total())) << 4) + skew)
+            .checked_sub(((u64::from(width) * u64::from(histogram.total())) << 4) + u64::from(skew))
             .filter(|&above| above > 0)?;
-        // 8 + 3 + 32 bits + 16
-        let variance =
-            u64::from(bins_outside * width) * u64::from(outside) * u64::from(z_squared >> 16);
+        // At most 8 + 3 + 32 + 16 bits, or 10 + 3 + 26 + 16.
+        let variance = u64::from(bins * width) * u64::from(outside) * u64::from(z_squared >> 16);
         let squared = above.checked_mul(above);
         if squared.is_some_and(|squared| squared <= variance) {
             return None;
