@@ -7,7 +7,8 @@ use std::fs;
 use std::path::Path;
 
 /// The images a board runs, each with the features of the boards it is for.
-const IMAGES: [(&str, &[&str]); 3] = [
+const IMAGES: [(&str, &[&str]); 4] = [
+    ("bench", &["MPS2_AN386", "STM32F405"]),
     ("sidecar-mps2-an386", &["MPS2_AN386"]),
     ("sidecar-stm32f405", &["STM32F405"]),
     ("self-test", &["MPS2_AN386", "STM32F405"]),

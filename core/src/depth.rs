@@ -13,12 +13,12 @@
 //! fixed-point number with 8 fractional bits, rounded to the nearest 1/256 bin.
 //!
 //! ```
-//! use dtof_core::fixed::types::{I24F8, U16F16};
-//! use dtof_core::{BinPosition, Count, Histogram, RangeGate, RangeScale, centre_of_mass};
+//! use dtof_core::fixed::types::{I24F8, U16F16, U24F8};
+//! use dtof_core::{BinPosition, Histogram, RangeGate, RangeScale, centre_of_mass};
 //!
 //! let mut histogram = Histogram::<128>::new();
 //! histogram.add_batch(&[40, 40, 40, 41]);
-//! let depth = centre_of_mass(&histogram, &RangeGate::full(), histogram.peak(), Count::default());
+//! let depth = centre_of_mass(&histogram, &RangeGate::full(), histogram.peak(), U24F8::ZERO);
 //! assert_eq!(depth.offset.raw(), 128 + 64); // 40.75 bins
 //!
 //! // 250 ps bins are 37.474 mm each.
@@ -30,13 +30,13 @@
 
 use core::fmt;
 
-use fixed::types::{I24F8, U16F16};
+use fixed::types::{I24F8, U16F16, U24F8};
 
 use crate::flags::Flags;
 use crate::gate::RangeGate;
 use crate::histogram::{CounterWidth, Histogram};
 use crate::peak::Peak;
-use crate::units::{BinPosition, Count, SubBinOffset};
+use crate::units::{BinPosition, SubBinOffset};
 
 /// A sub-bin estimate and what is to be said against it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +61,7 @@ pub fn centre_of_mass<const BINS: usize, W: CounterWidth>(
     histogram: &Histogram<BINS, W>,
     gate: &RangeGate<BINS>,
     peak: Peak,
-    background: Count,
+    background: U24F8,
 ) -> Depth {
     let neighbour = |bin: u16| {
         if gate.contains(bin) {
@@ -81,14 +81,14 @@ pub fn centre_of_mass<const BINS: usize, W: CounterWidth>(
         flags |= Flags::CLIPPED;
     }
 
-    let above = |count: u32| count.saturating_sub(background.raw());
+    let above = |count: u32| (count << 8).saturating_sub(background.to_bits());
     let left = above(left.unwrap_or(0));
     let centre = above(peak.count.raw());
     let right = above(right.unwrap_or(0));
-    // Only their ratio counts, so that counts past 22 bits, which only 24-bit
-    // counters hold, may lose two bits to keep the 256-fold numerator within 32.
+    // Only their ratio counts, so that what is past 22 bits, 14 of them whole counts,
+    // may lose its last to keep the 256-fold numerator within 32.
     let excess = 10u32.saturating_sub((left | centre | right).leading_zeros());
-    let excess = excess.min(W::BITS.saturating_sub(22));
+    let excess = excess.min(W::BITS.saturating_sub(14));
     let (left, centre, right) = (left >> excess, centre >> excess, right >> excess);
     let sum = left + centre + right;
     let numerator = (right.abs_diff(left) << 8) + sum / 2;

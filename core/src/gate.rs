@@ -18,6 +18,7 @@
 //! ```
 
 use core::fmt;
+use core::ops::Range;
 
 /// First and last bin that may hold the peak, both inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,6 +82,7 @@ impl<const BINS: usize> RangeGate<BINS> {
     }
 
     /// The first bin that may hold the peak.
+    #[inline]
     #[must_use]
     pub const fn first(&self) -> u16 {
         self.first
@@ -97,7 +99,20 @@ impl<const BINS: usize> RangeGate<BINS> {
     #[must_use]
     pub const fn contains(&self, bin: u16) -> bool {
         // One comparison: bins before the first wrap to the far end.
-        bin.wrapping_sub(self.first) < self.end - self.first
+        let first = self.first as u32;
+        (bin as u32).wrapping_sub(first) < self.end as u32 - first
+    }
+
+    /// Whether it leaves out nothing.
+    #[inline]
+    pub(crate) const fn is_full(&self) -> bool {
+        self.first == 0 && self.end as usize == BINS
+    }
+
+    /// The gated bins, as indices.
+    #[inline]
+    pub(crate) const fn bins(&self) -> Range<usize> {
+        self.first as usize..self.end as usize
     }
 
     /// Where the four quadrants of the gated bins start, and where the last one

@@ -20,9 +20,12 @@
 //! assert_eq!((histogram.total(), histogram.rejected()), (4, 1));
 //! ```
 
+use core::sync::atomic::{Ordering, compiler_fence};
+
 use crate::gate::RangeGate;
-use crate::isqrt::isqrt;
+use crate::isqrt::{isqrt, root_below};
 use crate::peak::Peak;
+use crate::photon_count::PhotonCount;
 use crate::units::{BinIndex, Count};
 
 mod sealed {
@@ -35,7 +38,7 @@ mod sealed {
 /// iterations for wider counts.
 pub trait CounterWidth: sealed::Sealed {
     /// The integer that holds one counter.
-    type Counter: Copy + Ord + Into<u32> + core::fmt::Debug;
+    type Counter: PhotonCount + Ord + core::fmt::Debug;
     /// An empty counter.
     const ZERO: Self::Counter;
     /// Bits a counter uses; it saturates at `2^BITS - 1`.
@@ -49,6 +52,11 @@ pub trait CounterWidth: sealed::Sealed {
     /// The floor of the square root of any count, with as many iterations as
     /// the width needs: 5 for 10 bits, 8 for 16, 12 for 24.
     fn square_root(count: u32) -> u32;
+
+    /// The largest root of a count of this width for which
+    /// `root² + alpha·root < level`, and what is left of `level`; `alpha` and
+    /// `level` in 1/256.
+    fn root_below(level: u32, alpha: u32) -> (u32, u32);
 }
 
 /// 10-bit counters (0..=1023), those of the paper's FPGA and the default.
@@ -76,6 +84,10 @@ macro_rules! counter_width {
             #[inline]
             fn square_root(count: u32) -> u32 {
                 isqrt::<{ <$name as CounterWidth>::BITS.div_ceil(2) }>(count)
+            }
+            #[inline]
+            fn root_below(level: u32, alpha: u32) -> (u32, u32) {
+                root_below::<{ <$name as CounterWidth>::BITS.div_ceil(2) }>(level, alpha)
             }
         }
     };
@@ -109,6 +121,9 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         BINS.ilog2()
     };
 
+    /// Whether the key of a count too high may not fit 32 bits.
+    const KEY_MAY_OVERFLOW: bool = Self::LOG2_BINS + W::BITS == 32;
+
     /// An empty histogram.
     #[must_use]
     pub const fn new() -> Self {
@@ -128,26 +143,106 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     /// counter stays full and the photon is counted as saturated.
     #[inline]
     pub fn add(&mut self, code: u16) {
-        let Some(counter) = self.counts.get_mut(usize::from(code)) else {
-            self.rejected = self.rejected.saturating_add(1);
-            return;
-        };
-        let count: u32 = (*counter).into();
-        if count >= W::MAX {
-            self.saturated = self.saturated.saturating_add(1);
-            return;
-        }
-        *counter = W::counter(count + 1);
-        self.total = self.total.wrapping_add(1);
-        self.peak_key = self.peak_key.max(Self::key(count + 1, code.into()));
+        self.add_gated(code, &RangeGate::full());
     }
 
     /// Counts one photon for each TDC code, as [`Self::add`] does.
     #[inline]
     pub fn add_batch(&mut self, codes: &[u16]) {
-        for &code in codes {
-            self.add(code);
+        self.add_gated_batch(codes, &RangeGate::full());
+    }
+
+    /// Counts one photon, as [`Self::add`] does, if its bin is gated. Returns the
+    /// photons left out by the gate, 0 or 1.
+    #[inline]
+    pub(crate) fn add_gated(&mut self, code: u16, gate: &RangeGate<BINS>) -> u32 {
+        let Some(counter) = self.counts.get_mut(usize::from(code)) else {
+            self.rejected = self.rejected.saturating_add(1);
+            return 0;
+        };
+        if !gate.contains(code) {
+            return 1;
         }
+        let mut saturated = 0;
+        Self::count_photon(counter, code, &mut self.peak_key, &mut saturated);
+        if saturated > 0 {
+            self.saturated = self.saturated.saturating_add(1);
+        } else {
+            self.total = self.total.wrapping_add(1);
+        }
+        0
+    }
+
+    /// Counts one photon for each TDC code whose bin is gated. Returns the photons
+    /// left out by the gate.
+    #[inline]
+    pub(crate) fn add_gated_batch(&mut self, codes: &[u16], gate: &RangeGate<BINS>) -> u32 {
+        // Bins from 0 on save an instruction a photon.
+        if gate.is_full() {
+            self.add_gated_inlined(codes, &RangeGate::full())
+        } else {
+            self.add_gated_inlined(codes, gate)
+        }
+    }
+
+    #[inline(always)]
+    fn add_gated_inlined(&mut self, codes: &[u16], gate: &RangeGate<BINS>) -> u32 {
+        // Here and not in `self`, so that they stay in registers.
+        let (mut peak_key, mut saturated, mut rejected, mut gated_out) = (self.peak_key, 0, 0, 0);
+        let counters = self.counts.get_mut(gate.bins()).unwrap_or_default();
+        let first = usize::from(gate.first());
+        let mut count = |&code: &u16| {
+            // One comparison: bins before the first wrap to the far end.
+            match counters.get_mut(usize::from(code).wrapping_sub(first)) {
+                Some(counter) => {
+                    Self::count_photon(counter, code, &mut peak_key, &mut saturated);
+                }
+                None if usize::from(code) < BINS => gated_out += 1,
+                None => rejected += 1,
+            }
+        };
+        // Eight a turn, so that the loop itself costs little.
+        let (eights, rest) = codes.as_chunks::<8>();
+        for [a, b, c, d, e, f, g, h] in eights {
+            count(a);
+            count(b);
+            count(c);
+            count(d);
+            count(e);
+            count(f);
+            count(g);
+            count(h);
+        }
+        rest.iter().for_each(count);
+
+        self.peak_key = peak_key;
+        let lost = saturated + rejected + gated_out;
+        #[allow(clippy::cast_possible_truncation)] // fewer than 2³² photons
+        let counted = (codes.len() as u32).wrapping_sub(lost);
+        self.total = self.total.wrapping_add(counted);
+        if lost > 0 {
+            self.saturated = self.saturated.saturating_add(saturated);
+            self.rejected = self.rejected.saturating_add(rejected);
+        }
+        gated_out
+    }
+
+    /// Counts one photon in the counter of its bin, unless that is full.
+    #[inline(always)]
+    fn count_photon(counter: &mut W::Counter, code: u16, peak_key: &mut u32, saturated: &mut u32) {
+        let mut count = (*counter).into() + 1;
+        let key = Self::key(count, code.into());
+        // No bin is higher than the peak, so that only what would be a new peak
+        // can be too high for its counter.
+        if key > *peak_key || Self::KEY_MAY_OVERFLOW {
+            if count > W::MAX {
+                count = W::MAX;
+                *saturated += 1;
+            } else {
+                *peak_key = key.max(*peak_key);
+            }
+        }
+        *counter = W::counter(count);
     }
 
     /// Adds the gated bins of a whole mini-frame, such as the 5-laser-cycle
@@ -161,22 +256,26 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         frame: &[C; BINS],
         gate: &RangeGate<BINS>,
     ) -> u32 {
-        let gated = usize::from(gate.first())..usize::from(gate.last()) + 1;
+        let gated = gate.bins();
         let counters = self.counts.get_mut(gated.clone()).unwrap_or_default();
         let photons = frame.get(gated.clone()).unwrap_or_default();
         let (mut total, mut saturated, mut peak_key) = (0u32, 0u32, self.peak_key);
-        for ((counter, &photons), bin) in counters.iter_mut().zip(photons).zip(gate.first()..) {
+        let bins = u32::from(gate.first())..;
+        for (bin, (counter, &photons)) in bins.zip(counters.iter_mut().zip(photons)) {
             let photons: u32 = photons.into();
-            if photons == 0 {
-                continue;
+            if photons > 0 {
+                let before: u32 = (*counter).into();
+                let mut count = before.saturating_add(photons);
+                total = total.wrapping_add(photons);
+                if count > W::MAX {
+                    let lost = photons - W::MAX.saturating_sub(before);
+                    count = W::MAX;
+                    total = total.wrapping_sub(lost);
+                    saturated = saturated.saturating_add(lost);
+                }
+                *counter = W::counter(count);
+                peak_key = peak_key.max(Self::key(count, bin));
             }
-            let before: u32 = (*counter).into();
-            let taken = photons.min(W::MAX.saturating_sub(before));
-            let count = before + taken;
-            *counter = W::counter(count);
-            saturated = saturated.saturating_add(photons - taken);
-            total = total.wrapping_add(taken);
-            peak_key = peak_key.max(Self::key(count, bin.into()));
         }
         self.total = self.total.wrapping_add(total);
         self.saturated = self.saturated.saturating_add(saturated);
@@ -194,9 +293,10 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     #[must_use]
     pub fn peak(&self) -> Peak {
         // The inverse of `key`: the count rounds up, the bin is what is missing.
-        let count = (self.peak_key >> Self::LOG2_BINS)
-            + u32::from(self.peak_key & ((1 << Self::LOG2_BINS) - 1) != 0);
-        let bin = (count << Self::LOG2_BINS).wrapping_sub(self.peak_key);
+        // Nothing is limited; to say how wide they are saves the test for it.
+        let last_bin = (1 << Self::LOG2_BINS) - 1;
+        let count = (self.peak_key.wrapping_add(last_bin) >> Self::LOG2_BINS) & W::MAX;
+        let bin = self.peak_key.wrapping_neg() & last_bin;
         Peak {
             bin: BinIndex::saturating((bin & 0x3ff) as u16),
             count: Count::saturating(count),
@@ -243,7 +343,14 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     /// Empties the histogram for the next exposure.
     #[inline]
     pub fn clear(&mut self) {
-        self.counts.fill(W::ZERO);
+        // Not `fill`, which calls `memset`: that takes twice as long. The fence, which
+        // is no instruction, keeps the compiler from making it one all the same.
+        let (blocks, rest) = self.counts.as_chunks_mut::<8>();
+        for block in blocks {
+            *block = [W::ZERO; 8];
+            compiler_fence(Ordering::Release);
+        }
+        rest.fill(W::ZERO);
         self.peak_key = 0;
         self.total = 0;
         self.rejected = 0;

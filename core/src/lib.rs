@@ -81,32 +81,42 @@
 
 mod aer;
 pub mod background;
+mod centred_window;
 mod depth;
+mod detection;
+mod estimator;
 mod event;
 mod flags;
 mod gate;
 mod histogram;
 mod isqrt;
 pub mod peak;
+mod photon_count;
 mod pixel;
 mod processing_element;
 mod rule;
 mod threshold;
 mod units;
+mod window;
 
 /// The fixed-point numbers of α, bin width and range.
 pub use fixed;
 
 pub use aer::{AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord};
+pub use centred_window::CentredWindow;
 pub use depth::{Depth, RangeScale, RangeScaleError, centre_of_mass};
+pub use detection::{Detection, detect};
+pub use estimator::DepthEstimator;
 pub use event::{DepthEvent, EventSlot};
 pub use flags::Flags;
 pub use gate::{GateError, RangeGate};
 pub use histogram::{Count10, Count16, Count24, CounterWidth, Histogram};
 pub use isqrt::isqrt;
 pub use peak::Peak;
-pub use pixel::{AsyncPixel, ConfigError, Detection, Look, PixelConfig, Statistics, detect};
+pub use photon_count::PhotonCount;
+pub use pixel::{AsyncPixel, ConfigError, Look, PixelConfig, Statistics};
 pub use processing_element::{Macropixel, ProcessingElement};
-pub use rule::{DetectionRule, PaperRule};
+pub use rule::{DetectionRule, PaperRule, whole_background};
 pub use threshold::Threshold;
 pub use units::{BinIndex, BinPosition, Count, LaserCycle, PixelAddress, SubBinOffset};
+pub use window::{WindowRule, WindowWidthError};

@@ -34,14 +34,14 @@
 use core::fmt;
 use core::ops::AddAssign;
 
-use crate::depth::{Depth, centre_of_mass};
+use crate::detection::detect;
+use crate::estimator::DepthEstimator;
 use crate::event::{DepthEvent, EventSlot};
 use crate::flags::Flags;
 use crate::gate::RangeGate;
 use crate::histogram::{Count10, CounterWidth, Histogram};
-use crate::peak::Peak;
 use crate::rule::{DetectionRule, PaperRule};
-use crate::units::{Count, LaserCycle, PixelAddress};
+use crate::units::{LaserCycle, PixelAddress};
 
 /// How pixels operate: one configuration for many. Valid by construction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +52,7 @@ pub struct PixelConfig<const BINS: usize, R: DetectionRule = PaperRule> {
     l2: u16,
     gate: RangeGate<BINS>,
     rule: R,
+    estimator: DepthEstimator,
 }
 
 /// A configuration that cannot be used.
@@ -118,7 +119,15 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
             l2,
             gate,
             rule,
+            estimator: DepthEstimator::CentreOfMass3,
         })
+    }
+
+    /// The same with another depth estimator than the paper's
+    /// [`DepthEstimator::CentreOfMass3`].
+    #[must_use]
+    pub const fn with_estimator(self, estimator: DepthEstimator) -> Self {
+        Self { estimator, ..self }
     }
 
     /// Laser cycles between looks.
@@ -150,43 +159,12 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
     pub const fn rule(&self) -> &R {
         &self.rule
     }
-}
 
-/// A peak that stands clear of the background.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Detection {
-    /// The highest bin.
-    pub peak: Peak,
-    /// The background a bin, as the rule estimates it.
-    pub background: Count,
-    /// Where in its bins the pulse lies.
-    pub depth: Depth,
-}
-
-/// One decision on one histogram: peak, background, threshold, depth. What a
-/// pixel does at each look, on its own for histograms that arrive whole.
-///
-/// `histogram` holds gated bins only, as [`Histogram::add_frame`] with the same
-/// gate and [`AsyncPixel::count`] see to. A peak outside the gate is none.
-#[inline]
-#[must_use]
-pub fn detect<const BINS: usize, W: CounterWidth, R: DetectionRule>(
-    histogram: &Histogram<BINS, W>,
-    gate: &RangeGate<BINS>,
-    rule: &R,
-) -> Option<Detection> {
-    let peak = histogram.peak();
-    if !gate.contains(peak.bin.raw()) {
-        return None;
+    /// How the depth of an event is found.
+    #[must_use]
+    pub const fn estimator(&self) -> DepthEstimator {
+        self.estimator
     }
-    let background = rule.detect(histogram, gate, peak)?;
-    let depth = centre_of_mass(histogram, gate, peak, background);
-    Some(Detection {
-        peak,
-        background,
-        depth,
-    })
 }
 
 /// What the end of a laser cycle brought.
@@ -238,6 +216,17 @@ impl Statistics {
     #[must_use]
     pub const fn photons(&self) -> u64 {
         self.counted + self.saturated + self.rejected + self.gated_out
+    }
+
+    /// Adds those of an exposure.
+    #[inline]
+    fn add_photons_of<const BINS: usize, W: CounterWidth>(
+        &mut self,
+        histogram: &Histogram<BINS, W>,
+    ) {
+        self.counted += u64::from(histogram.total());
+        self.saturated += u64::from(histogram.saturated());
+        self.rejected += u64::from(histogram.rejected());
     }
 }
 
@@ -294,18 +283,18 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// Counts one photon with the TDC code `code` in the present laser cycle.
     #[inline]
     pub fn count<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, code: u16) {
-        if config.gate.contains(code) || usize::from(code) >= BINS {
-            self.histogram.add(code); // which counts a code past the last bin
-        } else {
-            self.statistics.gated_out += 1;
+        let gated_out = self.histogram.add_gated(code, &config.gate);
+        if gated_out > 0 {
+            self.statistics.gated_out += u64::from(gated_out);
         }
     }
 
     /// Counts one photon for each TDC code, as [`Self::count`] does.
     #[inline]
     pub fn count_batch<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, codes: &[u16]) {
-        for &code in codes {
-            self.count(config, code);
+        let gated_out = self.histogram.add_gated_batch(codes, &config.gate);
+        if gated_out > 0 {
+            self.statistics.gated_out += u64::from(gated_out);
         }
     }
 
@@ -380,7 +369,12 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             self.deferred = true;
             return Look::Deferred;
         }
-        let Some(detection) = detect(&self.histogram, &config.gate, &config.rule) else {
+        let Some(detection) = detect(
+            &self.histogram,
+            &config.gate,
+            &config.rule,
+            config.estimator,
+        ) else {
             return Look::NoPeak;
         };
         let mut flags = detection.depth.flags;
@@ -439,17 +433,14 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// What the pixel has done so far, the present exposure included.
     #[must_use]
     pub fn statistics(&self) -> Statistics {
-        let histogram = &self.histogram;
         let mut statistics = self.statistics;
-        statistics.counted += u64::from(histogram.total());
-        statistics.saturated += u64::from(histogram.saturated());
-        statistics.rejected += u64::from(histogram.rejected());
+        statistics.add_photons_of(&self.histogram);
         statistics
     }
 
     /// Begins a new exposure.
     fn restart(&mut self) {
-        self.statistics = self.statistics();
+        self.statistics.add_photons_of(&self.histogram);
         self.histogram.clear();
         self.exposure = 0;
         self.deferred = false;

@@ -77,4 +77,18 @@ impl Threshold {
         (peak.raw() << 8) > self.level::<W>(background).to_bits()
             && peak.raw() >= self.minimum_count.raw()
     }
+
+    /// The lowest background a bin, in counts of the width `W`, whose level a peak
+    /// of `peak` photons does not exceed: one more than the largest count if there
+    /// is none.
+    ///
+    /// With `r` the root, `peak ≤ background + α·r` is a straight line in the
+    /// background from `r²` on, up to the next square. The last `r` whose line
+    /// begins below the peak comes out of the iterations of the square root.
+    #[inline]
+    #[must_use]
+    pub fn lowest_background<W: CounterWidth>(&self, peak: Count) -> u32 {
+        let (root, left) = W::root_below(peak.raw() << 8, self.alpha.to_bits().into());
+        root * root + left.div_ceil(256).min(2 * root + 1)
+    }
 }

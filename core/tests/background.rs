@@ -117,6 +117,43 @@ fn counts_past_24_bits_are_taken_as_24_bits() {
     assert_eq!(quadrant(&counts, &RangeGate::full(), 0), 0x00ff_ffff);
 }
 
+/// The same of any integer, and whether it reaches a level.
+#[test]
+fn counts_of_every_width_give_the_same() {
+    fn check<const BINS: usize>(rng: &mut Pcg32) {
+        let width = 8 + rng.next_u32() % (BINS as u32 - 7);
+        let first = (rng.next_u32() % (BINS as u32 - width + 1)) as u16;
+        let gate = RangeGate::<BINS>::new(first, first + width as u16 - 1).unwrap();
+        let bits = 1 + rng.next_u32() % 16;
+        let counts: [u32; BINS] = core::array::from_fn(|_| rng.next_u32() >> (32 - bits));
+        let peak = BinIndex::saturating((rng.next_u32() % BINS as u32) as u16);
+        let expected = background::quadrant(&counts, &gate, peak);
+        let halves = counts.map(|count| count as u16);
+        assert_eq!(background::quadrant(&halves, &gate, peak), expected);
+        if bits <= 8 {
+            let bytes = counts.map(|count| count as u8);
+            assert_eq!(background::quadrant(&bytes, &gate, peak), expected);
+        }
+        let expected = expected.raw();
+        for level in [
+            0,
+            expected.saturating_sub(1),
+            expected,
+            expected + 1,
+            u32::MAX,
+        ] {
+            let reaches = background::quadrant_reaches(&halves, &gate, peak, level);
+            assert_eq!(reaches, expected >= level);
+        }
+    }
+    let mut rng = Pcg32::seed_from_u64(4);
+    for _ in 0..10_000 {
+        check::<8>(&mut rng);
+        check::<16>(&mut rng);
+        check::<128>(&mut rng);
+    }
+}
+
 proptest! {
     #[test]
     fn bins_outside_the_gate_do_not_matter(

@@ -1,6 +1,6 @@
 //! Sub-bin depth against the real-valued formula, and bins into millimetres.
 
-use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_core::fixed::types::{I24F8, U16F16, U24F8};
 use dtof_core::{
     BinIndex, BinPosition, Count, Count10, Count16, Count24, CounterWidth, Depth, Flags, Histogram,
     Peak, RangeGate, RangeScale, RangeScaleError, SubBinOffset, centre_of_mass,
@@ -21,7 +21,7 @@ fn depth<W: CounterWidth>([left, centre, right]: [u32; 3], background: u32) -> D
     let gate = RangeGate::full();
     let mut histogram = Histogram::<8, W>::new();
     histogram.add_frame(&[0, 0, 0, left, centre, right, 0, 0], &gate);
-    let background = Count::new(background).unwrap();
+    let background = U24F8::from_num(background);
     centre_of_mass(&histogram, &gate, peak_at(4, centre), background)
 }
 
@@ -158,7 +158,7 @@ fn a_window_past_the_gate_is_clipped_and_empty_there() {
             let left = if bin == first { 0 } else { count(bin - 1) };
             let right = if bin == last { 0 } else { count(bin + 1) };
             let peak = peak_at(bin, count(bin));
-            let depth = centre_of_mass(&histogram, &gate, peak, Count::default());
+            let depth = centre_of_mass(&histogram, &gate, peak, U24F8::ZERO);
             let clipped = bin == first || bin == last;
             assert_eq!(depth.flags.contains(Flags::CLIPPED), clipped, "{bin}");
             let offset = f64::from(depth.offset.raw()) / 256.0;
@@ -184,7 +184,7 @@ fn both_flags_at_once() {
     let gate = RangeGate::full();
     let mut histogram = Histogram::<8>::new();
     histogram.add_frame(&[2000u16, 0, 0, 0, 0, 0, 0, 0], &gate);
-    let depth = centre_of_mass(&histogram, &gate, histogram.peak(), Count::default());
+    let depth = centre_of_mass(&histogram, &gate, histogram.peak(), U24F8::ZERO);
     assert_eq!(depth.flags, Flags::SATURATED | Flags::CLIPPED);
     assert_eq!(depth.offset, SubBinOffset::CENTRE);
 }

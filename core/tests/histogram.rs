@@ -227,6 +227,31 @@ fn a_cleared_histogram_counts_like_a_new_one() {
     naive.assert_same(&histogram);
 }
 
+/// Bins and counters as wide as a key allows, so that the key of one count more
+/// would not fit it.
+#[test]
+fn full_counters_of_24_bits_stay_full() {
+    let full = 0x00ff_ffff;
+    let codes = [255, 0, 7, 254, 0, 1, 0, 255, 9, 0];
+    let mut frame = [full - 1; 256];
+    let mut single = Histogram::<256, Count24>::new();
+    let mut batched = Histogram::<256, Count24>::new();
+    single.add_frame(&frame, &RangeGate::full());
+    batched.add_frame(&frame, &RangeGate::full());
+    for code in codes {
+        single.add(code);
+        frame[usize::from(code)] += 1;
+    }
+    batched.add_batch(&codes);
+    for histogram in [single, batched] {
+        assert_eq!(histogram.counts(), &frame.map(|count| count.min(full)));
+        assert_eq!(histogram.saturated(), 4); // three of bin 0, one of bin 255
+        assert_eq!(histogram.total(), 256 * (full - 1) + 6);
+        let peak = histogram.peak();
+        assert_eq!((peak.bin.raw(), peak.count.raw()), (0, full));
+    }
+}
+
 #[test]
 fn it_takes_the_memory_it_says() {
     assert_eq!(size_of::<Histogram<128>>(), 128 * 2 + 16);

@@ -7,7 +7,7 @@
     reason = "small numbers"
 )]
 
-use dtof_core::fixed::types::U8F8;
+use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::{
     AsyncPixel, BinIndex, ConfigError, Count, Count10, CounterWidth, DepthEvent, DetectionRule,
     EventSlot, Flags, Histogram, LaserCycle, Look, PaperRule, Peak, PixelAddress, PixelConfig,
@@ -355,6 +355,32 @@ proptest! {
         compare::<16>(settings, &cycles);
     }
 
+    /// Batches of any length, some of them long enough to fill a counter.
+    #[test]
+    fn a_batch_is_its_photons_one_at_a_time(
+        settings in settings(),
+        batches in prop::collection::vec(prop::collection::vec((0u16..20, 1usize..200), 0..30), 0..10),
+    ) {
+        let config = settings.config::<16>();
+        let mut single = AsyncPixel::<16>::new(PixelAddress(77));
+        let mut batched = AsyncPixel::<16>::new(PixelAddress(77));
+        let mut model = Model::new(16, settings);
+        for runs in batches {
+            let runs = runs.into_iter().map(|(code, times)| vec![code; times]);
+            let codes: Vec<u16> = runs.flatten().collect();
+            batched.count_batch(&config, &codes);
+            for code in codes {
+                single.count(&config, code);
+                model.count(code.into());
+            }
+            for pixel in [&single, &batched] {
+                prop_assert_eq!(pixel.statistics(), model.statistics);
+                prop_assert_eq!(&pixel.histogram().counts().map(u32::from)[..], &model.counts[..]);
+            }
+            prop_assert_eq!(batched.histogram().peak(), single.histogram().peak());
+        }
+    }
+
     /// Frames of any length, which need not divide X: the look falls on the
     /// first frame boundary after X laser cycles or more.
     #[test]
@@ -542,8 +568,8 @@ impl DetectionRule for EverySecond {
         histogram: &Histogram<BINS, W>,
         _: &RangeGate<BINS>,
         _: Peak,
-    ) -> Option<Count> {
-        (histogram.total() == 2).then_some(Count::saturating(1))
+    ) -> Option<U24F8> {
+        (histogram.total() == 2).then_some(U24F8::lit("1.25"))
     }
 }
 

@@ -153,6 +153,50 @@ fn random_24_bit_backgrounds() {
     }
 }
 
+/// The lowest background whose level `peak` does not exceed, by definition.
+fn assert_lowest<W: CounterWidth>(alpha: u16, peak: u32) {
+    let lowest = threshold(alpha, 0).lowest_background::<W>(Count::new(peak).unwrap());
+    assert!(lowest <= W::MAX + 1);
+    if lowest <= W::MAX {
+        assert!(!fires::<W>(threshold(alpha, 0), peak, lowest));
+    }
+    if lowest > 0 {
+        assert!(fires::<W>(threshold(alpha, 0), peak, lowest - 1));
+    }
+}
+
+#[test]
+fn the_lowest_background_is_right_for_all_10_bit_peaks() {
+    for alpha in (0..=65_535).step_by(97).chain(ALPHAS) {
+        for peak in 0..1024 {
+            assert_lowest::<Count10>(alpha, peak);
+        }
+    }
+}
+
+#[test]
+fn the_lowest_background_of_a_peak_past_the_width_may_not_exist() {
+    let lowest = |peak| threshold(0, 0).lowest_background::<Count10>(Count::saturating(peak));
+    assert_eq!(lowest(1023), 1023);
+    assert_eq!(lowest(1024), 1024);
+    assert_eq!(lowest(u32::MAX), 1024);
+}
+
+#[test]
+fn the_lowest_background_is_right_for_wider_peaks() {
+    let mut rng = Pcg32::seed_from_u64(9);
+    for _ in 0..1_000_000 {
+        let alpha = u16::try_from(rng.next_u32() >> 16).unwrap() >> (rng.next_u32() % 16);
+        let peak = rng.next_u32() >> (8 + rng.next_u32() % 24);
+        assert_lowest::<Count24>(alpha, peak);
+        assert_lowest::<Count16>(alpha, peak & 0xffff);
+    }
+    for alpha in ALPHAS {
+        assert_lowest::<Count24>(alpha, 0x00ff_ffff);
+        assert_lowest::<Count16>(alpha, 0xffff);
+    }
+}
+
 proptest! {
     #[test]
     fn any_alpha_background_and_peak(

@@ -11,7 +11,9 @@ use std::path::PathBuf;
 use common::host::{CONFIGURATION, Host};
 use common::tmf882x::{Bench, Counts, packet, packets, settings};
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{AsyncPixel, Count, Count24, Histogram, PaperRule, RangeGate, detect};
+use dtof_core::{
+    AsyncPixel, Count, Count24, DepthEstimator, Histogram, PaperRule, RangeGate, detect,
+};
 use dtof_firmware::link::message::Configuration;
 use dtof_firmware::sensor::{About, Sensor};
 use dtof_firmware::sidecar::Sidecar;
@@ -112,7 +114,7 @@ fn the_sidecar_decides_recorded_histograms_as_the_core_does() {
         let mut histogram = Histogram::<128, Count24>::new();
         // The reference comes first, the centre zone is the fifth of nine.
         histogram.add_frame(&capture[5], &gate);
-        expected.push(detect(&histogram, &gate, &rule));
+        expected.push(detect(&histogram, &gate, &rule, DepthEstimator::default()));
     }
     let report = host.report(&mut device, 0);
     let decided = captures.len() as u64 * 9;

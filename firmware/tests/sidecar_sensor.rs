@@ -7,8 +7,8 @@ mod common;
 use common::host::{CONFIGURATION, Call, Host, Scripted};
 use dtof_core::fixed::types::{U8F8, U16F16};
 use dtof_core::{
-    AsyncPixel, Count, Count24, DepthEvent, Flags, Histogram, LaserCycle, PaperRule, PixelAddress,
-    PixelConfig, RangeGate, detect,
+    AsyncPixel, Count, Count24, DepthEstimator, DepthEvent, Flags, Histogram, LaserCycle,
+    PaperRule, PixelAddress, PixelConfig, RangeGate, detect,
 };
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::{self, Configuration, Refusal, Report};
@@ -313,7 +313,7 @@ fn a_histogram_is_decided_once_within_the_gate() {
     let expected = |counts: &[u32; 128], cycle| {
         let mut histogram = Histogram::<128, Count24>::new();
         histogram.add_frame(counts, &gate);
-        let detection = detect(&histogram, &gate, &rule()).unwrap();
+        let detection = detect(&histogram, &gate, &rule(), DepthEstimator::default()).unwrap();
         DepthEvent {
             pixel: PixelAddress(3),
             cycle: LaserCycle(cycle),

@@ -1,10 +1,11 @@
-//! Recorded photons with ground truth: the public TMF8820 capture log, when it
-//! lies at `../shared/data/tmf8820_plane_gt/distance_data.json` beside the
-//! workspace or where `TMF8820_LOG` says. Prints what comes out for each zone.
+//! Recorded photons with ground truth: the public TMF8820 capture log. Prints what
+//! comes out for each zone.
 
-use std::io::Write;
+mod capture_log;
+
 use std::path::PathBuf;
 
+use capture_log::{ground_truth, log, tell};
 use dtof::engine::host_engine;
 use dtof::recorded::{RecordedHistograms, RecordingLength};
 use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
@@ -14,33 +15,6 @@ use dtof_core::fixed::types::U8F8;
 
 const ZONES: usize = 9;
 const CENTRE: usize = 4;
-
-/// Writes past the test harness, which hides what passing tests print.
-fn tell(line: &str) {
-    let mut out = std::io::stderr().lock();
-    writeln!(out, "{line}").unwrap();
-}
-
-fn log() -> Option<PathBuf> {
-    let beside = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../shared/data/tmf8820_plane_gt/distance_data.json"
-    );
-    if let Some(named) = std::env::var_os("TMF8820_LOG") {
-        return Some(named.into()); // and fail if it is not there
-    }
-    Some(PathBuf::from(beside)).filter(|path| path.exists())
-}
-
-/// Distance to the plane of each capture in millimetres.
-fn ground_truth(log: &PathBuf) -> Vec<f64> {
-    let text = std::fs::read_to_string(log).unwrap();
-    let captures: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let captures = captures.as_array().unwrap().iter();
-    captures
-        .map(|capture| capture["dist_to_plane"].as_f64().unwrap() * 1000.0)
-        .collect()
-}
 
 /// What one zone reports over all captures from 30 to 400 mm.
 struct Zone {
@@ -106,9 +80,6 @@ fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES
 #[test]
 fn recorded_photons_give_every_distance_within_bounds() {
     let Some(log) = log() else {
-        tell(
-            "SKIPPED: recorded photons: no TMF8820 capture log beside the workspace, nor in TMF8820_LOG",
-        );
         return;
     };
     let all = ground_truth(&log)

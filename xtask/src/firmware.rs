@@ -12,6 +12,7 @@ use crate::toolchain;
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 const PROFILE: &str = "firmware";
+const SMALL_PROFILE: &str = "firmware-small";
 
 /// A board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,12 +50,25 @@ impl Board {
         program: Option<&Path>,
     ) -> Result<PathBuf> {
         let image = format!("sidecar-{}", self.name());
-        build(root, &image, &[&[self.name()], features].concat(), program)
+        let features = [&[self.name()], features].concat();
+        build(root, &image, &features, program, PROFILE)
     }
 
     /// Builds the self-test.
     pub fn self_test(self, root: &Path) -> Result<PathBuf> {
-        build(root, "self-test", &[self.name(), "self-test"], None)
+        build(
+            root,
+            "self-test",
+            &[self.name(), "self-test"],
+            None,
+            PROFILE,
+        )
+    }
+
+    /// Builds the image that counts instructions, `small` or fast.
+    pub fn bench(self, root: &Path, small: bool) -> Result<PathBuf> {
+        let profile = if small { SMALL_PROFILE } else { PROFILE };
+        build(root, "bench", &[self.name(), "bench"], None, profile)
     }
 }
 
@@ -130,7 +144,13 @@ fn check_program(bytes: &[u8]) -> Result<()> {
 
 /// Builds one image and says where it is. Each set of features has a folder of
 /// its own, so that none takes another's place.
-fn build(root: &Path, image: &str, features: &[&str], program: Option<&Path>) -> Result<PathBuf> {
+fn build(
+    root: &Path,
+    image: &str,
+    features: &[&str],
+    program: Option<&Path>,
+    profile: &str,
+) -> Result<PathBuf> {
     toolchain::ensure_target(TARGET)?;
     let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
     let folder = root.join(folder);
@@ -144,13 +164,13 @@ fn build(root: &Path, image: &str, features: &[&str], program: Option<&Path>) ->
         .args(["build", "--locked", "--package", "dtof-firmware"])
         .args((!io::stderr().is_terminal()).then_some("--quiet"))
         .args(["--bin", image, "--features", &features.join(",")])
-        .args(["--target", TARGET, "--profile", PROFILE, "--target-dir"])
+        .args(["--target", TARGET, "--profile", profile, "--target-dir"])
         .arg(&folder)
         .status()
         .context("cargo does not start")?;
     ensure!(status.success(), "{image} does not build, see above");
 
-    let built = folder.join(TARGET).join(PROFILE).join(image);
+    let built = folder.join(TARGET).join(profile).join(image);
     if !built.is_file() {
         bail!("{image} was built, but is not at {}", built.display());
     }

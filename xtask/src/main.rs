@@ -1,5 +1,6 @@
 //! `cargo xtask`: what set-up and checks need beyond cargo itself.
 
+mod bench;
 mod boards;
 mod debugger;
 mod emulate;
@@ -51,7 +52,9 @@ cargo xtask <command>
                 paper's claims, from the seeds of a quick look and the kept rest or
                 from all; --check changes nothing and fails if something would change
   self-test     the core works out the same on the target; --bless writes down
-                what it works out here";
+                what it works out here
+  bench         instructions the core's operations take on the target; writes
+                docs/bench/instructions.csv, or with --check compares with it";
 
 fn main() -> ExitCode {
     match run() {
@@ -82,6 +85,8 @@ fn run() -> Result<()> {
         ["figures", ref rest @ ..] => figures::make(root()?, rest),
         ["self-test"] => self_test::run(root()?),
         ["self-test", "--bless"] => self_test::bless(root()?),
+        ["bench"] => bench::run(root()?),
+        ["bench", "--check"] => bench::check(root()?),
         ["help" | "--help" | "-h"] => {
             println!("{HELP}");
             Ok(())

@@ -115,10 +115,21 @@ impl Emulator {
     /// Starts an image with its serial port on a free TCP port; before its first
     /// instruction it waits.
     pub fn start(board: Board, path: &Path, words: &[&str]) -> Result<Self> {
+        Self::start_with(board, path, words, &[])
+    }
+
+    /// The same with these arguments more for QEMU.
+    pub fn start_with(
+        board: Board,
+        path: &Path,
+        words: &[&str],
+        arguments: &[&str],
+    ) -> Result<Self> {
         let image = Image::read(path)?;
         let [port, debugger_port] = free_ports()?;
         let mut child = command(board, path, Some(port), words)?
             .args(["-S", "-gdb", &format!("tcp:127.0.0.1:{debugger_port}")])
+            .args(arguments)
             .stdout(Stdio::piped())
             .spawn()
             .with_context(|| format!("{} does not start", QEMU.program))?;

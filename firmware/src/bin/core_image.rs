@@ -26,13 +26,14 @@ use core::panic::PanicInfo;
 use core::ptr;
 use core::sync::atomic::AtomicU32;
 
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::peak::ComparatorTree;
 use dtof_core::{
-    AerDecoder, AerEncoder, AerWord, AsyncPixel, BinIndex, BinPosition, Count, Count10, Count16,
-    Count24, CounterWidth, DepthEvent, EventSlot, Flags, Histogram, LaserCycle, Macropixel,
-    PaperRule, Peak, PixelAddress, PixelConfig, ProcessingElement, RangeGate, RangeScale,
-    Statistics, SubBinOffset, Threshold, background, centre_of_mass, detect, isqrt,
+    AerDecoder, AerEncoder, AerWord, AsyncPixel, BinIndex, BinPosition, CentredWindow, Count,
+    Count10, Count16, Count24, CounterWidth, DepthEstimator, DepthEvent, EventSlot, Flags,
+    Histogram, LaserCycle, Macropixel, PaperRule, Peak, PixelAddress, PixelConfig,
+    ProcessingElement, RangeGate, RangeScale, Statistics, SubBinOffset, Threshold, WindowRule,
+    background, centre_of_mass, detect, isqrt, whole_background,
 };
 
 #[allow(unsafe_code, reason = "the linker knows the entry by this name")]
@@ -170,6 +171,7 @@ fn thresholds<W: CounterWidth>() {
     keep((threshold.alpha(), threshold.minimum_count()));
     keep(threshold.level::<W>(count()));
     keep(threshold.is_exceeded::<W>(count(), count()));
+    keep(threshold.lowest_background::<W>(count()));
 }
 
 #[inline(never)]
@@ -182,7 +184,10 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
         keep(histogram.add_frame(&values::<u16, BINS>(half), &gate));
         keep(histogram.add_frame(&values::<u32, BINS>(word), &gate));
         keep((histogram.peak(), histogram.count(usize::from(half()))));
-        keep(detect(&histogram, &gate, &rule()));
+        keep(detect(&histogram, &gate, &rule(), estimator()));
+        if let Some(rule) = window_rule() {
+            keep(detect(&histogram, &gate, &rule, estimator()));
+        }
 
         // As another detection rule may ask: about a peak of its own.
         let peak = Peak {
@@ -190,7 +195,15 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
             count: count(),
         };
         keep(background::quadrant(histogram.counts(), &gate, peak.bin));
-        keep(centre_of_mass(&histogram, &gate, peak, count()));
+        keep(background::quadrant_reaches(
+            histogram.counts(),
+            &gate,
+            peak.bin,
+            word(),
+        ));
+        keep(rule().detect_whole::<W, BINS>(histogram.counts(), &gate));
+        keep(centre_of_mass(&histogram, &gate, peak, background_level()));
+        keep(estimator().estimate(&histogram, &gate, peak, background_level()));
         if more() {
             histogram.clear();
         }
@@ -249,12 +262,47 @@ fn rule() -> PaperRule {
     PaperRule::new(alpha(), count())
 }
 
+fn window_rule() -> Option<WindowRule> {
+    match WindowRule::new(byte(), U4F12::from_bits(half()), count()) {
+        Ok(rule) => {
+            keep((rule.width(), rule.z(), rule.minimum_count()));
+            Some(rule)
+        }
+        Err(error) => {
+            keep(write!(Link, "{error}"));
+            None
+        }
+    }
+}
+
+fn estimator() -> DepthEstimator {
+    let estimator = DepthEstimator::for_pulse(alpha());
+    match CentredWindow::new(alpha()) {
+        Some(window) => {
+            keep(window.half_width());
+            DepthEstimator::CentredWindow(window)
+        }
+        None if more() => estimator,
+        None => DepthEstimator::CentreOfMass3,
+    }
+}
+
+/// Of any fraction, and whole.
+fn background_level() -> U24F8 {
+    if more() {
+        U24F8::from_bits(word())
+    } else {
+        whole_background(count())
+    }
+}
+
 fn config<const BINS: usize>() -> Option<PixelConfig<BINS>> {
     match PixelConfig::new(half(), half(), half(), gate(), rule()) {
         Ok(config) => {
             keep((config.x(), config.l1(), config.l2()));
             keep((*config.gate(), *config.rule().threshold()));
-            Some(config)
+            keep(config.estimator());
+            Some(config.with_estimator(estimator()))
         }
         Err(error) => {
             keep(error);

@@ -115,7 +115,9 @@ impl PhotonSink for Sidecar<'_> {
         };
         if !has_room_for_event(&self.words) {
             done.deferred = 1;
-        } else if let Some(detection) = detect(&histogram, config.gate(), config.rule()) {
+        } else if let Some(detection) =
+            detect(&histogram, config.gate(), config.rule(), config.estimator())
+        {
             self.enqueue(&DepthEvent {
                 pixel,
                 cycle,

@@ -1,7 +1,9 @@
 //! The studies there are.
 
+pub mod depth_error;
 pub mod depth_step;
 pub mod false_events;
+pub mod false_rate;
 pub mod fan_motion;
 pub mod gaussian_error;
 pub mod hit_rate;
@@ -9,10 +11,12 @@ pub mod hyperparameters;
 pub mod latency;
 mod one_pixel;
 pub mod paper_setting;
+pub mod passage;
 pub mod radial_motion;
 mod ranks;
 pub mod roc;
 pub mod static_scene;
+pub mod time_to_detect;
 
 use anyhow::{Context, Result};
 
@@ -30,6 +34,9 @@ pub const ALL: &[Study] = &[
     radial_motion::STUDY,
     fan_motion::STUDY,
     latency::STUDY,
+    false_rate::STUDY,
+    time_to_detect::STUDY,
+    depth_error::STUDY,
 ];
 
 /// The study of that name.

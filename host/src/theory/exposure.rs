@@ -7,8 +7,8 @@
 
 use anyhow::{Context, Result};
 use dtof_core::{
-    BinPosition, Count, Count10, CounterWidth, Detection, Histogram, PaperRule, PixelAddress,
-    RangeGate, background, detect,
+    BinPosition, Count, Count10, CounterWidth, DepthEstimator, Detection, Histogram, PaperRule,
+    PixelAddress, RangeGate, background, detect,
 };
 use rand_core::Rng;
 use rand_distr::{Distribution, Poisson};
@@ -74,7 +74,8 @@ impl Photons {
         })
     }
 
-    fn add_to<const BINS: usize>(&self, histogram: &mut Histogram<BINS>, rng: &mut Pcg64) {
+    /// Calls `photon` with the bin of each, one of `BINS`.
+    fn draw<const BINS: usize>(&self, rng: &mut Pcg64, mut photon: impl FnMut(u16)) {
         // A Poisson sample is a whole number.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let sample = |law: &Poisson<f64>, rng: &mut Pcg64| law.sample(rng) as u64;
@@ -85,7 +86,7 @@ impl Photons {
             let mut random = rng.next_u64();
             for _ in 0..left.min(4) {
                 #[allow(clippy::cast_possible_truncation)]
-                histogram.add((random as usize & (BINS - 1)) as u16);
+                photon((random as usize & (BINS - 1)) as u16);
                 random >>= 16;
             }
             left = left.saturating_sub(4);
@@ -93,9 +94,13 @@ impl Photons {
         for (bin, law) in &self.signal {
             // A counter is full by then.
             for _ in 0..sample(law, rng).min(1024) {
-                histogram.add(*bin);
+                photon(*bin);
             }
         }
+    }
+
+    fn add_to<const BINS: usize>(&self, histogram: &mut Histogram<BINS>, rng: &mut Pcg64) {
+        self.draw::<BINS>(rng, |bin| histogram.add(bin));
     }
 }
 
@@ -139,6 +144,28 @@ impl Exposures {
         self.looks.expiry()
     }
 
+    /// One exposure, photons only: calls `look` at each look with the laser cycles so
+    /// far and the photons since the look before, until it returns `true` or the
+    /// exposure expires.
+    pub fn frames<const BINS: usize>(
+        &self,
+        rng: &mut Pcg64,
+        mut look: impl FnMut(u32, &[u16; BINS]) -> bool,
+    ) {
+        let frame = |photons: &Photons, rng: &mut Pcg64| {
+            let mut frame = [0u16; BINS];
+            photons.draw::<BINS>(rng, |bin| frame[usize::from(bin)] += 1);
+            frame
+        };
+        let mut photons = frame(&self.until_first, rng);
+        for step in self.looks.first..=self.looks.last {
+            if look(step * self.looks.x, &photons) {
+                break;
+            }
+            photons = frame(&self.between, rng);
+        }
+    }
+
     /// One exposure: the laser cycles it lasted, and its event if there was one.
     pub fn event<const BINS: usize>(
         &self,
@@ -147,7 +174,12 @@ impl Exposures {
     ) -> (u32, Option<Detection>) {
         let mut event = None;
         let cycles = self.run::<BINS>(rng, |_, histogram| {
-            event = detect(histogram, &RangeGate::full(), rule);
+            event = detect(
+                histogram,
+                &RangeGate::full(),
+                rule,
+                DepthEstimator::default(),
+            );
             event.is_some()
         });
         (cycles, event)
@@ -328,7 +360,13 @@ mod tests {
                 photons.add_to(&mut histogram, &mut rng);
                 let fires = |alpha: u16| {
                     let rule = PaperRule::new(U8F8::from_bits(alpha), minimum_count);
-                    detect(&histogram, &RangeGate::full(), &rule).is_some()
+                    detect(
+                        &histogram,
+                        &RangeGate::full(),
+                        &rule,
+                        DepthEstimator::default(),
+                    )
+                    .is_some()
                 };
                 match highest_alpha(&histogram, minimum_count) {
                     None => {

@@ -8,6 +8,8 @@
 //! | [`single_look`] | false events of one look with the quadrant background | exact |
 //! | [`repeated_looks`] | false events of an exposure | bounds, exact |
 //! | [`table`] | what lies between the bounds | simulation |
+//! | [`likelihood_ratio`] | the fastest a rule can be that knows the scene | exact |
+//! | [`cramer_rao`] | the smallest error of a pulse's position | exact |
 //! | [`exposure`] | exposures, from look to look | simulation |
 //! | [`tune`] | settings for a wanted false event rate | all of these |
 //!
@@ -15,9 +17,11 @@
 //! `f64`. Nothing here is checked for sense: rates are finite and not negative,
 //! probabilities lie strictly between 0 and 1 where an inverse is taken of them.
 
+pub mod cramer_rao;
 pub mod exposure;
 pub mod gaussian;
 pub mod known_background;
+pub mod likelihood_ratio;
 pub mod normal;
 pub mod poisson;
 mod quadrature;

@@ -150,7 +150,7 @@ mod tests {
     /// All histograms of 8 bins with up to five photons a bin, one by one.
     #[test]
     fn agrees_with_all_histograms_of_few_photons() {
-        use dtof_core::{Histogram, PaperRule, RangeGate, detect};
+        use dtof_core::{DepthEstimator, Histogram, PaperRule, RangeGate, detect};
         let mean = 0.2;
         let law = Poisson::new(mean);
         let rule = PaperRule::new(U8F8::lit("0.5"), Count::saturating(1));
@@ -166,7 +166,14 @@ mod tests {
             let mut histogram = Histogram::<8>::new();
             histogram.add_frame(&counts, &RangeGate::full());
             left_out -= probability;
-            if detect(&histogram, &RangeGate::full(), &rule).is_some() {
+            if detect(
+                &histogram,
+                &RangeGate::full(),
+                &rule,
+                DepthEstimator::default(),
+            )
+            .is_some()
+            {
                 expected += probability;
             }
         }

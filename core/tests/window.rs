@@ -1,0 +1,185 @@
+//! The window rule decides as it is written, whatever the counts, and as seldom without
+//! a target as it says.
+
+#![allow(clippy::cast_possible_truncation, reason = "small numbers")]
+
+use dtof_core::fixed::types::{U4F12, U24F8};
+use dtof_core::{
+    Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DetectionRule, Histogram,
+    RangeGate, WindowRule, WindowWidthError, detect,
+};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+/// The most photons of all gated windows of `width` bins that hold the peak, the
+/// photons outside it, and how many bins these are in.
+fn window<const BINS: usize, W: CounterWidth>(
+    histogram: &Histogram<BINS, W>,
+    gate: &RangeGate<BINS>,
+    width: usize,
+) -> (u64, u64, u64) {
+    let counts: Vec<u64> = (gate.first()..=gate.last())
+        .map(|bin| histogram.count(bin.into()).unwrap().into())
+        .collect();
+    let peak = usize::from(histogram.peak().bin.raw() - gate.first());
+    let most = (0..=counts.len() - width)
+        .filter(|&start| (start..start + width).contains(&peak))
+        .map(|start| counts[start..start + width].iter().sum())
+        .max();
+    let (most, all): (u64, u64) = (most.unwrap(), counts.iter().sum());
+    (most, all - most, (counts.len() - width) as u64)
+}
+
+/// The background in 1/256 of a detection, the rule in whole numbers that cannot
+/// overflow, and checked against the rule in real ones.
+fn as_written<const BINS: usize, W: CounterWidth>(
+    rule: &WindowRule,
+    histogram: &Histogram<BINS, W>,
+    gate: &RangeGate<BINS>,
+) -> Option<U24F8> {
+    let width = rule.width();
+    let (inside, outside, bins) = window(histogram, gate, width.into());
+    // 1/4096 squared; z²/6 in 1/16 and z² in 1/256, rounded down.
+    let z_squared = i128::from(rule.z().to_bits()).pow(2);
+    let (skew, z_squared) = ((z_squared / 6) >> 20, z_squared >> 16);
+    let (s, r, n, w) = (
+        i128::from(inside),
+        i128::from(outside),
+        i128::from(bins),
+        i128::from(width),
+    );
+    let above = 16 * (n * s - w * r) - (n - w).max(0) * skew;
+    let clear = above > 0 && above.pow(2) > z_squared * (n + w) * w * r;
+
+    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+    let (inside_real, mean) = (
+        inside as f64,
+        f64::from(width) * outside as f64 / bins as f64,
+    );
+    let share = f64::from(width) / bins as f64;
+    let deviation = (mean * (1.0 + share)).sqrt();
+    let z = rule.z().to_num::<f64>();
+    let level = mean + z * deviation + (1.0 - share).max(0.0) * z * z / 6.0;
+    // Two roundings: the skew's, and that of z².
+    let tolerance = 0.0626 + deviation * (z - (z * z - 1.0 / 256.0).max(0.0).sqrt());
+    if inside_real > level + 1e-6 * level {
+        assert!(clear, "{inside_real} {level}");
+    }
+    if inside_real < level - tolerance - 1e-6 * level {
+        assert!(!clear, "{inside_real} {level}");
+    }
+    let fires = clear && inside >= u64::from(rule.minimum_count().raw());
+    fires.then(|| U24F8::from_bits(((outside << 8) / bins) as u32))
+}
+
+/// Random histograms with a peak that stands more or less clear; how many fired.
+fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) -> u32 {
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let mut fired = 0;
+    for round in 0..rounds {
+        let bins = 8 + rng.next_u32() % (BINS as u32 - 7);
+        let first = (rng.next_u32() % (BINS as u32 - bins + 1)) as u16;
+        let gate = match round % 3 {
+            0 => RangeGate::full(),
+            _ => RangeGate::new(first, first + bins as u16 - 1).unwrap(),
+        };
+        let most = 2 + rng.next_u32() % (W::MAX >> (rng.next_u32() % W::BITS));
+        let mut frame: [u32; BINS] = core::array::from_fn(|_| rng.next_u32() % most);
+        let above = rng.next_u32() % (2 * most);
+        if let Some(count) = frame.get_mut(rng.next_u32() as usize % BINS) {
+            *count += above;
+        }
+        let mut histogram = Histogram::<BINS, W>::new();
+        histogram.add_frame(&frame, &gate);
+        let z = U4F12::from_bits(rng.next_u32() as u16 >> (rng.next_u32() % 16));
+        let minimum = rng.next_u32() % (2 * most) * (round % 2);
+        let width = 1 + (rng.next_u32() % 7) as u8;
+        let rule = WindowRule::new(width, z, Count::saturating(minimum)).unwrap();
+        let expected = as_written(&rule, &histogram, &gate);
+        assert_eq!(rule.detect(&histogram, &gate, histogram.peak()), expected);
+        let detection = detect(&histogram, &gate, &rule, DepthEstimator::default());
+        let rounded = detection.map(|detection| detection.background.raw());
+        assert_eq!(rounded, expected.map(|level| (level.to_bits() + 128) >> 8));
+        fired += u32::from(expected.is_some());
+    }
+    fired
+}
+
+#[test]
+fn it_decides_as_it_is_written() {
+    for (fired, rounds) in [
+        (check::<8, Count10>(20_000, 1), 20_000),
+        (check::<128, Count10>(5000, 2), 5000),
+        (check::<128, Count16>(5000, 3), 5000),
+        (check::<128, Count24>(5000, 4), 5000),
+        (check::<1024, Count10>(500, 5), 500),
+        (check::<1024, Count16>(500, 6), 500),
+    ] {
+        // Both answers, often.
+        let often = rounds / 20..rounds - rounds / 20;
+        assert!(often.contains(&fired), "{fired} of {rounds}");
+    }
+}
+
+/// All bins full or empty but the window's, every width, the least and largest z.
+#[test]
+fn it_decides_as_it_is_written_at_the_extremes() {
+    fn all<const BINS: usize, W: CounterWidth>() {
+        let gates = [
+            RangeGate::<BINS>::full(),
+            RangeGate::new(0, 7).unwrap(),
+            RangeGate::new(BINS as u16 - 8, BINS as u16 - 1).unwrap(),
+        ];
+        for gate in gates {
+            for background in [0, 1, W::MAX / 2, W::MAX - 1, W::MAX] {
+                for (bin, other) in [(0, 1), (7, 6), (BINS - 1, BINS - 2), (BINS / 2, 3)] {
+                    for count in [1, W::MAX / 2 + 1, W::MAX] {
+                        let mut counts = [background; BINS];
+                        (counts[bin], counts[other]) = (count, count);
+                        let mut histogram = Histogram::<BINS, W>::new();
+                        histogram.add_frame(&counts, &gate);
+                        for width in 1..=WindowRule::MAX_WIDTH {
+                            for z in [0, 1, 17_613, u16::MAX] {
+                                let z = U4F12::from_bits(z);
+                                let rule = WindowRule::new(width, z, Count::default()).unwrap();
+                                let found = rule.detect(&histogram, &gate, histogram.peak());
+                                let expected = (histogram.total() > 0)
+                                    .then(|| as_written(&rule, &histogram, &gate));
+                                assert_eq!(found, expected.flatten());
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+    all::<8, Count10>();
+    all::<1024, Count10>();
+    all::<1024, Count16>();
+    all::<256, Count24>();
+}
+
+#[test]
+fn only_windows_that_can_be_used() {
+    for width in 0..=u8::MAX {
+        let rule = WindowRule::new(width, U4F12::ONE, Count::saturating(9));
+        if (1..=7).contains(&width) {
+            let rule = rule.unwrap();
+            let minimum = rule.minimum_count().raw();
+            assert_eq!((rule.width(), rule.z(), minimum), (width, U4F12::ONE, 9));
+        } else {
+            assert_eq!(rule, Err(WindowWidthError));
+        }
+    }
+}
+
+#[test]
+fn an_empty_histogram_is_no_detection() {
+    for width in 1..=7 {
+        let rule = WindowRule::new(width, U4F12::ZERO, Count::default()).unwrap();
+        let histogram = Histogram::<8>::new();
+        let gate = RangeGate::full();
+        let found = detect(&histogram, &gate, &rule, DepthEstimator::default());
+        assert_eq!(found, None);
+    }
+}

@@ -1,0 +1,60 @@
+//! How many instructions the operations of `dtof-core` take:
+//! `cargo xtask bench`, and `docs/bench/README.md` for what is counted.
+//!
+//! The emulator counts instructions. On a board (feature `stm32f405`) the same
+//! lines hold clock cycles; a debugger shows them. That has not been tried.
+
+#![no_std]
+#![no_main]
+
+#[cfg(not(all(target_os = "none", any(feature = "mps2-an386", feature = "stm32f405"))))]
+compile_error!("an image for a board: cargo xtask bench");
+
+mod counter;
+mod decisions;
+mod operations;
+mod report;
+mod roots;
+mod scene;
+mod windows;
+
+use core::panic::PanicInfo;
+
+use cortex_m_rt::{ExceptionFrame, entry, exception};
+use semihosting::println;
+use semihosting::process::ExitCode;
+
+use counter::Counter;
+use report::Report;
+use scene::State;
+
+#[entry]
+fn main() -> ! {
+    let Some(mut state) = State::new() else {
+        println!("the configuration is refused");
+        ExitCode::FAILURE.exit_process()
+    };
+    let Some(counter) = Counter::start(&mut state) else {
+        println!("the counter does not count instructions: see `cargo xtask bench`");
+        ExitCode::FAILURE.exit_process()
+    };
+    let mut report = Report;
+    operations::run(&mut report, &counter, &mut state);
+    decisions::run(&mut report, &counter, &mut state);
+    windows::run(&mut report, &counter, &mut state);
+    roots::run(&mut report, &counter, &mut state);
+    ExitCode::SUCCESS.exit_process()
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    println!("{info}");
+    ExitCode::FAILURE.exit_process()
+}
+
+#[allow(unsafe_code, reason = "the attribute asks for it")]
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    println!("hard fault at {:#010x}", frame.pc());
+    ExitCode::FAILURE.exit_process()
+}

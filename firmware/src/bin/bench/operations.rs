@@ -1,0 +1,172 @@
+//! The operations, each called as a program would call it.
+
+use core::hint::black_box;
+
+use dtof_core::fixed::types::U24F8;
+use dtof_core::{LaserCycle, Look, centre_of_mass};
+
+use crate::counter::{Counter, Operation};
+use crate::report::Report;
+use crate::scene::{CYCLES, EXPOSURES, PHOTONS, PHOTONS_A_CYCLE, State};
+
+/// Measures all.
+pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
+    let photons = EXPOSURES * PHOTONS;
+    let mut total = 0;
+    for number in 0..EXPOSURES {
+        state.empty(number, true);
+        for index in 0..PHOTONS {
+            total += counter.measure(count, state, index);
+        }
+    }
+    report.line("photon", "AsyncPixel::count", total, photons);
+
+    let rows: [(&str, &str, Operation, Prepare, u32); 10] = [
+        (
+            "photon",
+            "AsyncPixel::count_batch",
+            count_batch,
+            empty,
+            photons,
+        ),
+        (
+            "photon",
+            "AsyncPixel::count_batch; gate",
+            count_batch,
+            gated,
+            photons,
+        ),
+        ("photon", "Histogram::add_batch", add_batch, empty, photons),
+        ("frame", "Histogram::add_frame", add_frame, frame, EXPOSURES),
+        ("depth", "centre_of_mass", depth, with_target, EXPOSURES),
+        (
+            "pack",
+            "encode and to_le_bytes",
+            pack,
+            with_event,
+            EXPOSURES,
+        ),
+        ("clear", "Histogram::clear", clear, with_target, EXPOSURES),
+        ("clear", "look at L2", end_laser_cycle, at_l2, EXPOSURES),
+        ("exposure", "count_batch", exposure, empty, EXPOSURES),
+        ("exposure", "count", exposure_single, empty, EXPOSURES),
+    ];
+    for (operation, variant, way, prepare, runs) in rows {
+        let mut total = 0;
+        for number in 0..EXPOSURES {
+            prepare(state, number);
+            total += counter.measure(way, state, number);
+        }
+        report.line(operation, variant, total, runs);
+    }
+}
+
+/// Brings the state to where the operation begins.
+type Prepare = fn(&mut State, u32);
+
+fn empty(state: &mut State, number: u32) {
+    state.empty(number, true);
+}
+
+fn gated(state: &mut State, number: u32) {
+    state.empty(number, true);
+    state.config = state.gated;
+}
+
+fn with_target(state: &mut State, number: u32) {
+    state.counted(number, true);
+}
+
+fn frame(state: &mut State, number: u32) {
+    state.counted(number, true);
+    state.histogram.clear();
+}
+
+fn with_event(state: &mut State, number: u32) {
+    state.counted(number, true);
+    state.wait_for_last_look();
+    let _ = state.pixel.end_laser_cycle(&state.config, LaserCycle(43));
+    state.event = state.pixel.acknowledge();
+}
+
+fn at_l2(state: &mut State, number: u32) {
+    state.counted(number, true);
+    state.config = state.never_fires;
+    state.wait_for_last_look();
+}
+
+extern "C" fn count(state: &mut State, index: u32) -> u32 {
+    if let Some(&code) = state.codes.get(index as usize) {
+        state.pixel.count(&state.config, code);
+    }
+    0
+}
+
+extern "C" fn count_batch(state: &mut State, _: u32) -> u32 {
+    state.pixel.count_batch(&state.config, &state.codes);
+    0
+}
+
+extern "C" fn add_batch(state: &mut State, _: u32) -> u32 {
+    state.histogram.add_batch(&state.codes);
+    0
+}
+
+extern "C" fn add_frame(state: &mut State, _: u32) -> u32 {
+    state
+        .histogram
+        .add_frame(&state.foreign, state.config.gate())
+}
+
+extern "C" fn depth(state: &mut State, _: u32) -> u32 {
+    let peak = state.histogram.peak();
+    let gate = state.config.gate();
+    let depth = centre_of_mass(&state.histogram, gate, peak, const { U24F8::lit("3") });
+    depth.offset.raw().unsigned_abs().into()
+}
+
+extern "C" fn pack(state: &mut State, _: u32) -> u32 {
+    let Some(event) = &state.event else {
+        return 0;
+    };
+    let (_, word) = state.encoder.encode(event);
+    black_box(word.to_le_bytes());
+    1
+}
+
+extern "C" fn clear(state: &mut State, _: u32) -> u32 {
+    state.histogram.clear();
+    0
+}
+
+extern "C" fn end_laser_cycle(state: &mut State, cycle: u32) -> u32 {
+    let cycle = LaserCycle(cycle.into());
+    state.pixel.end_laser_cycle(&state.config, cycle) as u32
+}
+
+extern "C" fn exposure(state: &mut State, _: u32) -> u32 {
+    let mut photons = state.codes.chunks(PHOTONS_A_CYCLE);
+    for cycle in 0..CYCLES {
+        let photons = photons.next().unwrap_or_default();
+        state.pixel.count_batch(&state.config, photons);
+        let cycle = LaserCycle(cycle.into());
+        if state.pixel.end_laser_cycle(&state.config, cycle) == Look::Event {
+            state.event = state.pixel.acknowledge();
+        }
+    }
+    pack(state, 0)
+}
+
+extern "C" fn exposure_single(state: &mut State, _: u32) -> u32 {
+    let mut photons = state.codes.chunks(PHOTONS_A_CYCLE);
+    for cycle in 0..CYCLES {
+        for &code in photons.next().unwrap_or_default() {
+            state.pixel.count(&state.config, code);
+        }
+        let cycle = LaserCycle(cycle.into());
+        if state.pixel.end_laser_cycle(&state.config, cycle) == Look::Event {
+            state.event = state.pixel.acknowledge();
+        }
+    }
+    pack(state, 0)
+}

@@ -1,0 +1,40 @@
+//! The public TMF8820 capture log, when it lies at
+//! `../shared/data/tmf8820_plane_gt/distance_data.json` beside the workspace or where
+//! `TMF8820_LOG` says.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Writes past the test harness, which hides what passing tests print.
+pub fn tell(line: &str) {
+    let mut out = std::io::stderr().lock();
+    writeln!(out, "{line}").unwrap();
+}
+
+/// Where it is; says so if it is nowhere.
+pub fn log() -> Option<PathBuf> {
+    let beside = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../shared/data/tmf8820_plane_gt/distance_data.json"
+    );
+    if let Some(named) = std::env::var_os("TMF8820_LOG") {
+        return Some(named.into()); // and fail if it is not there
+    }
+    let found = Some(PathBuf::from(beside)).filter(|path| path.exists());
+    if found.is_none() {
+        tell(
+            "SKIPPED: recorded photons: no TMF8820 capture log beside the workspace, nor in TMF8820_LOG",
+        );
+    }
+    found
+}
+
+/// Distance to the plane of each capture in millimetres.
+pub fn ground_truth(log: &PathBuf) -> Vec<f64> {
+    let text = std::fs::read_to_string(log).unwrap();
+    let captures: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let captures = captures.as_array().unwrap().iter();
+    captures
+        .map(|capture| capture["dist_to_plane"].as_f64().unwrap() * 1000.0)
+        .collect()
+}

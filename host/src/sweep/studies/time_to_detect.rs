@@ -1,0 +1,302 @@
+//! How fast a pulse is found, against whoever knows everything but where it lies.
+
+use std::fmt::Write as _;
+
+use anyhow::Result;
+use rand_pcg::Pcg64;
+
+use crate::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
+use crate::simulation::Rates;
+use crate::summary::grouped;
+use crate::sweep::results::{Figure, Results, Table, Z_99};
+use crate::sweep::studies::passage::{BINS, LOOKS, Ladder, Method, Passage, count_false};
+use crate::sweep::{Part, Point, Study, Tally, point};
+use crate::theory::exposure::Exposures;
+use crate::theory::likelihood_ratio::{LikelihoodRatio, signal_for_information};
+
+/// Standard deviations of the pulse in bins.
+pub const SIGMAS: [f64; 3] = [0.5, 1.0, 1.5];
+/// Background photons a bin and laser cycle.
+pub const BACKGROUNDS: [f64; 3] = [0.01, 0.05, 0.2];
+/// Where in its bin the pulse lies, and what that is called.
+pub const PLACES: [(f64, &str); 2] = [(0.5, "centred"), (0.0, "on an edge")];
+/// False events an exposure at which methods are compared.
+pub const FALSE_SHARE: f64 = 0.01;
+/// The signal is such that this many nats take 200 laser cycles, wherever the
+/// background: the likelihood ratio needs 100 to 300.
+const INFORMATION: f64 = 9.0 / 200.0;
+/// Exposures of a trial.
+const EXPOSURES: u64 = 50;
+
+/// Against the likelihood ratio, at equal false events.
+pub const STUDY: Study = Study {
+    name: "time-to-detect",
+    about: "laser cycles to an event against the likelihood ratio, by pulse and background",
+    revision: 1,
+    few_seeds: 20,
+    all_seeds: 200,
+    points,
+    trial,
+    results,
+};
+
+/// Exposures without a target for each scene the likelihood ratio knows, and with
+/// one at each place.
+fn points() -> Vec<Point> {
+    let mut points = Vec::new();
+    for sigma in SIGMAS {
+        for background in BACKGROUNDS {
+            let scene = [("sigma", sigma), ("background", background)];
+            points.push(point([scene[0], scene[1], ("target", 0.0), ("place", 0.0)]));
+            for (place, _) in PLACES {
+                points.push(point([
+                    scene[0],
+                    scene[1],
+                    ("target", 1.0),
+                    ("place", place),
+                ]));
+            }
+        }
+    }
+    points
+}
+
+/// Thresholds about those at which the methods are compared.
+fn ladders() -> Vec<Ladder> {
+    let rules = Method::RULES.map(|method| match method {
+        Method::Paper => Ladder::new(method, 12, 24, 4),
+        _ => Ladder::new(method, 15, 19, 4),
+    });
+    let mut ladders = rules.to_vec();
+    ladders.push(Ladder::new(Method::Oracle, 5, 11, 1));
+    ladders
+}
+
+/// The same at every place, as the likelihood ratio does not know it: that of
+/// halfway from the middle of a bin to its edge.
+fn signal(point: &Point) -> f64 {
+    signal_for_information(point["background"], 0.25, point["sigma"], INFORMATION)
+}
+
+fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+    let (background, sigma) = (point["background"], point["sigma"]);
+    let signal = signal(point);
+    let rates = Rates {
+        background,
+        signal: signal * point["target"],
+        position: 64.0 + point["place"],
+        sigma,
+    };
+    let ladders = ladders();
+    let exposures = Exposures::new(&rates, u16::try_from(BINS)?, LOOKS)?;
+    let scene = LikelihoodRatio::new(u32::try_from(BINS)?, background, signal, sigma);
+    let mut passage = Passage::new(&ladders, exposures, Some(&scene))?;
+    if point["target"] == 0.0 {
+        return Ok(count_false(&mut passage, EXPOSURES, rng));
+    }
+    let mut tally = Tally::from([("exposures".to_owned(), EXPOSURES)]);
+    for _ in 0..EXPOSURES {
+        for (ladder, passed) in ladders.iter().zip(passage.run(rng)) {
+            for index in 0..ladder.thresholds.len() {
+                let cycles = passed.get(index).copied();
+                let lasted = u64::from(cycles.unwrap_or(LOOKS.expiry()));
+                let counts = [
+                    ("events", u64::from(cycles.is_some())),
+                    ("cycles", lasted),
+                    ("squares", lasted * lasted),
+                ];
+                for (what, count) in counts {
+                    *tally.entry(ladder.key(index, what)).or_default() += count;
+                }
+            }
+        }
+    }
+    Ok(tally)
+}
+
+/// How a method does in a scene.
+struct Outcome {
+    sigma: f64,
+    place: &'static str,
+    background: f64,
+    method: Method,
+    /// With a share of [`FALSE_SHARE`] of false events.
+    threshold: f64,
+    /// Mean laser cycles to an event; an exposure that expires is followed by
+    /// another.
+    cycles: f64,
+    /// Standard error of `cycles`, as a share of it.
+    error: f64,
+    /// `cycles` over those of the likelihood ratio.
+    ratio: f64,
+}
+
+#[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
+fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
+    let mut outcomes = Vec::new();
+    for sigma in SIGMAS {
+        for (within, place) in PLACES {
+            for background in BACKGROUNDS {
+                let with_target = part.one([
+                    ("sigma", sigma),
+                    ("background", background),
+                    ("target", 1.0),
+                    ("place", within),
+                ])?;
+                let first = outcomes.len();
+                for ladder in ladders() {
+                    let method = ladder.method;
+                    // What does not know the pulse has no use for its width.
+                    let without = [("background", background), ("target", 0.0)];
+                    let all = part.at(without);
+                    let threshold = if method == Method::Oracle {
+                        let own = all.filter(|point| point.is_at([("sigma", sigma)]));
+                        ladder.calibrated(own, FALSE_SHARE)
+                    } else {
+                        ladder.calibrated(all, FALSE_SHARE)
+                    };
+                    let count = |index, what| with_target.count(&ladder.key(index, what)) as f64;
+                    let of = |what| ladder.interpolated(threshold, |index| count(index, what));
+                    let exposures = with_target.count("exposures") as f64;
+                    let cycles = ladder.interpolated(threshold, |index| {
+                        count(index, "cycles") / count(index, "events").max(1.0)
+                    });
+                    let mean = of("cycles") / exposures;
+                    let variance = of("squares") / exposures - mean * mean;
+                    outcomes.push(Outcome {
+                        sigma,
+                        place,
+                        background,
+                        method,
+                        threshold,
+                        cycles,
+                        error: (variance.max(0.0) / exposures).sqrt() / mean,
+                        ratio: 1.0,
+                    });
+                }
+                // The likelihood ratio is the last.
+                let oracle = outcomes
+                    .last()
+                    .map_or(1.0, |oracle: &Outcome| oracle.cycles);
+                for outcome in &mut outcomes[first..] {
+                    outcome.ratio = outcome.cycles / oracle;
+                }
+            }
+        }
+    }
+    Ok(outcomes)
+}
+
+/// `sigma` is in whole tenths.
+fn is(outcome: &Outcome, sigma: f64, method: Method) -> bool {
+    (outcome.sigma - sigma).abs() < 0.01 && outcome.method == method
+}
+
+/// The mean of the ratios of a method over backgrounds and places of a pulse, and
+/// the largest.
+fn mean_and_worst(outcomes: &[Outcome], sigma: f64, method: Method) -> (f64, f64) {
+    let ratios = outcomes.iter().filter(|outcome| is(outcome, sigma, method));
+    let ratios = ratios.map(|outcome| outcome.ratio);
+    let count = ratios.clone().count().max(1);
+    #[allow(clippy::cast_precision_loss)]
+    let mean = ratios.clone().sum::<f64>() / count as f64;
+    (mean, ratios.fold(0.0, f64::max))
+}
+
+fn results(part: &Part) -> Result<Results> {
+    let outcomes = outcomes(part)?;
+    let mut figures = Vec::new();
+    let names = [
+        "time-to-detect-0.5",
+        "time-to-detect-1.0",
+        "time-to-detect-1.5",
+    ];
+    let exposures = part.at([("target", 1.0)]).next();
+    let exposures = exposures.map_or(0, |point| point.count("exposures"));
+    for (name, sigma) in names.into_iter().zip(SIGMAS) {
+        let mut best = (Method::Paper, f64::INFINITY, 0.0);
+        let mut series = Vec::new();
+        for (colour, method) in Method::RULES.into_iter().enumerate() {
+            let (mean, worst) = mean_and_worst(&outcomes, sigma, method);
+            if mean < best.1 {
+                best = (method, mean, worst);
+            }
+            for (place, style) in [("centred", Style::JoinedDots), ("on an edge", Style::Thin)] {
+                let points = outcomes
+                    .iter()
+                    .filter(|outcome| is(outcome, sigma, method) && outcome.place == place);
+                let dot = |outcome: &Outcome| Dot {
+                    x: outcome.background,
+                    y: outcome.ratio,
+                    interval: Some(interval(outcome)),
+                };
+                series.push(Series {
+                    name: (place == "centred").then(|| method.label()),
+                    colour,
+                    style,
+                    points: points.map(dot).collect(),
+                });
+            }
+        }
+        let axis = |label, range| Axis {
+            label,
+            logarithmic: true,
+            range,
+        };
+        let title = format!("Time to an event, pulse σ {sigma} bins (thin: on a bin edge)");
+        let svg = line_chart(&Chart {
+            title: &title,
+            x: axis("background a bin and laser cycle", Some((0.008, 0.6))),
+            y: axis(
+                "laser cycles over the likelihood ratio's",
+                Some((0.95, 4.5)),
+            ),
+            series,
+        })?;
+        figures.push(Figure {
+            name,
+            svg,
+            caption: format!(
+                "Mean laser cycles to an event as a multiple of the likelihood ratio's that knows background, signal \
+                 and shape of a pulse of {sigma} bins; all with 1 % false events in 1000 laser cycles. The best rule \
+                 for this pulse is the {}: {:.2} on average, {:.2} at most ({} exposures a dot)",
+                best.0.label(),
+                best.1,
+                best.2,
+                grouped(exposures)
+            ),
+        });
+    }
+    Ok(Results {
+        figures,
+        claims: Vec::new(),
+        tables: vec![Table {
+            name: "time_to_detect",
+            csv: csv(&outcomes)?,
+        }],
+    })
+}
+
+/// What the ratio lies in; that of the likelihood ratio's time is as wide.
+fn interval(outcome: &Outcome) -> (f64, f64) {
+    let half = Z_99 * outcome.error * std::f64::consts::SQRT_2;
+    (outcome.ratio * (1.0 - half), outcome.ratio * (1.0 + half))
+}
+
+fn csv(outcomes: &[Outcome]) -> Result<String> {
+    let mut csv = "sigma,place,background,method,threshold,cycles,ratio\n".to_owned();
+    for outcome in outcomes {
+        writeln!(
+            csv,
+            "{},{},{},{},{:.3},{:.1},{:.3}",
+            outcome.sigma,
+            outcome.place,
+            outcome.background,
+            outcome.method.name(),
+            outcome.threshold,
+            outcome.cycles,
+            outcome.ratio
+        )?;
+    }
+    Ok(csv)
+}

@@ -1,0 +1,184 @@
+//! `cargo xtask bench`: how many instructions the operations of the core take on
+//! the target, counted by the emulator.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::firmware::Board;
+use crate::qemu::{Emulator, End};
+
+const FILE: &str = "docs/bench/instructions.csv";
+const HEADER: &str = "operation,variant,opt,instructions";
+
+/// An instruction takes 256 ns of the emulator's clock: see
+/// `firmware/src/bin/bench/counter.rs`.
+const COUNT_INSTRUCTIONS: [&str; 2] = ["-icount", "shift=8"];
+
+/// A figure may grow by one fiftieth before [`check`] fails.
+const TOLERANCE: u64 = 50;
+
+/// One figure.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Row {
+    /// Operation, variant and optimisation level, with commas between.
+    name: String,
+    /// Instructions, in hundredths.
+    hundredths: u64,
+}
+
+/// Counts and writes the file.
+pub fn run(root: &Path) -> Result<()> {
+    let rows = count(root)?;
+    print(&rows);
+    fs::write(root.join(FILE), text(&rows)).context(FILE)?;
+    println!("{FILE}: written");
+    Ok(())
+}
+
+/// Counts and compares with the file.
+pub fn check(root: &Path) -> Result<()> {
+    let committed = parse(&fs::read_to_string(root.join(FILE)).context(FILE)?).context(FILE)?;
+    let rows = count(root)?;
+    print(&rows);
+    let worse = worse(&committed, &rows);
+    for line in &worse {
+        println!("{line}");
+    }
+    ensure!(worse.is_empty(), "not as good as {FILE}, see above");
+    println!("{FILE}: {} figures, none exceeded", committed.len());
+    Ok(())
+}
+
+/// Every figure, at both optimisation levels.
+fn count(root: &Path) -> Result<Vec<Row>> {
+    let board = Board::Mps2An386;
+    let mut rows = Vec::new();
+    for (level, small) in [("3", false), ("s", true)] {
+        let image = board.bench(root, small)?;
+        let emulator = Emulator::start_with(board, &image, &[], &COUNT_INSTRUCTIONS)?;
+        let End { status, output, .. } = emulator.wait()?;
+        let output = String::from_utf8_lossy(&output);
+        ensure!(status.success(), "QEMU: {status}: {}", output.trim());
+        for line in output.lines() {
+            rows.push(measured(line, level).with_context(|| format!("what is `{line}`?"))?);
+        }
+    }
+    Ok(rows)
+}
+
+/// A line of the image: operation, variant, instructions of all runs, runs.
+fn measured(line: &str, level: &str) -> Option<Row> {
+    let (rest, runs) = line.rsplit_once(',')?;
+    let (name, total) = rest.rsplit_once(',')?;
+    let (total, runs) = (total.parse::<u64>().ok()?, runs.parse::<u64>().ok()?);
+    Some(Row {
+        name: format!("{name},{level}"),
+        hundredths: (total * 100 + runs / 2).checked_div(runs)?,
+    })
+}
+
+/// What is missing in `rows`, or more than a little above what is `committed`.
+fn worse(committed: &[Row], rows: &[Row]) -> Vec<String> {
+    let mut lines = Vec::new();
+    for Row { name, hundredths } in committed {
+        match rows.iter().find(|row| row.name == *name) {
+            None => lines.push(format!("{name}: missing")),
+            Some(row) if row.hundredths > hundredths + hundredths / TOLERANCE => {
+                lines.push(format!(
+                    "{name}: {}, was {}",
+                    decimal(row.hundredths),
+                    decimal(*hundredths)
+                ));
+            }
+            Some(_) => {}
+        }
+    }
+    lines
+}
+
+fn text(rows: &[Row]) -> String {
+    let mut text = format!("{HEADER}\n");
+    for Row { name, hundredths } in rows {
+        let _ = writeln!(text, "{name},{}", decimal(*hundredths));
+    }
+    text
+}
+
+fn parse(text: &str) -> Result<Vec<Row>> {
+    let mut lines = text.lines();
+    ensure!(lines.next() == Some(HEADER), "the header is not {HEADER}");
+    let row = |line: &str| {
+        let (name, number) = line.rsplit_once(',')?;
+        let (whole, hundredths) = number.split_once('.')?;
+        let hundredths = hundredths
+            .parse::<u64>()
+            .ok()
+            .filter(|_| hundredths.len() == 2)?;
+        Some(Row {
+            name: name.into(),
+            hundredths: whole.parse::<u64>().ok()? * 100 + hundredths,
+        })
+    };
+    lines
+        .map(|line| row(line).with_context(|| format!("no figure: `{line}`")))
+        .collect()
+}
+
+fn decimal(hundredths: u64) -> String {
+    format!("{}.{:02}", hundredths / 100, hundredths % 100)
+}
+
+/// One line an operation, the levels beside each other.
+fn print(rows: &[Row]) {
+    println!("{:<48} {:>10} {:>10}", "instructions", "O3", "Os");
+    for row in rows {
+        let Some(name) = row.name.strip_suffix(",3") else {
+            continue;
+        };
+        let small = rows.iter().find(|row| row.name == format!("{name},s"));
+        let small = small.map_or_else(String::new, |row| decimal(row.hundredths));
+        let name = name.replacen(',', ": ", 1);
+        println!("{name:<48} {:>10} {small:>10}", decimal(row.hundredths));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(name: &str, hundredths: u64) -> Row {
+        Row {
+            name: name.into(),
+            hundredths,
+        }
+    }
+
+    #[test]
+    fn a_line_is_the_mean_of_its_runs() {
+        assert_eq!(measured("a,b,200,3", "s"), Some(row("a,b,s", 6667)));
+        assert_eq!(measured("a,b,200,0", "s"), None);
+        assert_eq!(measured("a panic", "s"), None);
+    }
+
+    #[test]
+    fn reads_what_it_writes() {
+        let rows = [row("a,b,3", 1005), row("a,b,s", 7)];
+        assert_eq!(text(&rows), format!("{HEADER}\na,b,3,10.05\na,b,s,0.07\n"));
+        assert_eq!(parse(&text(&rows)).unwrap(), rows);
+        assert!(parse("a,b,3,1.00\n").is_err());
+        assert!(parse(&format!("{HEADER}\na,b,3,1.0\n")).is_err());
+    }
+
+    #[test]
+    fn two_percent_more_pass_and_a_missing_line_fails() {
+        let committed = [row("a", 10_000), row("b", 10_000), row("c", 10_000)];
+        let rows = [row("b", 10_201), row("a", 10_200), row("new", 1)];
+        assert_eq!(
+            worse(&committed, &rows),
+            ["b: 102.01, was 100.00", "c: missing"]
+        );
+    }
+}
