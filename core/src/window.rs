@@ -169,8 +169,8 @@ impl DetectionRule for WindowRule {
         if squared.is_some_and(|squared| squared <= variance) {
             return None;
         }
-        let whole = outside / bins_outside;
-        let rest = ((outside % bins_outside) << 8) / bins_outside;
+        let whole = outside.checked_div(bins_outside)?;
+        let rest = ((outside - whole * bins_outside) << 8).checked_div(bins_outside)?;
         Some(U24F8::from_bits((whole << 8) + rest))
     }
 }
