@@ -44,7 +44,7 @@ fn false_events<const BINS: usize>(
         for cycle in 0..l2 {
             while next < f64::from(cycle) + 1.0 {
                 #[allow(clippy::cast_possible_truncation, reason = "BINS is at most 1024")]
-                let code = (u64::from(rng.next_u32()) * BINS as u64 >> 32) as u16;
+                let code = ((u64::from(rng.next_u32()) * BINS as u64) >> 32) as u16;
                 pixel.count(&config, code);
                 next += gap(&mut rng, photons_a_cycle);
             }
