@@ -141,8 +141,11 @@ impl CentredWindow {
         let [least, most] = [SubBinOffset::MIN, SubBinOffset::MAX].map(SubBinOffset::raw);
         let mut offset = SubBinOffset::CENTRE.raw();
         for _ in 0..STEPS {
-            let moved = offset + step(&bins, offset.into(), half, below);
-            offset = moved.clamp(least, most);
+            let step = step(&bins, offset.into(), half, below);
+            if step == 0 {
+                break;
+            }
+            offset = (offset + step).clamp(least, most);
         }
 
         let mut flags = Flags::NONE;

@@ -31,9 +31,9 @@
 //! let mut histogram = Histogram::<128>::new();
 //! histogram.add_batch(&[7, 60, 60, 61]);
 //! let (gate, estimator) = (RangeGate::full(), DepthEstimator::default());
-//! assert_eq!(detect(&histogram, &gate, &rule, estimator), None);
+//! assert_eq!(detect(&histogram, &gate, &rule, &estimator), None);
 //! histogram.add_batch(&[61, 60]);
-//! assert!(detect(&histogram, &gate, &rule, estimator).is_some());
+//! assert!(detect(&histogram, &gate, &rule, &estimator).is_some());
 //! # Ok::<(), dtof_core::WindowWidthError>(())
 //! ```
 
@@ -156,17 +156,23 @@ impl DetectionRule for WindowRule {
         let bins_outside = bins - width;
         let outside = histogram.total().wrapping_sub(inside);
 
-        // In 1/16 counts: 14 bits.
+        // In 1/16 counts.
         let z_squared = u32::from(self.z.to_bits()) * u32::from(self.z.to_bits());
         let skew = bins_outside.saturating_sub(width) * ((z_squared / 6) >> 20);
-        let all = u64::from(bins) * u64::from(inside);
-        let above = (all << 4)
-            .checked_sub(((u64::from(width) * u64::from(histogram.total())) << 4) + u64::from(skew))
-            .filter(|&above| above > 0)?;
+        let (inside_times, total_times) = (bins << 4, width << 4);
+        let above = if W::BITS <= 10 {
+            // 14 + 13 bits, 7 + 20 bits and 20 bits.
+            let level = total_times * histogram.total() + skew;
+            (inside_times * inside).checked_sub(level)?
+        } else {
+            let level = u64::from(total_times) * u64::from(histogram.total()) + u64::from(skew);
+            let above = (u64::from(inside_times) * u64::from(inside)).checked_sub(level)?;
+            // Its square is then above any variance.
+            u32::try_from(above).unwrap_or(u32::MAX)
+        };
         // At most 8 + 3 + 32 + 16 bits, or 10 + 3 + 26 + 16.
         let variance = u64::from(bins * width) * u64::from(outside) * u64::from(z_squared >> 16);
-        let squared = above.checked_mul(above);
-        if squared.is_some_and(|squared| squared <= variance) {
+        if above == 0 || u64::from(above) * u64::from(above) <= variance {
             return None;
         }
         let whole = outside.checked_div(bins_outside)?;

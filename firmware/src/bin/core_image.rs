@@ -184,9 +184,9 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
         keep(histogram.add_frame(&values::<u16, BINS>(half), &gate));
         keep(histogram.add_frame(&values::<u32, BINS>(word), &gate));
         keep((histogram.peak(), histogram.count(usize::from(half()))));
-        keep(detect(&histogram, &gate, &rule(), estimator()));
+        keep(detect(&histogram, &gate, &rule(), &estimator()));
         if let Some(rule) = window_rule() {
-            keep(detect(&histogram, &gate, &rule, estimator()));
+            keep(detect(&histogram, &gate, &rule, &estimator()));
         }
 
         // As another detection rule may ask: about a peak of its own.
@@ -313,7 +313,7 @@ fn config<const BINS: usize>() -> Option<PixelConfig<BINS>> {
         Ok(config) => {
             keep((config.x(), config.l1(), config.l2()));
             keep((*config.gate(), *config.rule().threshold()));
-            keep(config.estimator());
+            keep(*config.estimator());
             Some(config.with_estimator(estimator()))
         }
         Err(error) => {

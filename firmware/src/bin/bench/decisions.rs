@@ -1,8 +1,7 @@
 //! Decisions: with the peak kept while counting, and on a histogram that arrives
 //! whole from elsewhere.
 
-use dtof_core::fixed::types::U8F8;
-use dtof_core::{Count10, DepthEstimator, LaserCycle, detect};
+use dtof_core::{Count10, LaserCycle, detect};
 
 use crate::counter::{Counter, Operation};
 use crate::report::Report;
@@ -36,32 +35,6 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
         }
         report.line("decision", variant, total, runs);
     }
-    let rows: [(&str, Operation, u8, bool); 5] = [
-        ("window of 2; no event", window, 2, false),
-        ("window of 3; no event", window, 3, false),
-        ("window of 5; no event", window, 5, false),
-        ("window of 2; event and depth", window, 2, true),
-        (
-            "window of 3; event and centred window",
-            window_depth,
-            3,
-            true,
-        ),
-    ];
-    for (variant, way, width, event) in rows {
-        let (mut total, mut runs) = (0, 0);
-        for number in 0..EXPOSURES {
-            state.counted(number, event);
-            if let Ok(rule) = State::window(width) {
-                state.window = rule;
-            }
-            if (window(state, 0) > 0) == event {
-                total += counter.measure(way, state, 0);
-                runs += 1;
-            }
-        }
-        report.line("decision", variant, total, runs);
-    }
     for (variant, way) in [
         ("kept peak; slowest no event", kept as Operation),
         ("whole histogram; slowest no event", whole),
@@ -90,29 +63,6 @@ extern "C" fn kept(state: &mut State, _: u32) -> u32 {
         config.rule(),
         config.estimator(),
     ) {
-        Some(detection) => detection.depth.offset.raw().unsigned_abs().into(),
-        None => 0,
-    }
-}
-
-/// 0 without an event.
-extern "C" fn window(state: &mut State, _: u32) -> u32 {
-    let (histogram, gate) = (state.pixel.histogram(), state.config.gate());
-    match detect(
-        histogram,
-        gate,
-        &state.window,
-        DepthEstimator::CentreOfMass3,
-    ) {
-        Some(detection) => 1 + u32::from(detection.depth.offset.raw().unsigned_abs()),
-        None => 0,
-    }
-}
-
-extern "C" fn window_depth(state: &mut State, _: u32) -> u32 {
-    let (histogram, gate) = (state.pixel.histogram(), state.config.gate());
-    let estimator = const { DepthEstimator::for_pulse(U8F8::lit("1")) };
-    match detect(histogram, gate, &state.window, estimator) {
         Some(detection) => detection.depth.offset.raw().unsigned_abs().into(),
         None => 0,
     }

@@ -2,8 +2,8 @@
 
 use core::hint::black_box;
 
-use dtof_core::fixed::types::{U8F8, U24F8};
-use dtof_core::{CentredWindow, LaserCycle, Look, centre_of_mass};
+use dtof_core::fixed::types::U24F8;
+use dtof_core::{LaserCycle, Look, centre_of_mass};
 
 use crate::counter::{Counter, Operation};
 use crate::report::Report;
@@ -21,7 +21,7 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
     }
     report.line("photon", "AsyncPixel::count", total, photons);
 
-    let rows: [(&str, &str, Operation, Prepare, u32); 12] = [
+    let rows: [(&str, &str, Operation, Prepare, u32); 10] = [
         (
             "photon",
             "AsyncPixel::count_batch",
@@ -39,20 +39,6 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
         ("photon", "Histogram::add_batch", add_batch, empty, photons),
         ("frame", "Histogram::add_frame", add_frame, frame, EXPOSURES),
         ("depth", "centre_of_mass", depth, with_target, EXPOSURES),
-        (
-            "depth",
-            "CentredWindow; 2.6 bins",
-            narrow,
-            with_target,
-            EXPOSURES,
-        ),
-        (
-            "depth",
-            "CentredWindow; 7 bins",
-            wide,
-            with_target,
-            EXPOSURES,
-        ),
         (
             "pack",
             "encode and to_le_bytes",
@@ -136,24 +122,6 @@ extern "C" fn depth(state: &mut State, _: u32) -> u32 {
     let peak = state.histogram.peak();
     let gate = state.config.gate();
     let depth = centre_of_mass(&state.histogram, gate, peak, const { U24F8::lit("3") });
-    depth.offset.raw().unsigned_abs().into()
-}
-
-/// For a pulse of 0.4 bins.
-extern "C" fn narrow(state: &mut State, _: u32) -> u32 {
-    centred(state, const { CentredWindow::for_pulse(U8F8::lit("0.4")) })
-}
-
-/// For a pulse of 1.5 bins.
-extern "C" fn wide(state: &mut State, _: u32) -> u32 {
-    centred(state, const { CentredWindow::for_pulse(U8F8::lit("1.5")) })
-}
-
-#[inline(always)]
-fn centred(state: &State, window: CentredWindow) -> u32 {
-    let peak = state.histogram.peak();
-    let gate = state.config.gate();
-    let depth = window.estimate(&state.histogram, gate, peak, const { U24F8::lit("1.75") });
     depth.offset.raw().unsigned_abs().into()
 }
 

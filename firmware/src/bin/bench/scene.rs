@@ -1,10 +1,10 @@
 //! What the operations work on: exposures of 256 photons over 44 laser cycles
 //! into 128 bins, with and without a target.
 
-use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AerEncoder, AsyncPixel, ConfigError, Count, DepthEvent, Histogram, LaserCycle, PaperRule,
-    PixelAddress, PixelConfig, RangeGate, WindowRule, WindowWidthError,
+    PixelAddress, PixelConfig, RangeGate,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -25,8 +25,6 @@ pub struct State {
     pub config: PixelConfig<BINS>,
     /// The same with a gate whose quadrants do not start at even bins.
     pub gated: PixelConfig<BINS>,
-    /// z = 4.5.
-    pub window: WindowRule,
     /// L2 = 44, and no peak is high enough.
     pub never_fires: PixelConfig<BINS>,
     pub codes: [u16; PHOTONS as usize],
@@ -43,7 +41,6 @@ impl State {
         Some(Self {
             config: Self::config(40, 2000, 5, RangeGate::full()).ok()?,
             gated: Self::config(40, 2000, 5, RangeGate::new(3, 124).ok()?).ok()?,
-            window: Self::window(2).ok()?,
             never_fires: Self::config(4, CYCLES, 1023, RangeGate::full()).ok()?,
             codes: [0; PHOTONS as usize],
             pixel: AsyncPixel::new(PixelAddress(7)),
@@ -52,11 +49,6 @@ impl State {
             encoder: AerEncoder::new(),
             event: None,
         })
-    }
-
-    /// The window rule, `width` bins wide.
-    pub fn window(width: u8) -> Result<WindowRule, WindowWidthError> {
-        WindowRule::new(width, const { U4F12::lit("4.5") }, Count::saturating(5))
     }
 
     /// `minimum` photons in a reported peak.
