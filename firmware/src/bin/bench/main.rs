@@ -16,6 +16,7 @@ mod operations;
 mod report;
 mod roots;
 mod scene;
+mod windows;
 
 use core::panic::PanicInfo;
 
@@ -40,6 +41,7 @@ fn main() -> ! {
     let mut report = Report;
     operations::run(&mut report, &counter, &mut state);
     decisions::run(&mut report, &counter, &mut state);
+    windows::run(&mut report, &counter, &mut state);
     roots::run(&mut report, &counter, &mut state);
     ExitCode::SUCCESS.exit_process()
 }

@@ -1,10 +1,10 @@
 //! What the operations work on: exposures of 256 photons over 44 laser cycles
 //! into 128 bins, with and without a target.
 
-use dtof_core::fixed::types::U8F8;
+use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
-    AerEncoder, AsyncPixel, ConfigError, Count, DepthEvent, Histogram, LaserCycle, PaperRule,
-    PixelAddress, PixelConfig, RangeGate,
+    AerEncoder, AsyncPixel, ConfigError, Count, DepthEstimator, DepthEvent, Histogram, LaserCycle,
+    PaperRule, PixelAddress, PixelConfig, RangeGate, WindowRule,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -27,6 +27,10 @@ pub struct State {
     pub gated: PixelConfig<BINS>,
     /// L2 = 44, and no peak is high enough.
     pub never_fires: PixelConfig<BINS>,
+    /// Which is measured.
+    pub window: WindowRule,
+    /// Which is measured.
+    pub estimator: DepthEstimator,
     pub codes: [u16; PHOTONS as usize],
     pub pixel: AsyncPixel<BINS>,
     pub histogram: Histogram<BINS>,
@@ -42,6 +46,8 @@ impl State {
             config: Self::config(40, 2000, 5, RangeGate::full()).ok()?,
             gated: Self::config(40, 2000, 5, RangeGate::new(3, 124).ok()?).ok()?,
             never_fires: Self::config(4, CYCLES, 1023, RangeGate::full()).ok()?,
+            window: WindowRule::new(1, U4F12::ZERO, Count::saturating(5)).ok()?,
+            estimator: DepthEstimator::default(),
             codes: [0; PHOTONS as usize],
             pixel: AsyncPixel::new(PixelAddress(7)),
             histogram: Histogram::new(),
