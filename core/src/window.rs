@@ -122,17 +122,19 @@ impl WindowRule {
         let (bin, last) = (peak.bin.raw(), gate.last());
         let first_start = (bin + 1).saturating_sub(width).max(gate.first());
         let last_start = bin.min((last + 1).saturating_sub(width));
-        let bins = |start: u16, end: u16| {
-            let bins = histogram.counts().get(start.into()..end.into());
-            bins.unwrap_or_default().iter()
-        };
-        let mut sum = bins(first_start, first_start + width)
+        // From the first bin of the first window to the last of the last.
+        let bins = usize::from(first_start)..usize::from(last_start + width);
+        let bins = histogram.counts().get(bins).unwrap_or_default();
+        let windows = bins.split_at_checked(width.into());
+        let (first, entering) = windows.unwrap_or_default();
+        let mut sum = first
+            .iter()
             .fold(0, |sum: u32, &count| sum.wrapping_add(count.into()));
         let mut highest = sum;
-        let left = bins(first_start, last_start);
-        let entered = bins(first_start + width, last_start + width);
-        for (&left, &entered) in left.zip(entered) {
-            sum = sum.wrapping_add(entered.into()).wrapping_sub(left.into());
+        for (&leaving, &entering) in bins.iter().zip(entering) {
+            sum = sum
+                .wrapping_add(entering.into())
+                .wrapping_sub(leaving.into());
             highest = highest.max(sum);
         }
         highest

@@ -27,10 +27,6 @@ pub struct State {
     pub gated: PixelConfig<BINS>,
     /// L2 = 44, and no peak is high enough.
     pub never_fires: PixelConfig<BINS>,
-    /// Which is measured.
-    pub window: WindowRule,
-    /// Which is measured.
-    pub estimator: DepthEstimator,
     pub codes: [u16; PHOTONS as usize],
     pub pixel: AsyncPixel<BINS>,
     pub histogram: Histogram<BINS>,
@@ -38,6 +34,10 @@ pub struct State {
     pub foreign: [u16; BINS],
     pub encoder: AerEncoder,
     pub event: Option<DepthEvent>,
+    /// Which is measured.
+    pub window: WindowRule,
+    /// Which is measured.
+    pub estimator: DepthEstimator,
 }
 
 impl State {
