@@ -62,6 +62,8 @@ impl CentredWindow {
     pub const MIN: U8F8 = U8F8::lit("1");
     /// The widest half width: 4 bins.
     pub const MAX: U8F8 = U8F8::lit("4");
+    /// What the half width is above twice the pulse's standard deviation.
+    const MARGIN: U8F8 = U8F8::lit("0.5");
 
     /// From half the width in bins; `None` outside [`Self::MIN`]..=[`Self::MAX`].
     #[must_use]
@@ -78,7 +80,7 @@ impl CentredWindow {
     /// 0.4 to 1.75 bins.
     #[must_use]
     pub const fn for_pulse(sigma: U8F8) -> Self {
-        let half_width = sigma.saturating_add(sigma).saturating_add(U8F8::lit("0.5"));
+        let half_width = sigma.saturating_add(sigma).saturating_add(Self::MARGIN);
         match Self::new(half_width) {
             Some(window) => window,
             None if half_width.to_bits() < Self::MIN.to_bits() => Self {
@@ -139,8 +141,11 @@ impl CentredWindow {
         let [least, most] = [SubBinOffset::MIN, SubBinOffset::MAX].map(SubBinOffset::raw);
         let mut offset = SubBinOffset::CENTRE.raw();
         for _ in 0..STEPS {
-            let moved = offset + step(&bins, offset.into(), half, below);
-            offset = moved.clamp(least, most);
+            let step = step(&bins, offset.into(), half, below);
+            if step == 0 {
+                break;
+            }
+            offset = (offset + step).clamp(least, most);
         }
 
         let mut flags = Flags::NONE;

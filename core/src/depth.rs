@@ -55,7 +55,7 @@ pub struct Depth {
 /// Within 1/512 bin of the real-valued formula for 10- and 16-bit counters,
 /// within 1/256 bin for 24-bit ones. With nothing above the background the
 /// middle of the peak bin. A neighbour outside the gate counts as empty.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn centre_of_mass<const BINS: usize, W: CounterWidth>(
     histogram: &Histogram<BINS, W>,

@@ -8,9 +8,9 @@
 //! let mut histogram = Histogram::<128>::new();
 //! histogram.add_batch(&[60, 60, 60, 60, 7]);
 //! let estimator = DepthEstimator::default();
-//! assert_eq!(detect(&histogram, &RangeGate::full(), &rule, estimator), None);
+//! assert_eq!(detect(&histogram, &RangeGate::full(), &rule, &estimator), None);
 //! histogram.add(60);
-//! let detection = detect(&histogram, &RangeGate::full(), &rule, estimator).unwrap();
+//! let detection = detect(&histogram, &RangeGate::full(), &rule, &estimator).unwrap();
 //! assert_eq!((detection.peak.bin.raw(), detection.background.raw()), (60, 0));
 //! ```
 
@@ -48,7 +48,7 @@ pub fn detect<const BINS: usize, W: CounterWidth, R: DetectionRule>(
     histogram: &Histogram<BINS, W>,
     gate: &RangeGate<BINS>,
     rule: &R,
-    estimator: DepthEstimator,
+    estimator: &DepthEstimator,
 ) -> Option<Detection> {
     // Without a gate, halves and quadrants are known when compiled.
     if gate.is_full() {
@@ -63,7 +63,7 @@ fn detect_gated<const BINS: usize, W: CounterWidth, R: DetectionRule>(
     histogram: &Histogram<BINS, W>,
     gate: &RangeGate<BINS>,
     rule: &R,
-    estimator: DepthEstimator,
+    estimator: &DepthEstimator,
 ) -> Option<Detection> {
     let peak = histogram.peak();
     if !gate.contains(peak.bin.raw()) {

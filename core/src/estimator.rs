@@ -28,10 +28,10 @@ impl DepthEstimator {
     }
 
     /// The depth of `peak`, less the `background` a bin.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn estimate<const BINS: usize, W: CounterWidth>(
-        self,
+        &self,
         histogram: &Histogram<BINS, W>,
         gate: &RangeGate<BINS>,
         peak: Peak,

@@ -98,6 +98,7 @@ mod rule;
 mod threshold;
 mod units;
 mod window;
+mod window_z;
 
 /// The fixed-point numbers of α, bin width and range.
 pub use fixed;
@@ -120,3 +121,4 @@ pub use rule::{DetectionRule, PaperRule, whole_background};
 pub use threshold::Threshold;
 pub use units::{BinIndex, BinPosition, Count, LaserCycle, PixelAddress, SubBinOffset};
 pub use window::{WindowRule, WindowWidthError};
+pub use window_z::z_for;

@@ -162,8 +162,8 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
 
     /// How the depth of an event is found.
     #[must_use]
-    pub const fn estimator(&self) -> DepthEstimator {
-        self.estimator
+    pub const fn estimator(&self) -> &DepthEstimator {
+        &self.estimator
     }
 }
 
@@ -373,7 +373,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             &self.histogram,
             &config.gate,
             &config.rule,
-            config.estimator,
+            &config.estimator,
         ) else {
             return Look::NoPeak;
         };

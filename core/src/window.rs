@@ -31,9 +31,9 @@
 //! let mut histogram = Histogram::<128>::new();
 //! histogram.add_batch(&[7, 60, 60, 61]);
 //! let (gate, estimator) = (RangeGate::full(), DepthEstimator::default());
-//! assert_eq!(detect(&histogram, &gate, &rule, estimator), None);
+//! assert_eq!(detect(&histogram, &gate, &rule, &estimator), None);
 //! histogram.add_batch(&[61, 60]);
-//! assert!(detect(&histogram, &gate, &rule, estimator).is_some());
+//! assert!(detect(&histogram, &gate, &rule, &estimator).is_some());
 //! # Ok::<(), dtof_core::WindowWidthError>(())
 //! ```
 
@@ -122,17 +122,19 @@ impl WindowRule {
         let (bin, last) = (peak.bin.raw(), gate.last());
         let first_start = (bin + 1).saturating_sub(width).max(gate.first());
         let last_start = bin.min((last + 1).saturating_sub(width));
-        let bins = |start: u16, end: u16| {
-            let bins = histogram.counts().get(start.into()..end.into());
-            bins.unwrap_or_default().iter()
-        };
-        let mut sum = bins(first_start, first_start + width)
+        // From the first bin of the first window to the last of the last.
+        let bins = usize::from(first_start)..usize::from(last_start + width);
+        let bins = histogram.counts().get(bins).unwrap_or_default();
+        let windows = bins.split_at_checked(width.into());
+        let (first, entering) = windows.unwrap_or_default();
+        let mut sum = first
+            .iter()
             .fold(0, |sum: u32, &count| sum.wrapping_add(count.into()));
         let mut highest = sum;
-        let left = bins(first_start, last_start);
-        let entered = bins(first_start + width, last_start + width);
-        for (&left, &entered) in left.zip(entered) {
-            sum = sum.wrapping_add(entered.into()).wrapping_sub(left.into());
+        for (&leaving, &entering) in bins.iter().zip(entering) {
+            sum = sum
+                .wrapping_add(entering.into())
+                .wrapping_sub(leaving.into());
             highest = highest.max(sum);
         }
         highest
@@ -156,21 +158,27 @@ impl DetectionRule for WindowRule {
         let bins_outside = bins - width;
         let outside = histogram.total().wrapping_sub(inside);
 
-        // In 1/16 counts: 14 bits.
+        // In 1/16 counts.
         let z_squared = u32::from(self.z.to_bits()) * u32::from(self.z.to_bits());
         let skew = bins_outside.saturating_sub(width) * ((z_squared / 6) >> 20);
-        let all = u64::from(bins) * u64::from(inside);
-        let above = (all << 4)
-            .checked_sub(((u64::from(width) * u64::from(histogram.total())) << 4) + u64::from(skew))
-            .filter(|&above| above > 0)?;
+        let (inside_times, total_times) = (bins << 4, width << 4);
+        let above = if W::BITS <= 10 {
+            // 14 + 13 bits, 7 + 20 bits and 20 bits.
+            let level = total_times * histogram.total() + skew;
+            (inside_times * inside).checked_sub(level)?
+        } else {
+            let level = u64::from(total_times) * u64::from(histogram.total()) + u64::from(skew);
+            let above = (u64::from(inside_times) * u64::from(inside)).checked_sub(level)?;
+            // Its square is then above any variance.
+            u32::try_from(above).unwrap_or(u32::MAX)
+        };
         // At most 8 + 3 + 32 + 16 bits, or 10 + 3 + 26 + 16.
         let variance = u64::from(bins * width) * u64::from(outside) * u64::from(z_squared >> 16);
-        let squared = above.checked_mul(above);
-        if squared.is_some_and(|squared| squared <= variance) {
+        if above == 0 || u64::from(above) * u64::from(above) <= variance {
             return None;
         }
-        let whole = outside / bins_outside;
-        let rest = ((outside % bins_outside) << 8) / bins_outside;
+        let whole = outside.checked_div(bins_outside)?;
+        let rest = ((outside - whole * bins_outside) << 8).checked_div(bins_outside)?;
         Some(U24F8::from_bits((whole << 8) + rest))
     }
 }

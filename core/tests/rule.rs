@@ -57,7 +57,7 @@ fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) -> u32 {
             background,
             expected.map(|(_, background)| whole_background(background))
         );
-        let detection = detect(&histogram, &gate, &rule, DepthEstimator::default());
+        let detection = detect(&histogram, &gate, &rule, &DepthEstimator::default());
         let detected = detection.map(|detection| (detection.peak, detection.background));
         assert_eq!(detected, expected);
         let whole = rule.detect_whole::<W, BINS>(histogram.counts(), &gate);

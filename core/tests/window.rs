@@ -97,7 +97,7 @@ fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) -> u32 {
         let rule = WindowRule::new(width, z, Count::saturating(minimum)).unwrap();
         let expected = as_written(&rule, &histogram, &gate);
         assert_eq!(rule.detect(&histogram, &gate, histogram.peak()), expected);
-        let detection = detect(&histogram, &gate, &rule, DepthEstimator::default());
+        let detection = detect(&histogram, &gate, &rule, &DepthEstimator::default());
         let rounded = detection.map(|detection| detection.background.raw());
         assert_eq!(rounded, expected.map(|level| (level.to_bits() + 128) >> 8));
         fired += u32::from(expected.is_some());
@@ -179,7 +179,7 @@ fn an_empty_histogram_is_no_detection() {
         let rule = WindowRule::new(width, U4F12::ZERO, Count::default()).unwrap();
         let histogram = Histogram::<8>::new();
         let gate = RangeGate::full();
-        let found = detect(&histogram, &gate, &rule, DepthEstimator::default());
+        let found = detect(&histogram, &gate, &rule, &DepthEstimator::default());
         assert_eq!(found, None);
     }
 }

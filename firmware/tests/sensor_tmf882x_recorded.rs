@@ -114,7 +114,7 @@ fn the_sidecar_decides_recorded_histograms_as_the_core_does() {
         let mut histogram = Histogram::<128, Count24>::new();
         // The reference comes first, the centre zone is the fifth of nine.
         histogram.add_frame(&capture[5], &gate);
-        expected.push(detect(&histogram, &gate, &rule, DepthEstimator::default()));
+        expected.push(detect(&histogram, &gate, &rule, &DepthEstimator::default()));
     }
     let report = host.report(&mut device, 0);
     let decided = captures.len() as u64 * 9;

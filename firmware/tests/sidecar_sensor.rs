@@ -313,7 +313,7 @@ fn a_histogram_is_decided_once_within_the_gate() {
     let expected = |counts: &[u32; 128], cycle| {
         let mut histogram = Histogram::<128, Count24>::new();
         histogram.add_frame(counts, &gate);
-        let detection = detect(&histogram, &gate, &rule(), DepthEstimator::default()).unwrap();
+        let detection = detect(&histogram, &gate, &rule(), &DepthEstimator::default()).unwrap();
         DepthEvent {
             pixel: PixelAddress(3),
             cycle: LaserCycle(cycle),

@@ -5,6 +5,7 @@
 //! `figures/data`. So a quick look that is taken again must give the kept numbers
 //! bit for bit, and together with the kept rest every document.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,7 +13,9 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 
+use crate::methods;
 use crate::sweep::results::Results;
+use crate::sweep::studies::{depth_error, time_to_detect};
 use crate::sweep::{self, Part, SeedRange, Study, studies};
 
 /// What is done anew.
@@ -37,6 +40,7 @@ pub fn documents(
     let data = |study: &Study, which| format!("figures/data/{}.{which}.json", study.name);
     let mut documents = Vec::new();
     let mut all = Vec::new();
+    let mut parts = BTreeMap::new();
     for study in studies::ALL {
         progress(study);
         let few = work_out(study, 0, study.few_seeds)?;
@@ -59,6 +63,7 @@ pub fn documents(
         );
         let results = (study.results)(&part).with_context(|| study.name.to_owned())?;
         all.push((study, results));
+        parts.insert(study.name, part);
     }
     for (_, results) in &all {
         for figure in &results.figures {
@@ -70,6 +75,11 @@ pub fn documents(
             documents.push((path.into(), table.csv.clone()));
         }
     }
+    let part = |study: Study| parts.get(study.name).context(study.name);
+    let [time, depth] = [time_to_detect::STUDY, depth_error::STUDY].map(part);
+    let counts = docs.join(methods::INSTRUCTIONS);
+    let counts = fs::read_to_string(&counts).with_context(|| counts.display().to_string())?;
+    documents.extend(methods::documents(&counts, time?, depth?)?);
     documents.push(("figures/README.md".into(), captions(&all)?));
     documents.push(("paper-claims.md".into(), claims(&all)?));
     Ok(documents)

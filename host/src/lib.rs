@@ -16,6 +16,7 @@ pub mod engine;
 pub mod events_csv;
 pub mod figures;
 pub mod maps;
+pub mod methods;
 pub mod monitor;
 pub mod npy;
 pub mod output;

@@ -30,10 +30,10 @@ use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::peak::ComparatorTree;
 use dtof_core::{
     AerDecoder, AerEncoder, AerWord, AsyncPixel, BinIndex, BinPosition, CentredWindow, Count,
-    Count10, Count16, Count24, CounterWidth, DepthEstimator, DepthEvent, EventSlot, Flags,
-    Histogram, LaserCycle, Macropixel, PaperRule, Peak, PixelAddress, PixelConfig,
+    Count10, Count16, Count24, CounterWidth, DepthEstimator, DepthEvent, DetectionRule, EventSlot,
+    Flags, Histogram, LaserCycle, Macropixel, PaperRule, Peak, PixelAddress, PixelConfig,
     ProcessingElement, RangeGate, RangeScale, Statistics, SubBinOffset, Threshold, WindowRule,
-    background, centre_of_mass, detect, isqrt, whole_background,
+    background, centre_of_mass, detect, isqrt, whole_background, z_for,
 };
 
 #[allow(unsafe_code, reason = "the linker knows the entry by this name")]
@@ -184,9 +184,9 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
         keep(histogram.add_frame(&values::<u16, BINS>(half), &gate));
         keep(histogram.add_frame(&values::<u32, BINS>(word), &gate));
         keep((histogram.peak(), histogram.count(usize::from(half()))));
-        keep(detect(&histogram, &gate, &rule(), estimator()));
+        keep(detect(&histogram, &gate, &rule(), &estimator()));
         if let Some(rule) = window_rule() {
-            keep(detect(&histogram, &gate, &rule, estimator()));
+            keep(detect(&histogram, &gate, &rule, &estimator()));
         }
 
         // As another detection rule may ask: about a peak of its own.
@@ -214,17 +214,29 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
 
 #[inline(never)]
 fn pixels<const BINS: usize, W: CounterWidth>() {
-    let Some(config) = config::<BINS>() else {
-        return;
-    };
+    keep(z_for::<BINS>(word(), &gate(), half(), half(), half()));
+    if let Some(config) = config::<BINS>() {
+        pixels_with::<BINS, W, _>(&config);
+        let [x, l1, l2] = [config.x(), config.l1(), config.l2()];
+        if let Some(rule) = window_rule()
+            && let Ok(config) = PixelConfig::new(x, l1, l2, gate(), rule)
+        {
+            pixels_with::<BINS, W, _>(&config.with_estimator(estimator()));
+        }
+    }
+}
+
+fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(
+    config: &PixelConfig<BINS, R>,
+) {
     let mut pixel = AsyncPixel::<BINS, W>::new(address());
     while more() {
-        pixel.count(&config, half());
-        pixel.count_batch(&config, some(&values::<u16, 16>(half)));
-        pixel.count_frame(&config, &values::<u16, BINS>(half));
-        pixel.count_frame(&config, &values::<u32, BINS>(word));
-        keep(pixel.end_laser_cycle(&config, cycle()));
-        keep(pixel.end_laser_cycles(&config, cycle(), half()));
+        pixel.count(config, half());
+        pixel.count_batch(config, some(&values::<u16, 16>(half)));
+        pixel.count_frame(config, &values::<u16, BINS>(half));
+        pixel.count_frame(config, &values::<u32, BINS>(word));
+        keep(pixel.end_laser_cycle(config, cycle()));
+        keep(pixel.end_laser_cycles(config, cycle(), half()));
         keep((pixel.request(), pixel.exposure()));
         if more() {
             keep(pixel.acknowledge());
@@ -301,7 +313,7 @@ fn config<const BINS: usize>() -> Option<PixelConfig<BINS>> {
         Ok(config) => {
             keep((config.x(), config.l1(), config.l2()));
             keep((*config.gate(), *config.rule().threshold()));
-            keep(config.estimator());
+            keep(*config.estimator());
             Some(config.with_estimator(estimator()))
         }
         Err(error) => {

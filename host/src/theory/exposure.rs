@@ -178,7 +178,7 @@ impl Exposures {
                 histogram,
                 &RangeGate::full(),
                 rule,
-                DepthEstimator::default(),
+                &DepthEstimator::default(),
             );
             event.is_some()
         });
@@ -364,7 +364,7 @@ mod tests {
                         &histogram,
                         &RangeGate::full(),
                         &rule,
-                        DepthEstimator::default(),
+                        &DepthEstimator::default(),
                     )
                     .is_some()
                 };

@@ -170,7 +170,7 @@ mod tests {
                 &histogram,
                 &RangeGate::full(),
                 &rule,
-                DepthEstimator::default(),
+                &DepthEstimator::default(),
             )
             .is_some()
             {

@@ -38,6 +38,10 @@ pub struct State {
     pub foreign: [u16; BINS],
     pub encoder: AerEncoder,
     pub event: Option<DepthEvent>,
+    /// Which is measured.
+    pub window: WindowRule,
+    /// Which is measured.
+    pub estimator: DepthEstimator,
 }
 
 impl State {

@@ -61,7 +61,7 @@ fn decided(state: &State) -> Option<dtof_core::Detection> {
         state.pixel.histogram(),
         &RangeGate::full(),
         &state.window,
-        state.estimator,
+        &state.estimator,
     )
 }
 

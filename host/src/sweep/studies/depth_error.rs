@@ -178,7 +178,8 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 /// Root mean square error of a method at a point, in bins, over the smallest
 /// possible.
 #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
-fn over_bound(point: &PointTally, name: &str) -> f64 {
+#[must_use]
+pub fn over_bound(point: &PointTally, name: &str) -> f64 {
     let near = point.count("histograms") - point.count("elsewhere");
     let mean = point.count(name) as f64 / near.max(1) as f64;
     let bound = Pulse {

@@ -277,3 +277,97 @@ pub fn count_false(passage: &mut Passage, exposures: u64, rng: &mut Pcg64) -> Ta
     }
     tally
 }
+
+#[cfg(test)]
+mod tests {
+    use dtof_core::{AsyncPixel, LaserCycle, PixelAddress, PixelConfig};
+
+    use super::*;
+    use crate::simulation::Rates;
+    use crate::sweep::point;
+    use crate::theory::exposure::trial_rng;
+
+    fn exposures(signal: f64) -> Exposures {
+        let rates = Rates {
+            background: 0.05,
+            signal,
+            position: 64.2,
+            sigma: 0.8,
+        };
+        Exposures::new(&rates, 128, LOOKS).unwrap()
+    }
+
+    /// When a pixel reports first, if it does.
+    fn event<R: DetectionRule>(rule: R, frames: &[(u32, [u16; BINS])]) -> Option<u32> {
+        let config = PixelConfig::new(4, 39, 1000, RangeGate::full(), rule).unwrap();
+        let mut pixel = AsyncPixel::<BINS, Count16>::new(PixelAddress(0));
+        let mut before = 0;
+        for (cycles, frame) in frames {
+            pixel.count_frame(&config, frame);
+            let passed = u16::try_from(cycles - before).unwrap();
+            let _ = pixel.end_laser_cycles(&config, LaserCycle((*cycles).into()), passed);
+            if let Some(event) = pixel.acknowledge() {
+                return Some(event.exposure.into());
+            }
+            before = *cycles;
+        }
+        None
+    }
+
+    #[test]
+    fn thresholds_fire_when_a_pixel_reports() {
+        let ladders = [
+            Ladder::new(Method::Paper, 8, 24, 4),
+            Ladder::new(Method::Window(3), 12, 24, 4),
+        ];
+        let count = Count::saturating(MINIMUM_COUNT);
+        let mut fired = 0;
+        for seed in 0..20 {
+            let signal = if seed < 10 { 0.4 } else { 0.0 };
+            let mut passage = Passage::new(&ladders, exposures(signal), None).unwrap();
+            let passed = passage.run(&mut trial_rng(seed, 0));
+            // The same photons.
+            let mut frames = Vec::new();
+            exposures(signal).frames::<BINS>(&mut trial_rng(seed, 0), |cycles, frame| {
+                frames.push((cycles, *frame));
+                false
+            });
+            assert_eq!(frames.len(), 240);
+            for (index, &threshold) in ladders[0].thresholds.iter().enumerate() {
+                let rule = PaperRule::new(U8F8::from_num(threshold), count);
+                assert_eq!(passed[0].get(index).copied(), event(rule, &frames));
+            }
+            for (index, &threshold) in ladders[1].thresholds.iter().enumerate() {
+                let rule = WindowRule::new(3, U4F12::from_num(threshold), count).unwrap();
+                assert_eq!(passed[1].get(index).copied(), event(rule, &frames));
+            }
+            fired += passed[1].len();
+        }
+        assert!(fired > 100, "{fired}");
+    }
+
+    #[test]
+    fn the_threshold_of_a_share_lies_between_its_neighbours() {
+        let ladder = Ladder::new(Method::Window(2), 12, 14, 4);
+        let mut tally = Tally::from([("exposures".to_owned(), 1000)]);
+        for (index, count) in [1000, 100, 1].into_iter().enumerate() {
+            tally.insert(ladder.key(index, "false"), count);
+        }
+        assert_eq!(ladder.key(1, "false"), "w2 3.25 false");
+        let points = [PointTally {
+            parameters: point([]),
+            tally,
+        }];
+        let at = |share: f64| ladder.calibrated(points.iter(), share);
+        assert!((at(0.1) - 3.25).abs() < 1e-12);
+        // Equal factors: 10 is halfway from 100 to 1.
+        assert!((at(0.01) - 3.375).abs() < 1e-12);
+        assert_eq!(at(1e-6), 3.5);
+        let linear = ladder.interpolated(3.375, |index| [0.0, 4.0, 8.0][index]);
+        assert!((linear - 6.0).abs() < 1e-12);
+        assert_eq!(
+            ladder.interpolated(9.0, |index| [0.0, 4.0, 8.0][index]),
+            8.0
+        );
+    }
+}

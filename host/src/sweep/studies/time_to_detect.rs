@@ -115,24 +115,33 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 }
 
 /// How a method does in a scene.
-struct Outcome {
-    sigma: f64,
-    place: &'static str,
-    background: f64,
-    method: Method,
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    /// Standard deviation of the pulse in bins.
+    pub sigma: f64,
+    /// Where in its bin the pulse lies.
+    pub place: &'static str,
+    /// Background photons a bin and laser cycle.
+    pub background: f64,
+    /// What decides.
+    pub method: Method,
     /// With a share of [`FALSE_SHARE`] of false events.
-    threshold: f64,
+    pub threshold: f64,
     /// Mean laser cycles to an event; an exposure that expires is followed by
     /// another.
-    cycles: f64,
+    pub cycles: f64,
     /// Standard error of `cycles`, as a share of it.
-    error: f64,
+    pub error: f64,
     /// `cycles` over those of the likelihood ratio.
-    ratio: f64,
+    pub ratio: f64,
 }
 
+/// Every method in every scene with a target.
+///
+/// # Errors
+/// If `part` is not of this study.
 #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
-fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
+pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
     let mut outcomes = Vec::new();
     for sigma in SIGMAS {
         for (within, place) in PLACES {

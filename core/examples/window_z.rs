@@ -1,0 +1,132 @@
+//! The tables behind `z_for`: `cargo run --release -p dtof-core --example window_z`.
+//!
+//! z against the number of independent trials is the normal distribution's: one
+//! trial in as many exceeds it. How many independent looks there are in the first `k`,
+//! of an exposure with a look every X laser cycles, is simulated: without a target, 128
+//! bins, one photon a bin and look, windows of 2, 3 and 5 bins. The z that one exposure
+//! in 300 exceeds says how many independent trials that is; a single look counts as 1.
+
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+const BINS: usize = 128;
+const WIDTHS: [usize; 3] = [2, 3, 5];
+const EXPOSURES: usize = 30_000;
+const ONE_IN: usize = 300;
+/// As many numbers of looks as `LOOKS` has entries: powers of two.
+const POWERS: usize = 11;
+
+fn main() {
+    println!("Z, from 2^6 trials on, every second power of two:");
+    for log2 in (6..=34).step_by(2) {
+        print!("{}, ", (z_of(f64::from(log2).exp2()) * 4096.0).round());
+    }
+    let threads = 2;
+    let highest: Vec<_> = std::thread::scope(|scope| {
+        let run = |seed| scope.spawn(move || simulate(seed, EXPOSURES / threads));
+        let workers: Vec<_> = (0..threads as u64).map(run).collect();
+        let results = workers.into_iter().map(|worker| worker.join().unwrap());
+        results.flatten().collect()
+    });
+    println!("\nLOOKS in 1/16, for 1, 2, 4, … looks:");
+    for power in 0..POWERS {
+        let mut z = 0.0;
+        for width in 0..WIDTHS.len() {
+            let mut of_all: Vec<f64> = highest.iter().map(|z| z[power][width]).collect();
+            of_all.sort_by(|a, b| b.total_cmp(a));
+            z += of_all[EXPOSURES / ONE_IN] / WIDTHS.len() as f64;
+        }
+        let trials = 1.0 / upper_tail(z);
+        print!("{}, ", (trials / (ONE_IN * BINS) as f64 * 16.0).round());
+    }
+    println!();
+}
+
+/// The highest z of each exposure up to each power of two looks, for each width.
+fn simulate(seed: u64, exposures: usize) -> Vec<[[f64; WIDTHS.len()]; POWERS]> {
+    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    let exposure = |_| {
+        let (mut counts, mut total) = ([0u32; BINS], 0u32);
+        let mut highest = [0.0; WIDTHS.len()];
+        let mut looks = 0;
+        core::array::from_fn(|power| {
+            while looks < 1 << power {
+                for count in &mut counts {
+                    let photons = poisson_of_one(&mut rng);
+                    *count += photons;
+                    total += photons;
+                }
+                for (highest, width) in highest.iter_mut().zip(WIDTHS) {
+                    *highest = z_reached(&counts, total, width).max(*highest);
+                }
+                looks += 1;
+            }
+            highest
+        })
+    };
+    (0..exposures).map(exposure).collect()
+}
+
+fn poisson_of_one(rng: &mut Pcg64Mcg) -> u32 {
+    let mut left = rng.next_u32();
+    // e⁻¹/k! of 2³²
+    let (mut share, mut count) = (1_580_030_169, 0);
+    while left >= share && share > 0 {
+        left -= share;
+        count += 1;
+        share /= count;
+    }
+    count
+}
+
+/// The z at which the window rule just fires.
+fn z_reached(counts: &[u32; BINS], total: u32, width: usize) -> f64 {
+    let peak = (0..BINS).max_by_key(|&bin| (counts[bin], BINS - bin));
+    let peak = peak.unwrap_or(0);
+    let starts = (peak + 1).saturating_sub(width)..=peak.min(BINS - width);
+    let sums = starts.map(|start| counts[start..start + width].iter().sum::<u32>());
+    let inside = sums.max().unwrap_or(0);
+    let [bins, w, inside, total] = [BINS as f64, width as f64, inside.into(), total.into()];
+    let outside_bins = bins - w;
+    let above = bins * inside - w * total;
+    let variance = bins * w * (total - inside);
+    let skew = (outside_bins - w) / 6.0;
+    // above = z·√variance + z²·skew
+    let discriminant = (variance + 4.0 * skew * above.max(0.0)).sqrt();
+    (discriminant - variance.sqrt()) / (2.0 * skew)
+}
+
+/// The share of a normal distribution above `z`, to 1.2e-7 of it (Numerical Recipes,
+/// erfcc).
+fn upper_tail(z: f64) -> f64 {
+    let x = z / std::f64::consts::SQRT_2;
+    let t = 1.0 / (1.0 + 0.5 * x);
+    let coefficients = [
+        0.170_872_77,
+        -0.822_152_23,
+        1.488_515_87,
+        -1.135_203_98,
+        0.278_868_07,
+        -0.186_288_06,
+        0.096_784_18,
+        0.374_091_96,
+        1.000_023_68,
+        -1.265_512_23,
+    ];
+    let sum = coefficients.iter().fold(0.0, |sum, c| sum * t + c);
+    0.5 * t * (sum - x * x).exp()
+}
+
+/// The z that one of `trials` exceeds.
+fn z_of(trials: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 40.0);
+    for _ in 0..60 {
+        let middle = (low + high) / 2.0;
+        if upper_tail(middle) * trials > 1.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
