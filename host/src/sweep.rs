@@ -57,15 +57,23 @@ pub struct Study {
 }
 
 impl Study {
-    /// The random numbers of a seed at a point: independent of every other's.
+    /// The random numbers of a seed at a point: independent of those of every other
+    /// study, point and seed, and of a simulated pixel's.
     fn rng(&self, point: usize, seed: u64) -> Pcg64 {
-        // The step is odd and about 0.6 of the period, so that places lie far
-        // apart.
-        const STEP: u128 = 0x9e37_79b9_7f4a_7c15_f39c_c060_5ced_c835;
-        let mut rng = Pcg64::seed_from_u64(seed);
-        rng.advance(STEP.wrapping_mul(point as u128 + 1));
-        rng
+        // FNV-1a.
+        let name = self.name.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        });
+        Pcg64::seed_from_u64(mixed(mixed(name) ^ mixed(point as u64)) ^ mixed(seed))
     }
+}
+
+/// The finaliser of `SplitMix64`: each bit in changes half of the bits out.
+const fn mixed(mut bits: u64) -> u64 {
+    bits = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    bits ^ (bits >> 31)
 }
 
 /// A point of these parameters.

@@ -103,7 +103,7 @@ impl Ladder {
     #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
     pub fn calibrated<'a>(
         &self,
-        points: impl Iterator<Item = &'a PointTally> + Clone,
+        points: &(impl Iterator<Item = &'a PointTally> + Clone),
         share: f64,
     ) -> f64 {
         let exposures: u64 = points.clone().map(|point| point.count("exposures")).sum();

@@ -160,9 +160,9 @@ pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
                     let all = part.at(without);
                     let threshold = if method == Method::Oracle {
                         let own = all.filter(|point| point.is_at([("sigma", sigma)]));
-                        ladder.calibrated(own, FALSE_SHARE)
+                        ladder.calibrated(&own, FALSE_SHARE)
                     } else {
-                        ladder.calibrated(all, FALSE_SHARE)
+                        ladder.calibrated(&all, FALSE_SHARE)
                     };
                     let count = |index, what| with_target.count(&ladder.key(index, what)) as f64;
                     let of = |what| ladder.interpolated(threshold, |index| count(index, what));
