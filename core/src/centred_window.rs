@@ -114,8 +114,11 @@ impl CentredWindow {
         peak: Peak,
         background: U24F8,
     ) -> Depth {
-        let excess = 22u32.saturating_sub(peak.count.raw().leading_zeros());
-        let excess = excess.min(W::BITS - 10);
+        let excess = if W::BITS > 10 {
+            22u32.saturating_sub(peak.count.raw().leading_zeros())
+        } else {
+            0
+        };
         let scaled = |count: u32| (count >> excess).min(1023).cast_signed();
         let background = (background.to_bits() >> excess).min(1023 << 8);
 

@@ -87,8 +87,11 @@ pub fn centre_of_mass<const BINS: usize, W: CounterWidth>(
     let right = above(right.unwrap_or(0));
     // Only their ratio counts, so that what is past 22 bits, 14 of them whole counts,
     // may lose its last to keep the 256-fold numerator within 32.
-    let excess = 10u32.saturating_sub((left | centre | right).leading_zeros());
-    let excess = excess.min(W::BITS.saturating_sub(14));
+    let excess = if W::BITS > 14 {
+        10u32.saturating_sub((left | centre | right).leading_zeros())
+    } else {
+        0
+    };
     let (left, centre, right) = (left >> excess, centre >> excess, right >> excess);
     let sum = left + centre + right;
     let numerator = (right.abs_diff(left) << 8) + sum / 2;

@@ -16,6 +16,7 @@
 //!     Peak          the highest bin, the lowest index wins a tie
 //!     background    smaller quadrant maximum of the half without the peak
 //!     Threshold     background + α·√background
+//!                   or another DetectionRule: WindowRule
 //!   → DepthEvent    pixel, laser cycle, exposure, sub-bin depth, counts, flags
 //!   → AerWord       128 bits, held by the pixel until the link takes it
 //! ```

@@ -31,8 +31,9 @@ const Z: [u16; 15] = [
 /// 0.1 %.
 ///
 /// `gate`, `x`, `l1` and `l2` are those of the [`PixelConfig`](crate::PixelConfig). Holds
-/// for a background of 0.4 to 200 photons a bin, where 0.4 to 1.2 times as many come,
-/// and 2.4 times at 5 of 16 bins; with fewer photons false events are rarer. From 64 to 2³⁴ trials,
+/// for a background of 0.4 to 200 photons a bin. With 128 bins 0.4 to 1.2 times as many
+/// come as wanted, fewer with more bins, up to 2.4 times as many with 16 (windows of 5).
+/// With fewer photons false events are rarer. From 64 to 2³⁴ trials,
 /// z 2.15 to 6.44, to which it is limited.
 ///
 /// ```

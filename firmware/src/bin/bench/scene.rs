@@ -19,8 +19,12 @@ pub const PHOTONS_A_CYCLE: usize = 6;
 /// Exposures of each kind.
 pub const EXPOSURES: u32 = 64;
 
-/// All that operations read and change.
+/// All that operations read and change. What is measured comes first, where the
+/// processor's instructions reach it whatever else there is.
+#[repr(C)]
 pub struct State {
+    pub histogram: Histogram<BINS>,
+    pub pixel: AsyncPixel<BINS>,
     /// X = 4, L1 = 40, α = 4, at least 5 photons.
     pub config: PixelConfig<BINS>,
     /// The same with a gate whose quadrants do not start at even bins.
@@ -32,8 +36,6 @@ pub struct State {
     /// Which is measured.
     pub estimator: DepthEstimator,
     pub codes: [u16; PHOTONS as usize],
-    pub pixel: AsyncPixel<BINS>,
-    pub histogram: Histogram<BINS>,
     /// The histogram as another sensor would send it.
     pub foreign: [u16; BINS],
     pub encoder: AerEncoder,
