@@ -17,12 +17,22 @@ use embedded_hal::i2c::{self, ErrorType, I2c, NoAcknowledgeSource, Operation};
 
 /// SCL low, and the bus free between STOP and START.
 const LOW_NS: u32 = 1300;
+/// SDA keeps its level for this long of `LOW_NS`, for devices that see SCL fall
+/// late (note 3).
+const HOLD_NS: u32 = 300;
 /// SCL high; with `LOW_NS` the period of 400 kHz. Hold and set-up times of START
 /// and STOP are shorter.
 const HIGH_NS: u32 = 1200;
-/// A device that is not ready holds SCL low. It is looked at again after each
-/// `LOW_NS` and given up after 10 ms.
-const STRETCHED: u32 = 10_000_000 / LOW_NS;
+/// SCL rises as fast as its resistor charges the wire; it is looked at this often
+/// until it is high, and its time high counts from then on.
+const RISE_LOOK_NS: u32 = 100;
+/// After so many looks, a microsecond, a device holds it: one that is not ready.
+/// Then it is looked at after each `LOW_NS`.
+const RISE_LOOKS: u32 = 10;
+/// What the devices may hold SCL low in a transaction, all bits together: what
+/// `SMBus` allows one in a message (`T_LOW:SEXT`). The pauses are counted, not the
+/// looks between them.
+const HELD_NS: u32 = 25_000_000;
 /// Clocks after which a device that was interrupted while it sent has let go of
 /// SDA (UM10204, section 3.1.16 "Bus clear").
 const CLEAR: u32 = 9;
@@ -34,6 +44,8 @@ pub struct SoftwareI2c<SCL, SDA, D> {
     scl: SCL,
     sda: SDA,
     delay: D,
+    /// What is left of `HELD_NS` in this transaction.
+    held_left_ns: u32,
 }
 
 /// What can go wrong on the bus.
@@ -44,10 +56,12 @@ pub enum Error {
     NoDevice,
     /// The device does not acknowledge a byte.
     NotTaken,
-    /// SCL stays low: a device has held it for 10 ms, or nothing pulls it up.
+    /// SCL stays low: devices have held it for 25 ms of a transaction, or nothing
+    /// pulls it up.
     ClockLow,
-    /// SDA stays low: a device holds it through a bus clear, or nothing pulls it
-    /// up.
+    /// SDA stays low: a device holds it through a bus clear or does not give it
+    /// free for START or STOP, or nothing pulls it up. Bytes read before are not
+    /// the device's.
     DataLow,
     /// A pin failed.
     Pin,
@@ -88,7 +102,12 @@ where
 {
     /// A bus that is not touched yet; both pins are high.
     pub const fn new(scl: SCL, sda: SDA, delay: D) -> Self {
-        Self { scl, sda, delay }
+        Self {
+            scl,
+            sda,
+            delay,
+            held_left_ns: HELD_NS,
+        }
     }
 
     /// Gives the pins (SCL, SDA) and the delay back.
@@ -104,27 +123,46 @@ where
         self.sda.is_high().map_err(|_| Error::Pin)
     }
 
-    /// SCL low for its time before, high for its time after.
+    /// The rest of SCL's time low before, its time high after.
     // Once in an image, not once a bit, byte and access: it takes its time anyhow.
     #[inline(never)]
     fn raise_scl(&mut self) -> Result {
-        self.delay.delay_ns(LOW_NS);
+        self.delay.delay_ns(LOW_NS - HOLD_NS);
         self.scl.set_high().map_err(|_| Error::Pin)?;
-        for _ in 0..STRETCHED {
-            if self.scl.is_high().map_err(|_| Error::Pin)? {
-                self.delay.delay_ns(HIGH_NS);
-                return Ok(());
+        let mut looks = 0;
+        while self.scl.is_low().map_err(|_| Error::Pin)? {
+            let mut pause_ns = RISE_LOOK_NS;
+            if looks == RISE_LOOKS {
+                pause_ns = LOW_NS;
+                let left = self.held_left_ns.checked_sub(pause_ns);
+                self.held_left_ns = left.ok_or(Error::ClockLow)?;
+            } else {
+                looks += 1;
             }
-            self.delay.delay_ns(LOW_NS);
+            self.delay.delay_ns(pause_ns);
         }
-        Err(Error::ClockLow)
+        self.delay.delay_ns(HIGH_NS);
+        Ok(())
     }
 
+    #[inline(never)]
     fn lower_scl(&mut self) -> Result {
-        self.scl.set_low().map_err(|_| Error::Pin)
+        self.scl.set_low().map_err(|_| Error::Pin)?;
+        self.delay.delay_ns(HOLD_NS);
+        Ok(())
+    }
+
+    /// SDA is to be high: nobody else drives it here.
+    fn check_sda(&mut self) -> Result {
+        if self.sda()? {
+            Ok(())
+        } else {
+            Err(Error::DataLow)
+        }
     }
 
     /// The bit on SDA during a clock.
+    #[inline(never)]
     fn clock(&mut self) -> Result<bool> {
         self.raise_scl()?;
         let bit = self.sda()?;
@@ -152,6 +190,7 @@ where
     fn restart(&mut self) -> Result {
         self.set_sda(true)?;
         self.raise_scl()?;
+        self.check_sda()?;
         self.begin()
     }
 
@@ -165,7 +204,9 @@ where
     fn stop(&mut self) -> Result {
         self.set_sda(false)?;
         self.raise_scl()?;
-        self.set_sda(true)
+        self.set_sda(true)?;
+        self.delay.delay_ns(LOW_NS);
+        self.check_sda()
     }
 
     /// Whether the byte is acknowledged.
@@ -255,17 +296,18 @@ where
     D: DelayNs,
 {
     /// An operation that reads nothing is left out. After an error the bus is
-    /// free again, if it can be.
+    /// free again, if it can be. The error is the first, whatever comes of that.
     fn transaction(&mut self, address: u8, operations: &mut [Operation<'_>]) -> Result {
+        self.held_left_ns = HELD_NS;
         let done = self.run(address, operations);
-        match done {
-            Ok(()) => {}
-            Err(Error::NoDevice | Error::NotTaken) => self.stop()?,
-            Err(Error::ClockLow | Error::DataLow | Error::Pin) => {
-                // What is wrong is known already; START clears the rest.
-                let _ = self.sda.set_high();
-                let _ = self.scl.set_high();
-            }
+        let ended = match done {
+            Err(Error::NoDevice | Error::NotTaken) => self.stop(),
+            _ => done,
+        };
+        if ended.is_err() {
+            // What is wrong is known already; the next START clears the rest.
+            let _ = self.sda.set_high();
+            let _ = self.scl.set_high();
         }
         done
     }

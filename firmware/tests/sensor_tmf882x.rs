@@ -11,7 +11,7 @@ use dtof_core::PixelAddress;
 use dtof_firmware::sensor::tmf882x::{
     BootCommand, Command, Config, ConfigError, Error, Settings, SpadMap, Tmf882x, Waiting,
 };
-use dtof_firmware::sensor::{Polled, Sensor};
+use dtof_firmware::sensor::{Polled, Sensor, SensorFault};
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock, Transaction as Access};
 use proptest::prelude::*;
@@ -228,6 +228,23 @@ fn not_acknowledged_while_measuring() {
     let polled = bench.poll(&accesses);
     assert_eq!(polled, Err(Error::Nack(NACK)));
     stops_measuring(&mut bench, polled);
+}
+
+/// Nobody answers, or somebody does and takes no more.
+#[test]
+fn only_an_address_not_acknowledged_is_no_answer() {
+    for (source, fault) in [
+        (NoAcknowledgeSource::Address, SensorFault::NoAnswer),
+        (NoAcknowledgeSource::Unknown, SensorFault::NoAnswer),
+        (NoAcknowledgeSource::Data, SensorFault::Bus),
+    ] {
+        let kind = ErrorKind::NoAcknowledge(source);
+        let mut bench = measuring();
+        bench.interrupt.set(false);
+        let polled = bench.poll(&[read(0x41, 0xE1, &[0]).with_error(kind)]);
+        assert_eq!(polled.map_err(SensorFault::from), Err(fault));
+        stops_measuring(&mut bench, polled);
+    }
 }
 
 #[test]

@@ -12,6 +12,9 @@ use embedded_hal::i2c::{I2c, Operation};
 use proptest::prelude::*;
 
 const ADDRESS: u8 = 0x41;
+/// The period of 400 kHz; how often a rising SCL is looked at.
+const PERIOD_NS: u64 = 2500;
+const LOOK_NS: u64 = 100;
 
 /// What the device sees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +57,9 @@ struct Wires {
     /// What the controller and the device each let go of.
     controller: [bool; 2],
     device: [bool; 2],
+    /// What a wire takes to rise, and since when it does.
+    rise_ns: u64,
+    free_since: [Option<u64>; 2],
     phase: Phase,
     seen: Vec<Seen>,
     /// Sends 0, 1, 2 and so on.
@@ -63,12 +69,21 @@ struct Wires {
     /// Holds SCL low for so long after each byte.
     stretch_ns: u64,
     stretched_until: u64,
+    /// How often SCL has fallen, and a wire that is low for good from one of the
+    /// falls on.
+    falls: usize,
+    stuck: Option<(usize, usize)>,
     /// When SCL last rose and fell.
     rose_ns: u64,
     fell_ns: u64,
     shortest_high: u64,
     shortest_low: u64,
     shortest_period: u64,
+    /// Of the periods without START and STOP.
+    longest_period: u64,
+    is_plain_period: bool,
+    /// From SCL's fall to the controller's next change of SDA.
+    shortest_hold: u64,
 }
 
 const SCL: usize = 0;
@@ -80,36 +95,81 @@ impl Wires {
             now_ns: 1_000_000,
             controller: [true; 2],
             device: [true; 2],
+            rise_ns: 0,
+            free_since: [Some(0); 2],
             phase: Phase::Idle,
             seen: Vec::new(),
             next: 0,
             takes: usize::MAX,
             stretch_ns: 0,
             stretched_until: 0,
+            falls: 0,
+            stuck: None,
             rose_ns: 0,
             fell_ns: 0,
             shortest_high: u64::MAX,
             shortest_low: u64::MAX,
             shortest_period: u64::MAX,
+            longest_period: 0,
+            is_plain_period: false,
+            shortest_hold: u64::MAX,
         }
     }
 
     fn level(&self, wire: usize) -> bool {
-        let stretched = wire == SCL && self.now_ns < self.stretched_until;
-        self.controller[wire] && self.device[wire] && !stretched
+        self.free_since[wire].is_some_and(|since| since + self.rise_ns <= self.now_ns)
+    }
+
+    /// A wire begins to rise once nobody holds it any more.
+    fn settle(&mut self) {
+        for wire in [SCL, SDA] {
+            let stretched = wire == SCL && self.now_ns < self.stretched_until;
+            let is_stuck =
+                (self.stuck).is_some_and(|(stuck, fall)| stuck == wire && self.falls >= fall);
+            let is_free = self.controller[wire] && self.device[wire] && !stretched && !is_stuck;
+            self.free_since[wire] = match self.free_since[wire] {
+                _ if !is_free => None,
+                None => Some(self.now_ns),
+                since => since,
+            };
+        }
+    }
+
+    /// Something else about the wires changes, the time or who holds them.
+    fn change(&mut self, change: impl FnOnce(&mut Self)) {
+        let before = [self.level(SCL), self.level(SDA)];
+        change(self);
+        self.settle();
+        self.see(before);
+        // What the device lets go of.
+        self.settle();
+    }
+
+    /// The device holds a wire, or does not, whatever it is doing.
+    fn hold(&mut self, wire: usize, holds: bool) {
+        self.device[wire] = !holds;
+        self.settle();
     }
 
     /// The controller drives a wire.
     fn set(&mut self, wire: usize, high: bool) {
-        let before = [self.level(SCL), self.level(SDA)];
-        self.controller[wire] = high;
-        self.see(before);
+        if wire == SDA && self.controller[SDA] != high && !self.level(SCL) {
+            self.shortest_hold = self.shortest_hold.min(self.now_ns - self.fell_ns);
+        }
+        self.change(|wires| wires.controller[wire] = high);
     }
 
     fn wait(&mut self, ns: u32) {
-        let before = [self.level(SCL), self.level(SDA)];
-        self.now_ns += u64::from(ns);
-        self.see(before);
+        let end = self.now_ns + u64::from(ns);
+        while self.now_ns < end {
+            let rises = self.free_since.iter().flatten();
+            let rises = rises.map(|since| since + self.rise_ns);
+            let next = rises
+                .chain([self.stretched_until])
+                .filter(|&at| at > self.now_ns)
+                .fold(end, u64::min);
+            self.change(|wires| wires.now_ns = next);
+        }
     }
 
     fn see(&mut self, [scl, sda]: [bool; 2]) {
@@ -118,6 +178,7 @@ impl Wires {
             (true, false) => self.falls(),
             (true, true) if sda && !self.level(SDA) => {
                 self.seen.push(Seen::Start);
+                self.is_plain_period = false;
                 self.phase = Phase::Receive {
                     byte: 0,
                     bits: 0,
@@ -126,6 +187,7 @@ impl Wires {
             }
             (true, true) if !sda && self.level(SDA) => {
                 self.seen.push(Seen::Stop);
+                self.is_plain_period = false;
                 self.phase = Phase::Idle;
             }
             _ => {}
@@ -137,8 +199,13 @@ impl Wires {
             self.shortest_low = self.shortest_low.min(self.now_ns - self.fell_ns);
         }
         if self.rose_ns > 0 {
-            self.shortest_period = self.shortest_period.min(self.now_ns - self.rose_ns);
+            let period = self.now_ns - self.rose_ns;
+            self.shortest_period = self.shortest_period.min(period);
+            if self.is_plain_period {
+                self.longest_period = self.longest_period.max(period);
+            }
         }
+        self.is_plain_period = true;
         self.rose_ns = self.now_ns;
         let sda = self.level(SDA);
         match &mut self.phase {
@@ -156,6 +223,7 @@ impl Wires {
             self.shortest_high = self.shortest_high.min(self.now_ns - self.rose_ns);
         }
         self.fell_ns = self.now_ns;
+        self.falls += 1;
         match self.phase {
             Phase::Receive {
                 byte,
@@ -353,10 +421,12 @@ proptest! {
     #[test]
     fn any_transaction_is_what_its_contract_says(
         parts in proptest::collection::vec(part(), 0..6),
-        stretch_ns in 0u64..50_000,
+        stretch_ns in prop_oneof![Just(0), 0u64..50_000],
+        rise_ns in proptest::sample::select(vec![0, 50, 300]),
     ) {
         let (mut bus, wires) = bus();
         wires.borrow_mut().stretch_ns = stretch_ns;
+        wires.borrow_mut().rise_ns = rise_ns;
         let read = run(&mut bus, &parts).unwrap();
         let wires = wires.borrow();
         prop_assert_eq!(&wires.seen, &expected(&parts));
@@ -365,8 +435,50 @@ proptest! {
         // Fast mode, and both wires free afterwards.
         prop_assert!(wires.shortest_low >= 1300);
         prop_assert!(wires.shortest_high >= 600);
-        prop_assert!(wires.shortest_period >= 2500);
+        prop_assert!(wires.shortest_period >= PERIOD_NS);
+        prop_assert!(wires.shortest_hold >= 300);
+        if stretch_ns == 0 {
+            // No slower than the wires.
+            let longest = wires.longest_period;
+            prop_assert!(longest <= PERIOD_NS + rise_ns + LOOK_NS, "{longest} ns");
+        }
         prop_assert!(wires.level(SCL) && wires.level(SDA));
+    }
+}
+
+/// From any bit on SDA stays low, which acknowledges everything and reads as
+/// zeros.
+#[test]
+fn data_stuck_low_is_never_taken_for_an_answer() {
+    let parts = [Part::Write(vec![7, 8]), Part::Read(2), Part::Write(vec![9])];
+    // START and three bytes, START and three, START and two.
+    let ends = [28, 28 + 28, 28 + 28 + 19];
+    for fall in 1..=ends[2] {
+        let (mut bus, wires) = bus();
+        wires.borrow_mut().stuck = Some((SDA, fall));
+        assert_eq!(run(&mut bus, &parts), Err(Error::DataLow), "{fall}");
+        // Seen at the next START or STOP.
+        let end = ends.into_iter().find(|&end| fall <= end);
+        assert_eq!(Some(wires.borrow().falls), end);
+        assert_eq!(wires.borrow().controller, [true; 2]);
+        // Free again.
+        wires.borrow_mut().stuck = None;
+        assert_eq!(run(&mut bus, &parts).map(|read| read.len()), Ok(2));
+    }
+}
+
+/// The register of a packet is written, its 135 bytes are read.
+#[test]
+fn a_packet_of_135_bytes_takes_3_to_4_ms() {
+    for (rise_ns, microseconds) in [(0, 3116), (300, 3490)] {
+        let (mut bus, wires) = bus();
+        wires.borrow_mut().rise_ns = rise_ns;
+        let before = wires.borrow().now_ns;
+        bus.write_read(ADDRESS, &[0x20], &mut [0; 135]).unwrap();
+        let took = wires.borrow().now_ns - before;
+        assert_eq!(took.div_ceil(1000), microseconds);
+        // 138 bytes of 9 bits, START twice, STOP once.
+        assert!(took <= (138 * 9 + 4) * (PERIOD_NS + rise_ns + LOOK_NS));
     }
 }
 
@@ -392,29 +504,70 @@ fn a_byte_not_taken_ends_the_transaction() {
     assert_eq!(seen[2..], [Seen::Written(1), Seen::Written(2), Seen::Stop]);
 }
 
+/// The address and the byte are acknowledged, and the clock is then held.
 #[test]
-fn a_clock_held_for_9_ms_is_waited_for_and_one_held_for_11_ms_is_not() {
+fn a_clock_held_for_24_ms_is_waited_for_and_one_held_for_26_ms_is_not() {
     let (mut bus, wires) = bus();
-    wires.borrow_mut().stretch_ns = 9_000_000;
+    wires.borrow_mut().stretch_ns = 12_000_000;
     assert_eq!(bus.write(ADDRESS, &[1]), Ok(()));
-    wires.borrow_mut().stretch_ns = 11_000_000;
+    wires.borrow_mut().stretch_ns = 13_000_000;
     assert_eq!(bus.write(ADDRESS, &[1]), Err(Error::ClockLow));
     wires.borrow_mut().stretch_ns = 0;
     wires.borrow_mut().wait(20_000_000);
     assert_eq!(bus.write(ADDRESS, &[1]), Ok(()));
 }
 
+/// The time a device may hold the clock is one for all bytes of a transaction,
+/// and another for the next.
+#[test]
+fn a_device_that_holds_the_clock_at_every_byte_is_given_up_after_25_ms() {
+    let (mut bus, wires) = bus();
+    wires.borrow_mut().stretch_ns = 1_000_000;
+    let bytes = [0; 128];
+    for _ in 0..2 {
+        assert_eq!(bus.write(ADDRESS, &bytes[..23]), Ok(()));
+    }
+    let before = wires.borrow().now_ns;
+    assert_eq!(bus.write(ADDRESS, &bytes), Err(Error::ClockLow));
+    let took = wires.borrow().now_ns - before;
+    assert!((25_000_000..26_000_000).contains(&took), "{took} ns");
+    // As long as it would take without.
+    wires.borrow_mut().wait(1_000_000);
+    wires.borrow_mut().stretch_ns = 0;
+    assert_eq!(bus.write(ADDRESS, &bytes), Ok(()));
+}
+
+/// STOP after a byte that is not acknowledged fails as well: the bus is let go of,
+/// and the first error is told.
+#[test]
+fn an_error_of_the_stop_after_an_error_hides_nothing_and_drives_nothing() {
+    for wire in [SCL, SDA] {
+        for (address, bytes, error) in [(0x42, 1, Error::NoDevice), (ADDRESS, 2, Error::NotTaken)] {
+            let (mut bus, wires) = bus();
+            wires.borrow_mut().takes = 1;
+            // START, and the bytes with the bit that acknowledges them.
+            wires.borrow_mut().stuck = Some((wire, 1 + bytes * 9));
+            assert_eq!(bus.write(address, &[1, 2]), Err(error));
+            assert_eq!(wires.borrow().controller, [true; 2]);
+            assert!(!wires.borrow().seen.contains(&Seen::Stop));
+            wires.borrow_mut().stuck = None;
+            wires.borrow_mut().takes = usize::MAX;
+            assert_eq!(bus.write(ADDRESS, &[1, 2]), Ok(()));
+        }
+    }
+}
+
 #[test]
 fn a_bus_that_nothing_pulls_up_costs_no_more_than_its_limit() {
     for (wire, error) in [(SCL, Error::ClockLow), (SDA, Error::DataLow)] {
         let (mut bus, wires) = bus();
-        wires.borrow_mut().device[wire] = false;
+        wires.borrow_mut().hold(wire, true);
         let before = wires.borrow().now_ns;
         assert_eq!(bus.write(ADDRESS, &[1]), Err(error));
         let took = wires.borrow().now_ns - before;
-        assert!(took <= 10_100_000, "{took} ns");
+        assert!(took <= 25_100_000, "{took} ns");
         // Plugged in again.
-        wires.borrow_mut().device[wire] = true;
+        wires.borrow_mut().hold(wire, false);
         assert_eq!(bus.write(ADDRESS, &[1]), Ok(()));
     }
 }
@@ -426,7 +579,7 @@ fn a_device_stuck_in_a_byte_is_clocked_free() {
         let (mut bus, wires) = bus();
         {
             let mut wires = wires.borrow_mut();
-            wires.device[SDA] = false;
+            wires.hold(SDA, true);
             wires.phase = Phase::Send { byte: 0, bits };
         }
         let mut byte = [0xAA];

@@ -3,8 +3,8 @@
 
 use dtof::engine::host_engine;
 use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
-use dtof::simulation::{Rates, SimulatedArray};
-use dtof::source::{Geometry, PhotonSource};
+use dtof::simulation::{Rates, SimulatedArray, SimulatedPixel};
+use dtof::source::{Geometry, PhotonSource, pixel_rng};
 use dtof::theory::exposure::{Exposures, Looks, trial_rng};
 use dtof::theory::repeated_looks::{
     ALPHA_STEPS, FalseEvents, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
@@ -12,7 +12,7 @@ use dtof::theory::repeated_looks::{
 use dtof::theory::table::{self, MARGIN, Row, Table};
 use dtof::theory::tune::{Request, Tuned, Wanted, tune};
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
-use dtof_core::{Count, DepthEvent, Threshold};
+use dtof_core::{Count, DepthEvent, PixelAddress, Threshold};
 use dtof_host_tests::binomial::{alike, plausible};
 
 /// The chance that a test fails for nothing.
@@ -230,17 +230,18 @@ fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec
         columns: side,
         rows: side,
     };
-    let rates: Vec<Rates> = (0..side * side)
-        .map(|pixel| Rates {
+    let pixels = (0..side * side).map(|pixel| {
+        let rates = Rates {
             background: request.background,
             signal,
             position: position(pixel),
             sigma: request.sigma,
-        })
-        .collect();
+        };
+        let address = PixelAddress(u16::try_from(pixel).unwrap());
+        SimulatedPixel::new(&rates, 128, pixel_rng(settings.seed, address)).unwrap()
+    });
     let cycles = tuned.looks.expiry();
-    let mut photons =
-        SimulatedArray::new(geometry, &rates, 128, cycles.into(), settings.seed).unwrap();
+    let mut photons = SimulatedArray::new(geometry, pixels.collect(), cycles.into(), None);
     let mut engine = host_engine(&settings, &photons.addresses()).unwrap();
     let slice = photons.next_slice(u16::try_from(cycles).unwrap()).unwrap();
     let mut events = engine.run(&slice).unwrap();

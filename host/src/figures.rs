@@ -131,7 +131,7 @@ fn captions(all: &[(&Study, Results)]) -> Result<String> {
         for figure in &results.figures {
             write!(
                 text,
-                "\n## {name}\n\n![{caption}]({name}.svg)\n\n{caption}\n\n\
+                "\n## {name}\n\n![{name}]({name}.svg)\n\n{caption}\n\n\
                  Study `{study}`, seeds 0 to {last}.\n",
                 name = figure.name,
                 caption = figure.caption,

@@ -12,6 +12,7 @@
 //!   → [`merge`]  parts of disjoint seeds as one
 //! ```
 
+pub mod mean;
 mod part;
 pub mod results;
 mod run;

@@ -8,7 +8,7 @@ use dtof::device::{Client, DeviceEngine, configuration};
 use dtof::engine::{Engine, host_engine};
 use dtof::monitor;
 use dtof::scene;
-use dtof::settings::{Settings, U8F8Number};
+use dtof::settings::{Settings, U8F8Number, U16F16Number};
 use dtof::source::{Geometry, PhotonSource};
 use dtof_core::fixed::types::U8F8;
 use dtof_firmware::sensor::SensorFault;
@@ -189,6 +189,17 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
     Ok(stack)
 }
 
+/// What a sensor that is not there is taken for. The emulator has no pins, so that
+/// all of them read as zeros: a TDC7200 that does not answer, and an I²C bus that
+/// nothing pulls up. On a real board its resistors pull it up, and both are "no
+/// answer".
+fn unplugged(sensor: Sensor) -> SensorFault {
+    match sensor {
+        Sensor::Tdc7200 => SensorFault::NoAnswer,
+        Sensor::Tmf882x => SensorFault::Bus,
+    }
+}
+
 /// The image of a sensor with nothing connected says so, and decides on photons of
 /// the link afterwards. Gives the bytes of stack used.
 fn says_unplugged(board: Board, image: &Path, sensor: Sensor, array: Geometry) -> Result<u64> {
@@ -196,7 +207,14 @@ fn says_unplugged(board: Board, image: &Path, sensor: Sensor, array: Geometry) -
     let mut emulator = Emulator::start(board, image, &[])?;
     let mut client = Client::new(emulator.connect()?).with_context(|| name.clone())?;
     let pixels = u16::try_from(array.addresses())?;
-    client.configure(&configuration(&settings(), pixels, 1)?)?;
+    let about = client
+        .sensor()?
+        .with_context(|| format!("{name}: no sensor"))?;
+    let mut wanted = settings();
+    if let Some(bin_width) = about.bin_width {
+        wanted.bin_width_ps = U16F16Number(bin_width);
+    }
+    client.configure(&configuration(&wanted, pixels, 1)?)?;
     let since = Instant::now();
     let report = loop {
         let report = client.report().with_context(|| name.clone())?;
@@ -210,6 +228,8 @@ fn says_unplugged(board: Board, image: &Path, sensor: Sensor, array: Geometry) -
     };
     let fault = SensorFault::from_number(report.last_sensor_error);
     let fault = fault.with_context(|| format!("{name}: no reason for {report:?}"))?;
+    let expected = unplugged(sensor);
+    ensure!(fault == expected, "{name}: \"{fault}\", not \"{expected}\"");
     ensure!(
         report.statistics.photons() == 0,
         "{name}: photons without a sensor"

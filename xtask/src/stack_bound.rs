@@ -60,14 +60,22 @@ pub fn of_image(path: &Path) -> Result<u64> {
     Ok((bound + handlers).into())
 }
 
+/// The functions defmt asks of a logger, in defmt-rtt, and how often each calls one
+/// of the two that write. One call more may be of something else.
+const DEFMT_RTT: [(&str, u32); 3] = [
+    ("_defmt_acquire", 1),
+    ("_defmt_release", 3),
+    ("_defmt_write", 5),
+];
+
 /// A function, as far as the stack is concerned.
 #[derive(Debug, Default)]
 struct Function {
     name: String,
     takes: u32,
     goes_to: BTreeSet<u32>,
-    /// Whether it goes where nobody knows before it runs.
-    goes_anywhere: bool,
+    /// How often it goes where nobody knows before it runs.
+    goes_anywhere: u32,
     sets_stack_pointer: bool,
 }
 
@@ -79,8 +87,7 @@ struct Needs {
 }
 
 impl Needs {
-    /// The functions defmt asks of a logger call in defmt-rtt one of two, by the
-    /// channel's mode.
+    /// Those of [`DEFMT_RTT`] call one of two, by the channel's mode.
     fn resolve_defmt_rtt(&mut self) {
         let writes = |(_, function): &(&u32, &Function)| function.name.contains("blocking_write");
         let found = self.functions.iter().filter(writes);
@@ -88,10 +95,11 @@ impl Needs {
         if writers.is_empty() {
             return;
         }
-        let logger = |function: &&mut Function| function.name.starts_with("_defmt_");
-        for function in self.functions.values_mut().filter(logger) {
-            if function.goes_anywhere {
-                function.goes_anywhere = false;
+        for function in self.functions.values_mut() {
+            let is_it = |(name, _): &&(&str, u32)| *name == function.name;
+            let calls = DEFMT_RTT.iter().find(is_it).map_or(0, |&(_, calls)| calls);
+            if (1..=calls).contains(&function.goes_anywhere) {
+                function.goes_anywhere = 0;
                 function.goes_to.extend(&writers);
             }
         }
@@ -110,7 +118,7 @@ impl Needs {
         }
         ensure!(!self.under_way.contains(&address), "{name} calls itself");
         ensure!(
-            !function.goes_anywhere,
+            function.goes_anywhere == 0,
             "{name} calls what is only known when it runs"
         );
         ensure!(
@@ -200,7 +208,7 @@ impl Function {
             Effect::Takes(bytes) => self.takes += bytes,
             Effect::GoesTo(to) if to != own.start && own.contains(&to) => {}
             Effect::GoesTo(to) => _ = self.goes_to.insert(to),
-            Effect::GoesAnywhere => self.goes_anywhere = true,
+            Effect::GoesAnywhere => self.goes_anywhere += 1,
             Effect::SetsStackPointer => self.sets_stack_pointer = true,
         }
     }
@@ -218,7 +226,7 @@ mod tests {
             name: ["function", "rust_begin_unwind"][usize::from(index == last)].to_owned(),
             takes: *takes,
             goes_to: goes_to.iter().copied().collect(),
-            goes_anywhere: unbounded == u32::try_from(index).ok(),
+            goes_anywhere: (unbounded == u32::try_from(index).ok()).into(),
             sets_stack_pointer: false,
         };
         let functions = functions.iter().enumerate().map(function);
@@ -242,6 +250,31 @@ mod tests {
         let functions: [(u32, &[u32]); 3] = [(8, &[1]), (4, &[2]), (1000, &[0])];
         assert_eq!(need(&functions, Some(2)).unwrap(), 12);
         assert!(need(&functions, Some(1)).is_err());
+    }
+
+    #[test]
+    fn a_logger_is_excused_for_its_own_calls_alone() {
+        for (name, calls, is_bounded) in [
+            ("_defmt_acquire", 1, true),
+            ("_defmt_acquire", 2, false),
+            ("_defmt_write", 5, true),
+            ("_defmt_timestamp", 1, false),
+        ] {
+            let function = |name: &str, takes, goes_anywhere| Function {
+                name: name.to_owned(),
+                takes,
+                goes_anywhere,
+                ..Function::default()
+            };
+            let writer = function("defmt_rtt::blocking_write", 10, 0);
+            let mut needs = Needs {
+                functions: [(0, function(name, 4, calls)), (2, writer)].into(),
+                known: BTreeMap::new(),
+                under_way: Vec::new(),
+            };
+            needs.resolve_defmt_rtt();
+            assert_eq!(needs.of(0).ok(), is_bounded.then_some(14), "{name} {calls}");
+        }
     }
 
     #[test]

@@ -67,8 +67,9 @@ pub fn wide(address: u32, first: u16, second: u16) -> Effect {
             let loads_word = first & 0x70 == 0x50;
             match second >> 12 {
                 13 if loads_word => Effect::SetsStackPointer,
-                // Other than from the stack, which is a return.
-                15 if loads_word && base != 13 => Effect::GoesAnywhere,
+                // Other than POP, which is a return.
+                15 if first == 0xf85d && second & 0xfff == 0xb04 => Effect::None,
+                15 if loads_word => Effect::GoesAnywhere,
                 _ if base == 13 && first & 0x80 == 0 && second & 0xb00 == 0x900 => {
                     Effect::Takes(byte)
                 }
@@ -135,8 +136,8 @@ fn branch(address: u32, first: u16, second: u16) -> Effect {
         let offset = sign << 20 | j2 << 19 | j1 << 18 | (first & 0x3f) << 12;
         return Effect::GoesTo(target(address, offset | (second & 0x7ff) << 1, 21));
     }
-    // MSR of MSP or PSP
-    if first & 0xfff0 == 0xf380 && matches!(second & 0xff, 8 | 9) {
+    // MSR of MSP, PSP or CONTROL, which chooses one of the two
+    if first & 0xfff0 == 0xf380 && matches!(second & 0xff, 8 | 9 | 20) {
         return Effect::SetsStackPointer;
     }
     Effect::None
@@ -217,9 +218,13 @@ mod tests {
             assert_eq!(narrow(0, code), Effect::GoesAnywhere);
         }
         assert_eq!(wide(0, 0xf8d0, 0xf004), Effect::GoesAnywhere); // ldr.w pc, [r0, #4]
+        assert_eq!(wide(0, 0xf8dd, 0xf004), Effect::GoesAnywhere); // ldr.w pc, [sp, #4]
+        assert_eq!(wide(0, 0xf85d, 0xfd04), Effect::GoesAnywhere); // ldr pc, [sp, #-4]!
+        assert_eq!(wide(0, 0xf85d, 0xf021), Effect::GoesAnywhere); // ldr.w pc, [sp, r1, lsl #2]
         assert_eq!(narrow(0, 0x46a5), Effect::SetsStackPointer); // mov sp, r4
         assert_eq!(wide(0, 0xea4f, 0x0d04), Effect::SetsStackPointer); // mov.w sp, r4
         assert_eq!(wide(0, 0xf380, 0x8808), Effect::SetsStackPointer); // msr msp, r0
+        assert_eq!(wide(0, 0xf380, 0x8814), Effect::SetsStackPointer); // msr control, r0
     }
 
     #[test]

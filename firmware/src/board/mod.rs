@@ -13,6 +13,7 @@ pub mod mps2_an386;
 mod report;
 #[cfg(all(target_os = "none", feature = "stm32f405"))]
 pub mod stm32f405;
+pub mod systick;
 
 // Each board defines the interrupt handlers of the image.
 #[cfg(all(feature = "mps2-an386", feature = "stm32f405"))]

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
+use dtof::simulation::MM_PER_PS;
 use dtof::theory::gaussian;
 use dtof::theory::rates::{signal_for_snr, snr};
 use dtof::theory::table::Table;
@@ -63,9 +64,6 @@ pub struct Tune {
     #[arg(long)]
     json: bool,
 }
-
-/// Millimetres of range a picosecond, half the speed of light.
-const MM_PER_PS: f64 = 0.149_896_229;
 
 /// One result: name in JSON, name for people, value, unit, where it comes from.
 struct Line(&'static str, &'static str, f64, &'static str, String);

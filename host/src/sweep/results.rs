@@ -205,8 +205,8 @@ mod tests {
     fn the_interval_is_wilsons() {
         let share = Share::new(10, 100);
         assert!((share.value - 0.1).abs() < 1e-15);
-        assert!((share.interval.0 - 0.046_6).abs() < 1e-4);
-        assert!((share.interval.1 - 0.201_5).abs() < 1e-4);
+        assert!((share.interval.0 - 0.046_0).abs() < 1e-4);
+        assert!((share.interval.1 - 0.203_8).abs() < 1e-4);
         assert!(share.holds(0.1) && !share.holds(0.04) && !share.holds(0.21));
         // No success is no proof that there is none.
         assert!(Share::new(0, 100).holds(0.05) && Share::new(100, 100).holds(0.95));

@@ -1,27 +1,39 @@
 //! The studies there are.
 
 pub mod depth_error;
+pub mod depth_step;
 pub mod false_events;
 pub mod false_rate;
+pub mod fan_motion;
 pub mod gaussian_error;
 pub mod hit_rate;
 pub mod hyperparameters;
+pub mod latency;
+mod one_pixel;
 pub mod paper_setting;
 pub mod passage;
+pub mod radial_motion;
+mod ranks;
 pub mod roc;
+pub mod static_scene;
 pub mod time_to_detect;
 
 use anyhow::{Context, Result};
 
 use super::Study;
 
-/// In the order of the paper.
+/// In the order of the paper; then what it does not have.
 pub const ALL: &[Study] = &[
     hit_rate::STUDY,
     gaussian_error::STUDY,
     roc::STUDY,
     false_events::STUDY,
     hyperparameters::STUDY,
+    static_scene::STUDY,
+    depth_step::STUDY,
+    radial_motion::STUDY,
+    fan_motion::STUDY,
+    latency::STUDY,
     false_rate::STUDY,
     time_to_detect::STUDY,
     depth_error::STUDY,

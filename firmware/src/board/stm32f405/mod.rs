@@ -38,7 +38,7 @@ use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 pub use self::sensor_port::SensorPort;
 
-use super::{Board, report};
+use super::{Board, report, systick};
 use crate::serial::{BoardBuffers, Buffers, Serial, SerialInterrupt};
 
 const BAUD: u32 = 1_000_000;
@@ -83,7 +83,7 @@ impl Stm32F405 {
 
         let mut timer = core.SYST;
         timer.set_clock_source(SystClkSource::Core);
-        timer.set_reload(rcc.clocks.hclk().raw() / 1000 - 1);
+        timer.set_reload(systick::reload(rcc.clocks.hclk().raw()));
         timer.clear_current();
         timer.enable_interrupt();
         timer.enable_counter();

@@ -13,20 +13,21 @@
 //! | 3V | VDD | VDD |
 //! | GND | GND | GND |
 //!
-//! All at the board's 3 V. PC8 is pulled up in the controller, and so are PA8 and PC9, but
-//! too weakly for 400 kHz: the bus needs resistors of 1 to 4.7 kΩ to 3.3 V, which
+//! All at the board's 3 V. PC8 and PB14 are pulled up in the controller, and so are
+//! PA8 and PC9, but too weakly for 400 kHz: the bus needs resistors of 1 to 4.7 kΩ, which
 //! most modules have.
 
+use cortex_m::peripheral::SYST;
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
-use embedded_hal::delay::DelayNs;
 use embedded_hal_bus::spi::ExclusiveDevice;
-use stm32f4xx_hal::gpio::{Input, OpenDrain, Output, Pin};
+use stm32f4xx_hal::gpio::{Input, OpenDrain, Output, Pin, Pull, Speed};
 use stm32f4xx_hal::pac::SPI2;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::spi::{Mode, Phase, Polarity};
 
+use crate::board::systick::SystickDelay;
 use crate::i2c::SoftwareI2c;
 use crate::sensor::Sensor;
 use crate::sensor::tdc7200::{self, Tdc7200};
@@ -60,6 +61,8 @@ impl SensorPort {
                 first_bin_ps: 12_000,
                 // 500 ns, if a turn of the ring oscillator takes 3.5.
                 overflow: 143,
+                // A bit that is lost on the way is an error, not another depth.
+                parity: true,
                 ..settings
             }) {
                 Ok(config) => config,
@@ -70,7 +73,14 @@ impl SensorPort {
             polarity: Polarity::IdleLow,
             phase: Phase::CaptureOnFirstTransition,
         };
-        let pins = (Some(self.sck), Some(self.miso), Some(self.mosi));
+        // Slow edges would cost the last bit of a byte. With nothing connected the
+        // bus reads as ones.
+        let fast = Speed::VeryHigh;
+        let pins = (
+            Some(self.sck.into_alternate::<5>().speed(fast)),
+            Some(self.miso.into_alternate().internal_resistor(Pull::Up)),
+            Some(self.mosi.into_alternate().speed(fast)),
+        );
         // A quarter of 42 MHz; without the PLL half of 16 MHz.
         let bus = self.spi.spi(pins, MODE_0, 11.MHz(), &mut self.rcc);
         let Ok(device) = ExclusiveDevice::new_no_delay(bus, self.cs);
@@ -86,22 +96,9 @@ impl SensorPort {
                 Ok(config) => config,
                 Err(_) => panic!("not a configuration"),
             };
-        let delay = Delay {
-            cycles_per_us: self.rcc.clocks.sysclk().to_MHz(),
-        };
+        // The timer runs since the board has started.
+        let delay = SystickDelay::new(SYST::get_current, self.rcc.clocks.hclk().raw());
         let bus = SoftwareI2c::new(self.scl, self.sda, delay);
         Tmf882x::<_, _, _>::new(bus, self.interrupt, self.enable, image, CONFIG)
-    }
-}
-
-/// Counts instructions that do nothing.
-struct Delay {
-    cycles_per_us: u32,
-}
-
-impl DelayNs for Delay {
-    fn delay_ns(&mut self, ns: u32) {
-        let cycles = u64::from(ns) * u64::from(self.cycles_per_us) / 1000 + 1;
-        cortex_m::asm::delay(u32::try_from(cycles).unwrap_or(u32::MAX));
     }
 }

@@ -25,9 +25,11 @@ pub enum Waiting {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Error<B, P> {
-    /// Nobody acknowledged on the bus.
+    /// Nobody acknowledged the address, or the bus does not tell what was not
+    /// acknowledged.
     Nack(B),
-    /// The bus failed otherwise.
+    /// The bus failed otherwise. So it does when a byte after the address is not
+    /// acknowledged: somebody is there.
     Bus(B),
     /// A pin failed.
     Pin(P),

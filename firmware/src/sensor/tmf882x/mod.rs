@@ -61,7 +61,7 @@ mod registers;
 
 use dtof_core::fixed::types::{I24F8, U16F16};
 use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
-use embedded_hal::i2c::{ErrorKind, ErrorType, I2c};
+use embedded_hal::i2c::{ErrorKind, ErrorType, I2c, NoAcknowledgeSource};
 
 use self::bootloader::{Answer, MAX_DATA, Message, SEED};
 use self::frame::{Assembly, NoPacket, OutOfOrder, PACKET, Packet, Taken};
@@ -505,9 +505,11 @@ fn count(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }
 
+/// Who does not acknowledge a byte has acknowledged the address: somebody is there.
 fn bus_error<B: embedded_hal::i2c::Error, P>(error: B) -> Error<B, P> {
+    use NoAcknowledgeSource::{Address, Unknown};
     match error.kind() {
-        ErrorKind::NoAcknowledge(_) => Error::Nack(error),
+        ErrorKind::NoAcknowledge(Address | Unknown) => Error::Nack(error),
         _ => Error::Bus(error),
     }
 }
@@ -523,10 +525,12 @@ where
     /// Bin width and offset are those fitted to the public log of one TMF8820.
     fn about(&self) -> About {
         const ZONES: u16 = 9;
+        const BIN_WIDTH: U16F16 = U16F16::lit("92.1");
+        const OFFSET: I24F8 = I24F8::lit("-179.5");
         About {
             pixels: self.config.settings().first_pixel.0.saturating_add(ZONES),
-            bin_width: Some(U16F16::lit("92.1")),
-            offset: I24F8::lit("-179.5"),
+            bin_width: Some(BIN_WIDTH),
+            offset: OFFSET,
         }
     }
 
@@ -543,7 +547,7 @@ where
     }
 
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, I2C, INT> {
-        let off = self.off();
+        let was_measuring = self.is_measuring();
         let polled = self.step(now_ms, sink);
         if let Err(error) = &polled {
             count(&mut self.counts.errors);
@@ -551,7 +555,9 @@ where
                 Error::ForeignResult { .. }
                 | Error::WrongSize { .. }
                 | Error::OutOfOrder { .. } => self.state,
-                _ => off,
+                _ => State::Off {
+                    reset: !was_measuring,
+                },
             };
         }
         polled
