@@ -9,15 +9,19 @@
 //! | [`repeated_looks`] | false events of an exposure | bounds, exact |
 //! | [`table`] | what lies between the bounds | simulation |
 //! | [`exposure`] | exposures, from look to look | simulation |
+//! | [`likelihood_ratio`] | the fastest a rule can be that knows the scene | exact |
+//! | [`cramer_rao`] | the smallest error of a pulse's position | exact |
 //! | [`tune`] | settings for a wanted false event rate | all of these |
 //!
 //! Times are in bins from the start of bin 0, counts are mean photons, all in
 //! `f64`. Nothing here is checked for sense: rates are finite and not negative,
 //! probabilities lie strictly between 0 and 1 where an inverse is taken of them.
 
+pub mod cramer_rao;
 pub mod exposure;
 pub mod gaussian;
 pub mod known_background;
+pub mod likelihood_ratio;
 pub mod normal;
 pub mod poisson;
 mod quadrature;

@@ -4,8 +4,8 @@
 use anyhow::Result;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AsyncPixel, BinPosition, Count, Count16, Histogram, LaserCycle, PaperRule, PixelAddress,
-    PixelConfig, RangeGate, detect,
+    AsyncPixel, BinPosition, Count, Count16, DepthEstimator, Histogram, LaserCycle, PaperRule,
+    PixelAddress, PixelConfig, RangeGate, detect,
 };
 
 use crate::scene;
@@ -91,7 +91,12 @@ impl FramePixel {
             return None;
         }
         let any = PaperRule::new(U8F8::ZERO, Count::saturating(1));
-        let found = detect(&self.histogram, &RangeGate::full(), &any);
+        let found = detect(
+            &self.histogram,
+            &RangeGate::full(),
+            &any,
+            &DepthEstimator::default(),
+        );
         let first = self.first;
         self.first = cycle + 1;
         self.histogram.clear();
