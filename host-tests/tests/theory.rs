@@ -244,9 +244,8 @@ fn false_events<const BINS: usize>(
         let mut histogram = Histogram::<BINS>::new();
         histogram.add_frame(&counts, &gate);
         for (events, rule) in events.iter_mut().zip(rules) {
-            *events += u32::from(
-                detect(&histogram, &gate, rule, &DepthEstimator::CentreOfMass3).is_some(),
-            );
+            *events +=
+                u32::from(detect(&histogram, &gate, rule, &DepthEstimator::default()).is_some());
         }
     }
     events

@@ -22,7 +22,7 @@ use anyhow::{Context, Result};
 
 use super::Study;
 
-/// In the order of the paper.
+/// In the order of the paper; then what it does not have.
 pub const ALL: &[Study] = &[
     hit_rate::STUDY,
     gaussian_error::STUDY,

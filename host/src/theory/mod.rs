@@ -11,6 +11,8 @@
 //! | [`likelihood_ratio`] | the fastest a rule can be that knows the scene | exact |
 //! | [`cramer_rao`] | the smallest error of a pulse's position | exact |
 //! | [`exposure`] | exposures, from look to look | simulation |
+//! | [`likelihood_ratio`] | the fastest a rule can be that knows the scene | exact |
+//! | [`cramer_rao`] | the smallest error of a pulse's position | exact |
 //! | [`tune`] | settings for a wanted false event rate | all of these |
 //!
 //! Times are in bins from the start of bin 0, counts are mean photons, all in

@@ -204,7 +204,7 @@ fn results(part: &Part) -> Result<Results> {
             title: &format!("One threshold for all backgrounds, {percent} % wanted"),
             x: axis(
                 "background counts a bin at the first look",
-                Some((0.3, 6000.0)),
+                Some((0.3, 30_000.0)),
             ),
             y: axis(
                 "false events an exposure",

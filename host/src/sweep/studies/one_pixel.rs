@@ -95,7 +95,7 @@ impl FramePixel {
             &self.histogram,
             &RangeGate::full(),
             &any,
-            &DepthEstimator::CentreOfMass3,
+            &DepthEstimator::default(),
         );
         let first = self.first;
         self.first = cycle + 1;

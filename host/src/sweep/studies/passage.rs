@@ -101,16 +101,12 @@ impl Ladder {
     /// by equal factors. The first or the last if it lies beyond.
     #[must_use]
     #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
-    pub fn calibrated<'a>(
-        &self,
-        points: &(impl Iterator<Item = &'a PointTally> + Clone),
-        share: f64,
-    ) -> f64 {
-        let exposures: u64 = points.clone().map(|point| point.count("exposures")).sum();
+    pub fn calibrated(&self, points: &[&PointTally], share: f64) -> f64 {
+        let exposures: u64 = points.iter().map(|point| point.count("exposures")).sum();
         let wanted = (share * exposures as f64).ln();
         let found = |index: usize| {
             let key = self.key(index, "false");
-            let count: u64 = points.clone().map(|point| point.count(&key)).sum();
+            let count: u64 = points.iter().map(|point| point.count(&key)).sum();
             // None is less than one.
             (count as f64).max(0.5).ln()
         };
@@ -354,11 +350,11 @@ mod tests {
             tally.insert(ladder.key(index, "false"), count);
         }
         assert_eq!(ladder.key(1, "false"), "w2 3.25 false");
-        let points = [PointTally {
+        let point = PointTally {
             parameters: point([]),
             tally,
-        }];
-        let at = |share: f64| ladder.calibrated(&points.iter(), share);
+        };
+        let at = |share: f64| ladder.calibrated(&[&point], share);
         assert!((at(0.1) - 3.25).abs() < 1e-12);
         // Equal factors: 10 is halfway from 100 to 1.
         assert!((at(0.01) - 3.375).abs() < 1e-12);

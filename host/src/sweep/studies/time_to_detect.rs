@@ -10,7 +10,7 @@ use crate::simulation::Rates;
 use crate::summary::grouped;
 use crate::sweep::results::{Figure, Results, Table, Z_99};
 use crate::sweep::studies::passage::{BINS, LOOKS, Ladder, Method, Passage, count_false};
-use crate::sweep::{Part, Point, Study, Tally, point};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use crate::theory::exposure::Exposures;
 use crate::theory::likelihood_ratio::{LikelihoodRatio, signal_for_information};
 
@@ -158,12 +158,11 @@ pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
                     // What does not know the pulse has no use for its width.
                     let without = [("background", background), ("target", 0.0)];
                     let all = part.at(without);
-                    let threshold = if method == Method::Oracle {
-                        let own = all.filter(|point| point.is_at([("sigma", sigma)]));
-                        ladder.calibrated(&own, FALSE_SHARE)
-                    } else {
-                        ladder.calibrated(&all, FALSE_SHARE)
+                    let is_known = |point: &&PointTally| {
+                        method != Method::Oracle || point.is_at([("sigma", sigma)])
                     };
+                    let points: Vec<&PointTally> = all.filter(is_known).collect();
+                    let threshold = ladder.calibrated(&points, FALSE_SHARE);
                     let count = |index, what| with_target.count(&ladder.key(index, what)) as f64;
                     let of = |what| ladder.interpolated(threshold, |index| count(index, what));
                     let exposures = with_target.count("exposures") as f64;
@@ -247,19 +246,17 @@ fn results(part: &Part) -> Result<Results> {
                 });
             }
         }
-        let axis = |label, range| Axis {
-            label,
-            logarithmic: true,
-            range,
-        };
         let title = format!("Time to an event, pulse σ {sigma} bins (thin: on a bin edge)");
         let svg = line_chart(&Chart {
             title: &title,
-            x: axis("background a bin and laser cycle", Some((0.008, 0.6))),
-            y: axis(
-                "laser cycles over the likelihood ratio's",
-                Some((0.95, 4.5)),
-            ),
+            x: Axis {
+                range: Some((0.0, 0.36)),
+                ..Axis::linear("background a bin and laser cycle")
+            },
+            y: Axis {
+                range: Some((0.95, 7.0)),
+                ..Axis::logarithmic("laser cycles over the likelihood ratio's")
+            },
             series,
         })?;
         figures.push(Figure {
