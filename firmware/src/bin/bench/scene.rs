@@ -31,10 +31,6 @@ pub struct State {
     pub gated: PixelConfig<BINS>,
     /// L2 = 44, and no peak is high enough.
     pub never_fires: PixelConfig<BINS>,
-    /// Which is measured.
-    pub window: WindowRule,
-    /// Which is measured.
-    pub estimator: DepthEstimator,
     pub codes: [u16; PHOTONS as usize],
     /// The histogram as another sensor would send it.
     pub foreign: [u16; BINS],
