@@ -240,11 +240,15 @@ fn how_far_the_table_is_off_between_its_points() {
 }
 
 /// Of those places the ones with fewest photons, where many exposures take little time.
-const RARE: [(f64, u32, u32); 6] = [
+const RARE: [(f64, u32, u32); 10] = [
     (0.364, 8, 28),
+    (0.662, 3, 62),
     (0.74, 4, 18),
     (0.813, 14, 22),
+    (2.31, 40, 71),
     (2.52, 2, 17),
+    (2.97, 8, 55),
+    (6.73, 6, 39),
     (8.21, 6, 14),
     (10.6, 6, 12),
 ];
@@ -264,7 +268,7 @@ fn rare_false_events_are_not_more_than_the_upper_limit_and_its_margin() {
         }
     }
     println!("{} α", compared.len());
-    assert!(compared.len() > 40, "{}", compared.len());
+    assert!(compared.len() > 20, "{}", compared.len());
     let level = LEVEL / f64::from(u32::try_from(compared.len()).unwrap());
     for (events, found) in compared {
         let share = f64::from(events) / f64::from(EXPOSURES);
