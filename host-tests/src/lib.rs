@@ -1,7 +1,6 @@
 //! What the integer code answers to: the paper in floating point, written from
 //! the paper and not from `dtof-core`.
 
-pub mod binomial;
 pub mod reference;
 
 /// The examples of the README, compiled and run.

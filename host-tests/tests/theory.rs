@@ -4,13 +4,13 @@
 //! a test is divided by the comparisons it makes: one run in a thousand may fail
 //! for another seed.
 
+use dtof::theory::binomial::plausible;
 use dtof::theory::exposure::trial_rng;
 use dtof::theory::gaussian::{self, MeanCounts};
 use dtof::theory::known_background;
 use dtof::theory::rates::{bin_share, peak_share, signal_for_snr};
 use dtof::theory::single_look::SingleLook;
 use dtof_core::{Count, DepthEstimator, Histogram, PaperRule, RangeGate, detect};
-use dtof_host_tests::binomial::plausible;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
 

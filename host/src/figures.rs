@@ -54,8 +54,12 @@ pub fn documents(
         let mut part = few;
         part.add(&rest)
             .with_context(|| format!("{}: the kept rest", study.name))?;
+        let all_seeds = SeedRange {
+            first: 0,
+            end: study.all_seeds,
+        };
         ensure!(
-            part.seed_count() == study.all_seeds,
+            part.seeds() == [all_seeds],
             "{}: the kept rest is not of the seeds {}..{}",
             study.name,
             study.few_seeds,

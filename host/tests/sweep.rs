@@ -130,6 +130,14 @@ fn what_does_not_add_up_is_refused() {
         scratch.file(name, text);
         scratch.refused(&merge(&["part", name]), &[name, reason]);
     }
+    // Nor is one taken alone that is of no study, or not of its points.
+    for (name, reason) in [
+        ("study", "no study `other`"),
+        ("revision", "revision 3"),
+        ("points", "not the same points"),
+    ] {
+        scratch.refused(&merge(&[name]), &[name, reason]);
+    }
     assert!(!scratch.path("sum").exists());
 }
 

@@ -140,7 +140,7 @@ fn what_cannot_be_met_is_refused_in_one_line() {
     );
     refused(
         "--background 1 --signal 1 --sigma-bins 0.8",
-        &["fills the 10-bit counters", "--l2 860"],
+        &["fills the 10-bit counters", "lower --l2 to 860"],
     );
     refused(
         "--background 1e300 --signal 1 --sigma-bins 0.8",
@@ -150,6 +150,18 @@ fn what_cannot_be_met_is_refused_in_one_line() {
         "--background 0.05 --signal 1e12 --sigma-bins 0.8",
         &["fills a 10-bit counter within a laser cycle"],
     );
+    // However large, in one short line, and without advice that does not help.
+    for line in [
+        "--background 1e308 --signal 1 --sigma-bins 0.8",
+        "--background 0.05 --signal 1e308 --sigma-bins 0.8",
+        "--background 0.05 --signal 1 --sigma-bins 1e308",
+        "--background 0.05 --signal 1 --sigma-ps 1e308 --bin-width-ps 1e-300",
+    ] {
+        let output = tune(line);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success(), "{line}");
+        assert!(error.len() < 160 && !error.contains("--l2"), "{error}");
+    }
     // One photon and an empty background: no α helps.
     refused(
         "--background 0.01 --signal 1 --sigma-bins 0.8 --min-count 1 --l1 8 --false-per-exposure 1e-9",

@@ -103,7 +103,8 @@ impl Tune {
         };
         ensure!(
             sigma <= f64::from(self.bins) / 4.0,
-            "a pulse of σ = {sigma} bins does not fit {} bins",
+            "a pulse of σ = {} bins does not fit {} bins",
+            number(sigma),
             self.bins
         );
         let wanted = match (self.false_per_second, self.laser_hz) {

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use tempfile::NamedTempFile;
 
+use super::studies::named;
 use super::{Point, Study, Tally};
 
 /// Seeds `first` to `end - 1`.
@@ -126,7 +127,8 @@ impl Part {
     /// Adds another part of the same study.
     ///
     /// # Errors
-    /// If it is of another study or revision, or shares a seed.
+    /// If it is of another study, revision or grid, shares a seed, or a count would not
+    /// fit. This part is then as it was.
     pub fn add(&mut self, other: &Self) -> Result<()> {
         ensure!(
             (&self.study, self.revision) == (&other.study, other.revision),
@@ -143,12 +145,15 @@ impl Part {
                 .zip(&other.points)
                 .all(|(a, b)| a.parameters == b.parameters);
         ensure!(same, "{}: not the same points", self.study);
+        // Aside, so that an error leaves this part as it was.
+        let mut sum = self.clone();
         for &range in &other.seeds {
-            self.add_range(range)?;
+            sum.add_range(range)?;
         }
-        for (point, other) in self.points.iter_mut().zip(&other.points) {
+        for (point, other) in sum.points.iter_mut().zip(&other.points) {
             add(&mut point.tally, &other.tally)?;
         }
+        *self = sum;
         Ok(())
     }
 
@@ -243,16 +248,49 @@ fn add(sum: &mut Tally, more: &Tally) -> Result<()> {
     Ok(())
 }
 
-/// The sum of all parts at `paths`.
+/// The sum of all parts at `paths`, of a study and grid of this program.
 ///
 /// # Errors
 /// The part that does not fit, and why.
 pub fn merge<P: AsRef<Path>>(paths: &[P]) -> Result<Part> {
-    let mut paths = paths.iter().map(AsRef::as_ref);
-    let mut sum = Part::load(paths.next().context("no parts")?)?;
-    for path in paths {
+    let mut sum: Option<Part> = None;
+    for path in paths.iter().map(AsRef::as_ref) {
+        let name = || path.display().to_string();
         let part = Part::load(path)?;
-        sum.add(&part).with_context(|| path.display().to_string())?;
+        let sum = match &mut sum {
+            Some(sum) => sum,
+            none => none.insert(Part::empty(named(&part.study).with_context(name)?)),
+        };
+        sum.add(&part).with_context(name)?;
     }
-    Ok(sum)
+    sum.context("no parts")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sweep::studies::hit_rate;
+    use crate::sweep::tally;
+
+    fn part(seed: u64, count: u64) -> Part {
+        let mut part = Part::empty(&hit_rate::STUDY);
+        let tallies = vec![tally([("trials", count)]); part.points.len()];
+        part.add_seed(seed, tallies).unwrap();
+        part
+    }
+
+    #[test]
+    fn what_does_not_add_leaves_a_part_as_it_was() {
+        let mut sum = part(3, 1);
+        let before = sum.clone();
+        // Its first seed is new, its second is not; the other's counts do not fit.
+        let mut shares = part(1, 1);
+        shares.add(&part(3, 1)).unwrap();
+        for bad in [shares, part(4, u64::MAX)] {
+            assert!(sum.add(&bad).is_err());
+            assert_eq!(sum, before);
+        }
+        sum.add(&part(4, 1)).unwrap();
+        assert_eq!(sum.seed_count(), 2);
+    }
 }

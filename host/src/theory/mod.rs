@@ -10,6 +10,7 @@
 //! | [`table`] | what lies between the bounds | simulation |
 //! | [`likelihood_ratio`] | the fastest a rule can be that knows the scene | exact |
 //! | [`cramer_rao`] | the smallest error of a pulse's position | exact |
+//! | [`binomial`] | intervals of a probability, from counts | exact |
 //! | [`exposure`] | exposures, from look to look | simulation |
 //! | [`likelihood_ratio`] | the fastest a rule can be that knows the scene | exact |
 //! | [`cramer_rao`] | the smallest error of a pulse's position | exact |
@@ -19,6 +20,7 @@
 //! `f64`. Nothing here is checked for sense: rates are finite and not negative,
 //! probabilities lie strictly between 0 and 1 where an inverse is taken of them.
 
+pub mod binomial;
 pub mod cramer_rao;
 pub mod exposure;
 pub mod gaussian;

@@ -62,8 +62,8 @@ pub struct Bounds {
     /// At most: the probabilities of its looks added up, at most 1.
     pub sum: f64,
     /// `H`: −ln of the probability of no false event, were the looks
-    /// independent. What is found is a share of this: see
-    /// [`table`](super::table).
+    /// independent. Looks share photons, so the simulated intensity is lower:
+    /// [`table`](super::table) has its ratio to this.
     pub independent: f64,
 }
 

@@ -2,8 +2,8 @@
 //!
 //! Were the looks of an exposure independent, a false event would have the
 //! intensity `H = Σ −ln(1 − p_k)` over the exact single-look probabilities, and
-//! the probability `1 − exp(−H)`. As they share photons, the intensity found is
-//! a share of that. The share varies slowly, where the probability itself goes
+//! the probability `1 − exp(−H)`. As they share photons, the simulated intensity is
+//! lower. Its ratio to `H`, here the share, varies slowly, where the probability itself goes
 //! over orders of magnitude and in steps (α meets an integer root): so the
 //! share is what is interpolated, over the logarithms of the mean background at
 //! the first look, of the first look, and of last over first look. Between two
@@ -19,6 +19,7 @@ use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, Threshold};
 use rayon::prelude::*;
 
+use super::binomial;
 use super::exposure::trial_rng;
 use super::repeated_looks::{
     ALPHA_STEPS, BINS, FalseEvents, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
@@ -41,9 +42,11 @@ const LAST: u32 = 1700;
 const HIGHEST_MEAN: f64 = 1700.0;
 /// Fewer events say too little of their probability.
 const FEWEST_EVENTS: u64 = 20;
-/// Between its points a probability of the table may be too low by this factor,
+/// Between its points an upper limit of the table may be too low by this factor,
 /// no more (`host-tests/tests/theory_exposures.rs`).
 pub const MARGIN: f64 = 1.25;
+/// Above the upper limit of a simulated probability lie as many of its samples.
+const UPPER_TAIL: f64 = 0.01;
 /// Exposures of one trial.
 const TRIAL: u32 = 500;
 
@@ -81,6 +84,16 @@ pub fn points() -> Vec<Point> {
         }
     }
     points
+}
+
+/// The grid in words: what a table says it was made for.
+fn grid() -> String {
+    let alphas: Vec<u16> = (0..ALPHA_STEPS).map(alpha_bits).collect();
+    format!(
+        "# grid first_mean {FIRST_MEANS:?} first_look {FIRSTS:?} span {SPANS:?} \
+         last_look up to {LAST} last_mean up to {HIGHEST_MEAN} alpha_256 {alphas:?} \
+         events from {FEWEST_EVENTS}"
+    )
 }
 
 /// Simulates one point, in trials numbered from `first_trial`.
@@ -140,8 +153,9 @@ pub fn csv(tallies: &[(Point, FalseEvents)]) -> Result<String> {
     let (_, first) = tallies.first().context("no points")?;
     let mut text = format!(
         "# False events of repeated looks: {BINS} bins, minimum count {MINIMUM_COUNT}, \
-         made by: dtof figures\n# exposures {}\n\
+         made by: dtof figures\n{}\n# exposures {}\n\
          first_mean,first_look,last_look,alpha_256,events,independent_intensity\n",
+        grid(),
         first.exposures
     );
     let of_points: Vec<Vec<Row>> = tallies
@@ -161,8 +175,11 @@ pub fn csv(tallies: &[(Point, FalseEvents)]) -> Result<String> {
 /// The table that is kept.
 const KEPT: &str = include_str!("../../../docs/figures/data/repeated_looks.csv");
 
-/// ln H and ln of the share of it that was found, ascending in H.
+/// ln H and ln of its share, ascending in H.
 type Shares = Vec<(f64, f64)>;
+
+/// Shares by mean, first look and span; empty where nothing was simulated.
+type Grid = Vec<[[Shares; SPANS.len()]; FIRSTS.len()]>;
 
 /// The table, ready to be asked.
 #[derive(Clone, Debug)]
@@ -171,20 +188,27 @@ pub struct Table {
     pub exposures: u64,
     /// Its rows.
     pub rows: Vec<Row>,
-    /// By mean, first look and span; empty where nothing was simulated.
-    shares: Vec<[[Shares; SPANS.len()]; FIRSTS.len()]>,
+    /// The shares that were seen.
+    shares: Grid,
+    /// Upper 99 % limits of those.
+    upper: Grid,
 }
 
 impl Table {
     /// The table in `repeated_looks.csv`.
     ///
     /// # Errors
-    /// If the file is damaged.
+    /// If the file is damaged, or was made for another grid.
     pub fn kept() -> Result<Self> {
         Self::read(KEPT)
     }
 
     fn read(text: &str) -> Result<Self> {
+        ensure!(
+            text.lines().any(|line| line == grid()),
+            "repeated_looks.csv is of another grid than this program's: make it anew with \
+             `cargo xtask figures --all`"
+        );
         let header = |name: &str| {
             let mut lines = text.lines();
             let value = lines.find_map(|line| line.strip_prefix("# ")?.strip_prefix(name));
@@ -198,6 +222,7 @@ impl Table {
             exposures: header("exposures")?,
             rows: Vec::new(),
             shares: vec![Default::default(); FIRST_MEANS.len()],
+            upper: vec![Default::default(); FIRST_MEANS.len()],
         };
         for line in text.lines().filter(|line| !line.starts_with('#')).skip(1) {
             let row = read_row(line).with_context(|| format!("row {line:?}"))?;
@@ -214,17 +239,26 @@ impl Table {
         let [Some(mean), Some(first), Some(span)] = [mean, first, span] else {
             anyhow::bail!("not a point of the grid");
         };
+        let is_alpha = (0..ALPHA_STEPS).any(|step| alpha_bits(step) == row.alpha);
+        ensure!(
+            is_alpha && row.last <= LAST && row.first_mean * f64::from(SPANS[span]) <= HIGHEST_MEAN,
+            "not a point of the grid"
+        );
         ensure!(
             row.events < self.exposures && row.intensity > 0.0,
             "not a probability"
         );
-        let found = -(-(row.events as f64) / self.exposures as f64).ln_1p();
-        let shares = &mut self.shares[mean][first][span];
-        // Higher α, lower intensity: from the back. Two α with the same
-        // thresholds have the same.
+        let share = row.events as f64 / self.exposures as f64;
+        let (_, most) = binomial::interval(row.events, self.exposures, UPPER_TAIL);
         let independent = row.intensity.ln();
-        if shares.first().is_none_or(|known| independent < known.0) {
-            shares.insert(0, (independent, (found / row.intensity).ln()));
+        for (grid, probability) in [(&mut self.shares, share), (&mut self.upper, most)] {
+            let shares = &mut grid[mean][first][span];
+            // Higher α, lower intensity: from the back. Two α with the same
+            // thresholds have the same.
+            if shares.first().is_none_or(|known| independent < known.0) {
+                let found = -(-probability).ln_1p();
+                shares.insert(0, (independent, (found / row.intensity).ln()));
+            }
         }
         self.rows.push(row);
         Ok(())
@@ -246,21 +280,25 @@ impl Table {
         let (first, first_part) = place(&FIRSTS.map(f64::from), first.into())?;
         let (span, span_part) = place(&SPANS.map(f64::from), span)?;
         let independent = independent.ln();
-        let mut sum = 0.0;
+        let [mut sum, mut upper] = [0.0; 2];
         let mut seen = true;
         for corner in 0..8 {
             let [a, b, c] = [corner & 1, corner >> 1 & 1, corner >> 2];
             let part = |upper: usize, part: f64| if upper == 1 { part } else { 1.0 - part };
             let weight = part(a, mean_part) * part(b, first_part) * part(c, span_part);
             if weight > 0.0 {
-                let shares = &self.shares[mean + a][first + b][span + c];
-                let (found, within) = at(shares, independent)?;
+                let of = |grid: &Grid| at(&grid[mean + a][first + b][span + c], independent);
+                let (found, within) = of(&self.shares)?;
+                let (most, _) = of(&self.upper)?;
                 sum += weight * found;
+                upper += weight * most;
                 seen &= within;
             }
         }
+        let probability = |intensity: f64| -(-intensity.exp()).exp_m1();
         Some(Found {
-            probability: -(-sum.exp()).exp_m1(),
+            probability: probability(sum),
+            at_most: probability(upper),
             seen,
         })
     }
@@ -271,6 +309,8 @@ impl Table {
 pub struct Found {
     /// That of a false event in an exposure.
     pub probability: f64,
+    /// The same from the upper 99 % limits of what was seen at the points around it.
+    pub at_most: f64,
     /// Whether events of that kind were seen. If not, it is at most
     /// `probability`, the least the table saw.
     pub seen: bool,
@@ -323,3 +363,6 @@ fn at(shares: &Shares, independent: f64) -> Option<(f64, bool)> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

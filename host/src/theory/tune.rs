@@ -2,8 +2,8 @@
 //! them.
 //!
 //! α is the smallest whose probability of a false event in an exposure is not
-//! above the wanted one. That probability comes from the simulated [`Table`],
-//! and has to be below by the table's [`MARGIN`]; where the table saw no events,
+//! above the wanted one. That probability comes from the simulated [`Table`]; its
+//! upper limit has to be below by the table's [`MARGIN`]; where the table saw no events,
 //! or was not made for the settings, from the sum over looks of the exact
 //! single-look probability, which it cannot exceed. Of all L1 the one with the shortest mean
 //! time to an event is taken, found by simulating exposures.
@@ -157,7 +157,7 @@ pub fn tune(request: &Request, table: &Table) -> Result<Tuned> {
             continue;
         };
         reached = true;
-        let detections = detections(request, &tuned, EXPOSURES.0)?;
+        let detections = detections(request, &tuned, 0, EXPOSURES.0)?;
         let time = cycles_to_event(&detections);
         if detections.near > 0 && best.is_none_or(|best| time < best.cycles_to_event()) {
             best = Some(Tuned {
@@ -172,7 +172,8 @@ pub fn tune(request: &Request, table: &Table) -> Result<Tuned> {
          or --l1"
     );
     if let Some(best) = &mut best {
-        best.detections = detections(request, best, EXPOSURES.1)?;
+        // Other photons than those it was chosen by, which flatter it.
+        best.detections = detections(request, best, POSITIONS, EXPOSURES.1)?;
     }
     #[allow(clippy::cast_precision_loss)]
     let detected = |tuned: &Tuned| tuned.detections.near as f64 / tuned.detections.exposures as f64;
@@ -221,16 +222,24 @@ fn check(request: &Request) -> Result<()> {
     let mean = (background * last).min(5000.0);
     let full = Poisson::new(mean).highest_at_least(Count10::MAX, bins.into());
     if full > MOST_SATURATED {
+        // A mean of 860 at the last look leaves them room.
+        let fits = (860.0 / background).floor();
+        let least = request.l1.map_or(2.0 * f64::from(x), f64::from);
+        let way_out = if fits > least {
+            format!("lower --l2 to {fits}")
+        } else {
+            "lower --l1, --x or the background".to_owned()
+        };
         bail!(
-            "a background of {background} photons a bin fills the 10-bit counters before L2 = {l2}: \
-             with --l2 {:.0} it would not",
-            (860.0 / background).floor()
+            "a background of {} photons a bin fills the 10-bit counters before L2 = {l2}: {way_out}",
+            short(background)
         );
     }
     let signal = request.signal;
     ensure!(
         signal <= f64::from(Count10::MAX),
-        "a signal of {signal} photons fills a 10-bit counter within a laser cycle"
+        "a signal of {} photons fills a 10-bit counter within a laser cycle",
+        short(signal)
     );
     let (Wanted::PerExposure(wanted) | Wanted::PerCycle(wanted)) = request.wanted;
     ensure!(
@@ -238,6 +247,15 @@ fn check(request: &Request) -> Result<()> {
         "the wanted false events must be more than 0 and less than 1 an exposure or laser cycle"
     );
     Ok(())
+}
+
+/// A number of any size in a few characters.
+fn short(value: f64) -> String {
+    if (1e-4..1e6).contains(&value) {
+        format!("{value}")
+    } else {
+        format!("{value:.3e}")
+    }
 }
 
 /// The L1 to compare: the one given, or from X on, each half as much again.
@@ -284,18 +302,19 @@ fn calibrated(
                 } else {
                     Source::TableAtMost
                 };
-                let probability = found.probability.max(bounds.worst_look);
-                (probability, source, bounds)
+                let [probability, at_most] =
+                    [found.probability, found.at_most].map(|found| found.max(bounds.worst_look));
+                (probability, at_most, source, bounds)
             }
-            _ => (bounds.sum, Source::Bound, bounds),
+            _ => (bounds.sum, bounds.sum, Source::Bound, bounds),
         }
     };
     let kept = |alpha: u16| {
-        let (probability, source, bounds) = probability(alpha);
+        let (probability, at_most, source, bounds) = probability(alpha);
         let most = match source {
             Source::Bound => probability,
             // Whatever the table is off by, not above the bound.
-            Source::Table | Source::TableAtMost => (probability * MARGIN).min(bounds.sum),
+            Source::Table | Source::TableAtMost => (at_most * MARGIN).min(bounds.sum),
         };
         most <= wanted
     };
@@ -311,7 +330,7 @@ fn calibrated(
             low = middle + 1;
         }
     }
-    let (false_events, source, bounds) = probability(high);
+    let (false_events, _, source, bounds) = probability(high);
     Some(Tuned {
         alpha: U8F8::from_bits(high),
         l1,
@@ -324,8 +343,13 @@ fn calibrated(
     })
 }
 
-/// Exposures with the target, at all places within a bin.
-fn detections(request: &Request, tuned: &Tuned, exposures: u32) -> Result<Detections> {
+/// Exposures with the target, at all places within a bin: trials `first_trial` on.
+fn detections(
+    request: &Request,
+    tuned: &Tuned,
+    first_trial: u16,
+    exposures: u32,
+) -> Result<Detections> {
     let trial = match request.bins {
         8 => Detections::trial::<8>,
         16 => Detections::trial::<16>,
@@ -348,7 +372,8 @@ fn detections(request: &Request, tuned: &Tuned, exposures: u32) -> Result<Detect
                 position: bin + (f64::from(place) + 0.5) / f64::from(POSITIONS),
                 sigma: request.sigma,
             };
-            trial(request.seed, place, &rates, tuned.looks, &rule, exposures)
+            let number = first_trial + place;
+            trial(request.seed, number, &rates, tuned.looks, &rule, exposures)
         })
         .collect::<Result<_>>()?;
     let mut sum = Detections::default();

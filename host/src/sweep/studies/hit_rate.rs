@@ -188,8 +188,8 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
             } else {
                 Verdict::Refuted
             },
-            why: "counts are Poisson; a Gaussian with variance = mean has too much weight below \
-                  for few photons",
+            why: "counts are Poisson; with few photons a Gaussian of the same variance gives low \
+                  counts, even negative ones, too high a probability",
         },
         Claim {
             claim: "Eq. 7 with Poisson counts instead of Gaussian ones",

@@ -18,7 +18,7 @@ use dtof_core::{
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
 
-use self::setting::{Setting, ends, error, false_share, percent};
+use self::setting::{NOTHING, Setting, error, false_share};
 use crate::chart::{self, Axis, Chart, Series, Style, line_chart};
 use crate::simulation::MM_PER_PS;
 use crate::summary::grouped;
@@ -128,27 +128,14 @@ fn results(part: &Part) -> Result<Results> {
         let texts = Setting::all(part).map(|setting| setting.text(of));
         texts.join("; ")
     };
-    // In every setting, in none, or in some.
-    let verdict = |holds: fn(Setting) -> bool| match Setting::all(part)
-        .into_iter()
-        .filter(|&setting| holds(setting))
-        .count()
-    {
-        0 => Verdict::Refuted,
-        SETTINGS_LEN => Verdict::Agrees,
-        _ => Verdict::Differs,
-    };
-    let range_of_errors = |setting: Setting| {
-        let (low, high) = ends(setting.shares(4, 40, error).iter().map(|share| share.value));
-        format!("{high:.3} to {low:.3} bins")
-    };
+    let verdict = |holds: fn(Setting) -> Option<bool>| in_all(Setting::all(part).map(holds));
     let claims = vec![
         Claim {
             claim: "the false positive rate does not depend on the SNR (III-C, Eq. 10)",
             paper: "figure",
             here: format!(
-                "share of events that are false over A/B = 1 to 20, α = 4, L1 = 20: {}",
-                settings(|setting| percent(setting.false_range(4, 20)))
+                "share of events that are false, α = 4, L1 = 20: {}",
+                settings(|setting| setting.list(4, 20, percent))
             ),
             verdict: verdict(|setting| setting.false_events_ignore_snr()),
             why: "Eq. 10 is the rate of a look at background; of the events of a board fewer are false \
@@ -158,8 +145,8 @@ fn results(part: &Part) -> Result<Results> {
             claim: "RMSE falls with the SNR for L1 above 20 (III-C)",
             paper: "figure",
             here: format!(
-                "α = 4, L1 = 40, A/B = 1 to 20: {}",
-                settings(range_of_errors)
+                "RMSE in bins, α = 4, L1 = 40: {}",
+                settings(|setting| setting.list(4, 40, bins))
             ),
             verdict: verdict(|setting| setting.error_falls_with_snr()),
             why: "down to what the three bins of the centre of mass leave: with the pulse on an edge \
@@ -170,10 +157,12 @@ fn results(part: &Part) -> Result<Results> {
             paper: "none",
             here: format!(
                 "greatest factor between α = 2 and 8 at one SNR, L1 = 40 and 80: {}",
-                settings(|setting| format!("{:.2}", setting.error_by_alpha()))
+                settings(|setting| setting
+                    .error_by_alpha()
+                    .map_or(NOTHING.to_owned(), |factor| format!("{factor:.2}")))
             ),
             // To a tenth.
-            verdict: verdict(|setting| setting.error_by_alpha() <= 1.1),
+            verdict: verdict(|setting| setting.error_by_alpha().map(|factor| factor <= 1.1)),
             why: "a larger α waits for more photons and lets fewer false events through, both of which \
                   lower the error where signal is scarce",
         },
@@ -181,10 +170,14 @@ fn results(part: &Part) -> Result<Results> {
             claim: "larger L1 brings little beyond 40 (III-C)",
             paper: "figure",
             here: format!(
-                "mean RMSE over SNR in bins at L1 = 10, 20, 40, 80, α = 4: {}",
-                settings(|setting| {
-                    let errors = [10, 20, 40, 80].map(|l1| setting.mean_at(l1, error));
-                    errors.map(|error| format!("{error:.3}")).join(", ")
+                "mean RMSE in bins at L1 = 10, 20, 40, 80 over the SNRs that have enough events at each, \
+                 α = 4: {}",
+                settings(|setting| match setting.mean_errors([10, 20, 40, 80]) {
+                    None => NOTHING.to_owned(),
+                    Some((errors, snrs)) => {
+                        let errors = errors.map(|error| format!("{error:.3}"));
+                        format!("{} ({snrs} SNRs)", errors.join(", "))
+                    }
                 })
             ),
             verdict: verdict(|setting| setting.little_gain_beyond_40()),
@@ -195,28 +188,14 @@ fn results(part: &Part) -> Result<Results> {
             claim: "α = 4 with L1 = 20 gives below 0.1 % false events (III-C)",
             paper: "< 0.1 %",
             here: format!(
-                "events outside ±0.5 bin at A/B = 1, 2, 5, 10, 20: {}",
-                settings(|setting| {
-                    let shares = setting.shares(4, 20, false_share);
-                    let percent = |share: &Share| format!("{:.2}", share.value * 100.0);
-                    format!(
-                        "{} %",
-                        shares.iter().map(percent).collect::<Vec<_>>().join(", ")
-                    )
-                })
+                "events outside ±0.5 bin: {}",
+                settings(|setting| setting.list(4, 20, percent))
             ),
             // At every SNR of every setting, at none of any, or at some.
-            verdict: {
-                let shares = Setting::all(part)
-                    .into_iter()
-                    .flat_map(|setting| setting.shares(4, 20, false_share).into_iter());
-                let below: Vec<bool> = shares.map(|share| share.value < 0.001).collect();
-                match below.iter().filter(|&&below| below).count() {
-                    0 => Verdict::Refuted,
-                    all if all == below.len() => Verdict::Agrees,
-                    _ => Verdict::Differs,
-                }
-            },
+            verdict: in_all(Setting::all(part).into_iter().flat_map(|setting| {
+                let shares = setting.shares(4, 20, false_share).into_iter();
+                shares.map(below_a_thousandth)
+            })),
             why: "at B = 0.05 a quadrant of two bins often holds nothing at L1 = 20, and then any peak passes; at B = 1.5 it takes a signal well above the background",
         },
     ];
@@ -227,7 +206,41 @@ fn results(part: &Part) -> Result<Results> {
     })
 }
 
-const SETTINGS_LEN: usize = SETTINGS.len();
+fn percent(point: &PointTally) -> String {
+    format!("{:.3} %", false_share(point).value * 100.0)
+}
+
+fn bins(point: &PointTally) -> String {
+    format!("{:.3}", error(point).value)
+}
+
+/// Whether a claim holds everywhere, nowhere, or in some places; what could not be told
+/// (`None`) leaves it open, unless places that could be told differ.
+fn in_all(holds: impl IntoIterator<Item = Option<bool>>) -> Verdict {
+    let [mut open, mut held, mut failed] = [false; 3];
+    for holds in holds {
+        match holds {
+            None => open = true,
+            Some(true) => held = true,
+            Some(false) => failed = true,
+        }
+    }
+    match (held, failed) {
+        (true, true) => Verdict::Differs,
+        (true, false) if !open => Verdict::Agrees,
+        (false, true) if !open => Verdict::Refuted,
+        _ => Verdict::NotDecided,
+    }
+}
+
+/// Whether the whole interval lies below 0.1 %, or above; `None` if it holds it.
+fn below_a_thousandth(share: Share) -> Option<bool> {
+    if share.holds(0.001) {
+        None
+    } else {
+        Some(share.value < 0.001)
+    }
+}
 
 fn figures(setting: Setting) -> Result<Vec<Figure>> {
     let pixels = setting.part.seed_count();
@@ -328,5 +341,21 @@ fn metres(bins: Share) -> Share {
             bins.interval.0 * METRES_A_BIN,
             bins.interval.1 * METRES_A_BIN,
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_not_seen_is_no_pass() {
+        assert_eq!(in_all([]), Verdict::NotDecided);
+        assert_eq!(in_all([Some(true), None]), Verdict::NotDecided);
+        assert_eq!(in_all([Some(true), Some(true)]), Verdict::Agrees);
+        assert_eq!(in_all([Some(false), Some(false)]), Verdict::Refuted);
+        assert_eq!(in_all([Some(true), None, Some(false)]), Verdict::Differs);
+        assert_eq!(below_a_thousandth(Share::new(0, 50)), None);
+        assert_eq!(below_a_thousandth(Share::new(0, 50_000)), Some(true));
     }
 }

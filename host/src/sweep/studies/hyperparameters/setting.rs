@@ -39,7 +39,7 @@ impl<'a> Setting<'a> {
     }
 
     /// The points of an α and L1, by SNR. Those with fewer than 50 events say
-    /// nothing.
+    /// nothing, so that there may be fewer than SNRs, or none.
     pub fn by_snr(self, alpha: u16, l1: u16) -> Vec<&'a PointTally> {
         let points = self.part.at([
             ("background", self.background),
@@ -55,66 +55,89 @@ impl<'a> Setting<'a> {
     }
 
     /// Whether the false events are as many at every SNR, to a factor of 2 or the
-    /// intervals.
-    pub fn false_events_ignore_snr(self) -> bool {
+    /// intervals. `None` with fewer than two points to compare.
+    pub fn false_events_ignore_snr(self) -> Option<bool> {
         let shares = self.shares(4, 20, false_share);
-        shares.iter().all(|a| {
+        let ignore = shares.iter().all(|a| {
             let alike = |b: &Share| a.value <= 2.0 * b.value || a.interval.0 <= b.interval.1;
             shares.iter().all(alike)
-        })
+        });
+        (shares.len() > 1).then_some(ignore)
     }
 
     /// Whether the error at the highest SNR lies below that at the lowest, intervals
-    /// included, and it never rises by more than a twentieth, for L1 above 20.
-    pub fn error_falls_with_snr(self) -> bool {
-        [40, 80].into_iter().all(|l1| {
+    /// included, and it never rises by more than a twentieth, for L1 above 20. `None`
+    /// with fewer than two points of an L1.
+    pub fn error_falls_with_snr(self) -> Option<bool> {
+        let mut falls = true;
+        for l1 in [40, 80] {
             let errors = self.shares(4, l1, error);
+            let [first, .., last] = errors[..] else {
+                return None;
+            };
             let no_rise = |pair: &[Share]| pair[1].value <= 1.05 * pair[0].value;
-            let ends = errors.first().zip(errors.last());
-            ends.is_some_and(|(first, last)| last.interval.1 < first.interval.0)
-                && errors.windows(2).all(no_rise)
-        })
+            falls &= last.interval.1 < first.interval.0 && errors.windows(2).all(no_rise);
+        }
+        Some(falls)
     }
 
     /// The greatest factor between the errors of two α, for L1 above 20 at one SNR.
-    pub fn error_by_alpha(self) -> f64 {
-        let mut factor = 1f64;
+    /// `None` if no two can be compared.
+    pub fn error_by_alpha(self) -> Option<f64> {
+        let mut factor: Option<f64> = None;
         for l1 in [40, 80] {
             for snr in SNRS {
                 let at = ALPHAS.into_iter().flat_map(|alpha| self.by_snr(alpha, l1));
-                let errors = at
+                let errors: Vec<f64> = at
                     .filter(|point| point.is_at([("snr", snr)]))
-                    .map(|point| error(point).value);
-                let (low, high) = ends(errors);
-                if low > 0.0 && high > 0.0 {
-                    factor = factor.max(high / low);
+                    .map(|point| error(point).value)
+                    .collect();
+                if let (2.., Some((low, high))) = (errors.len(), ends(errors)) {
+                    let here = high / low;
+                    factor = Some(factor.map_or(here, |before| before.max(here)));
                 }
             }
         }
         factor
     }
 
-    /// The error and the false events at an L1, averaged over SNR, α = 4.
+    /// The errors at several L1, averaged over the SNRs that have one at each of them,
+    /// α = 4, and how many SNRs those are. `None` without one.
     #[allow(clippy::cast_precision_loss, reason = "five")]
-    pub fn mean_at(self, l1: u16, of: fn(&PointTally) -> Share) -> f64 {
-        let shares = self.shares(4, l1, of);
-        shares.iter().map(|share| share.value).sum::<f64>() / shares.len() as f64
+    pub fn mean_errors<const N: usize>(self, l1s: [u16; N]) -> Option<([f64; N], usize)> {
+        let by_l1 = l1s.map(|l1| self.by_snr(4, l1));
+        let at = |points: &[&PointTally], snr| {
+            let mut points = points.iter();
+            let found = points.find(|point| point.is_at([("snr", snr)]));
+            found.map(|point| error(point).value)
+        };
+        let is_common = |&snr: &f64| by_l1.iter().all(|points| at(points, snr).is_some());
+        let common: Vec<f64> = SNRS.into_iter().filter(is_common).collect();
+        let mean = |points: Vec<&PointTally>| {
+            let errors = common.iter().filter_map(|&snr| at(&points, snr));
+            errors.sum::<f64>() / common.len() as f64
+        };
+        (!common.is_empty()).then(|| (by_l1.map(mean), common.len()))
     }
 
     /// Whether from L1 = 40 to 80 the error falls by less than from 20 to 40 and by
     /// less than a tenth.
-    pub fn little_gain_beyond_40(self) -> bool {
-        let [at_20, at_40, at_80] = [20, 40, 80].map(|l1| self.mean_at(l1, error));
-        at_40 - at_80 < (at_20 - at_40).max(0.1 * at_40) && at_80 > 0.9 * at_40
+    pub fn little_gain_beyond_40(self) -> Option<bool> {
+        let ([at_20, at_40, at_80], _) = self.mean_errors([20, 40, 80])?;
+        Some(at_40 - at_80 < (at_20 - at_40).max(0.1 * at_40) && at_80 > 0.9 * at_40)
     }
 
-    /// The share of false events over SNR, lowest and highest, at an α and L1.
-    pub fn false_range(self, alpha: u16, l1: u16) -> (f64, f64) {
-        ends(
-            self.shares(alpha, l1, false_share)
-                .iter()
-                .map(|share| share.value),
-        )
+    /// What `of` gives for every point of an α and L1, each after its SNR.
+    pub fn list(self, alpha: u16, l1: u16, of: fn(&PointTally) -> String) -> String {
+        let points = self.by_snr(alpha, l1).into_iter();
+        let texts: Vec<String> = points
+            .map(|point| format!("{} at A/B = {}", of(point), point.parameter("snr")))
+            .collect();
+        if texts.is_empty() {
+            NOTHING.to_owned()
+        } else {
+            texts.join(", ")
+        }
     }
 
     /// What `of` gives, after the setting.
@@ -123,13 +146,13 @@ impl<'a> Setting<'a> {
     }
 }
 
-/// The lowest and the highest.
-pub fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, 0.0), |(low, high), value| {
-        (value.min(low), value.max(high))
+/// The lowest and the highest, if there is one.
+fn ends(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+    values.into_iter().fold(None, |ends, value| {
+        let (low, high) = ends.unwrap_or((value, value));
+        Some((low.min(value), high.max(value)))
     })
 }
 
-pub fn percent((low, high): (f64, f64)) -> String {
-    format!("{:.3} to {:.3} %", low * 100.0, high * 100.0)
-}
+/// Where no point has enough events.
+pub const NOTHING: &str = "fewer than 50 events";

@@ -1,0 +1,53 @@
+//! The kept table against the grid.
+
+use super::*;
+
+#[test]
+fn the_kept_table_is_of_this_grid() {
+    let table = Table::kept().unwrap();
+    // Every point has rows.
+    for point in points() {
+        let of_point = |row: &&Row| (row.first_mean, row.first) == (point.first_mean, point.first);
+        assert!(table.rows.iter().any(|row| of_point(&row)), "{point:?}");
+    }
+    // In the order of the grid, none twice.
+    let place = |row: &Row| (row.first_mean, row.first, row.last, row.alpha);
+    assert!(
+        table
+            .rows
+            .windows(2)
+            .all(|pair| place(&pair[0]) < place(&pair[1]))
+    );
+}
+
+#[test]
+fn another_grid_is_refused_in_one_line() {
+    let another = KEPT.replace("[2, 5, 11,", "[2, 6, 11,");
+    let error = Table::read(&another).unwrap_err().to_string();
+    assert!(
+        error.contains("another grid") && !error.contains('\n'),
+        "{error}"
+    );
+    let row = KEPT.lines().last().unwrap();
+    let with = |row: &str| format!("{KEPT}{row}\n");
+    let fields: Vec<&str> = row.split(',').collect();
+    for (field, value) in [(0, "7"), (1, "3"), (2, "100"), (3, "300")] {
+        let mut bad = fields.clone();
+        bad[field] = value;
+        let error = Table::read(&with(&bad.join(","))).unwrap_err();
+        assert!(
+            format!("{error:#}").contains("not a point of the grid"),
+            "{error:#}"
+        );
+    }
+}
+
+#[test]
+fn few_events_leave_more_room_above() {
+    let table = Table::kept().unwrap();
+    for row in &table.rows {
+        let found = table.look_up(row.first_mean, row.first, row.last, row.intensity);
+        let found = found.unwrap();
+        assert!(found.at_most >= found.probability, "{row:?}");
+    }
+}
