@@ -63,6 +63,8 @@ pub enum Verdict {
     Differs,
     /// It is not so.
     Refuted,
+    /// The sample cannot tell.
+    NotDecided,
 }
 
 impl Verdict {
@@ -79,6 +81,7 @@ impl fmt::Display for Verdict {
             Self::Agrees => "agrees",
             Self::Differs => "differs",
             Self::Refuted => "refuted",
+            Self::NotDecided => "not decided",
         })
     }
 }
