@@ -43,7 +43,7 @@ pub const STUDY: Study = Study {
     about: "laser cycles to notice a step in depth, and readings of both surfaces at once",
     revision: 2,
     few_seeds: 10,
-    all_seeds: 300,
+    all_seeds: 1000,
     points,
     trial,
     results,
@@ -252,9 +252,10 @@ fn blur_claim(part: &Part) -> Result<Claim> {
         let texts = excesses(SENSORS[0]).map(mixed::points);
         let frames = mixed::worst(excesses(SENSORS[4])).map_or(String::new(), mixed::points);
         here.push(format!(
-            "step of {step} bins {}, worst of frames of 2000 {frames}; exposures over it that expired {} (without the step {})",
+            "step of {step} bins {}, worst of frames of 2000 {frames}; exposures over it that expired {} of {} (without the step {})",
             texts.collect::<Vec<_>>().join(", "),
             at_signals(part, step, "events mixed, not read"),
+            grouped(STEPS * part.seed_count()),
             at_signals(part, step, "events clean, not read"),
         ));
     }
@@ -272,7 +273,7 @@ fn blur_claim(part: &Part) -> Result<Claim> {
             (_, 1..) => Verdict::Differs,
             _ => Verdict::NotDecided,
         },
-        why: "a step does not blur if the excess is below 2 percentage points with 99 % confidence at every signal, and blurs if it is above them at one; agrees if no step blurs, differs if one does; each exposure beside one of the same random numbers, over the same laser cycle, without the step; a peak is of one surface or of the other if they lie farther apart than the centre of mass sees, for frames as well, but has only its part of the photons; surfaces two bins apart mix in every exposure that saw both",
+        why: "a step does not blur if the excess is below 2 percentage points with 99 % confidence at every signal, and blurs if it is above them at one; agrees if no step blurs, differs if one does; each exposure beside one of the same random numbers, over the same laser cycle, without the step, where both were read: a dim pixel often reads nothing of an exposure with a step in it; a peak is of one surface or of the other if they lie farther apart than the centre of mass sees, for frames as well, but has only its part of the photons; surfaces two bins apart mix in every exposure that saw both",
     })
 }
 

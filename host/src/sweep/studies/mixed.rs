@@ -20,7 +20,8 @@ pub const MARGIN: f64 = 0.02;
 /// Adds the exposures over laser cycles `at - 1` and `at`, of readings in which the
 /// surface steps at the start of `at` and of readings in which it does not, and
 /// whether they belong to none of `surfaces`. Where one of the two was not read, as
-/// it expired, the pair counts apart.
+/// it expired, the pair counts apart; so does an edge that falls between two
+/// exposures.
 pub fn add_pair(
     tally: &mut Tally,
     sensor: &str,
@@ -28,6 +29,11 @@ pub fn add_pair(
     at: u64,
     surfaces: &[i64],
 ) {
+    // The same in both, which differ from `at` on.
+    if with.iter().any(|reading| reading.last + 1 == at) {
+        add(tally, sensor, "between exposures", 1);
+        return;
+    }
     let is_neither = |readings: &[Reading]| {
         let mut over = readings
             .iter()
@@ -127,6 +133,7 @@ mod tests {
         // Nothing was read over it.
         add(180, [&with[..1], &without]);
         add(180, [&with, &without[..1]]);
+        assert_eq!(tally["a between exposures"], 1);
         assert_eq!((tally["a pairs"], tally["a mixed alone"]), (1, 1));
         assert_eq!(
             (tally["a mixed, neither"], tally["a clean, neither"]),

@@ -358,7 +358,7 @@ mod tests {
             parameters: point([]),
             tally,
         }];
-        let at = |share: f64| ladder.calibrated(points.iter(), share);
+        let at = |share: f64| ladder.calibrated(&points.iter(), share);
         assert!((at(0.1) - 3.25).abs() < 1e-12);
         // Equal factors: 10 is halfway from 100 to 1.
         assert!((at(0.01) - 3.375).abs() < 1e-12);
