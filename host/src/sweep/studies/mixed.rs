@@ -141,7 +141,7 @@ mod tests {
         );
         assert_eq!(
             (tally["a mixed, not read"], tally["a clean, not read"]),
-            (2, 1)
+            (1, 1)
         );
     }
 
