@@ -248,7 +248,7 @@ fn blur_claim(part: &Part) -> Result<Claim> {
     for step in STEPS_BINS {
         let points = part.at([("step", step)]);
         let excesses = |sensor| points.clone().map(move |point| excess(point, sensor));
-        verdicts.push(is_sharp(excesses(SENSORS[0])));
+        verdicts.push(is_sharp(&excesses(SENSORS[0]).collect::<Vec<_>>()));
         let texts = excesses(SENSORS[0]).map(mixed::points);
         let frames = mixed::worst(excesses(SENSORS[4])).map_or(String::new(), mixed::points);
         here.push(format!(

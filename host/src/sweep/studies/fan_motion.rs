@@ -310,7 +310,7 @@ fn claim(part: &Part) -> Result<Claim> {
         paper: "without motion blur",
         here: here.join("; "),
         verdict: if is_short {
-            is_sharp(excesses.into_iter())
+            is_sharp(&excesses)
         } else {
             Verdict::Refuted
         },

@@ -90,10 +90,10 @@ pub fn worst(excesses: impl Iterator<Item = Measured>) -> Option<Measured> {
 }
 
 /// Whether no excess reaches [`MARGIN`], with 99 % confidence in each.
-pub fn is_sharp(excesses: impl Iterator<Item = Measured> + Clone) -> Verdict {
-    if excesses.clone().all(|excess| excess.interval.1 < MARGIN) {
+pub fn is_sharp(excesses: &[Measured]) -> Verdict {
+    if excesses.iter().all(|excess| excess.interval.1 < MARGIN) {
         Verdict::Agrees
-    } else if excesses.clone().any(|excess| excess.interval.0 > MARGIN) {
+    } else if excesses.iter().any(|excess| excess.interval.0 > MARGIN) {
         Verdict::Refuted
     } else {
         Verdict::NotDecided
@@ -150,7 +150,7 @@ mod tests {
         let verdict = |pairs, alone| {
             let counts = [("a pairs", pairs), ("a mixed alone", alone)];
             let point = of(crate::sweep::tally(counts));
-            is_sharp([excess(&point, "a")].into_iter())
+            is_sharp(&[excess(&point, "a")])
         };
         assert_eq!(verdict(0, 0), Verdict::NotDecided);
         assert_eq!(verdict(50, 0), Verdict::NotDecided);
