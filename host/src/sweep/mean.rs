@@ -1,28 +1,35 @@
 //! Means and errors of whole numbers that add up.
+//!
+//! Sums are whole numbers of 64 bits, and what is subtracted from each other is
+//! worked out in 128 bits, so that nothing cancels: a mean and a variance are
+//! rounded once, to a part in 2^52.
 
 use super::results::Z_99;
 use super::{PointTally, Tally};
 
 /// Adds `amount` to a count.
 pub fn add(tally: &mut Tally, name: &str, what: &str, amount: u64) {
-    *tally.entry(format!("{name} {what}")).or_default() += amount;
+    let sum = tally.entry(format!("{name} {what}")).or_default();
+    *sum = sum.saturating_add(amount);
 }
 
 /// Adds one value of `name`: how many there are, their sum and that of their
-/// squares.
+/// squares. A sum that does not fit stays at 2^64 - 1, and no other seed adds to
+/// it: [`super::Part::add`] is an error then.
 pub fn add_value(tally: &mut Tally, name: &str, value: i64) {
     let size = value.unsigned_abs();
     let side = if value < 0 { "below 0" } else { "above 0" };
     add(tally, name, "values", 1);
     add(tally, name, side, size);
-    add(tally, name, "squares", size * size);
+    add(tally, name, "squares", size.saturating_pow(2));
 }
 
 /// Adds one error of `name`, whose root mean square is asked for: a value, and
-/// its fourth power. Errors to some thousand fit.
+/// its fourth power. 16 million errors of up to 1,000 fit.
 pub fn add_error(tally: &mut Tally, name: &str, error: i64) {
     add_value(tally, name, error);
-    add(tally, name, "fourths", error.unsigned_abs().pow(4));
+    let fourth = error.unsigned_abs().saturating_pow(4);
+    add(tally, name, "fourths", fourth);
 }
 
 /// A number with the 99 % interval it lies in.
@@ -34,37 +41,52 @@ pub struct Measured {
     pub interval: (f64, f64),
 }
 
-#[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
+/// The mean of `values` whole numbers of this `sum` and sum of `squares`, and half
+/// the width of its 99 % interval by the central limit theorem.
+#[allow(clippy::cast_precision_loss, reason = "to a part in 2^53")]
+fn mean_and_half(values: u128, sum: i128, squares: u128) -> (f64, f64) {
+    // values² times the variance; never below 0 (Cauchy and Schwarz).
+    let spread = (values * squares).saturating_sub(sum.unsigned_abs().pow(2));
+    let count = values as f64;
+    let variance = spread as f64 / count / count;
+    let half = Z_99 * (variance / (count - 1.0).max(1.0)).sqrt();
+    (sum as f64 / count, half)
+}
+
 impl Measured {
     /// The mean of the values of `name`, by the central limit theorem. NaN
     /// without a value.
     #[must_use]
     pub fn mean(point: &PointTally, name: &str) -> Self {
-        let count = |what: &str| point.count(&format!("{name} {what}")) as f64;
-        let values = count("values");
-        let mean = (count("above 0") - count("below 0")) / values;
-        let variance = (count("squares") / values - mean * mean).max(0.0);
-        let half = Z_99 * (variance / (values - 1.0).max(1.0)).sqrt();
+        let count = |what: &str| point.count(&format!("{name} {what}"));
+        let sum = i128::from(count("above 0")) - i128::from(count("below 0"));
+        let (value, half) = mean_and_half(count("values").into(), sum, count("squares").into());
         Self {
-            value: mean,
-            interval: (mean - half, mean + half),
+            value,
+            interval: (value - half, value + half),
         }
     }
 
-    /// The root mean square of the errors of all `names` together, by the central
-    /// limit theorem for the squares. NaN without an error.
+    /// The root mean square of the errors of all `names` together. NaN without an
+    /// error.
     #[must_use]
     pub fn root_mean_square(point: &PointTally, names: &[String]) -> Self {
         let sum = |what: &str| {
             let counts = names
                 .iter()
                 .map(|name| point.count(&format!("{name} {what}")));
-            counts.sum::<u64>() as f64
+            counts.map(u128::from).sum::<u128>()
         };
-        let values = sum("values");
-        let square = sum("squares") / values;
-        let variance = (sum("fourths") / values - square * square).max(0.0);
-        let half = Z_99 * (variance / (values - 1.0).max(1.0)).sqrt();
+        Self::root_of_squares(sum("values"), sum("squares"), sum("fourths"))
+    }
+
+    /// The root mean square of `values` errors whose `squares` and `fourths` powers
+    /// add up to these, below 2^64 each, by the central limit theorem for the
+    /// squares. NaN without an error.
+    #[must_use]
+    pub fn root_of_squares(values: u128, squares: u128, fourths: u128) -> Self {
+        let sum = i128::try_from(squares).unwrap_or(i128::MAX);
+        let (square, half) = mean_and_half(values, sum, fourths);
         Self {
             value: square.sqrt(),
             interval: ((square - half).max(0.0).sqrt(), (square + half).sqrt()),
@@ -131,6 +153,20 @@ mod tests {
         let rms = Measured::root_mean_square(&point, &["a".to_owned()]);
         assert!((rms.value - 31.5_f64.sqrt()).abs() < 1e-12);
         assert!((mean.over(mean).value - 1.0).abs() < 1e-12);
+    }
+
+    /// Fourth powers near 2^62 that differ in their last bits: in `f64` their
+    /// difference would be 0 or noise.
+    #[test]
+    fn nothing_cancels() {
+        let error = |error: u128| [1, error.pow(2), error.pow(4)];
+        let (a, b) = (error(46_340), error(46_341));
+        let [values, squares, fourths] = std::array::from_fn(|index| a[index] + b[index]);
+        let rms = Measured::root_of_squares(values, squares, fourths);
+        // Squares differ by 92,681: the deviation of each from their mean is half.
+        let half = Z_99 * 92_681.0 / 2.0;
+        let mean = (46_340.0_f64.powi(2) + 46_341.0_f64.powi(2)) / 2.0;
+        assert!((rms.interval.1 - (mean + half).sqrt()).abs() < 1e-9);
     }
 
     #[test]

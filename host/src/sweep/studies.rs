@@ -9,6 +9,7 @@ pub mod gaussian_error;
 pub mod hit_rate;
 pub mod hyperparameters;
 pub mod latency;
+mod mixed;
 mod one_pixel;
 pub mod paper_setting;
 pub mod passage;

@@ -30,11 +30,14 @@ pub const SENSORS: [&str; 5] = [
     "frames of 2000",
 ];
 
+/// Laser cycles of the prototype from one look at the histogram to the next (X).
+pub const PROTOTYPE_X: u16 = 4;
+
 /// The paper's FPGA prototype: α = 8, X = 4, L2 = 2000, and `l1`.
 pub fn prototype(l1: u16) -> Result<PixelConfig<BINS>> {
     let settings = Settings {
         l1,
-        x: 4,
+        x: PROTOTYPE_X,
         ..scene::settings(0)
     };
     settings.config()

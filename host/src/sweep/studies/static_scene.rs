@@ -6,6 +6,7 @@ mod results;
 use anyhow::Result;
 use dtof_core::{DepthEvent, PixelAddress};
 use rand_core::Rng;
+use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 
 use super::one_pixel::{FramePixel, PER_BIN, in_parts};
@@ -27,6 +28,9 @@ const MEAN_OF: usize = 10;
 const FALSE: i64 = 3 * PER_BIN;
 /// Whole numbers of a correlation, a relative error, a reflectivity.
 const MILLION: f64 = 1e6;
+/// Pixels of a row over which a surface turns by one bin of range: the boards are as
+/// wide, so that they lie evenly in a bin, not on the edge of one.
+const PIXELS_A_BIN: f64 = 8.0;
 /// The pulse of the figures, in bins.
 const WIDE: f64 = 1.0;
 /// The scenes, as a point names them.
@@ -43,7 +47,7 @@ const NOISES: [&str; 3] = [
 pub const STUDY: Study = Study {
     name: "static-scene",
     about: "first events, event rates, depth errors and reflectivity of two static scenes",
-    revision: 1,
+    revision: 2,
     few_seeds: 4,
     all_seeds: 40,
     points,
@@ -51,8 +55,8 @@ pub const STUDY: Study = Study {
     results: results::results,
 };
 
-/// Both scenes as their files are, and the first with a pulse as narrow as that of
-/// the paper's system, 10 ns in bins of 8.75 ns.
+/// Both scenes, and the first with a pulse as narrow as that of the paper's system,
+/// 10 ns in bins of 8.75 ns.
 fn points() -> Vec<Point> {
     let points = [(0.0, WIDE), (1.0, WIDE), (0.0, 0.5)].into_iter();
     points
@@ -60,21 +64,36 @@ fn points() -> Vec<Point> {
         .collect()
 }
 
-/// At 32×16 pixels.
-fn scene(point: &Point) -> Result<Scene> {
+/// The scene of the file at 32×16 pixels, with every surface turned by a bin in
+/// [`PIXELS_A_BIN`], and `shift` bins farther away.
+fn scene(point: &Point, shift: f64) -> Result<Scene> {
     let text = if point["scene"] > 0.0 {
         include_str!("../../../../scenes/demo.toml")
     } else {
         include_str!("../../../../scenes/static.toml")
     };
-    Ok(Scene {
+    let mut scene = Scene {
         geometry: Geometry {
             columns: 32,
             rows: 16,
         },
         pulse_sigma_bins: point["pulse_sigma_bins"],
         ..Scene::parse(text)?
-    })
+    };
+    let mm_per_bin = scene.mm_per_bin();
+    // From the first column of the layout to the last, in pixels.
+    let across = f64::from(scene.geometry.columns) / f64::from(scene.layout.columns);
+    let pixels = f64::from(scene.layout.columns - 1) * across;
+    for surface in &mut scene.surfaces {
+        // A surface that is turned already is as good.
+        #[allow(clippy::float_cmp, reason = "one is the default of the other")]
+        if surface.range_right_mm == surface.range_mm {
+            surface.range_right_mm += pixels / PIXELS_A_BIN * mm_per_bin;
+        }
+        surface.range_mm += shift * mm_per_bin;
+        surface.range_right_mm += shift * mm_per_bin;
+    }
+    Ok(scene)
 }
 
 /// What there is of a pixel.
@@ -103,7 +122,7 @@ impl Pixel {
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    let scene = scene(point)?;
+    let scene = scene(point, Uniform::new(0.0, 1.0)?.sample(rng))?;
     let settings = scene::settings(rng.next_u64());
     let mut photons = scene.photons(settings.seed, CYCLES)?;
     let addresses = photons.addresses();
@@ -169,19 +188,33 @@ fn add_pixel(tally: &mut Tally, scene: &Scene, address: PixelAddress, pixel: &Pi
     for (depth, position) in frames.chain(of_events) {
         add_depth(tally, &format!("{surface}, {depth}"), position - truth);
     }
-    // Of one pixel, so that what the centre of mass always errs by there drops out.
-    let (earlier, _) = pixel.positions.split_at(pixel.positions.len() - MEAN_OF);
-    if let [first, second, ..] = pixel.frames[..] {
-        add_depth(tally, &format!("{surface}, {}", NOISES[0]), second - first);
-    }
-    if let [.., before, last] = pixel.positions[..] {
-        add_depth(tally, &format!("{surface}, {}", NOISES[1]), last - before);
-    }
-    if earlier.len() >= MEAN_OF {
-        #[allow(clippy::cast_possible_truncation, reason = "a position")]
-        let before = mean_of_last(earlier, MEAN_OF).round() as i64;
-        let name = format!("{surface}, {}", NOISES[2]);
-        add_depth(tally, &name, mean(MEAN_OF) - before);
+    add_noises(tally, surface, pixel);
+}
+
+/// Adds what differs from one depth of a pixel to its next: what the centre of mass
+/// always errs by there drops out. All three depths are of the same pixels, those
+/// with twice [`MEAN_OF`] events and two frames, and no difference that is false.
+fn add_noises(tally: &mut Tally, surface: &str, pixel: &Pixel) {
+    let Some(at) = pixel.positions.len().checked_sub(2 * MEAN_OF) else {
+        return;
+    };
+    let (before, last) = pixel.positions[at..].split_at(MEAN_OF);
+    #[allow(clippy::cast_possible_truncation, reason = "a position")]
+    let mean = |positions| mean_of_last(positions, MEAN_OF).round() as i64;
+    let [first, second, ..] = pixel.frames[..] else {
+        return;
+    };
+    let differences = [
+        second - first,
+        last[MEAN_OF - 1] - last[MEAN_OF - 2],
+        mean(last) - mean(before),
+    ];
+    let any_false = differences.iter().any(|off| off.abs() > FALSE);
+    for (name, difference) in NOISES.into_iter().zip(differences) {
+        let name = format!("{surface}, {name}");
+        if !any_false || difference.abs() > FALSE {
+            add_depth(tally, &name, difference);
+        }
     }
 }
 
@@ -218,22 +251,33 @@ fn add_scene(tally: &mut Tally, scene: &Scene, addresses: &[PixelAddress], pixel
         |pixel| pixel.counts as f64 / pixel.exposed as f64,
     ];
     for (name, estimate) in ESTIMATES.into_iter().zip(estimates) {
-        // Estimate over truth, up to one scale for all.
+        // Estimate over truth, up to one scale for all. A pixel without an event is
+        // black.
         let ratios: Vec<(usize, f64)> = addresses
             .iter()
             .zip(pixels)
-            .filter(|(_, pixel)| !pixel.positions.is_empty())
             .filter_map(|(&address, pixel)| {
                 let surface = scene.truth(address, 0)?.surface;
                 let Light::Reflectivity(truth) = scene.surfaces[surface].light else {
                     return None;
                 };
+                if pixel.positions.is_empty() {
+                    return Some((surface, 0.0));
+                }
                 let z = mean_of_last(&pixel.positions, MEAN_OF) / PER_BIN as f64;
                 Some((surface, estimate(pixel) * z * z / truth))
             })
             .collect();
         let (scale, error) = common_scale(ratios.iter().map(|(_, ratio)| *ratio));
         add_value(tally, name, (error * MILLION).round() as i64);
+        // Black pixels have no say in the scale.
+        let seen = ratios.iter().map(|(_, ratio)| *ratio);
+        let (_, error) = common_scale(seen.filter(|&ratio| ratio > 0.0));
+        add_value(
+            tally,
+            &format!("{name}, with an event"),
+            (error * MILLION).round() as i64,
+        );
         for (surface, ratio) in ratios {
             let name = format!("{}, {name}", scene.surfaces[surface].name);
             add_value(tally, &name, (ratio * scale * 1000.0).round() as i64);
@@ -278,5 +322,53 @@ mod tests {
         assert_eq!(mean_of_last(&positions, 10), 7.5);
         assert_eq!(mean_of_last(&positions, 1), 12.0);
         assert_eq!(mean_of_last(&positions[..3], 10), 2.0);
+    }
+
+    /// The parts of a bin at which the pixels of a board lie.
+    #[test]
+    fn boards_lie_evenly_in_a_bin() {
+        let scene = scene(&points()[0], 0.3).unwrap();
+        for column in [2, 12, 22] {
+            let mut phases: Vec<f64> = (column..column + 8)
+                .map(|column| {
+                    let view = scene.truth(PixelAddress(8 * 32 + column), 0).unwrap();
+                    assert_ne!(scene.surfaces[view.surface].name, "wall");
+                    view.range_mm / scene.mm_per_bin() % 1.0
+                })
+                .collect();
+            phases.sort_by(f64::total_cmp);
+            for pair in phases.windows(2) {
+                assert!((pair[1] - pair[0] - 0.125).abs() < 1e-9, "{phases:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn all_noises_are_of_the_same_pixels() {
+        let noises = |positions: Vec<i64>, frames: Vec<i64>| {
+            let mut tally = Tally::new();
+            let pixel = Pixel {
+                positions,
+                frames,
+                ..Pixel::default()
+            };
+            add_noises(&mut tally, "a", &pixel);
+            let of = |what: &str| {
+                NOISES.map(|name| {
+                    let name = format!("a, {name} {what}");
+                    tally.get(&name).copied().unwrap_or_default()
+                })
+            };
+            (of("values"), of("false"))
+        };
+        let none = [0; 3];
+        assert_eq!(noises(vec![0; 19], vec![0, 1]), (none, none));
+        assert_eq!(noises(vec![0; 20], vec![0]), (none, none));
+        assert_eq!(noises(vec![0; 20], vec![0, 1]), ([1; 3], none));
+        let (frames, far) = (vec![0, 1], FALSE + 1);
+        let mut positions = vec![0; 20];
+        positions[19] = far;
+        assert_eq!(noises(positions, frames), (none, [0, 1, 0]));
+        assert_eq!(noises(vec![0; 20], vec![0, far]), (none, [1, 0, 0]));
     }
 }

@@ -1,7 +1,8 @@
 //! What one background and pulse width say of the claims.
 
 use super::{ALPHAS, SETTINGS, SNRS};
-use crate::sweep::results::{Share, Z_99};
+use crate::sweep::mean::Measured;
+use crate::sweep::results::Share;
 use crate::sweep::{Part, PointTally};
 
 pub fn false_share(point: &PointTally) -> Share {
@@ -9,16 +10,11 @@ pub fn false_share(point: &PointTally) -> Share {
 }
 
 /// The root mean square error of all events in bins, with its 99 % interval.
-#[allow(clippy::cast_precision_loss, reason = "to a part in 2^53")]
 pub fn error(point: &PointTally) -> Share {
-    let events = point.count("events") as f64;
-    let mean = point.count("squares") as f64 / events / 256f64.powi(2);
-    let fourth = point.count("fourth") as f64 / events / 256f64.powi(4);
-    let half = Z_99 * ((fourth - mean * mean).max(0.0) / events).sqrt();
-    Share {
-        value: mean.sqrt(),
-        interval: ((mean - half).max(0.0).sqrt(), (mean + half).sqrt()),
-    }
+    let sum = |name| u128::from(point.count(name));
+    let parts = Measured::root_of_squares(sum("events"), sum("squares"), sum("fourth"));
+    let Measured { value, interval } = parts.times(1.0 / 256.0);
+    Share { value, interval }
 }
 
 /// One of [`SETTINGS`].
