@@ -13,10 +13,10 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::methods;
 use crate::sweep::results::Results;
-use crate::sweep::studies::{depth_error, time_to_detect};
+use crate::sweep::studies::{depth_error, failures::STUDY as FAILURES, time_to_detect};
 use crate::sweep::{self, Part, SeedRange, Study, studies};
+use crate::{failures, methods};
 
 /// What is done anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,6 +84,8 @@ pub fn documents(
     let counts = docs.join(methods::INSTRUCTIONS);
     let counts = fs::read_to_string(&counts).with_context(|| counts.display().to_string())?;
     documents.extend(methods::documents(&counts, time?, depth?)?);
+    let failures = failures::document(part(FAILURES)?)?;
+    documents.push(("failures.md".into(), failures));
     documents.push(("figures/README.md".into(), captions(&all)?));
     documents.push(("paper-claims.md".into(), claims(&all)?));
     Ok(documents)

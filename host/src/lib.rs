@@ -14,6 +14,7 @@ pub mod chart;
 pub mod device;
 pub mod engine;
 pub mod events_csv;
+pub mod failures;
 pub mod figures;
 pub mod maps;
 pub mod methods;

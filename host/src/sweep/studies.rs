@@ -2,6 +2,7 @@
 
 pub mod depth_error;
 pub mod depth_step;
+pub mod failures;
 pub mod false_events;
 pub mod false_rate;
 pub mod fan_motion;
@@ -38,6 +39,7 @@ pub const ALL: &[Study] = &[
     false_rate::STUDY,
     time_to_detect::STUDY,
     depth_error::STUDY,
+    failures::STUDY,
 ];
 
 /// The study of that name.

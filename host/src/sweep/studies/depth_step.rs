@@ -43,7 +43,7 @@ pub const STUDY: Study = Study {
     about: "laser cycles to notice a step in depth, and readings of both surfaces at once",
     revision: 2,
     few_seeds: 10,
-    all_seeds: 1000,
+    all_seeds: 300,
     points,
     trial,
     results,

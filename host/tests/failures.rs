@@ -1,0 +1,98 @@
+//! What the study of failures finds, on a few seeds.
+
+use std::time::Duration;
+
+use dtof::sweep::studies::failures::cases::Case;
+use dtof::sweep::studies::failures::{Outcome, Rule, STUDY, Verdict, outcomes};
+use dtof::sweep::{self, SeedRange};
+
+/// Those of a case, whose name starts with `name`.
+fn of<'a>(all: &'a [(Case, Vec<Outcome>)], name: &str) -> &'a [Outcome] {
+    let found = all.iter().find(|(case, _)| case.name.starts_with(name));
+    &found.unwrap_or_else(|| panic!("no case {name}")).1
+}
+
+/// The smallest share of false events that the interval allows.
+fn surely_false(outcome: &Outcome) -> f64 {
+    outcome.false_share.map_or(0.0, |share| share.interval.0)
+}
+
+#[test]
+fn a_few_seeds_show_what_fails_and_what_is_flagged() {
+    let folder = tempfile::tempdir().unwrap();
+    let seeds = SeedRange { first: 0, end: 5 };
+    let path = folder.path().join("part");
+    let part = sweep::run(&STUDY, seeds, &path, Duration::MAX, |_| ()).unwrap();
+    let all = outcomes(&part).unwrap();
+
+    for outcome in of(&all, "plain") {
+        assert!(surely_false(outcome) < 0.02 && outcome.without.value < 0.1);
+        assert!(outcome.verdict != Verdict::Fails && !outcome.is_silent);
+    }
+    // The cover glass is the brightest: nothing says so. A gate helps.
+    for outcome in of(&all, "cover glass 10 × the signal") {
+        assert!(surely_false(outcome) > 0.8, "{outcome:?}");
+        assert!(outcome.verdict == Verdict::Fails && outcome.is_silent);
+    }
+    for outcome in of(&all, "cover glass 10 × the signal, gate") {
+        assert!(surely_false(outcome) < 0.02 && outcome.without.value < 0.1);
+        assert!(outcome.verdict != Verdict::Fails && !outcome.is_silent);
+    }
+    // Full counters and windows past the histogram are flagged.
+    for name in ["signal of 80 photons", "signal of 400 photons"] {
+        for outcome in of(&all, name) {
+            assert!(
+                outcome.saturated > 0.99 && !outcome.is_silent,
+                "{outcome:?}"
+            );
+        }
+    }
+    for name in ["pulse at 0.3 bins", "pulse at 127.7 bins"] {
+        for outcome in of(&all, name) {
+            assert!(outcome.clipped > 0.6 && !outcome.is_silent, "{outcome:?}");
+        }
+    }
+    // With light in each quadrant the paper's rule has no background left; the mean has.
+    for outcome in of(&all, "a pulse in each quadrant") {
+        match outcome.rule {
+            Rule::Window => assert!(outcome.without.value < 0.1, "{outcome:?}"),
+            Rule::Paper(_) => assert!(outcome.without.value > 0.3, "{outcome:?}"),
+        }
+    }
+    // Of the photons of a cycle only the first counts: the slope is taken for the peak.
+    for outcome in of(&all, "one hit, 6 photons") {
+        assert!(
+            surely_false(outcome) > 0.8 && outcome.is_silent,
+            "{outcome:?}"
+        );
+    }
+    for outcome in of(&all, "hot pixel") {
+        assert!(outcome.without.value > 0.8, "{outcome:?}");
+    }
+    // A background that changes within the exposure makes no false events.
+    for name in ["weak signal, background × 4", "weak signal, background / 4"] {
+        for outcome in of(&all, name) {
+            assert!(surely_false(outcome) < 0.02, "{outcome:?}");
+        }
+    }
+    // A target that moves while it is exposed is reported where it was.
+    let still = of(&all, "weak signal").iter();
+    for (still, drifting) in still.zip(of(&all, "weak signal, the same drift")) {
+        if still.rule == Rule::Window {
+            assert!(drifting.error > 1.5 * still.error, "{drifting:?}");
+        }
+    }
+}
+
+#[test]
+fn the_document_has_a_row_for_every_case() {
+    let folder = tempfile::tempdir().unwrap();
+    let seeds = SeedRange { first: 7, end: 8 };
+    let path = folder.path().join("part");
+    let part = sweep::run(&STUDY, seeds, &path, Duration::MAX, |_| ()).unwrap();
+    let text = dtof::failures::document(&part).unwrap();
+    assert!(!text.contains("NaN"), "{text}");
+    let rows: Vec<&str> = text.lines().filter(|line| line.starts_with('|')).collect();
+    assert_eq!(rows.len(), part.points().len() + 2);
+    assert!(rows.iter().all(|row| row.matches('|').count() == 9));
+}
