@@ -334,7 +334,7 @@ fn results(part: &Part) -> Result<Results> {
     let svg = line_chart(&Chart {
         title: "False events of all events over the background",
         x: Axis {
-            range: Some((0.03, 30000.0)),
+            range: Some((0.03, 200_000.0)),
             ..Axis::logarithmic("background counts a bin after 40 laser cycles")
         },
         y: Axis {
