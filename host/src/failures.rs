@@ -27,8 +27,9 @@ pub fn document(part: &Part) -> Result<String> {
          plain scene;\n\
          - **degrades** otherwise.\n\n\
          It is **silent** where 2 % of the events or more are false, or the error is twice that in the plain scene or\n\
-         more, and fewer than nine in ten of these events have a flag. An exposure without an event is counted as\n\
-         expired, and so not silent.\n\n\
+         more, and fewer than nine in ten of these events have a flag. Fewer wrong events than one in a hundred\n\
+         exposures are what any threshold lets through and do not count; an exposure without an event says nothing\n\
+         wrong. An event of two or more surfaces is right if it is of one of them.\n\n\
          ![False events over the background](figures/failures-background.svg)\n\n"
         .to_owned();
     text.push_str("| case |");
