@@ -157,7 +157,9 @@ impl CentredWindow {
         }
         let middle = (i32::from(peak.bin.raw()) << 8) + i32::from(offset);
         let [start, end] = [gate.first(), gate.last() + 1].map(|bin| i32::from(bin) << 8);
-        if middle - half < start || middle + half > end {
+        // The offset holds no more than two bins about the peak.
+        let at_limit = offset <= least || offset >= most;
+        if middle - half < start || middle + half > end || at_limit {
             flags |= Flags::CLIPPED;
         }
         Depth {

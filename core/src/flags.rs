@@ -14,8 +14,9 @@ impl Flags {
     /// Bit 0: the peak's counter is full. The peak may lie in another full
     /// bin, and the depth is drawn towards the middle of the bin.
     pub const SATURATED: Self = Self(1);
-    /// Bit 1: the depth window reaches past the range gate, so that the depth
-    /// is drawn into the gate.
+    /// Bit 1: the depth window reaches past the range gate, so that the depth is
+    /// drawn into the gate; or the position would lie farther from the peak bin than
+    /// its two bins and is held there.
     pub const CLIPPED: Self = Self(1 << 1);
     /// Bit 2: a decision was put off while the slot was full, so that the
     /// exposure may be longer than the photons asked for.

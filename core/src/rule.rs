@@ -60,7 +60,8 @@ impl PaperRule {
 
     /// One decision on a histogram that arrives whole: the peak and the background
     /// a bin if it is a detection, the same as [`detect`](crate::detect) gives for a
-    /// [`Histogram`] of these counts.
+    /// [`Histogram`] of these counts, none of which may exceed `W`'s. Whether the
+    /// peak's counter is full is the caller's to see.
     ///
     /// Costs one pass over the gated bins: the maxima of the four quadrants tell
     /// the peak's count, its half and the background. Only a detection is looked

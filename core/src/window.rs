@@ -11,7 +11,7 @@
 //! often there are many and what is in brackets is nearly 1.
 //! The last term is for the skew of small counts: with it one `z` gives the same
 //! rate of false events from fractions of a count a bin to hundreds, and for every
-//! width, where the α of the paper's rule has to follow the background. The total of the histogram
+//! width that leaves 15 bins outside for each of its own, where the α of the paper's rule has to follow the background. The total of the histogram
 //! is known, so that `λ` takes no pass over the bins.
 //!
 //! With `B = n + w` gated bins and `T` photons in them, multiplied by `n` and squared,

@@ -26,15 +26,16 @@ const Z: [u16; 15] = [
     25519, 26394,
 ];
 
-/// The z of a [`WindowRule`](crate::WindowRule) of any width with which one in
-/// `one_in` exposures without a target brings a false event: 100 for 1 %, 1000 for
-/// 0.1 %.
+/// The z of a [`WindowRule`](crate::WindowRule) with which one in `one_in` exposures
+/// without a target brings a false event: 100 for 1 %, 1000 for 0.1 %.
 ///
 /// `gate`, `x`, `l1` and `l2` are those of the [`PixelConfig`](crate::PixelConfig). Holds
-/// for a background of 0.4 to 200 photons a bin. With 128 bins 0.4 to 1.2 times as many
-/// come as wanted, fewer with more bins, up to 2.4 times as many with 16 (windows of 5).
-/// With fewer photons false events are rarer. From 64 to 2³⁴ trials,
-/// z 2.15 to 6.44, to which it is limited.
+/// for a background of 0.4 to 200 photons a bin at the first look, and for gates of at
+/// least 16 bins for each bin of the window: with 128 bins 0.4 to 1.2 times as many come
+/// as wanted, fewer with more bins. With fewer bins, or with less background, the bins
+/// outside the window may be all but empty, and several times as many come (16 bins and
+/// a window of 5: 2.4 times at 2 photons a bin, more below); a larger minimum count
+/// holds them back. From 64 to 2³⁴ trials, z 2.15 to 6.44, to which it is limited.
 ///
 /// ```
 /// use dtof_core::{RangeGate, z_for};

@@ -63,7 +63,7 @@ impl Instructions<'_> {
 struct Entry {
     label: String,
     cost: f64,
-    /// Time or error over the smallest possible: mean, least, largest.
+    /// Time or error over the reference's: mean, least, largest.
     mean: f64,
     range: (f64, f64),
 }
