@@ -153,6 +153,9 @@ fn claims(all: &[(&Study, Results)]) -> Result<String> {
     let mut text = "# The paper's claims\n\n\
         Made by `cargo xtask figures`; do not edit. Each claim of the paper, its number, ours, and whether \
         they go together; the [figures](figures/README.md) show more.\n\n\
+        **Agrees**: so here as well, in all that was tried. **Differs**: in part, or by another number. **Refuted**: \
+        not so in anything that was tried, or not as it is stated. **Not decided**: the sample cannot tell. What \
+        counts as what is said with the claim, or in its study in `host/src/sweep/studies`.\n\n\
         | claim | the paper | here | verdict | why |\n|---|---|---|---|---|\n"
         .to_owned();
     for claim in all.iter().flat_map(|(_, results)| &results.claims) {

@@ -78,6 +78,15 @@ fn the_options_it_prints_are_options_of_replay() {
     );
 }
 
+/// Another histogram than that of `replay` by itself is named.
+#[test]
+fn the_histogram_is_one_of_the_options() {
+    let last = |line: &str| text(line).lines().last().unwrap().to_owned();
+    let other = last(&format!("{PIXEL} --bins 64 --bin-width-ps 500"));
+    assert!(other.ends_with(" --bins 64 --bin-width-ps 500"), "{other}");
+    assert!(!last(PIXEL).contains("--bins"));
+}
+
 #[test]
 fn fewer_false_events_take_a_higher_alpha_and_longer() {
     let fixed = format!("{PIXEL} --l1 80");

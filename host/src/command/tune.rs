@@ -83,7 +83,7 @@ impl Tune {
             let object: serde_json::Map<_, _> = fields.collect();
             writeln!(out, "{}", serde_json::to_string_pretty(&object)?)?;
         } else {
-            out.write_all(text(&lines, &request, &tuned).as_bytes())?;
+            out.write_all(text(&lines, &request, &tuned, self.bin_width_ps).as_bytes())?;
         }
         Ok(out.flush()?)
     }
@@ -224,7 +224,13 @@ impl Tune {
 }
 
 /// For people; the last line is what other commands take.
-fn text(lines: &[Line], request: &Request, tuned: &Tuned) -> String {
+fn text(lines: &[Line], request: &Request, tuned: &Tuned, bin_width_ps: f64) -> String {
+    // Without them `replay` takes another histogram than these settings are for.
+    let histogram = if (request.bins, bin_width_ps) == (128, 250.0) {
+        String::new()
+    } else {
+        format!(" --bins {} --bin-width-ps {bin_width_ps}", request.bins)
+    };
     let mut text = String::new();
     for Line(_, name, value, unit, source) in lines {
         let value = format!("{} {unit}", number(*value));
@@ -232,8 +238,13 @@ fn text(lines: &[Line], request: &Request, tuned: &Tuned) -> String {
     }
     let _ = writeln!(
         text,
-        "\n--alpha {} --l1 {} --l2 {} --x {} --min-count {}",
-        tuned.alpha, tuned.l1, request.l2, request.x, request.minimum_count
+        "\n--alpha {} --l1 {} --l2 {} --x {} --min-count {}{histogram}",
+        // All digits: fewer may be another multiple of 1/256.
+        tuned.alpha.to_num::<f64>(),
+        tuned.l1,
+        request.l2,
+        request.x,
+        request.minimum_count
     );
     text
 }
