@@ -1,6 +1,8 @@
 //! Photons and histograms of a sensor, which does not wait.
 
-use dtof_core::{Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, Statistics, detect};
+use dtof_core::{
+    Count24, DepthEstimator, DepthEvent, Histogram, LaserCycle, PixelAddress, Statistics, detect,
+};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
 use super::{BINS, Sidecar, has_room_for_event};
@@ -116,7 +118,13 @@ impl PhotonSink for Sidecar<'_> {
         if !has_room_for_event(&self.words) {
             done.deferred = 1;
         } else if let Some(detection) =
-            detect(&histogram, config.gate(), config.rule(), config.estimator())
+            // The link knows no other estimator: the code of others is left out.
+            detect(
+                &histogram,
+                config.gate(),
+                config.rule(),
+                &DepthEstimator::CentreOfMass3,
+            )
         {
             self.enqueue(&DepthEvent {
                 pixel,
