@@ -96,25 +96,9 @@ fn z_reached(counts: &[u32; BINS], total: u32, width: usize) -> f64 {
     (discriminant - variance.sqrt()) / (2.0 * skew)
 }
 
-/// The share of a normal distribution above `z`, to 1.2e-7 of it (Numerical Recipes,
-/// erfcc).
+/// The share of a normal distribution above `z`.
 fn upper_tail(z: f64) -> f64 {
-    let x = z / std::f64::consts::SQRT_2;
-    let t = 1.0 / (1.0 + 0.5 * x);
-    let coefficients = [
-        0.170_872_77,
-        -0.822_152_23,
-        1.488_515_87,
-        -1.135_203_98,
-        0.278_868_07,
-        -0.186_288_06,
-        0.096_784_18,
-        0.374_091_96,
-        1.000_023_68,
-        -1.265_512_23,
-    ];
-    let sum = coefficients.iter().fold(0.0, |sum, c| sum * t + c);
-    0.5 * t * (sum - x * x).exp()
+    libm::erfc(z / std::f64::consts::SQRT_2) / 2.0
 }
 
 /// The z that one of `trials` exceeds.

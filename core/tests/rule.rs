@@ -2,6 +2,8 @@
 
 #![allow(clippy::cast_possible_truncation, reason = "small numbers")]
 
+mod common;
+
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DetectionRule, Histogram,
@@ -27,21 +29,7 @@ fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) -> u32 {
     let mut rng = Pcg32::seed_from_u64(seed);
     let mut fired = 0;
     for round in 0..rounds {
-        let width = 8 + rng.next_u32() % (BINS as u32 - 7);
-        let first = (rng.next_u32() % (BINS as u32 - width + 1)) as u16;
-        let gate = match round % 3 {
-            0 => RangeGate::full(),
-            _ => RangeGate::new(first, first + width as u16 - 1).unwrap(),
-        };
-        // Up to what a counter holds, and past it.
-        let most = 2 + rng.next_u32() % (W::MAX >> (rng.next_u32() % W::BITS));
-        let mut frame: [u32; BINS] = core::array::from_fn(|_| rng.next_u32() % most);
-        let above = rng.next_u32() % (2 * most);
-        if let Some(count) = frame.get_mut(rng.next_u32() as usize % BINS) {
-            *count += above;
-        }
-        let mut histogram = Histogram::<BINS, W>::new();
-        histogram.add_frame(&frame, &gate);
+        let (gate, histogram, most) = common::histogram::<BINS, W>(&mut rng, round);
         let alpha = rng.next_u32() as u16 >> (rng.next_u32() % 16);
         let minimum = Count::saturating(rng.next_u32() % (2 * most));
         let minimum = if round % 2 == 0 {

@@ -3,6 +3,8 @@
 
 #![allow(clippy::cast_possible_truncation, reason = "small numbers")]
 
+mod common;
+
 use dtof_core::fixed::types::{U4F12, U24F8};
 use dtof_core::{
     Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DetectionRule, Histogram,
@@ -77,20 +79,7 @@ fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) -> u32 {
     let mut rng = Pcg32::seed_from_u64(seed);
     let mut fired = 0;
     for round in 0..rounds {
-        let bins = 8 + rng.next_u32() % (BINS as u32 - 7);
-        let first = (rng.next_u32() % (BINS as u32 - bins + 1)) as u16;
-        let gate = match round % 3 {
-            0 => RangeGate::full(),
-            _ => RangeGate::new(first, first + bins as u16 - 1).unwrap(),
-        };
-        let most = 2 + rng.next_u32() % (W::MAX >> (rng.next_u32() % W::BITS));
-        let mut frame: [u32; BINS] = core::array::from_fn(|_| rng.next_u32() % most);
-        let above = rng.next_u32() % (2 * most);
-        if let Some(count) = frame.get_mut(rng.next_u32() as usize % BINS) {
-            *count += above;
-        }
-        let mut histogram = Histogram::<BINS, W>::new();
-        histogram.add_frame(&frame, &gate);
+        let (gate, histogram, most) = common::histogram::<BINS, W>(&mut rng, round);
         let z = U4F12::from_bits(rng.next_u32() as u16 >> (rng.next_u32() % 16));
         let minimum = rng.next_u32() % (2 * most) * (round % 2);
         let width = 1 + (rng.next_u32() % 7) as u8;
