@@ -32,12 +32,13 @@
 
 use core::fmt;
 
+use crate::dynamic_depth::DynamicDepthEvent;
 use crate::event::DepthEvent;
 use crate::flags::Flags;
-use crate::units::{BinIndex, Count, LaserCycle, PixelAddress, SubBinOffset};
+use crate::units::{BinIndex, BinPosition, Count, LaserCycle, PixelAddress, SubBinOffset};
 
 /// The version of the word layout, which file headers and links announce.
-pub const AER_VERSION: u16 = 1;
+pub const AER_VERSION: u16 = 2;
 
 /// A bit field of one 64-bit half of a word.
 #[derive(Clone, Copy)]
@@ -87,6 +88,15 @@ const OFFSET: Field = Field {
     bits: 10,
 };
 const FLAGS: Field = Field { shift: 58, bits: 6 };
+// The low half of a dynamic depth event; its pixel and cycle are where those of a depth
+// event are.
+const CHANGE_FLAGS: Field = Field { shift: 52, bits: 6 };
+// The high half of a dynamic depth event.
+const POSITION: Field = Field { shift: 0, bits: 32 };
+const CHANGE: Field = Field {
+    shift: 32,
+    bits: 32,
+};
 // The low half of a control word.
 const CONTROL: Field = Field {
     shift: 52,
@@ -98,6 +108,7 @@ const CYCLE_HIGH: Field = Field { shift: 0, bits: 44 };
 
 const KIND_CONTROL: u64 = 0;
 const KIND_DEPTH_EVENT: u64 = 1;
+const KIND_DYNAMIC_DEPTH: u64 = 2;
 const CONTROL_TIME: u64 = 1;
 const CONTROL_END: u64 = 2;
 
@@ -151,6 +162,20 @@ impl AerWord {
         }
     }
 
+    /// The dynamic depth event without the upper bits of its laser cycle. Exact.
+    #[inline]
+    #[must_use]
+    pub const fn dynamic_depth(event: &DynamicDepthEvent) -> Self {
+        Self {
+            low: KIND.put(KIND_DYNAMIC_DEPTH)
+                | PIXEL.put(event.pixel.0 as u64)
+                | CYCLE_LOW.put(event.cycle.0)
+                | CHANGE_FLAGS.put(event.flags.bits() as u64),
+            high: POSITION.put(event.position.raw().cast_unsigned() as u64)
+                | CHANGE.put(event.change().cast_unsigned() as u64),
+        }
+    }
+
     /// The upper bits of the laser cycle of the events that follow.
     #[inline]
     #[must_use]
@@ -190,13 +215,29 @@ impl AerEncoder {
     #[inline]
     #[must_use = "without the time word the events that follow have a wrong laser cycle"]
     pub const fn encode(&mut self, event: &DepthEvent) -> (Option<AerWord>, AerWord) {
-        let high = event.cycle.0 >> CYCLE_LOW.bits;
+        (self.time(event.cycle), AerWord::depth_event(event))
+    }
+
+    /// The same for a dynamic depth event.
+    #[inline]
+    #[must_use = "without the time word the events that follow have a wrong laser cycle"]
+    pub const fn encode_dynamic_depth(
+        &mut self,
+        event: &DynamicDepthEvent,
+    ) -> (Option<AerWord>, AerWord) {
+        (self.time(event.cycle), AerWord::dynamic_depth(event))
+    }
+
+    /// The time word that is due before an event of this laser cycle.
+    #[inline]
+    const fn time(&mut self, cycle: LaserCycle) -> Option<AerWord> {
+        let high = cycle.0 >> CYCLE_LOW.bits;
         let time = match self.cycle_high {
             Some(sent) if sent == high => None,
-            _ => Some(AerWord::time(event.cycle)),
+            _ => Some(AerWord::time(cycle)),
         };
         self.cycle_high = Some(high);
-        (time, AerWord::depth_event(event))
+        time
     }
 }
 
@@ -206,12 +247,14 @@ impl AerEncoder {
 pub enum AerRecord {
     /// A depth event with its whole laser cycle.
     Event(DepthEvent),
+    /// A dynamic depth event with its whole laser cycle.
+    DynamicDepth(DynamicDepthEvent),
     /// A time word: the events that follow lie in this laser cycle or in the
     /// 2²⁰ − 1 after it.
     Time(LaserCycle),
     /// The end of a recording.
     End {
-        /// Depth events in the recording.
+        /// Depth events and dynamic depth events in the recording.
         events: u64,
         /// CRC-32 of all bytes before this word.
         checksum: u32,
@@ -228,6 +271,9 @@ pub enum AerError {
     UnknownControl,
     /// Bits that are zero in this version are set.
     ReservedBits,
+    /// A field holds what cannot be: a dynamic depth event without a change, or a
+    /// position outside the histogram.
+    OutOfRange,
     /// An event before any time word, so that its laser cycle is unknown.
     MissingTime,
 }
@@ -238,6 +284,7 @@ impl fmt::Display for AerError {
             Self::UnknownKind => "unknown kind of word",
             Self::UnknownControl => "unknown control word",
             Self::ReservedBits => "reserved bits are set",
+            Self::OutOfRange => "a field is out of range",
             Self::MissingTime => "an event before any time word",
         })
     }
@@ -269,6 +316,10 @@ impl AerDecoder {
             KIND_DEPTH_EVENT => {
                 let high = self.cycle_high.ok_or(AerError::MissingTime)?;
                 Ok(AerRecord::Event(unpack(word, high)))
+            }
+            KIND_DYNAMIC_DEPTH => {
+                let high = self.cycle_high.ok_or(AerError::MissingTime)?;
+                unpack_dynamic_depth(word, high).map(AerRecord::DynamicDepth)
             }
             KIND_CONTROL => self.control(word),
             _ => Err(AerError::UnknownKind),
@@ -319,4 +370,22 @@ fn unpack(word: AerWord, cycle_high: u64) -> DepthEvent {
         background: Count::saturating(BACKGROUND.get(word.high) as u32),
         flags: Flags::from_bits(FLAGS.get(word.high) as u8).unwrap_or(Flags::NONE),
     }
+}
+
+/// The same for a dynamic depth event, whose fields are narrower than their bits.
+#[allow(clippy::cast_possible_truncation, reason = "fields of up to 32 bits")]
+fn unpack_dynamic_depth(word: AerWord, cycle_high: u64) -> Result<DynamicDepthEvent, AerError> {
+    let position = BinPosition::new((POSITION.get(word.high) as u32).cast_signed());
+    let event = DynamicDepthEvent::new(
+        PixelAddress(PIXEL.get(word.low) as u16),
+        LaserCycle(cycle_high << CYCLE_LOW.bits | CYCLE_LOW.get(word.low)),
+        position.ok_or(AerError::OutOfRange)?,
+        (CHANGE.get(word.high) as u32).cast_signed(),
+        Flags::from_bits(CHANGE_FLAGS.get(word.low) as u8).unwrap_or(Flags::NONE),
+    );
+    let event = event.ok_or(AerError::OutOfRange)?;
+    if AerWord::dynamic_depth(&event) != word {
+        return Err(AerError::ReservedBits);
+    }
+    Ok(event)
 }

@@ -178,6 +178,16 @@ impl RangeScale {
         I24F8::from_bits(self.raw_range(position) as i32)
     }
 
+    /// A distance between two positions, from millimetres to 1/256 bins, rounded to
+    /// the nearest.
+    #[inline]
+    #[must_use]
+    pub const fn bins_of(&self, distance: U24F8) -> u64 {
+        // 32 + 16 bits; the bin is not 0.
+        let distance = (distance.to_bits() as u64) << 16;
+        (distance + self.bin as u64 / 2) / self.bin as u64
+    }
+
     /// In 1/256 mm, before it is narrowed.
     const fn raw_range(&self, position: BinPosition) -> i64 {
         // 19 bits times 32 bits, 24 fractional bits; half of the last place

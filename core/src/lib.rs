@@ -19,6 +19,8 @@
 //!                   or another DetectionRule: WindowRule
 //!   → DepthEvent    pixel, laser cycle, exposure, sub-bin depth, counts, flags
 //!   → AerWord       128 bits, held by the pixel until the link takes it
+//!
+//! of the events of a pixel: RunningMean, Reflectivity, DynamicDepthEvent
 //! ```
 //!
 //! # Example
@@ -68,6 +70,7 @@
 //! - **Look**: the check of N every X laser cycles, with a decision if
 //!   `L1 < N < L2`.
 //! - **Peak event**, here *depth event*: a peak that stands clear.
+//! - **Dynamic depth**: events of changes of depth only, with a polarity.
 //! - **AER**: address-event representation; REQ and ACK are its handshake.
 
 #![no_std]
@@ -85,6 +88,7 @@ pub mod background;
 mod centred_window;
 mod depth;
 mod detection;
+mod dynamic_depth;
 mod estimator;
 mod event;
 mod flags;
@@ -95,7 +99,9 @@ pub mod peak;
 mod photon_count;
 mod pixel;
 mod processing_element;
+mod reflectivity;
 mod rule;
+mod running_mean;
 mod threshold;
 mod units;
 mod window;
@@ -108,6 +114,10 @@ pub use aer::{AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord}
 pub use centred_window::CentredWindow;
 pub use depth::{Depth, RangeScale, RangeScaleError, centre_of_mass};
 pub use detection::{Detection, detect};
+pub use dynamic_depth::{
+    DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Polarity, Reference,
+    ZeroThresholdError,
+};
 pub use estimator::DepthEstimator;
 pub use event::{DepthEvent, EventSlot};
 pub use flags::Flags;
@@ -118,7 +128,9 @@ pub use peak::Peak;
 pub use photon_count::PhotonCount;
 pub use pixel::{AsyncPixel, ConfigError, Look, PixelConfig, Statistics};
 pub use processing_element::{Macropixel, ProcessingElement};
+pub use reflectivity::Reflectivity;
 pub use rule::{DetectionRule, PaperRule, whole_background};
+pub use running_mean::RunningMean;
 pub use threshold::Threshold;
 pub use units::{BinIndex, BinPosition, Count, LaserCycle, PixelAddress, SubBinOffset};
 pub use window::{WindowRule, WindowWidthError};

@@ -128,6 +128,17 @@ impl BinPosition {
     /// Two bins before bin 0: the nearest.
     pub const MIN: Self = Self::of(BinIndex(0), SubBinOffset::MIN);
 
+    /// From 1/256 bins, or `None` outside [`Self::MIN`]..=[`Self::MAX`].
+    #[inline]
+    #[must_use]
+    pub const fn new(raw: i32) -> Option<Self> {
+        if Self::MIN.0 <= raw && raw <= Self::MAX.0 {
+            Some(Self(raw))
+        } else {
+            None
+        }
+    }
+
     /// Where `offset` from the start of `bin` lies. Exact.
     #[inline]
     #[must_use]

@@ -9,8 +9,8 @@
 use std::collections::BTreeMap;
 
 use dtof_core::{
-    AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord, BinIndex, Count, DepthEvent,
-    Flags, LaserCycle, PixelAddress, SubBinOffset,
+    AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord, BinIndex, BinPosition,
+    Count, DepthEvent, DynamicDepthEvent, Flags, LaserCycle, PixelAddress, SubBinOffset,
 };
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
@@ -136,6 +136,18 @@ fn event_of(values: &BTreeMap<&str, i128>) -> DepthEvent {
     }
 }
 
+fn change_of(values: &BTreeMap<&str, i128>) -> DynamicDepthEvent {
+    assert_eq!(values.len(), 5);
+    DynamicDepthEvent::new(
+        PixelAddress(values["pixel"].try_into().unwrap()),
+        LaserCycle(values["cycle"].try_into().unwrap()),
+        BinPosition::new(values["position"].try_into().unwrap()).unwrap(),
+        values["change"].try_into().unwrap(),
+        Flags::from_bits(values["flags"].try_into().unwrap()).unwrap(),
+    )
+    .unwrap()
+}
+
 fn hex(text: &str) -> Vec<u8> {
     let bytes = text.trim_matches('`').split_whitespace();
     bytes
@@ -214,6 +226,14 @@ fn the_golden_file_is_what_encoder_and_decoder_make_of_it() {
                     assert!(DOCUMENT.contains(&example), "{example}");
                 }
             }
+            "dynamic" => {
+                let event = change_of(&values);
+                assert_eq!(decoded, AerRecord::DynamicDepth(event));
+                let (time, word) = encoder.encode_dynamic_depth(&event);
+                assert_eq!(time.map(AerWord::to_le_bytes), time_due.take());
+                assert_eq!(word.to_le_bytes(), sent);
+                events += 1;
+            }
             "end" => {
                 let checksum = crc32(&bytes);
                 assert_eq!(values["events"], events);
@@ -226,7 +246,7 @@ fn the_golden_file_is_what_encoder_and_decoder_make_of_it() {
         }
         bytes.extend(sent);
     }
-    assert!(events >= 8);
+    assert!(events >= 12);
     assert!(golden.last().unwrap()[1].starts_with("end"));
     assert!(DOCUMENT.contains(&format!("{} bytes", bytes.len())));
     assert!(DOCUMENT.contains(&format!("version {AER_VERSION}")));
@@ -235,10 +255,14 @@ fn the_golden_file_is_what_encoder_and_decoder_make_of_it() {
 #[test]
 fn the_words_to_refuse_are_refused_for_the_reason_given() {
     let (_, refused) = golden_rows();
-    assert!(refused.len() >= 8);
+    assert!(refused.len() >= 17);
     for row in refused {
         let word = AerWord::from_le_bytes(word_of(row[0]));
-        let error = AerDecoder::new().decode(word).unwrap_err();
+        let mut decoder = AerDecoder::new();
+        if row[1] != AerError::MissingTime.to_string() {
+            decoder.decode(AerWord::time(LaserCycle(0))).unwrap();
+        }
+        let error = decoder.decode(word).unwrap_err();
         assert_eq!(error.to_string(), row[1], "{}", row[0]);
     }
 }
@@ -472,7 +496,7 @@ fn an_error_leaves_the_decoder_as_it_was() {
     for (byte, bit, error) in [
         (0, 0x01, AerError::ReservedBits),   // of a time word
         (6, 0x20, AerError::UnknownControl), // 1 becomes 3
-        (7, 0x80, AerError::UnknownKind),    // 0 becomes 2
+        (7, 0xc0, AerError::UnknownKind),    // 0 becomes 3
         (15, 0x80, AerError::ReservedBits),
     ] {
         let mut bytes = AerWord::time(LaserCycle(0)).to_le_bytes();
@@ -522,9 +546,28 @@ fn check_any_bytes(bytes: [u8; 16]) {
             assert_eq!(decoded, expected);
         }
         (0, _) => assert_eq!(decoded, Err(AerError::UnknownControl)),
+        (2, _) => {
+            let position = (number >> 64) as u32 as i32;
+            let change = (number >> 96) as u32 as i32;
+            let in_range = (-512..=262_399).contains(&position)
+                && (-262_911..=262_911).contains(&change)
+                && change != 0;
+            let reserved = number >> 16 & 0xffff | number >> 58 & 0xf;
+            match decoded {
+                Ok(AerRecord::DynamicDepth(event)) => {
+                    assert!(in_range && reserved == 0);
+                    assert_eq!(event.cycle.0 >> 20, 3);
+                    // Sent on, it is the same.
+                    assert_eq!(AerWord::dynamic_depth(&event).to_le_bytes(), bytes);
+                }
+                Err(AerError::OutOfRange) => assert!(!in_range),
+                Err(AerError::ReservedBits) => assert!(in_range && reserved != 0),
+                _ => panic!("{decoded:?}"),
+            }
+        }
         _ => assert_eq!(decoded, Err(AerError::UnknownKind)),
     }
-    if kind == 1 {
+    if kind == 1 || kind == 2 {
         assert_eq!(AerDecoder::new().decode(word), Err(AerError::MissingTime));
     }
 }
@@ -542,7 +585,61 @@ fn random_bytes_decode_as_documented_or_not_at_all() {
             let control = 1 + u128::from(rng.next_u32() % 2);
             bytes = (few & !(0xfff << 52) | control << 52).to_le_bytes();
         }
+        // A tenth dynamic depth events, most of them with a position and a change that
+        // can be.
+        if number % 10 == 1 {
+            let word = u128::from_le_bytes(bytes) & !(0xf << 58 | 0xffff << 16);
+            let small = word >> 64 & 0x3_ffff | (word >> 96 & 0x3_ffff) << 32;
+            let few = 1 << (rng.next_u32() % 128);
+            let few = if rng.next_u32() % 4 == 0 { few } else { 0 };
+            let low = word & u128::from(u64::MAX) & !(3 << 62) | 2 << 62;
+            bytes = (small << 64 | low ^ few & !(3 << 62)).to_le_bytes();
+        }
         check_any_bytes(bytes);
+    }
+}
+
+#[test]
+fn all_combinations_of_the_boundaries_of_a_dynamic_depth_event() {
+    let tables = ["### Dynamic depth event", "### Time word"].map(bit_table);
+    let two = |number: i32| u128::from(number.cast_unsigned());
+    for pixel in [0, 1, u16::MAX] {
+        for cycle in [0, 1, (1 << 20) - 1, 1 << 20, u64::MAX] {
+            for position in [-512, -1, 0, 1, 262_399] {
+                for change in [-262_911, -1, 1, 262_911] {
+                    for flags in 0..64 {
+                        let event = DynamicDepthEvent::new(
+                            PixelAddress(pixel),
+                            LaserCycle(cycle),
+                            BinPosition::new(position).unwrap(),
+                            change,
+                            Flags::from_bits(flags).unwrap(),
+                        )
+                        .unwrap();
+                        let (time, word) = AerEncoder::new().encode_dynamic_depth(&event);
+                        let time = time.unwrap();
+                        assert_eq!(time.to_le_bytes(), pack_time(&tables[1], event.cycle));
+                        let values = BTreeMap::from([
+                            ("pixel", pixel.into()),
+                            ("cycle_low", u128::from(cycle % (1 << 20))),
+                            ("flags", flags.into()),
+                            ("position", two(position)),
+                            ("change", two(change)),
+                        ]);
+                        assert_eq!(word.to_le_bytes(), pack(&tables[0], &values));
+                        let mut decoder = AerDecoder::new();
+                        decoder.decode(time).unwrap();
+                        let decoded = decoder.decode(word);
+                        assert_eq!(decoded, Ok(AerRecord::DynamicDepth(event)));
+                    }
+                }
+            }
+        }
+    }
+    for (position, change) in [(0, 0), (0, 262_912), (0, -262_912)] {
+        let position = BinPosition::new(position).unwrap();
+        let (pixel, cycle) = (PixelAddress(0), LaserCycle(0));
+        assert!(DynamicDepthEvent::new(pixel, cycle, position, change, Flags::NONE).is_none());
     }
 }
 
