@@ -30,7 +30,7 @@
 
 use core::fmt;
 
-use fixed::types::{I24F8, U16F16, U24F8};
+use fixed::types::{I24F8, I56F8, U16F16, U24F8};
 
 use crate::flags::Flags;
 use crate::gate::RangeGate;
@@ -176,6 +176,15 @@ impl RangeScale {
     #[allow(clippy::cast_possible_truncation, reason = "checked by `new`")]
     pub const fn range(&self, position: BinPosition) -> I24F8 {
         I24F8::from_bits(self.raw_range(position) as i32)
+    }
+
+    /// How far apart two positions are, from 1/256 bins to millimetres, rounded to the
+    /// nearest 1/256 mm. The range offset has no part in it.
+    #[inline]
+    #[must_use]
+    pub const fn distance(&self, bins: i32) -> I56F8 {
+        // 32 bits times 32 bits, 24 fractional bits.
+        I56F8::from_bits((bins as i64 * self.bin as i64 + (1 << 15)) >> 16)
     }
 
     /// A distance between two positions, from millimetres to 1/256 bins, rounded to

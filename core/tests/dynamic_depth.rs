@@ -183,6 +183,15 @@ proptest! {
         // A bin is known to half of 1/65536 mm.
         let error = 0.5 + bins / (f64::from(width) * 0.149_896_229) * 0.51;
         prop_assert!((found - bins).abs() <= error, "{found} {bins} {error}");
+        // And back, as far as the format goes.
+        if let Ok(steps) = i32::try_from(scale.bins_of(distance)) {
+            let back = scale.distance(steps).to_num::<f64>();
+            let step = f64::from(width) / 65536.0 * 0.149_896_229 / 256.0;
+            let error = step / 2.0 + 1.0 / 256.0 + distance.to_num::<f64>() * 1e-9;
+            prop_assert!((back - distance.to_num::<f64>()).abs() <= error + step, "{back} {distance}");
+            let opposite = scale.distance(-steps).to_num::<f64>();
+            prop_assert!((back + opposite).abs() <= 1.0 / 256.0);
+        }
     }
 }
 

@@ -162,6 +162,7 @@ fn decode(decoder: &mut AerDecoder, body: &[u8]) -> Vec<DepthEvent> {
             |word| match decoder.decode(AerWord::from_le_bytes(word)).unwrap() {
                 AerRecord::Event(event) => Some(event),
                 AerRecord::Time(_) => None,
+                AerRecord::DynamicDepth(_) => panic!("dynamic depth is off"),
                 AerRecord::End { .. } => panic!("a device ends no stream"),
             },
         )

@@ -6,13 +6,47 @@ use std::io::{self, Read, Write};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{AER_VERSION, AerDecoder, AerEncoder, AerRecord, AerWord, DepthEvent};
+use dtof_core::{
+    AER_VERSION, AerDecoder, AerEncoder, AerRecord, AerWord, DepthEvent, DynamicDepthEvent,
+    LaserCycle, PixelAddress,
+};
 
 use crate::source::Geometry;
 
 const MAGIC: [u8; 8] = *b"DTOF-AER";
 const HEADER_BYTES: u16 = 64;
+/// The oldest version that is read: it has depth events only.
+const OLDEST_VERSION: u16 = 1;
 static CRC_32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// An event of either kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A peak stood clear.
+    Depth(DepthEvent),
+    /// The mean depth has changed.
+    DynamicDepth(DynamicDepthEvent),
+}
+
+impl Event {
+    /// Which macropixel.
+    #[must_use]
+    pub fn pixel(&self) -> PixelAddress {
+        match self {
+            Self::Depth(event) => event.pixel,
+            Self::DynamicDepth(event) => event.pixel,
+        }
+    }
+
+    /// When.
+    #[must_use]
+    pub fn cycle(&self) -> LaserCycle {
+        match self {
+            Self::Depth(event) => event.cycle,
+            Self::DynamicDepth(event) => event.cycle,
+        }
+    }
+}
 
 /// What a reader must know to turn words into ranges.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,8 +86,8 @@ impl Header {
         ensure!(bytes[..8] == MAGIC, "not an AER file");
         let version = u16_at(8);
         ensure!(
-            version == AER_VERSION,
-            "AER version {version}; this program reads {AER_VERSION}"
+            (OLDEST_VERSION..=AER_VERSION).contains(&version),
+            "AER version {version}; this program reads {OLDEST_VERSION} to {AER_VERSION}"
         );
         ensure!(
             u16_at(10) == HEADER_BYTES && bytes[32..].iter().all(|&byte| byte == 0),
@@ -99,8 +133,11 @@ impl<W: Write> Writer<W> {
     ///
     /// # Errors
     /// Those of the writer.
-    pub fn write(&mut self, event: &DepthEvent) -> io::Result<()> {
-        let (time, word) = self.encoder.encode(event);
+    pub fn write(&mut self, event: &Event) -> io::Result<()> {
+        let (time, word) = match event {
+            Event::Depth(event) => self.encoder.encode(event),
+            Event::DynamicDepth(event) => self.encoder.encode_dynamic_depth(event),
+        };
         if let Some(time) = time {
             self.put(&time.to_le_bytes())?;
         }
@@ -170,7 +207,7 @@ impl<R: Read> Reader<R> {
     ///
     /// # Errors
     /// What is wrong and at which byte of the file.
-    pub fn next_event(&mut self) -> Result<Option<DepthEvent>> {
+    pub fn next_event(&mut self) -> Result<Option<Event>> {
         while !self.ended {
             let offset = self.offset;
             if let Some(event) = self.next_word().with_context(|| format!("byte {offset}"))? {
@@ -181,15 +218,14 @@ impl<R: Read> Reader<R> {
     }
 
     /// Reads one word; gives the event if it is one.
-    fn next_word(&mut self) -> Result<Option<DepthEvent>> {
+    fn next_word(&mut self) -> Result<Option<Event>> {
         let Some(bytes) = self.read_word()? else {
             bail!("the file ends without an end word");
         };
         match self.decoder.decode(AerWord::from_le_bytes(bytes))? {
-            AerRecord::Event(event) => {
-                self.accept(&bytes);
-                self.events += 1;
-                Ok(Some(event))
+            AerRecord::Event(event) => Ok(Some(self.counted(&bytes, Event::Depth(event)))),
+            AerRecord::DynamicDepth(event) => {
+                Ok(Some(self.counted(&bytes, Event::DynamicDepth(event))))
             }
             AerRecord::Time(_) => {
                 self.accept(&bytes);
@@ -225,6 +261,12 @@ impl<R: Read> Reader<R> {
         let word = <[u8; AerWord::BYTES]>::try_from(bytes);
         word.map(Some)
             .map_err(|_| anyhow!("the file ends inside a word"))
+    }
+
+    fn counted(&mut self, bytes: &[u8; AerWord::BYTES], event: Event) -> Event {
+        self.accept(bytes);
+        self.events += 1;
+        event
     }
 
     fn accept(&mut self, bytes: &[u8; AerWord::BYTES]) {

@@ -70,7 +70,7 @@ impl Output {
     pub fn write(&mut self, events: &[DepthEvent]) -> Result<()> {
         for event in events {
             events_csv::write(&mut self.csv, event, &self.scale)
-                .and_then(|()| self.aer.write(event))
+                .and_then(|()| self.aer.write(&aer_file::Event::Depth(*event)))
                 .with_context(|| self.folder.display().to_string())?;
             self.maps.add(event, &self.scale);
         }

@@ -86,6 +86,7 @@ impl Host {
                 match self.decoder.decode(word).unwrap() {
                     AerRecord::Event(event) => self.events.push(event),
                     AerRecord::Time(_) => {}
+                    AerRecord::DynamicDepth(_) => panic!("dynamic depth is off"),
                     AerRecord::End { .. } => panic!("an end"),
                 }
             }

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Write};
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::{aer_file, events_csv};
 use dtof_core::RangeScale;
@@ -30,9 +30,22 @@ impl Decode {
         let mut reader = aer_file::Reader::new(BufReader::new(file)).with_context(name)?;
         let header = *reader.header();
         let scale = RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?;
-        writeln!(out, "{}", events_csv::HEADER)?;
-        while let Some(event) = reader.next_event().with_context(name)? {
-            events_csv::write(out, &event, &scale)?;
+        let first = reader.next_event();
+        // The columns are those of the first event.
+        let header = match &first {
+            Ok(Some(event)) => events_csv::header(event),
+            _ => events_csv::HEADER,
+        };
+        writeln!(out, "{header}")?;
+        let mut next = first.with_context(name)?;
+        while let Some(event) = next {
+            ensure!(
+                events_csv::header(&event) == header,
+                "{}: depth events and dynamic depth events in one file have no columns in common",
+                name()
+            );
+            events_csv::write_event(out, &event, &scale)?;
+            next = reader.next_event().with_context(name)?;
         }
         Ok(())
     }

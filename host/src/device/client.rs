@@ -210,6 +210,9 @@ impl Client {
                 let word = word.try_into().context("the device sends half a word")?;
                 match self.decoder.decode(AerWord::from_le_bytes(word))? {
                     AerRecord::Event(event) => self.events.push(event),
+                    AerRecord::DynamicDepth(_) => {
+                        bail!("the device sends changes of depth nobody asked for")
+                    }
                     AerRecord::Time(_) => {}
                     AerRecord::End { .. } => bail!("the device ends a stream it never ends"),
                 }
