@@ -2,6 +2,7 @@
 
 pub mod depth_error;
 pub mod depth_step;
+pub mod dynamic_depth;
 pub mod failures;
 pub mod false_events;
 pub mod false_rate;
@@ -35,6 +36,7 @@ pub const ALL: &[Study] = &[
     depth_step::STUDY,
     radial_motion::STUDY,
     fan_motion::STUDY,
+    dynamic_depth::STUDY,
     latency::STUDY,
     false_rate::STUDY,
     time_to_detect::STUDY,

@@ -1,0 +1,203 @@
+//! One pixel, and whether what its dynamic depth says is so.
+
+use std::collections::VecDeque;
+
+use dtof_core::{DepthEvent, DynamicDepthConfig, DynamicDepthPixel, Polarity, Reference};
+
+use crate::sweep::Tally;
+use crate::sweep::mean::{add, add_value};
+
+/// Events a mean is of: the paper's.
+const MEAN_OF: usize = 3;
+/// Laser cycles after a step within which it has to be found; one that comes later in
+/// the run is left out.
+const WITHIN: u64 = 20_000;
+/// Laser cycles before it from which on it may be found.
+const EARLY: u64 = 2_000;
+
+/// When the truth moves by more than `threshold_mm` from where it last did so, and to
+/// which side.
+pub fn true_steps(truth: impl Iterator<Item = (u64, f64)>, threshold_mm: f64) -> Vec<(u64, i8)> {
+    let mut reference = None;
+    let mut steps = Vec::new();
+    for (cycle, range_mm) in truth {
+        let from = *reference.get_or_insert(range_mm);
+        let moved: f64 = range_mm - from;
+        if moved.abs() > threshold_mm {
+            steps.push((cycle, if moved < 0.0 { -1 } else { 1 }));
+            reference = Some(range_mm);
+        }
+    }
+    steps
+}
+
+/// A dynamic depth event.
+#[derive(Clone, Copy)]
+struct Change {
+    cycle: u64,
+    side: i8,
+    /// Whether the truth has changed to the same side by half the threshold.
+    is_true: bool,
+}
+
+/// A pixel with its dynamic depth, and the same means of the truth.
+#[derive(Clone)]
+pub struct Watched {
+    config: DynamicDepthConfig,
+    threshold_mm: f64,
+    pixel: DynamicDepthPixel<MEAN_OF>,
+    truth_mm: VecDeque<f64>,
+    reference_mm: Option<f64>,
+    changes: Vec<Change>,
+    events: u64,
+}
+
+impl Watched {
+    /// Before any event.
+    pub fn new(config: DynamicDepthConfig, threshold_mm: f64) -> Self {
+        Self {
+            config,
+            threshold_mm,
+            pixel: DynamicDepthPixel::new(),
+            truth_mm: VecDeque::new(),
+            reference_mm: None,
+            changes: Vec::new(),
+            events: 0,
+        }
+    }
+
+    /// Takes an event of the pixel in, and how far away what it saw was.
+    #[allow(clippy::cast_precision_loss, reason = "three")]
+    pub fn observe(&mut self, event: &DepthEvent, truth_mm: f64) {
+        self.events += 1;
+        let change = self.pixel.observe(&self.config, event);
+        self.truth_mm.push_back(truth_mm);
+        if self.truth_mm.len() > MEAN_OF {
+            self.truth_mm.pop_front();
+        }
+        if self.truth_mm.len() < MEAN_OF {
+            return;
+        }
+        let mean = self.truth_mm.iter().sum::<f64>() / MEAN_OF as f64;
+        let moved = mean - *self.reference_mm.get_or_insert(mean);
+        if let Some(change) = change {
+            let side = match change.polarity() {
+                Polarity::Nearer => -1,
+                Polarity::Farther => 1,
+            };
+            self.changes.push(Change {
+                cycle: change.cycle.0,
+                side,
+                is_true: moved * f64::from(side) > self.threshold_mm / 2.0,
+            });
+        }
+        if change.is_some() || self.config.reference() == Reference::Previous {
+            self.reference_mm = Some(mean);
+        }
+    }
+
+    /// Adds what was reported, beside the true `steps` of a run of `cycles` laser
+    /// cycles, to the counts of `name`.
+    pub fn add_to(&self, tally: &mut Tally, name: &str, steps: &[(u64, i8)], cycles: u64) {
+        let count = |amount: usize| amount as u64;
+        add(tally, name, "changes", count(self.changes.len()));
+        let is_false = self.changes.iter().filter(|change| !change.is_true);
+        add(tally, name, "false", count(is_false.count()));
+        if steps.is_empty() {
+            add(tally, name, "still pixels", 1);
+            add(tally, name, "still events", self.events);
+            add(tally, name, "still changes", count(self.changes.len()));
+        }
+        let mut changes = self.changes.iter().peekable();
+        for (index, &(at, side)) in steps.iter().enumerate() {
+            let next = steps.get(index + 1).map_or(cycles, |step| step.0);
+            if at + WITHIN > cycles {
+                break;
+            }
+            // A mean is noisy, so that one that moves slowly may be there earlier.
+            let from = at.saturating_sub(EARLY.min(next - at));
+            let until = (at + WITHIN).min(next.saturating_sub(EARLY));
+            while changes.next_if(|change| change.cycle < from).is_some() {}
+            let mut found = None;
+            while let Some(change) = changes.next_if(|change| change.cycle <= until) {
+                if change.side == side && found.is_none() {
+                    found = Some(change.cycle);
+                }
+            }
+            add(tally, name, "steps", 1);
+            if let Some(cycle) = found {
+                let delay = cycle.cast_signed() - at.cast_signed();
+                add_value(tally, &format!("{name} delay"), delay);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dtof_core::fixed::types::{I24F8, U16F16, U24F8};
+    use dtof_core::{BinIndex, Count, Flags, LaserCycle, PixelAddress, RangeScale, SubBinOffset};
+
+    use super::*;
+
+    /// A pixel of 250 ps bins that sees these bins, an event each 100 laser cycles.
+    fn watched(bins: &[u16], truth: &[u16]) -> Watched {
+        let scale = RangeScale::new(U16F16::from_num(250), I24F8::ZERO).unwrap();
+        let threshold = U24F8::from_num(100);
+        let config = DynamicDepthConfig::new(threshold, &scale, Reference::Previous).unwrap();
+        let mut watched = Watched::new(config, 100.0);
+        for (cycle, (&bin, &truth)) in (1..).zip(bins.iter().zip(truth)) {
+            let event = DepthEvent {
+                pixel: PixelAddress(0),
+                cycle: LaserCycle(cycle * 100),
+                exposure: 44,
+                peak_bin: BinIndex::saturating(bin),
+                offset: SubBinOffset::CENTRE,
+                peak_count: Count::saturating(9),
+                background: Count::saturating(1),
+                flags: Flags::NONE,
+            };
+            watched.observe(&event, f64::from(truth) * 37.474);
+        }
+        watched
+    }
+
+    fn tallied(watched: &Watched, steps: &[(u64, i8)]) -> Tally {
+        let mut tally = Tally::new();
+        watched.add_to(&mut tally, "a", steps, 100_000);
+        tally
+    }
+
+    #[test]
+    fn a_step_is_found_after_its_delay_and_its_changes_are_true() {
+        let bins: Vec<u16> = (0..20)
+            .map(|index| if index < 10 { 20 } else { 40 })
+            .collect();
+        // The step is just after the tenth event.
+        let tally = tallied(&watched(&bins, &bins), &[(1001, 1)]);
+        assert_eq!((tally["a changes"], tally["a false"]), (3, 0));
+        assert_eq!((tally["a steps"], tally["a delay values"]), (1, 1));
+        assert_eq!(tally["a delay above 0"], 99);
+        // To the other side it is not that step.
+        let tally = tallied(&watched(&bins, &bins), &[(1001, -1)]);
+        assert_eq!((tally["a steps"], tally.get("a delay values")), (1, None));
+    }
+
+    #[test]
+    fn a_false_event_makes_changes_to_both_sides_that_are_false() {
+        let mut bins = vec![20; 20];
+        bins[10] = 90;
+        let tally = tallied(&watched(&bins, &[20; 20]), &[]);
+        // It comes and goes.
+        assert_eq!((tally["a changes"], tally["a false"]), (2, 2));
+        assert_eq!((tally["a still pixels"], tally["a still changes"]), (1, 2));
+        assert_eq!(tally["a still events"], 20);
+    }
+
+    #[test]
+    fn steps_of_the_truth() {
+        let truth = [0.0, 60.0, 101.0, 150.0, 201.0, 202.0, 50.0, 50.0];
+        let steps = true_steps((0..).zip(truth), 100.0);
+        assert_eq!(steps, [(2, 1), (5, 1), (6, -1)]);
+    }
+}
