@@ -149,12 +149,11 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         let slice = photons.next_slice(SLICE)?;
         for event in engine.run(&slice)? {
             add(&mut tally, "depth", "events", 1);
-            // In the middle of the exposure.
-            let seen = event.cycle.0 - u64::from(event.exposure) / 2;
-            let truth = scene.truth(event.pixel, seen).map(|view| view.range_mm);
+            let first = (event.cycle.0 + 1).saturating_sub(event.exposure.into());
+            let truth = [first, event.cycle.0].map(|cycle| range_mm(&scene, event.pixel, cycle));
             let pixel = usize::from(event.pixel.0);
             for (_, _, pixels) in &mut ways {
-                pixels[pixel].observe(&event, truth.unwrap_or_default());
+                pixels[pixel].observe(&event, truth);
             }
         }
     }
@@ -175,11 +174,15 @@ fn name(threshold_mm: u32, reference: &str) -> String {
 
 /// The true steps of a pixel.
 fn steps(scene: &Scene, address: PixelAddress, cycles: u64, threshold_mm: f64) -> Vec<(u64, i8)> {
-    let truth = (0..cycles).step_by(50).map(|cycle| {
-        let view = scene.truth(address, cycle);
-        (cycle, view.map_or(0.0, |view| view.range_mm))
-    });
+    let truth = (0..cycles).step_by(50);
+    let truth = truth.map(|cycle| (cycle, range_mm(scene, address, cycle)));
     true_steps(truth, threshold_mm)
+}
+
+/// What a pixel sees; 0 if it sees nothing.
+fn range_mm(scene: &Scene, address: PixelAddress, cycle: u64) -> f64 {
+    let view = scene.truth(address, cycle);
+    view.map_or(0.0, |view| view.range_mm)
 }
 
 #[cfg(test)]

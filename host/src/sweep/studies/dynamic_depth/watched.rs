@@ -12,8 +12,6 @@ const MEAN_OF: usize = 3;
 /// Laser cycles after a step within which it has to be found; one that comes later in
 /// the run is left out.
 const WITHIN: u64 = 20_000;
-/// Laser cycles before it from which on it may be found.
-const EARLY: u64 = 2_000;
 
 /// When the truth moves by more than `threshold_mm` from where it last did so, and to
 /// which side.
@@ -36,18 +34,36 @@ pub fn true_steps(truth: impl Iterator<Item = (u64, f64)>, threshold_mm: f64) ->
 struct Change {
     cycle: u64,
     side: i8,
-    /// Whether the truth has changed to the same side by half the threshold.
+    /// Whether the truth has moved to this side by half the threshold meanwhile.
     is_true: bool,
 }
 
-/// A pixel with its dynamic depth, and the same means of the truth.
+/// From the nearest to the farthest.
+#[derive(Clone, Copy)]
+struct Extent {
+    low: f64,
+    high: f64,
+}
+
+impl Extent {
+    fn of(extents: impl Iterator<Item = Self>) -> Option<Self> {
+        extents.reduce(|a, b| Self {
+            low: a.low.min(b.low),
+            high: a.high.max(b.high),
+        })
+    }
+}
+
+/// A pixel with its dynamic depth, and what it saw meanwhile.
 #[derive(Clone)]
 pub struct Watched {
     config: DynamicDepthConfig,
     threshold_mm: f64,
     pixel: DynamicDepthPixel<MEAN_OF>,
-    truth_mm: VecDeque<f64>,
-    reference_mm: Option<f64>,
+    /// In the exposures of the last events: those of the mean, and the one before.
+    recent: VecDeque<Extent>,
+    /// Since the exposures of the mean that was reported last.
+    since: Option<Extent>,
     changes: Vec<Change>,
     events: u64,
 }
@@ -59,41 +75,45 @@ impl Watched {
             config,
             threshold_mm,
             pixel: DynamicDepthPixel::new(),
-            truth_mm: VecDeque::new(),
-            reference_mm: None,
+            recent: VecDeque::new(),
+            since: None,
             changes: Vec::new(),
             events: 0,
         }
     }
 
-    /// Takes an event of the pixel in, and how far away what it saw was.
-    #[allow(clippy::cast_precision_loss, reason = "three")]
-    pub fn observe(&mut self, event: &DepthEvent, truth_mm: f64) {
+    /// Takes an event of the pixel in, and how far away what it saw was at both ends
+    /// of its exposure.
+    pub fn observe(&mut self, event: &DepthEvent, [first, last]: [f64; 2]) {
         self.events += 1;
-        let change = self.pixel.observe(&self.config, event);
-        self.truth_mm.push_back(truth_mm);
-        if self.truth_mm.len() > MEAN_OF {
-            self.truth_mm.pop_front();
+        let seen = Extent {
+            low: first.min(last),
+            high: first.max(last),
+        };
+        self.recent.push_back(seen);
+        if self.recent.len() > MEAN_OF + 1 {
+            self.recent.pop_front();
         }
-        if self.truth_mm.len() < MEAN_OF {
+        self.since = Extent::of(self.since.into_iter().chain([seen]));
+        let Some(change) = self.pixel.observe(&self.config, event) else {
             return;
-        }
-        let mean = self.truth_mm.iter().sum::<f64>() / MEAN_OF as f64;
-        let moved = mean - *self.reference_mm.get_or_insert(mean);
-        if let Some(change) = change {
-            let side = match change.polarity() {
-                Polarity::Nearer => -1,
-                Polarity::Farther => 1,
-            };
-            self.changes.push(Change {
-                cycle: change.cycle.0,
-                side,
-                is_true: moved * f64::from(side) > self.threshold_mm / 2.0,
-            });
-        }
-        if change.is_some() || self.config.reference() == Reference::Previous {
-            self.reference_mm = Some(mean);
-        }
+        };
+        let newest = || self.recent.iter().rev().take(MEAN_OF).copied();
+        let before = match self.config.reference() {
+            Reference::Previous => Extent::of(self.recent.iter().copied()),
+            Reference::Reported => self.since,
+        };
+        let (side, moved) = match (change.polarity(), before.zip(Extent::of(newest()))) {
+            (Polarity::Nearer, Some((before, now))) => (-1, before.high - now.low),
+            (Polarity::Farther, Some((before, now))) => (1, now.high - before.low),
+            (_, None) => return,
+        };
+        self.changes.push(Change {
+            cycle: change.cycle.0,
+            side,
+            is_true: moved > self.threshold_mm / 2.0,
+        });
+        self.since = Extent::of(newest());
     }
 
     /// Adds what was reported, beside the true `steps` of a run of `cycles` laser
@@ -108,29 +128,37 @@ impl Watched {
             add(tally, name, "still events", self.events);
             add(tally, name, "still changes", count(self.changes.len()));
         }
-        let mut changes = self.changes.iter().peekable();
         for (index, &(at, side)) in steps.iter().enumerate() {
-            let next = steps.get(index + 1).map_or(cycles, |step| step.0);
             if at + WITHIN > cycles {
                 break;
             }
-            // A mean is noisy, so that one that moves slowly may be there earlier.
-            let from = at.saturating_sub(EARLY.min(next - at));
-            let until = (at + WITHIN).min(next.saturating_sub(EARLY));
-            while changes.next_if(|change| change.cycle < from).is_some() {}
-            let mut found = None;
-            while let Some(change) = changes.next_if(|change| change.cycle <= until) {
-                if change.side == side && found.is_none() {
-                    found = Some(change.cycle);
-                }
-            }
+            let from = at - early(steps, index);
+            let next = steps.get(index + 1);
+            let until = next.map_or(cycles, |next| next.0 - early(steps, index + 1));
+            let until = until.min(at + WITHIN);
+            let found = self.changes.iter().find(|change| {
+                (from..until).contains(&change.cycle) && change.side == side && change.is_true
+            });
             add(tally, name, "steps", 1);
-            if let Some(cycle) = found {
-                let delay = cycle.cast_signed() - at.cast_signed();
+            if let Some(found) = found {
+                let delay = found.cycle.cast_signed() - at.cast_signed();
                 add_value(tally, &format!("{name} delay"), delay);
             }
         }
     }
+}
+
+/// Laser cycles before a step from which on it may be found: a mean that goes slowly is
+/// noisy and may be there earlier, by up to half of what the step has taken. A step to
+/// the other side than its neighbour is one at once.
+fn early(steps: &[(u64, i8)], index: usize) -> u64 {
+    let (at, side) = steps[index];
+    let (since, neighbour) = match index.checked_sub(1) {
+        Some(before) => (steps[before].0, Some(&steps[before])),
+        None => (0, steps.get(1)),
+    };
+    let goes_on = neighbour.is_some_and(|neighbour| neighbour.1 == side);
+    if goes_on { (at - since) / 2 } else { 0 }
 }
 
 #[cfg(test)]
@@ -157,7 +185,7 @@ mod tests {
                 background: Count::saturating(1),
                 flags: Flags::NONE,
             };
-            watched.observe(&event, f64::from(truth) * 37.474);
+            watched.observe(&event, [f64::from(truth) * 37.474; 2]);
         }
         watched
     }
