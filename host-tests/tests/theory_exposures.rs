@@ -401,7 +401,7 @@ fn time_and_depth_error_are_those_of_the_engine() {
         (mean - expected).abs() / (variance * (1.0 / times + 1.0 / near)).sqrt()
     };
     let time = distance(&cycles, near_cycles / near);
-    let depth = distance(&squares, tuned.depth_error_bins().powi(2));
+    let depth = distance(&squares, tuned.detections.depth_error_bins().powi(2));
     assert!(time < 4.5 && depth < 4.5, "{time} {depth}");
 }
 
