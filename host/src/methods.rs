@@ -252,7 +252,7 @@ fn decision_table(text: &mut String, counts: &Instructions, outcomes: &[Outcome]
         "## Which rule\n\n\
          By the standard deviation of the pulse and the background. Times are means over a pulse in the middle of its\n\
          bin and on an edge, with 1 % false events in 1000 laser cycles, over those of the likelihood ratio that knows\n\
-         the scene.\n\n\
+         the scene. Commands take them as `--rule window --window 3 --z 4.38`.\n\n\
          | pulse σ, bins | background a bin and cycle | rule | α or z | time | instructions | the paper's rule: time |\n\
          |---|---|---|---|---|---|---|\n",
     );
