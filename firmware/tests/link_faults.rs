@@ -34,6 +34,9 @@ const CONFIGURATION: Configuration = Configuration {
     z: 0,
     estimator: 0,
     half_width: 0,
+    output: 0,
+    reference: 0,
+    threshold: 0,
 };
 
 /// Faults done to the bytes so far.

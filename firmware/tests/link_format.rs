@@ -98,6 +98,9 @@ fn a_host_configures_with_the_golden_frame() {
         z: 9 << 11,
         estimator: 1,
         half_width: 5 << 7,
+        output: 1,
+        reference: 1,
+        threshold: 100 << 8,
     };
     host.offer(CONFIGURE, &configuration.to_le_bytes()).unwrap();
     assert_eq!(hex(&next(&mut host, 0)), hex(&golden("configure 0")));
@@ -159,7 +162,7 @@ fn are_documented<T: Display>(all: &[T], number: impl Fn(&T) -> u8, table: &str)
 #[test]
 fn every_refusal_has_its_own_number_and_reason() {
     let all: Vec<Refusal> = (0..=255).filter_map(Refusal::from_number).collect();
-    assert_eq!(all.len(), 14);
+    assert_eq!(all.len(), 15);
     are_documented(&all, |&refusal| refusal as u8, "\n| reason | |\n");
 }
 
@@ -196,13 +199,14 @@ proptest! {
 
     #[test]
     fn configurations_come_back(
-        words in any::<[u16; 10]>(), bin_width: u32, offset: i32, bytes in any::<[u8; 4]>(),
+        words in any::<[u16; 10]>(), bin_width: u32, offset: i32, bytes in any::<[u8; 6]>(),
+        threshold: u32,
     ) {
         let [alpha, minimum_count, x, l1, l2, gate_first, gate_last, pixels, z, half_width] = words;
-        let [source, rule, window, estimator] = bytes;
+        let [source, rule, window, estimator, output, reference] = bytes;
         let configuration = Configuration {
             alpha, minimum_count, x, l1, l2, gate_first, gate_last, pixels, bin_width, offset,
-            source, rule, window, z, estimator, half_width,
+            source, rule, window, z, estimator, half_width, output, reference, threshold,
         };
         let bytes = configuration.to_le_bytes();
         prop_assert_eq!(Configuration::from_le_bytes(&bytes), Some(configuration));

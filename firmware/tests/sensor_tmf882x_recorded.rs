@@ -11,12 +11,10 @@ use std::path::PathBuf;
 use common::host::{CONFIGURATION, Host};
 use common::tmf882x::{Bench, Counts, packet, packets, settings};
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{
-    AsyncPixel, Count, Count24, DepthEstimator, Histogram, PaperRule, RangeGate, detect,
-};
+use dtof_core::{Count, Count24, DepthEstimator, Histogram, PaperRule, RangeGate, detect};
 use dtof_firmware::link::message::Configuration;
 use dtof_firmware::sensor::{About, Sensor};
-use dtof_firmware::sidecar::Sidecar;
+use dtof_firmware::sidecar::{Pixel, Sidecar};
 use serde_json::Value;
 
 /// Writes past the test harness, which hides what passing tests print.
@@ -85,7 +83,7 @@ fn the_sidecar_decides_recorded_histograms_as_the_core_does() {
     };
     // The reference is pixel 99, which is none of the sidecar's; the zones are 10
     // to 18, the centre one 14.
-    let mut pixels = heapless::Vec::<AsyncPixel<128>, 19>::new();
+    let mut pixels = heapless::Vec::<Pixel, 19>::new();
     let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut host = Host::new(1, 0);
     let wanted = Configuration {

@@ -5,21 +5,22 @@
 mod common;
 
 use common::host::{CONFIGURATION, Call, Host, Scripted};
-use dtof_core::fixed::types::{U4F12, U8F8, U16F16};
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
-    AnyRule, AsyncPixel, CentredWindow, Count, Count24, DepthEstimator, DepthEvent, Flags,
-    Histogram, LaserCycle, PaperRule, PixelAddress, PixelConfig, RangeGate, WindowRule, detect,
+    AnyRule, AsyncPixel, CentredWindow, Count, Count24, DepthEstimator, DepthEvent,
+    DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Flags, Histogram, LaserCycle,
+    PaperRule, PixelAddress, PixelConfig, RangeGate, RangeScale, Reference, WindowRule, detect,
 };
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::{self, Configuration, Refusal, Report};
 use dtof_firmware::sensor::{About, PhotonSink, Polled, Sensor, SensorFault, simulated};
-use dtof_firmware::sidecar::Sidecar;
+use dtof_firmware::sidecar::{Pixel, Sidecar};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 /// Room for the bytes of a few milliseconds.
 type Buffers = dtof_firmware::serial::Buffers<512, 1024>;
-type Pixels = heapless::Vec<AsyncPixel<128>, 8>;
+type Pixels = heapless::Vec<Pixel, 8>;
 
 /// A configuration with each rule and estimator, and the same as the core takes it.
 fn configurations() -> [(Configuration, PixelConfig<128, AnyRule>); 2] {
@@ -131,6 +132,47 @@ fn a_host_that_reads_gets_the_events_of_the_pixels() {
         assert_eq!(report.statistics.events, expected.len() as u64);
         assert_eq!(report.statistics.deferred, 0);
         assert_eq!(offered(&report), photons(&script));
+    }
+}
+
+#[test]
+fn dynamic_depth_sends_what_the_core_makes_of_the_events() {
+    let script = script(5_000);
+    let (wanted, config) = configurations()[0];
+    let scale = RangeScale::new(U16F16::from_num(250), I24F8::ZERO).unwrap();
+    // A twentieth of a bin, so that there are many.
+    let threshold = U24F8::lit("2");
+    for (number, reference) in [(0, Reference::Previous), (1, Reference::Reported)] {
+        let mut pixels = Pixels::new();
+        let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
+        let mut host = Host::new(1, 0);
+        let mut sensor = sensor(&script);
+        let wanted = Configuration {
+            output: 1,
+            reference: number,
+            threshold: threshold.to_bits(),
+            ..wanted
+        };
+        host.configure(&mut device, 0, &wanted);
+        for now_ms in 0..5_000 {
+            device.poll_sensor(&mut sensor, now_ms);
+            host.exchange(&mut device, now_ms);
+            host.read(4);
+        }
+        let report = host.report(&mut device, 5_000);
+        let dynamic_depth = DynamicDepthConfig::new(threshold, &scale, reference).unwrap();
+        let mut observers = [const { DynamicDepthPixel::<3>::new() }; 8];
+        let events = self::reference(&script, &config);
+        let expected: Vec<DynamicDepthEvent> = events
+            .iter()
+            .filter_map(|event| {
+                observers[usize::from(event.pixel.0)].observe(&dynamic_depth, event)
+            })
+            .collect();
+        assert!(expected.len() > 30, "{}", expected.len());
+        assert!(host.changes == expected && host.events.is_empty());
+        // Depth events are counted all the same.
+        assert_eq!(report.statistics.events, events.len() as u64);
     }
 }
 
@@ -383,7 +425,7 @@ fn histograms_without_room_for_an_event_are_counted_as_deferred() {
 fn the_simulated_scene_comes_over_a_serial_port() {
     let mut buffers = Buffers::new();
     let (mut interrupt, mut serial) = buffers.split(|| {});
-    let mut pixels = heapless::Vec::<AsyncPixel<128>, 16>::new();
+    let mut pixels = heapless::Vec::<Pixel, 16>::new();
     let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut sensor = simulated::scene();
     let mut host = Host::new(1, 0);

@@ -8,15 +8,15 @@ use common::host::{CONFIGURATION, Host};
 use common::plug::{Answers, Bus, Tdc, Tmf};
 use common::{Broken, Line};
 use dtof_core::fixed::types::U16F16;
-use dtof_core::{AsyncPixel, DepthEvent, PixelAddress, Statistics};
+use dtof_core::{DepthEvent, PixelAddress, Statistics};
 use dtof_firmware::link::endpoint::LinkCounters;
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::{self, Configuration, Refusal, Report, Token};
 use dtof_firmware::sensor::tmf882x::{BootCommand, Command, Tmf882x, Waiting};
 use dtof_firmware::sensor::{About, Sensor, SensorFault, simulated, tdc7200, tmf882x};
-use dtof_firmware::sidecar::Sidecar;
+use dtof_firmware::sidecar::{Pixel, Sidecar};
 
-type Pixels = heapless::Vec<AsyncPixel<128>, 9>;
+type Pixels = heapless::Vec<Pixel, 9>;
 
 /// A second with `sensor` and a host that reads; what the device says then. The
 /// sensor is asked three times a millisecond, as by a busy main loop.
@@ -187,7 +187,7 @@ fn every_error_of_a_driver_is_of_its_kind() {
 fn session_from(start_ms: u32) -> (Vec<DepthEvent>, LinkCounters) {
     let mut buffers = dtof_firmware::serial::Buffers::<512, 1024>::new();
     let (mut interrupt, mut serial) = buffers.split(|| {});
-    let mut pixels = heapless::Vec::<AsyncPixel<128>, 16>::new();
+    let mut pixels = heapless::Vec::<Pixel, 16>::new();
     let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut sensor = simulated::scene();
     for now_ms in 0..start_ms {
@@ -247,7 +247,7 @@ fn refused() -> Vec<(Vec<u8>, Refusal)> {
         ..CONFIGURATION
     };
     let mut all = vec![(good.to_le_bytes()[1..].to_vec(), Refusal::Unknown)];
-    let bad: [(Change, Refusal); 20] = [
+    let bad: [(Change, Refusal); 24] = [
         (|bad| bad.source = 2, Refusal::Unknown),
         (|bad| bad.rule = 2, Refusal::Unknown),
         (|bad| bad.rule = 1, Refusal::WindowWidth),
@@ -260,6 +260,17 @@ fn refused() -> Vec<(Vec<u8>, Refusal)> {
         (
             |bad| (bad.estimator, bad.half_width) = (1, 1025),
             Refusal::HalfWidth,
+        ),
+        (|bad| bad.output = 2, Refusal::Unknown),
+        (
+            |bad| (bad.output, bad.reference, bad.threshold) = (1, 2, 256),
+            Refusal::Unknown,
+        ),
+        (|bad| bad.output = 1, Refusal::ZeroThreshold),
+        (
+            // 1/512 of a bin of 37.5 mm is 0.07.
+            |bad| (bad.output, bad.threshold) = (1, 18),
+            Refusal::ZeroThreshold,
         ),
         (|bad| bad.x = 0, Refusal::ZeroX),
         (|bad| bad.x = 21, Refusal::XAboveL1),

@@ -13,6 +13,7 @@ pub mod aer_file;
 pub mod chart;
 pub mod detection;
 pub mod device;
+pub mod dynamic_depth;
 pub mod engine;
 pub mod events_csv;
 pub mod failures;

@@ -5,12 +5,14 @@ use std::io::{self, ErrorKind, Write};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use dtof_core::{DepthEvent, RangeScale, Statistics};
+use dtof_core::{RangeScale, Statistics};
 use dtof_firmware::link::endpoint::LinkCounters;
 use dtof_firmware::link::message::Report;
 use dtof_firmware::sensor::SensorFault;
 
+use crate::aer_file::Event;
 use crate::device::{Client, configuration};
+use crate::dynamic_depth::DynamicDepth;
 use crate::events_csv;
 use crate::settings::Settings;
 
@@ -20,6 +22,8 @@ const EVERY: Duration = Duration::from_secs(1);
 /// Has the device take photons from its sensor and writes its events as CSV to
 /// `events` as they come, and a line of statistics a second to `statistics`: rates,
 /// and of what was lost or went wrong all that did, counted from the beginning.
+///
+/// With `dynamic_depth` the events are changes of depth.
 ///
 /// Ends when `done`, asked again and again, says so of the time it has taken, or
 /// when nobody reads the output any more. The device takes no photons from its
@@ -31,12 +35,13 @@ pub fn monitor(
     client: &mut Client,
     settings: &Settings,
     pixels: u16,
+    dynamic_depth: Option<DynamicDepth>,
     done: impl Fn(Duration) -> bool,
     events: &mut impl Write,
     statistics: &mut impl Write,
 ) -> Result<()> {
     let scale = settings.range_scale()?;
-    client.configure(&configuration(settings, pixels, 1)?)?;
+    client.configure(&configuration(settings, pixels, 1, dynamic_depth)?)?;
     let started = Instant::now();
     let mut figures = Figures {
         since: started,
@@ -44,7 +49,11 @@ pub fn monitor(
         first: client.report()?,
         last: Statistics::default(),
     };
-    let mut open = still_open(header(events))?;
+    let columns = match dynamic_depth {
+        None => events_csv::HEADER,
+        Some(_) => events_csv::DYNAMIC_DEPTH_HEADER,
+    };
+    let mut open = still_open(header(events, columns))?;
     let mut asked = false;
     while open && !done(started.elapsed()) {
         if !asked && figures.since.elapsed() >= EVERY {
@@ -71,21 +80,21 @@ pub fn monitor(
         open &= still_open(writeln!(statistics, "{}", figures.line(client, &report)))?;
     }
     // After the answer there are no more events.
-    client.configure(&configuration(settings, pixels, 0)?)?;
+    client.configure(&configuration(settings, pixels, 0, dynamic_depth)?)?;
     if open {
         still_open(write(events, &client.take_events(), &scale))?;
     }
     Ok(())
 }
 
-fn header(out: &mut impl Write) -> io::Result<()> {
-    writeln!(out, "{}", events_csv::HEADER)?;
+fn header(out: &mut impl Write, columns: &str) -> io::Result<()> {
+    writeln!(out, "{columns}")?;
     out.flush()
 }
 
-fn write(out: &mut impl Write, events: &[DepthEvent], scale: &RangeScale) -> io::Result<()> {
+fn write(out: &mut impl Write, events: &[Event], scale: &RangeScale) -> io::Result<()> {
     for event in events {
-        events_csv::write(out, event, scale)?;
+        events_csv::write_event(out, event, scale)?;
     }
     if events.is_empty() {
         return Ok(());

@@ -11,11 +11,15 @@ use std::time::{Duration, Instant};
 
 use dtof::detection::{Estimator, Rule};
 use dtof::device::{self, Client};
+use dtof::dynamic_depth::DynamicDepth;
 use dtof::events_csv;
 use dtof::monitor::{losses, monitor};
 use dtof::settings::{I24F8Number, Settings, U16F16Number};
-use dtof_core::fixed::types::{I24F8, U0F32, U8F8, U8F24, U16F16};
-use dtof_core::{AnyRule, AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig};
+use dtof_core::fixed::types::{I24F8, U0F32, U8F8, U8F24, U16F16, U24F8};
+use dtof_core::{
+    AnyRule, AsyncPixel, DepthEvent, DynamicDepthPixel, LaserCycle, PixelAddress, PixelConfig,
+    Reference,
+};
 use dtof_firmware::link::endpoint::LinkCounters;
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::Report;
@@ -183,14 +187,14 @@ fn serve<S: Sensor>(
 }
 
 /// Pixels whose link takes every event at once.
-struct Reference {
+struct Pixels {
     config: PixelConfig<128, AnyRule>,
     pixels: Vec<AsyncPixel<128>>,
     cycle: u64,
     events: Vec<DepthEvent>,
 }
 
-impl PhotonSink for Reference {
+impl PhotonSink for Pixels {
     fn photon(&mut self, pixel: PixelAddress, code: u16) {
         self.pixels[usize::from(pixel.0)].count(&self.config, code);
     }
@@ -208,9 +212,9 @@ impl PhotonSink for Reference {
     }
 }
 
-/// The events of the first `cycles` laser cycles as CSV.
-fn reference(cycles: u64) -> String {
-    let mut reference = Reference {
+/// The events of the first `cycles` laser cycles.
+fn reference_events(cycles: u64) -> Vec<DepthEvent> {
+    let mut reference = Pixels {
         config: settings().config().unwrap(),
         pixels: (0..PIXELS)
             .map(|address| AsyncPixel::new(PixelAddress(address)))
@@ -225,10 +229,15 @@ fn reference(cycles: u64) -> String {
         let Ok(_) = sensor.poll(now_ms, &mut reference);
         now_ms += 10;
     }
+    reference.events
+}
+
+/// The same as CSV.
+fn reference(cycles: u64) -> String {
     let mut csv = Vec::new();
     let scale = settings().range_scale().unwrap();
     writeln!(csv, "{}", events_csv::HEADER).unwrap();
-    for event in &reference.events {
+    for event in &reference_events(cycles) {
         events_csv::write(&mut csv, event, &scale).unwrap();
     }
     String::from_utf8(csv).unwrap()
@@ -248,6 +257,7 @@ fn events_come_out_as_the_pixels_report_them_and_statistics_once_a_second() {
         &mut client,
         &settings(),
         PIXELS,
+        None,
         |elapsed| elapsed >= length,
         &mut events,
         &mut statistics,
@@ -326,6 +336,7 @@ fn a_sensor_that_does_not_answer_is_named() {
         &mut client(&name),
         &settings(),
         PIXELS,
+        None,
         |elapsed| elapsed >= Duration::from_secs(1),
         &mut events,
         &mut statistics,
@@ -363,6 +374,7 @@ fn a_reader_that_has_seen_enough_ends_it() {
             &mut client,
             &settings(),
             PIXELS,
+            None,
             |_| false,
             &mut events,
             &mut statistics,
@@ -379,6 +391,7 @@ fn a_device_that_goes_or_has_no_sensor_is_an_error() {
         &mut gone,
         &settings(),
         PIXELS,
+        None,
         |_| false,
         &mut events,
         &mut statistics,
@@ -393,12 +406,50 @@ fn a_device_that_goes_or_has_no_sensor_is_an_error() {
         &mut without,
         &settings(),
         PIXELS,
+        None,
         |_| false,
         &mut events,
         &mut statistics,
     );
     let error = format!("{:#}", error.unwrap_err());
     assert!(error.contains("the device has no sensor"), "{error}");
+}
+
+#[test]
+fn changes_of_depth_are_those_of_the_events() {
+    let threshold_mm = U24F8::lit("5");
+    let wanted = DynamicDepth {
+        threshold_mm,
+        reference: Reference::Reported,
+    };
+    let name = device(true, Duration::from_secs(60));
+    let (mut events, mut statistics) = (Vec::new(), Vec::new());
+    monitor(
+        &mut client(&name),
+        &settings(),
+        PIXELS,
+        Some(wanted),
+        |elapsed| elapsed >= Duration::from_secs(2),
+        &mut events,
+        &mut statistics,
+    )
+    .unwrap();
+    let scale = settings().range_scale().unwrap();
+    let config = wanted.config(&scale).unwrap();
+    let mut pixels = [const { DynamicDepthPixel::<{ DynamicDepth::MEAN_OF }>::new() }; 4];
+    let mut csv = Vec::new();
+    writeln!(csv, "{}", events_csv::DYNAMIC_DEPTH_HEADER).unwrap();
+    for event in reference_events(5_000) {
+        if let Some(change) = pixels[usize::from(event.pixel.0)].observe(&config, &event) {
+            events_csv::write_dynamic_depth(&mut csv, &change, &scale).unwrap();
+        }
+    }
+    assert!(events.iter().filter(|&&byte| byte == b'\n').count() > 5);
+    assert!(
+        csv.starts_with(&events),
+        "{}",
+        String::from_utf8(events).unwrap()
+    );
 }
 
 #[cfg(unix)]

@@ -192,6 +192,7 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
         &mut client,
         &settings(),
         16,
+        None,
         |elapsed| elapsed >= Duration::from_secs(3),
         &mut events,
         &mut statistics,
@@ -230,7 +231,7 @@ fn says_unplugged(board: Board, image: &Path, sensor: Sensor, array: Geometry) -
     if let Some(bin_width) = about.bin_width {
         wanted.bin_width_ps = U16F16Number(bin_width);
     }
-    client.configure(&configuration(&wanted, pixels, 1)?)?;
+    client.configure(&configuration(&wanted, pixels, 1, None)?)?;
     let since = Instant::now();
     let report = loop {
         let report = client.report().with_context(|| name.clone())?;

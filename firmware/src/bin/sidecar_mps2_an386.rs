@@ -9,16 +9,15 @@ compile_error!("an image for a board: cargo xtask image mps2-an386");
 use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, entry, exception};
-use dtof_core::AsyncPixel;
 use dtof_firmware::board::{mps2_an386::Mps2An386, turn};
 use dtof_firmware::sensor::Sensor;
 use dtof_firmware::sensor::simulated;
-use dtof_firmware::sidecar::{BINS, Sidecar};
+use dtof_firmware::sidecar::{Pixel, Sidecar};
 use heapless::Vec;
 use static_cell::ConstStaticCell;
 
 /// As many macropixels as the memory of the STM32F405 has room for.
-static PIXELS: ConstStaticCell<Vec<AsyncPixel<BINS>, 256>> = ConstStaticCell::new(Vec::new());
+static PIXELS: ConstStaticCell<Vec<Pixel, 256>> = ConstStaticCell::new(Vec::new());
 
 #[entry]
 fn main() -> ! {

@@ -9,17 +9,16 @@ compile_error!("an image for a board: cargo xtask image stm32f405");
 use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, entry, exception};
-use dtof_core::AsyncPixel;
 use dtof_firmware::board::{stm32f405::Stm32F405, turn};
 use dtof_firmware::sensor::Sensor;
 #[cfg(not(any(feature = "sensor-tdc7200", feature = "sensor-tmf882x")))]
 use dtof_firmware::sensor::simulated;
-use dtof_firmware::sidecar::{BINS, Sidecar};
+use dtof_firmware::sidecar::{Pixel, Sidecar};
 use heapless::Vec;
 use static_cell::ConstStaticCell;
 
 /// As many macropixels as the memory of the STM32F405 has room for.
-static PIXELS: ConstStaticCell<Vec<AsyncPixel<BINS>, 256>> = ConstStaticCell::new(Vec::new());
+static PIXELS: ConstStaticCell<Vec<Pixel, 256>> = ConstStaticCell::new(Vec::new());
 
 #[entry]
 fn main() -> ! {

@@ -2,7 +2,7 @@
 //!
 //! | kind | to | message | body |
 //! |---|---|---|---|
-//! | 0x01 | device | configure | [`Configuration`], 32 bytes |
+//! | 0x01 | device | configure | [`Configuration`], 38 bytes |
 //! | 0x02 | device | photons | [`Token`]s |
 //! | 0x03 | device | synchronise | anything |
 //! | 0x04 | device | statistics request | none |
@@ -15,7 +15,9 @@
 //! | 0x86 | host | sensor | [`About`], 10 bytes |
 
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{ConfigError, GateError, RangeScaleError, Statistics, WindowWidthError};
+use dtof_core::{
+    ConfigError, GateError, RangeScaleError, Statistics, WindowWidthError, ZeroThresholdError,
+};
 use heapless::Vec;
 
 use super::endpoint::LinkCounters;
@@ -198,11 +200,18 @@ pub struct Configuration {
     pub estimator: u8,
     /// Half the width of the centred window in 1/256 bin.
     pub half_width: u16,
+    /// 0: depth events, 1: dynamic depth events.
+    pub output: u8,
+    /// What a mean depth is compared with, 0: that of the event before, 1: the one
+    /// reported last; of dynamic depth.
+    pub reference: u8,
+    /// How far a mean depth has to move, in 1/256 mm; of dynamic depth.
+    pub threshold: u32,
 }
 
 impl Configuration {
     /// Bytes of the record.
-    pub const BYTES: usize = 32;
+    pub const BYTES: usize = 38;
 
     /// As it is sent.
     #[must_use]
@@ -230,7 +239,9 @@ impl Configuration {
             .flat_map(u16::to_le_bytes)
             .chain(wide)
             .chain([self.source, self.rule, self.window, z, z_high])
-            .chain([self.estimator, half_width, half_width_high]);
+            .chain([self.estimator, half_width, half_width_high])
+            .chain([self.output, self.reference])
+            .chain(self.threshold.to_le_bytes());
         for (place, byte) in bytes.iter_mut().zip(all) {
             *place = byte;
         }
@@ -260,6 +271,9 @@ impl Configuration {
             z: two(27)?,
             estimator: *bytes.get(29)?,
             half_width: two(30)?,
+            output: *bytes.get(32)?,
+            reference: *bytes.get(33)?,
+            threshold: u32::from_le_bytes(four(34)?),
         })
     }
 }
@@ -269,7 +283,8 @@ impl Configuration {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Refusal {
-    /// Not as long as the record, or of an unknown source, rule or estimator.
+    /// Not as long as the record, or of an unknown source, rule, estimator, output or
+    /// reference.
     Unknown = 1,
     /// X is 0.
     ZeroX = 2,
@@ -297,10 +312,12 @@ pub enum Refusal {
     WindowWidth = 13,
     /// The centred window is not 1 to 4 bins wide on either side.
     HalfWidth = 14,
+    /// The threshold of dynamic depth is less than half of 1/256 bin.
+    ZeroThreshold = 15,
 }
 
 impl Refusal {
-    const ALL: [Self; 14] = [
+    const ALL: [Self; 15] = [
         Self::Unknown,
         Self::ZeroX,
         Self::XAboveL1,
@@ -315,6 +332,7 @@ impl Refusal {
         Self::BinWidth,
         Self::WindowWidth,
         Self::HalfWidth,
+        Self::ZeroThreshold,
     ];
 
     /// From its number on the wire.
@@ -343,6 +361,7 @@ impl core::fmt::Display for Refusal {
             Self::BinWidth => f.write_str("the bins of the sensor are not as wide as that"),
             Self::WindowWidth => WindowWidthError.fmt(f),
             Self::HalfWidth => f.write_str("the centred window must be 1 to 4 bins to either side"),
+            Self::ZeroThreshold => ZeroThresholdError.fmt(f),
         }
     }
 }
@@ -373,6 +392,12 @@ impl From<GateError> for Refusal {
 impl From<WindowWidthError> for Refusal {
     fn from(_: WindowWidthError) -> Self {
         Self::WindowWidth
+    }
+}
+
+impl From<ZeroThresholdError> for Refusal {
+    fn from(_: ZeroThresholdError) -> Self {
+        Self::ZeroThreshold
     }
 }
 

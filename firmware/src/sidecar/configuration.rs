@@ -1,12 +1,12 @@
 //! Taking a configuration on.
 
-use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
-    AnyRule, AsyncPixel, CentredWindow, Count, DepthEstimator, PaperRule, PixelAddress,
-    PixelConfig, RangeGate, RangeScale, WindowRule,
+    AnyRule, CentredWindow, Count, DepthEstimator, DynamicDepthConfig, PaperRule, PixelAddress,
+    PixelConfig, RangeGate, RangeScale, Reference, WindowRule,
 };
 
-use super::Sidecar;
+use super::{Pixel, Sidecar};
 use crate::link::message::{Configuration, Refusal, Source};
 
 impl Sidecar<'_> {
@@ -32,13 +32,15 @@ impl Sidecar<'_> {
         let rule = rule(wanted, minimum)?;
         let config = PixelConfig::new(wanted.x, wanted.l1, wanted.l2, gate, rule)?
             .with_estimator(estimator(wanted)?);
-        RangeScale::new(bin_width, I24F8::from_bits(wanted.offset))?;
+        let scale = RangeScale::new(bin_width, I24F8::from_bits(wanted.offset))?;
+        let dynamic_depth = dynamic_depth(wanted, &scale)?;
         self.pixels.clear();
         for address in 0..wanted.pixels {
             // There is room: checked above.
-            let _ = self.pixels.push(AsyncPixel::new(PixelAddress(address)));
+            let _ = self.pixels.push(Pixel::new(PixelAddress(address)));
         }
         self.config = Some(config);
+        self.dynamic_depth = dynamic_depth;
         self.bin_width = bin_width;
         self.source = source;
         self.started = false;
@@ -64,4 +66,19 @@ fn estimator(wanted: &Configuration) -> Result<DepthEstimator, Refusal> {
             .ok_or(Refusal::HalfWidth),
         _ => Err(Refusal::Unknown),
     }
+}
+
+/// None if depth events are wanted themselves.
+fn dynamic_depth(
+    wanted: &Configuration,
+    scale: &RangeScale,
+) -> Result<Option<DynamicDepthConfig>, Refusal> {
+    let reference = match (wanted.output, wanted.reference) {
+        (0, _) => return Ok(None),
+        (1, 0) => Reference::Previous,
+        (1, 1) => Reference::Reported,
+        _ => return Err(Refusal::Unknown),
+    };
+    let threshold = U24F8::from_bits(wanted.threshold);
+    Ok(Some(DynamicDepthConfig::new(threshold, scale, reference)?))
 }

@@ -17,7 +17,8 @@ mod photons;
 mod sensor;
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{
-    AER_VERSION, AerEncoder, AerWord, AnyRule, AsyncPixel, DepthEvent, PixelConfig, Statistics,
+    AER_VERSION, AerEncoder, AerWord, AnyRule, AsyncPixel, DepthEvent, DynamicDepthConfig,
+    DynamicDepthPixel, PixelAddress, PixelConfig, Statistics,
 };
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::spsc::Queue;
@@ -44,6 +45,26 @@ const WORDS: usize = BODY_BYTES / AerWord::BYTES;
 /// The kind and the body of a message.
 type Answer = (u8, Vec<u8, BODY_BYTES>);
 
+/// Events of which dynamic depth is the mean: the paper's.
+const MEAN_OF: usize = 3;
+
+/// A macropixel, and what its dynamic depth is compared with: room for one, which the
+/// caller of [`Sidecar::new`] provides.
+#[derive(Debug)]
+pub struct Pixel {
+    detector: AsyncPixel<BINS>,
+    dynamic_depth: DynamicDepthPixel<MEAN_OF>,
+}
+
+impl Pixel {
+    const fn new(address: PixelAddress) -> Self {
+        Self {
+            detector: AsyncPixel::new(address),
+            dynamic_depth: DynamicDepthPixel::new(),
+        }
+    }
+}
+
 /// Macropixels of 128 bins behind a link.
 pub struct Sidecar<'a> {
     endpoint: Endpoint,
@@ -52,8 +73,10 @@ pub struct Sidecar<'a> {
     wire: [u8; WIRE_BYTES],
     wire_length: usize,
     wire_sent: usize,
-    pixels: &'a mut VecView<AsyncPixel<BINS>>,
+    pixels: &'a mut VecView<Pixel>,
     config: Option<PixelConfig<BINS, AnyRule>>,
+    /// Of the configuration in force: changes of depth are sent, not depth events.
+    dynamic_depth: Option<DynamicDepthConfig>,
     /// Of the configuration in force, for sensors that measure times.
     bin_width: U16F16,
     source: Source,
@@ -84,7 +107,7 @@ impl<'a> Sidecar<'a> {
     /// Waits for a host. `pixels` is the room for them, `sensor` what is to be known
     /// of the sensor if photons may come from anywhere but the link.
     #[must_use]
-    pub fn new(pixels: &'a mut VecView<AsyncPixel<BINS>>, sensor: Option<About>) -> Self {
+    pub fn new(pixels: &'a mut VecView<Pixel>, sensor: Option<About>) -> Self {
         pixels.clear();
         let room = u16::try_from(pixels.capacity()).unwrap_or(u16::MAX);
         #[allow(clippy::cast_possible_truncation, reason = "128")]
@@ -97,6 +120,7 @@ impl<'a> Sidecar<'a> {
             wire_sent: 0,
             pixels,
             config: None,
+            dynamic_depth: None,
             bin_width: U16F16::ZERO,
             source: Source::Link,
             sensor,
@@ -253,6 +277,7 @@ impl<'a> Sidecar<'a> {
     fn start_over(&mut self) {
         self.pixels.clear();
         self.config = None;
+        self.dynamic_depth = None;
         self.source = Source::Link;
         self.photons = None;
         self.answer = None;
@@ -290,23 +315,33 @@ impl<'a> Sidecar<'a> {
             let Some(pixel) = self.pixels.get_mut(index) else {
                 break;
             };
-            if !pixel.request() {
+            if !pixel.detector.request() {
                 continue;
             }
             if !has_room_for_event(&self.words) {
                 self.turn = index;
                 break;
             }
-            if let Some(event) = pixel.acknowledge() {
+            if let Some(event) = pixel.detector.acknowledge() {
                 self.enqueue(&event);
             }
         }
         self.send_words();
     }
 
-    /// Takes an event for which there is room.
+    /// Takes an event for which there is room. Of dynamic depth only a change goes on.
     fn enqueue(&mut self, event: &DepthEvent) {
-        let (time, word) = self.encoder.encode(event);
+        let (time, word) = match &self.dynamic_depth {
+            None => self.encoder.encode(event),
+            Some(config) => {
+                let pixel = self.pixels.get_mut(usize::from(event.pixel.0));
+                let change = pixel.and_then(|pixel| pixel.dynamic_depth.observe(config, event));
+                let Some(change) = change else {
+                    return;
+                };
+                self.encoder.encode_dynamic_depth(&change)
+            }
+        };
         for word in time.into_iter().chain([word]) {
             let _ = self.words.enqueue(word);
         }
@@ -335,7 +370,7 @@ impl<'a> Sidecar<'a> {
 
     /// Events that have not left their slots.
     fn waiting(&self) -> u64 {
-        let waiting = self.pixels.iter().filter(|pixel| pixel.request());
+        let waiting = self.pixels.iter().filter(|pixel| pixel.detector.request());
         waiting.map(|_| 1).sum()
     }
 
@@ -350,7 +385,7 @@ impl<'a> Sidecar<'a> {
     fn report(&self, overrun: u32) -> Report {
         let mut statistics = self.whole;
         for pixel in self.pixels.iter() {
-            statistics += pixel.statistics();
+            statistics += pixel.detector.statistics();
         }
         // Those that were sent before the report.
         statistics.events -= self.waiting();

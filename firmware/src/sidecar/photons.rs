@@ -1,6 +1,6 @@
 //! Photons into pixels, and those that come over the link.
 
-use dtof_core::{AsyncPixel, LaserCycle, Look};
+use dtof_core::{LaserCycle, Look};
 use heapless::vec::Vec;
 
 use super::Sidecar;
@@ -37,7 +37,7 @@ impl Sidecar<'_> {
         };
         loop {
             while photons.cycles > 0 {
-                if *looks == 0 || self.pixels.iter().any(AsyncPixel::request) {
+                if *looks == 0 || self.pixels.iter().any(|pixel| pixel.detector.request()) {
                     self.photons = Some(photons);
                     return;
                 }
@@ -64,7 +64,7 @@ impl Sidecar<'_> {
 
     pub(super) fn count(&mut self, pixel: usize, code: u16) {
         match (self.pixels.get_mut(pixel), &self.config) {
-            (Some(pixel), Some(config)) => pixel.count(config, code),
+            (Some(pixel), Some(config)) => pixel.detector.count(config, code),
             _ => self.unaddressed += 1,
         }
     }
@@ -87,7 +87,7 @@ impl Sidecar<'_> {
         let last = LaserCycle(self.cycle.saturating_sub(1));
         let mut fired = false;
         for pixel in self.pixels.iter_mut() {
-            fired |= pixel.end_laser_cycles(config, last, ended) == Look::Event;
+            fired |= pixel.detector.end_laser_cycles(config, last, ended) == Look::Event;
         }
         if fired {
             self.drain();

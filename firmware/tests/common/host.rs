@@ -1,7 +1,7 @@
 //! A host on a good wire, and a sensor that gives what a script says.
 
 use dtof_core::fixed::types::U16F16;
-use dtof_core::{AerDecoder, AerRecord, AerWord, DepthEvent, PixelAddress};
+use dtof_core::{AerDecoder, AerRecord, AerWord, DepthEvent, DynamicDepthEvent, PixelAddress};
 use dtof_firmware::link::endpoint::Endpoint;
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::{self, Configuration, Report};
@@ -26,6 +26,9 @@ pub const CONFIGURATION: Configuration = Configuration {
     z: 0,
     estimator: 0,
     half_width: 0,
+    output: 0,
+    reference: 0,
+    threshold: 0,
 };
 
 pub struct Host {
@@ -35,6 +38,8 @@ pub struct Host {
     decoder: AerDecoder,
     /// All events so far.
     pub events: Vec<DepthEvent>,
+    /// All changes of depth so far.
+    pub changes: Vec<DynamicDepthEvent>,
     /// All answers so far, and the events that came before each.
     pub answers: Vec<(u8, Vec<u8>, usize)>,
 }
@@ -47,6 +52,7 @@ impl Host {
             down: Deframer::new(),
             decoder: AerDecoder::new(),
             events: Vec::new(),
+            changes: Vec::new(),
             answers: Vec::new(),
         }
     }
@@ -90,7 +96,7 @@ impl Host {
                 match self.decoder.decode(word).unwrap() {
                     AerRecord::Event(event) => self.events.push(event),
                     AerRecord::Time(_) => {}
-                    AerRecord::DynamicDepth(_) => panic!("dynamic depth is off"),
+                    AerRecord::DynamicDepth(change) => self.changes.push(change),
                     AerRecord::End { .. } => panic!("an end"),
                 }
             }

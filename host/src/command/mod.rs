@@ -3,6 +3,7 @@
 pub mod decode;
 pub mod demo;
 mod detection;
+mod dynamic_depth;
 pub mod figures;
 pub mod monitor;
 mod operation;

@@ -5,13 +5,14 @@ use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::device::{self, Client};
 use dtof::monitor::monitor;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_firmware::sensor::About;
 
+use super::dynamic_depth;
 use super::operation::{Operation, number};
 
 /// Ctrl-C was pressed, or the program is asked to end in another way.
@@ -34,12 +35,21 @@ pub struct Monitor {
     /// Millimetres added to every range, rounded to 1/256 [default: as the device says]
     #[arg(long, value_name = "MM", value_parser = number::<I24F8>, allow_hyphen_values = true)]
     offset_mm: Option<I24F8>,
+    /// Have the device send changes of depth only, with a polarity
+    #[arg(long)]
+    dynamic_depth: bool,
+    #[command(flatten)]
+    of_dynamic_depth: dynamic_depth::Options,
     #[command(flatten)]
     operation: Operation,
 }
 
 impl Monitor {
     pub fn run(&self) -> Result<()> {
+        ensure!(
+            self.dynamic_depth || !self.of_dynamic_depth.are_given(),
+            "--threshold-mm and --reference are of --dynamic-depth"
+        );
         let name = || self.device.clone();
         let mut client = Client::new(device::open(&self.device)?).with_context(name)?;
         ctrlc::set_handler(|| {
@@ -66,6 +76,8 @@ impl Monitor {
             &mut client,
             &settings,
             pixels,
+            self.dynamic_depth
+                .then(|| self.of_dynamic_depth.dynamic_depth()),
             |elapsed| {
                 INTERRUPTED.load(Ordering::Relaxed)
                     || length.is_some_and(|length| elapsed >= length)

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail, ensure};
-use dtof_core::{AER_VERSION, AerDecoder, AerRecord, AerWord, DepthEvent};
+use dtof_core::{AER_VERSION, AerDecoder, AerRecord, AerWord};
 use dtof_firmware::link::endpoint::{Endpoint, LinkCounters, Message};
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::{self, Configuration, LINK_VERSION, Refusal, Report};
@@ -11,6 +11,7 @@ use dtof_firmware::sensor::About;
 use dtof_firmware::sidecar::greeting;
 
 use super::port::Port;
+use crate::aer_file::Event;
 
 /// A device that says nothing for so long is gone.
 const SILENCE: Duration = Duration::from_secs(5);
@@ -22,7 +23,7 @@ pub struct Client {
     deframer: Deframer,
     decoder: AerDecoder,
     started: Instant,
-    events: Vec<DepthEvent>,
+    events: Vec<Event>,
     /// Messages are taken no more often than this: a slow reader, for tests.
     pub reads_every: Duration,
     read: Instant,
@@ -128,7 +129,7 @@ impl Client {
     ///
     /// # Errors
     /// If the device is gone.
-    pub fn synchronise(&mut self) -> Result<Vec<DepthEvent>> {
+    pub fn synchronise(&mut self) -> Result<Vec<Event>> {
         self.send(message::SYNCHRONISE, &[])?;
         let answer = self.answer()?;
         ensure!(
@@ -168,7 +169,7 @@ impl Client {
     }
 
     /// The events that have arrived.
-    pub fn take_events(&mut self) -> Vec<DepthEvent> {
+    pub fn take_events(&mut self) -> Vec<Event> {
         std::mem::take(&mut self.events)
     }
 
@@ -209,9 +210,9 @@ impl Client {
             for word in message.body.chunks(AerWord::BYTES) {
                 let word = word.try_into().context("the device sends half a word")?;
                 match self.decoder.decode(AerWord::from_le_bytes(word))? {
-                    AerRecord::Event(event) => self.events.push(event),
-                    AerRecord::DynamicDepth(_) => {
-                        bail!("the device sends changes of depth nobody asked for")
+                    AerRecord::Event(event) => self.events.push(Event::Depth(event)),
+                    AerRecord::DynamicDepth(event) => {
+                        self.events.push(Event::DynamicDepth(event));
                     }
                     AerRecord::Time(_) => {}
                     AerRecord::End { .. } => bail!("the device ends a stream it never ends"),

@@ -6,14 +6,16 @@ mod port;
 mod qemu;
 
 use anyhow::{Result, bail, ensure};
-use dtof_core::{DepthEstimator, DepthEvent, PixelAddress, Statistics};
+use dtof_core::{DepthEstimator, DepthEvent, PixelAddress, Reference, Statistics};
 use dtof_firmware::link::endpoint::BODY_BYTES;
 use dtof_firmware::link::message::{self, Configuration, Report, Token};
 
 pub use client::Client;
 pub use port::{Port, open};
 
+use crate::aer_file::Event;
 use crate::detection::Rule;
+use crate::dynamic_depth::DynamicDepth;
 use crate::engine::Engine;
 use crate::settings::Settings;
 use crate::source::Slice;
@@ -53,6 +55,7 @@ impl DeviceEngine {
             settings,
             u16::try_from(addresses.len())?,
             0,
+            None,
         )?)?;
         Ok(Self {
             client,
@@ -69,11 +72,17 @@ impl DeviceEngine {
     }
 }
 
-/// The settings as the device takes them.
+/// The settings as the device takes them. With `dynamic_depth` it sends changes of depth
+/// in place of depth events.
 ///
 /// # Errors
 /// If there are no bins.
-pub fn configuration(settings: &Settings, pixels: u16, source: u8) -> Result<Configuration> {
+pub fn configuration(
+    settings: &Settings,
+    pixels: u16,
+    source: u8,
+    dynamic_depth: Option<DynamicDepth>,
+) -> Result<Configuration> {
     let last_bin = u16::try_from(settings.bins)? - 1;
     let (gate_first, gate_last) = settings.gate.unwrap_or((0, last_bin));
     let (rule, alpha, window, z) = match settings.rule {
@@ -83,6 +92,16 @@ pub fn configuration(settings: &Settings, pixels: u16, source: u8) -> Result<Con
     let (estimator, half_width) = match settings.estimator.in_core() {
         DepthEstimator::CentreOfMass3 => (0, 0),
         DepthEstimator::CentredWindow(window) => (1, window.half_width().to_bits()),
+    };
+    let (output, reference, threshold) = match dynamic_depth {
+        None => (0, 0, 0),
+        Some(dynamic_depth) => {
+            let reference = match dynamic_depth.reference {
+                Reference::Previous => 0,
+                Reference::Reported => 1,
+            };
+            (1, reference, dynamic_depth.threshold_mm.to_bits())
+        }
     };
     Ok(Configuration {
         alpha,
@@ -101,6 +120,9 @@ pub fn configuration(settings: &Settings, pixels: u16, source: u8) -> Result<Con
         z,
         estimator,
         half_width,
+        output,
+        reference,
+        threshold,
     })
 }
 
@@ -129,7 +151,12 @@ impl Engine for DeviceEngine {
             tokens.push(Token::EndOfCycles { cycles: 1 })?;
         }
         tokens.flush()?;
-        let events = self.client.synchronise()?;
+        let events = self.client.synchronise()?.into_iter();
+        let events = events.map(|event| match event {
+            Event::Depth(event) => Ok(event),
+            Event::DynamicDepth(_) => bail!("the device sends changes of depth nobody asked for"),
+        });
+        let events = events.collect::<Result<_>>()?;
         self.report = self.client.report()?;
         self.cycles += u64::from(cycles);
         self.sent += slice
