@@ -138,7 +138,7 @@ impl PaperRule {
     #[inline(always)]
     fn needs_maxima(&self, union: u32) -> bool {
         let alpha = u32::from(self.threshold.alpha().to_bits());
-        union > alpha * alpha >> 15
+        union > (alpha * alpha) >> 15
     }
 
     #[inline(always)]
