@@ -101,34 +101,29 @@ impl PaperRule {
         if !self.exceeds(Count::saturating(most), level) {
             return None;
         }
-        let (start, (one, other), far) = if in_lower {
-            (0, ((first, a), (second, b)), [third, fourth])
+        let (half, (one, other), (x, y), [in_one, in_other]) = if in_lower {
+            (0, (first, second), (third, fourth), [a, b])
         } else if in_upper {
-            (BINS / 2, ((third, c), (fourth, d)), [first, second])
+            (BINS / 2, (third, fourth), (first, second), [c, d])
         } else {
             return self.detect_ungated::<W, BINS>(counts);
         };
-        let bit = highest_bit(most).raw();
-        let (mut count, mut bin) = (Count::default(), start);
-        if one.1 & bit != 0 {
-            let (highest, index) = highest_with_bit(one.0, bit);
-            (count, bin) = (highest, start + index);
-        }
-        if other.1 & bit != 0 {
-            let (highest, index) = highest_with_bit(other.0, bit);
-            if highest > count {
-                (count, bin) = (highest, start + BINS / 4 + index);
-            }
-        }
+        let (start, quadrant) = if is_longer(in_one, in_other) {
+            (half, one)
+        } else if is_longer(in_other, in_one) {
+            (half + BINS / 4, other)
+        } else {
+            return self.detect_ungated::<W, BINS>(counts);
+        };
+        let (count, index) = highest_with_bit(quadrant, highest_bit(most).raw());
         if !self.exceeds(count, level) {
             return None;
         }
-        let [x, y] = far;
         let background = Count::saturating(W::Counter::highest(x).min(W::Counter::highest(y)));
         if !self.exceeds(count, self.threshold.level::<W>(background)) {
             return None;
         }
-        let bin = BinIndex::saturating(u16::try_from(bin).ok()?);
+        let bin = BinIndex::saturating(u16::try_from(start + index).ok()?);
         Some((Peak { bin, count }, background))
     }
 

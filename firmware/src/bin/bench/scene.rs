@@ -152,7 +152,7 @@ impl State {
     pub fn undecided_bits(&mut self) {
         self.empty(0, false);
         self.foreign = [0; BINS];
-        for (bin, photons) in [(31, 15), (63, 20), (95, 19), (127, 15)] {
+        for (bin, photons) in [(31, 15), (63, 15), (95, 20), (127, 19)] {
             if let Some(count) = self.foreign.get_mut(bin) {
                 *count = photons;
             }
