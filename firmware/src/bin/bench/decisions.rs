@@ -9,6 +9,9 @@ use crate::scene::{CYCLES, EXPOSURES, State};
 
 const WITH_GATE: &str = "kept peak; no event; gate";
 
+/// Brings the state to where the decision begins.
+type Prepare = fn(&mut State);
+
 /// Measures all.
 pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
     let rows: [(&str, Operation, bool); 6] = [
@@ -50,7 +53,7 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
         }
         report.line("decision", variant, total, runs);
     }
-    let slowest: [(&str, Operation, fn(&mut State)); 2] = [
+    let slowest: [(&str, Operation, Prepare); 2] = [
         ("kept peak; slowest no event", kept, State::late_background),
         (
             "whole histogram; slowest no event",
