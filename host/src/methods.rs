@@ -132,13 +132,9 @@ fn chart(title: &str, y: &str, entries: &[Entry]) -> Result<String> {
             }],
         });
     }
-    let dearest = entries.iter().map(|entry| entry.cost).fold(0.0, f64::max);
     line_chart(&Chart {
         title,
-        x: Axis {
-            range: Some((0.0, dearest * 2.2)),
-            ..Axis::linear("instructions on a Cortex-M4F")
-        },
+        x: Axis::linear("instructions on a Cortex-M4F"),
         y: Axis::logarithmic(y),
         series,
     })

@@ -224,10 +224,7 @@ fn results(part: &Part) -> Result<Results> {
     }
     let svg = line_chart(&Chart {
         title: "Depth error over the Cramér-Rao bound",
-        x: Axis {
-            range: Some((0.3, 3.3)),
-            ..Axis::linear("pulse σ (bins)")
-        },
+        x: Axis::linear("pulse σ (bins)"),
         y: Axis {
             range: Some((0.9, 9.0)),
             ..Axis::logarithmic("root mean square error over the bound")

@@ -249,10 +249,7 @@ fn results(part: &Part) -> Result<Results> {
         let title = format!("Time to an event, pulse σ {sigma} bins (thin: on a bin edge)");
         let svg = line_chart(&Chart {
             title: &title,
-            x: Axis {
-                range: Some((0.0, 0.36)),
-                ..Axis::linear("background a bin and laser cycle")
-            },
+            x: Axis::linear("background a bin and laser cycle"),
             y: Axis {
                 range: Some((0.95, 7.0)),
                 ..Axis::logarithmic("laser cycles over the likelihood ratio's")
