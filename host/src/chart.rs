@@ -1,11 +1,14 @@
 //! Line charts as SVG documents: what was measured as dots with the interval it
 //! lies in, what was worked out as lines.
 
+mod legend;
+
 use anyhow::{Result, ensure};
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 
+use self::legend::Legend;
 use crate::picture::one_line;
 
 /// Of the picture above the legend.
@@ -21,9 +24,6 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0x00, 0x00, 0x00),
 ];
 const FONT: (&str, u32) = ("sans-serif", 15);
-/// Height of a row of the legend and width of a letter, in pixels.
-const ROW: u32 = 22;
-const LETTER: u32 = 8;
 
 /// A chart.
 #[derive(Clone, Debug)]
@@ -180,15 +180,10 @@ pub fn line_chart(chart: &Chart) -> Result<String> {
     });
     let (left, right) = range(&chart.x, points.map(|point| point.x))?;
     let (low, high) = range(&chart.y, heights)?;
-    let entries: Vec<(&Series, &str)> = chart
-        .series
-        .iter()
-        .filter_map(|series| Some((series, series.name.as_deref()?)))
-        .collect();
-    let (columns, rows) = grid(&entries);
+    let legend = Legend::of(&chart.series);
     let mut svg = String::new();
     {
-        let size = (SIZE.0, SIZE.1 + rows * ROW);
+        let size = (SIZE.0, SIZE.1 + legend.height());
         let whole = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         whole.fill(&WHITE)?;
         let (area, below) = whole.split_vertically(SIZE.1);
@@ -204,39 +199,10 @@ pub fn line_chart(chart: &Chart) -> Result<String> {
                 low,
             )?,
         }
-        let cells = below.split_evenly((rows.max(1) as usize, columns as usize));
-        for ((series, name), cell) in entries.into_iter().zip(cells) {
-            legend(&cell, series, name)?;
-        }
+        legend.draw(&below)?;
         whole.present()?;
     }
     Ok(svg)
-}
-
-/// Columns and rows of the legend: as many columns as its longest name has room for.
-fn grid(entries: &[(&Series, &str)]) -> (u32, u32) {
-    let letters = |(_, name): &(&Series, &str)| name.chars().count();
-    let longest = entries.iter().map(letters).max().unwrap_or_default();
-    let count = u32::try_from(entries.len()).unwrap_or(u32::MAX);
-    let width = u32::try_from(longest)
-        .unwrap_or(u32::MAX)
-        .saturating_mul(LETTER);
-    let columns = (SIZE.0 / width.saturating_add(50)).clamp(1, count.max(1));
-    (columns, count.div_ceil(columns))
-}
-
-/// An entry of the legend.
-fn legend(cell: &Area, series: &Series, name: &str) -> Result<()> {
-    let colour = series.colour();
-    let ends = vec![(16, 8), (34, 8)];
-    match series.style.line_width() {
-        Some(width) if !series.style.has_dots() => {
-            cell.draw(&PathElement::new(ends, colour.stroke_width(width)))?;
-        }
-        _ => cell.draw(&Circle::new((25, 8), 3, colour.filled()))?,
-    }
-    cell.draw(&Text::new(one_line(name), (42, 1), FONT))?;
-    Ok(())
 }
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -383,30 +349,6 @@ mod tests {
         assert_eq!(dots(&svg), 3);
         let open = |line: &&str| line.starts_with("<circle") && line.contains("fill=\"none\"");
         assert_eq!(svg.lines().filter(open).count(), 1, "{svg}");
-    }
-
-    #[test]
-    fn the_legend_has_as_many_columns_as_fit() {
-        let named = |letters: usize| Series {
-            name: Some("x".repeat(letters)),
-            ..chart(false, vec![]).series[0].clone()
-        };
-        for (letters, count, expected) in [
-            (5, 3, (3, 1)),
-            (20, 4, (3, 2)),
-            (40, 3, (2, 2)),
-            (200, 3, (1, 3)),
-            (5, 0, (1, 0)),
-        ] {
-            let series = vec![named(letters); count];
-            let name = |series| (series, "x".repeat(letters));
-            let names: Vec<(&Series, String)> = series.iter().map(name).collect();
-            let entries: Vec<(&Series, &str)> = names
-                .iter()
-                .map(|(series, name)| (*series, &**name))
-                .collect();
-            assert_eq!(grid(&entries), expected);
-        }
     }
 
     #[test]
