@@ -1,15 +1,18 @@
 //! How fast a pulse is found, against whoever knows everything but where it lies.
 
+mod time;
+
 use std::fmt::Write as _;
 
 use anyhow::Result;
 use rand_pcg::Pcg64;
 
+use self::time::time;
 use crate::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
 use crate::simulation::Rates;
 use crate::summary::grouped;
 use crate::sweep::mean::Measured;
-use crate::sweep::results::{Figure, Results, Share, Table, Z_99};
+use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::studies::passage::{BINS, LOOKS, Ladder, Method, Passage, count_false};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use crate::theory::exposure::Exposures;
@@ -135,49 +138,6 @@ pub struct Outcome {
     pub cycles: Measured,
     /// `cycles` over those of the likelihood ratio.
     pub ratio: Measured,
-}
-
-/// Mean laser cycles to an event with a threshold, and the variance of that mean.
-#[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
-fn mean_and_variance(ladder: &Ladder, threshold: f64, point: &PointTally) -> (f64, f64) {
-    let exposures = point.count("exposures") as f64;
-    let of = |what: &str| {
-        let count = |index| point.count(&ladder.key(index, what)) as f64;
-        ladder.interpolated(threshold, count)
-    };
-    let [events, cycles, squares] = ["events", "cycles", "squares"].map(of);
-    let events = events.max(1.0);
-    let mean = cycles / events;
-    // Of a ratio of sums: the squares of what each exposure has above `mean` times its
-    // events. Those without an event lasted to the end.
-    let with_event = cycles - (exposures - events) * f64::from(LOOKS.expiry());
-    let above = squares - 2.0 * mean * with_event + mean * mean * events;
-    (mean, above.max(0.0) / (events * events))
-}
-
-/// Mean laser cycles to an event with [`FALSE_SHARE`] false events in the exposures of
-/// `without`, the threshold, and what both are sure of.
-fn time(ladder: &Ladder, without: &[&PointTally], with_target: &PointTally) -> (f64, Measured) {
-    let threshold = ladder.calibrated(without, FALSE_SHARE);
-    let (value, variance) = mean_and_variance(ladder, threshold, with_target);
-    // As many exposures are false or fewer, or more, by what they are sure of.
-    let exposures: u64 = without.iter().map(|point| point.count("exposures")).sum();
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "far fewer than 2^52"
-    )]
-    let events = (exposures as f64 * FALSE_SHARE).round() as u64;
-    let (fewer, more) = Share::new(events, exposures).interval;
-    let [late, early] = [fewer, more]
-        .map(|share| mean_and_variance(ladder, ladder.calibrated(without, share), with_target).0);
-    let half = Z_99 * variance.sqrt();
-    let interval = (
-        value - half.hypot(value - early),
-        value + half.hypot(late - value),
-    );
-    (threshold, Measured { value, interval })
 }
 
 /// Every method in every scene with a target.
