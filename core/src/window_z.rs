@@ -29,11 +29,12 @@ const Z: [u16; 15] = [
 /// The z of a [`WindowRule`](crate::WindowRule) with which one in `one_in` exposures
 /// without a target brings a false event: 100 for 1 %, 1000 for 0.1 %.
 ///
-/// `gate`, `x`, `l1` and `l2` are those of the [`PixelConfig`](crate::PixelConfig). At most
-/// 1.5 times as many come as wanted, whatever the gate, the width of the window and the
-/// background. With 128 bins and 0.4 photons a bin at the first look or more it is at least
-/// 0.4 times as many; with fewer bins or photons, or a window of most of the bins, fewer
-/// still. From 64 to 2³⁴ trials, z 2.15 to 6.44, to which it is limited.
+/// `gate`, `x`, `l1` and `l2` are those of the [`PixelConfig`](crate::PixelConfig). With 1
+/// in 100, at most 1.5 times as many come as wanted, whatever the gate, the width of the
+/// window and the background; with 1 in 1000 and hundreds of photons a bin it may be a
+/// little more. With 128 bins and 0.4 photons a bin at the first look or more it is at
+/// least 0.4 times as many; with fewer bins or photons, or a window of most of the bins,
+/// fewer still. From 64 to 2³⁴ trials, z 2.15 to 6.44, to which it is limited.
 ///
 /// ```
 /// use dtof_core::{RangeGate, z_for};
