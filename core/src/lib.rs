@@ -16,7 +16,7 @@
 //!     Peak          the highest bin, the lowest index wins a tie
 //!     background    smaller quadrant maximum of the half without the peak
 //!     Threshold     background + α·√background
-//!                   or another DetectionRule: WindowRule
+//!                   or another DetectionRule: WindowRule, AnyRule
 //!   → DepthEvent    pixel, laser cycle, exposure, sub-bin depth, counts, flags
 //!   → AerWord       128 bits, held by the pixel until the link takes it
 //! ```
@@ -81,6 +81,7 @@
 )]
 
 mod aer;
+mod any_rule;
 pub mod background;
 mod centred_window;
 mod depth;
@@ -105,6 +106,7 @@ mod window_z;
 pub use fixed;
 
 pub use aer::{AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord};
+pub use any_rule::AnyRule;
 pub use centred_window::CentredWindow;
 pub use depth::{Depth, RangeScale, RangeScaleError, centre_of_mass};
 pub use detection::{Detection, detect};

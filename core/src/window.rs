@@ -38,7 +38,7 @@
 
 use core::fmt;
 
-use fixed::types::{U4F12, U24F8};
+use fixed::types::{U4F12, U8F8, U24F8};
 
 use crate::gate::RangeGate;
 use crate::histogram::{CounterWidth, Histogram};
@@ -75,8 +75,7 @@ impl WindowRule {
     /// A window of `width` bins, `z` standard deviations above the background and
     /// at least `minimum_count` photons in the window.
     ///
-    /// To suit the pulse: 2 bins up to a standard
-    /// deviation of 0.6 bins, 3 near 1, 5 near 1.5.
+    /// [`Self::width_for_pulse`] says which width suits the pulse.
     ///
     /// Of `B` gated bins; more than `z²·width/(B - width)` photons make a detection even
     /// without any background. Where the window leaves few bins that is many: with 7 of 8
@@ -93,6 +92,20 @@ impl WindowRule {
             z,
             minimum_count,
         })
+    }
+
+    /// The width that suits a pulse of the standard deviation `sigma` in bins: 2 bins up
+    /// to 0.6, 3 up to 1.25, 5 above.
+    #[must_use]
+    pub const fn width_for_pulse(sigma: U8F8) -> u8 {
+        let bits = sigma.to_bits();
+        if bits <= const { U8F8::lit("0.6").to_bits() } {
+            2
+        } else if bits <= const { U8F8::lit("1.25").to_bits() } {
+            3
+        } else {
+            5
+        }
     }
 
     /// Bins in the window.

@@ -5,7 +5,7 @@
 
 mod common;
 
-use dtof_core::fixed::types::{U4F12, U24F8};
+use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
 use dtof_core::{
     Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DetectionRule, Histogram,
     RangeGate, WindowRule, WindowWidthError, detect,
@@ -180,5 +180,22 @@ fn a_window_of_most_bins_needs_many_photons() {
         let gate = RangeGate::full();
         let found = detect(&histogram, &gate, &rule, &DepthEstimator::default());
         assert_eq!(found.is_some(), expected);
+    }
+}
+
+#[test]
+fn the_width_suits_the_pulse() {
+    for (sigma, width) in [
+        ("0", 2),
+        ("0.6", 2),
+        ("0.61", 3),
+        ("1", 3),
+        ("1.25", 3),
+        ("1.26", 5),
+        ("1.5", 5),
+        ("255", 5),
+    ] {
+        let sigma: U8F8 = sigma.parse().unwrap();
+        assert_eq!(WindowRule::width_for_pulse(sigma), width, "{sigma}");
     }
 }

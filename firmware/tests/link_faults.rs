@@ -30,6 +30,10 @@ const CONFIGURATION: Configuration = Configuration {
     offset: 0,
     source: 0,
     rule: 0,
+    window: 0,
+    z: 0,
+    estimator: 0,
+    half_width: 0,
 };
 
 /// Faults done to the bytes so far.

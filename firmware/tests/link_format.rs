@@ -5,7 +5,7 @@ use std::fmt::Display;
 
 use dtof_firmware::link::endpoint::Endpoint;
 use dtof_firmware::link::frame::{Deframer, FrameError, PAYLOAD_BYTES, WIRE_BYTES, encode};
-use dtof_firmware::link::message::{Configuration, PHOTONS, Refusal, Report, Token};
+use dtof_firmware::link::message::{CONFIGURE, Configuration, PHOTONS, Refusal, Report, Token};
 use dtof_firmware::sensor::SensorFault;
 use dtof_firmware::sidecar::greeting;
 use proptest::prelude::*;
@@ -77,6 +77,33 @@ fn both_ends_send_the_golden_frames() {
 }
 
 #[test]
+fn a_host_configures_with_the_golden_frame() {
+    let mut host = Endpoint::host(0x1234, greeting(0, 0), 0);
+    next(&mut host, 0);
+    give(&mut host, &golden("welcome"));
+    let configuration = Configuration {
+        alpha: 0,
+        minimum_count: 5,
+        x: 4,
+        l1: 40,
+        l2: 2000,
+        gate_first: 10,
+        gate_last: 119,
+        pixels: 64,
+        bin_width: 250 << 16,
+        offset: -(359 << 7),
+        source: 0,
+        rule: 1,
+        window: 3,
+        z: 9 << 11,
+        estimator: 1,
+        half_width: 5 << 7,
+    };
+    host.offer(CONFIGURE, &configuration.to_le_bytes()).unwrap();
+    assert_eq!(hex(&next(&mut host, 0)), hex(&golden("configure 0")));
+}
+
+#[test]
 fn a_receiver_is_in_step_again_after_the_next_zero_byte() {
     let good = golden("photons 0");
     for damaged in [
@@ -132,7 +159,7 @@ fn are_documented<T: Display>(all: &[T], number: impl Fn(&T) -> u8, table: &str)
 #[test]
 fn every_refusal_has_its_own_number_and_reason() {
     let all: Vec<Refusal> = (0..=255).filter_map(Refusal::from_number).collect();
-    assert_eq!(all.len(), 12);
+    assert_eq!(all.len(), 14);
     are_documented(&all, |&refusal| refusal as u8, "\n| reason | |\n");
 }
 
@@ -168,10 +195,14 @@ proptest! {
     }
 
     #[test]
-    fn configurations_come_back(words in any::<[u16; 8]>(), bin_width: u32, offset: i32, source: u8, rule: u8) {
-        let [alpha, minimum_count, x, l1, l2, gate_first, gate_last, pixels] = words;
+    fn configurations_come_back(
+        words in any::<[u16; 10]>(), bin_width: u32, offset: i32, bytes in any::<[u8; 4]>(),
+    ) {
+        let [alpha, minimum_count, x, l1, l2, gate_first, gate_last, pixels, z, half_width] = words;
+        let [source, rule, window, estimator] = bytes;
         let configuration = Configuration {
-            alpha, minimum_count, x, l1, l2, gate_first, gate_last, pixels, bin_width, offset, source, rule,
+            alpha, minimum_count, x, l1, l2, gate_first, gate_last, pixels, bin_width, offset,
+            source, rule, window, z, estimator, half_width,
         };
         let bytes = configuration.to_le_bytes();
         prop_assert_eq!(Configuration::from_le_bytes(&bytes), Some(configuration));

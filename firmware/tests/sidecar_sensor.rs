@@ -5,10 +5,10 @@
 mod common;
 
 use common::host::{CONFIGURATION, Call, Host, Scripted};
-use dtof_core::fixed::types::{U8F8, U16F16};
+use dtof_core::fixed::types::{U4F12, U8F8, U16F16};
 use dtof_core::{
-    AsyncPixel, Count, Count24, DepthEstimator, DepthEvent, Flags, Histogram, LaserCycle,
-    PaperRule, PixelAddress, PixelConfig, RangeGate, detect,
+    AnyRule, AsyncPixel, CentredWindow, Count, Count24, DepthEstimator, DepthEvent, Flags,
+    Histogram, LaserCycle, PaperRule, PixelAddress, PixelConfig, RangeGate, WindowRule, detect,
 };
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::{self, Configuration, Refusal, Report};
@@ -21,8 +21,28 @@ use rand_pcg::Pcg32;
 type Buffers = dtof_firmware::serial::Buffers<512, 1024>;
 type Pixels = heapless::Vec<AsyncPixel<128>, 8>;
 
-fn rule() -> PaperRule {
-    PaperRule::new(U8F8::lit("4"), Count::saturating(5))
+/// A configuration with each rule and estimator, and the same as the core takes it.
+fn configurations() -> [(Configuration, PixelConfig<128, AnyRule>); 2] {
+    let minimum_count = Count::saturating(5);
+    let config = |rule| PixelConfig::new(4, 20, 200, RangeGate::full(), rule).unwrap();
+    let paper = PaperRule::new(U8F8::lit("4"), minimum_count);
+    let window = WindowRule::new(3, U4F12::lit("4.5"), minimum_count).unwrap();
+    let centred = CentredWindow::new(U8F8::lit("2.5")).unwrap();
+    let with_windows = Configuration {
+        rule: 1,
+        window: 3,
+        z: 9 << 11,
+        estimator: 1,
+        half_width: 5 << 7,
+        ..CONFIGURATION
+    };
+    [
+        (CONFIGURATION, config(paper.into())),
+        (
+            with_windows,
+            config(window.into()).with_estimator(DepthEstimator::CentredWindow(centred)),
+        ),
+    ]
 }
 
 /// Photons of one laser cycle and, now and then, of a few empty ones after it.
@@ -55,8 +75,7 @@ fn sensor(script: &[Vec<Call>]) -> Scripted<impl Iterator<Item = Option<Vec<Call
 }
 
 /// What pixels with a link that takes every event at once report.
-fn reference(script: &[Vec<Call>]) -> Vec<DepthEvent> {
-    let config = PixelConfig::<128>::new(4, 20, 200, RangeGate::full(), rule()).unwrap();
+fn reference(script: &[Vec<Call>], config: &PixelConfig<128, AnyRule>) -> Vec<DepthEvent> {
     let mut pixels: Vec<_> = (0..8)
         .map(|address| AsyncPixel::<128>::new(PixelAddress(address)))
         .collect();
@@ -64,11 +83,11 @@ fn reference(script: &[Vec<Call>]) -> Vec<DepthEvent> {
     let mut cycle = 0;
     for call in script.iter().flatten() {
         match *call {
-            Call::Photon(pixel, code) => pixels[usize::from(pixel)].count(&config, code),
+            Call::Photon(pixel, code) => pixels[usize::from(pixel)].count(config, code),
             Call::End(cycles) => {
                 for _ in 0..cycles {
                     for pixel in &mut pixels {
-                        pixel.end_laser_cycle(&config, LaserCycle(cycle));
+                        pixel.end_laser_cycle(config, LaserCycle(cycle));
                         events.extend(pixel.acknowledge());
                     }
                     cycle += 1;
@@ -95,22 +114,24 @@ fn offered(report: &Report) -> u64 {
 #[test]
 fn a_host_that_reads_gets_the_events_of_the_pixels() {
     let script = script(5_000);
-    let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
-    let mut host = Host::new(1, 0);
-    let mut sensor = sensor(&script);
-    host.configure(&mut device, 0, &CONFIGURATION);
-    for now_ms in 0..5_000 {
-        device.poll_sensor(&mut sensor, now_ms);
-        host.exchange(&mut device, now_ms);
-        host.read(4);
+    for (wanted, config) in configurations() {
+        let mut pixels = Pixels::new();
+        let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
+        let mut host = Host::new(1, 0);
+        let mut sensor = sensor(&script);
+        host.configure(&mut device, 0, &wanted);
+        for now_ms in 0..5_000 {
+            device.poll_sensor(&mut sensor, now_ms);
+            host.exchange(&mut device, now_ms);
+            host.read(4);
+        }
+        let report = host.report(&mut device, 5_000);
+        let expected = reference(&script, &config);
+        assert!(expected.len() > 500 && host.events == expected);
+        assert_eq!(report.statistics.events, expected.len() as u64);
+        assert_eq!(report.statistics.deferred, 0);
+        assert_eq!(offered(&report), photons(&script));
     }
-    let report = host.report(&mut device, 5_000);
-    let expected = reference(&script);
-    assert!(expected.len() > 500 && host.events == expected);
-    assert_eq!(report.statistics.events, expected.len() as u64);
-    assert_eq!(report.statistics.deferred, 0);
-    assert_eq!(offered(&report), photons(&script));
 }
 
 #[test]
@@ -277,13 +298,19 @@ fn histogram(bin: usize) -> Box<[u32; 128]> {
 
 #[test]
 fn a_histogram_is_decided_once_within_the_gate() {
+    for (wanted, config) in configurations() {
+        is_decided_once_within_the_gate(wanted, &config);
+    }
+}
+
+fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<128, AnyRule>) {
     let mut pixels = Pixels::new();
     let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut host = Host::new(1, 0);
     let wanted = Configuration {
         gate_first: 10,
         gate_last: 99,
-        ..CONFIGURATION
+        ..wanted
     };
     host.configure(&mut device, 0, &wanted);
     let mut outside = histogram(40);
@@ -313,7 +340,7 @@ fn a_histogram_is_decided_once_within_the_gate() {
     let expected = |counts: &[u32; 128], cycle| {
         let mut histogram = Histogram::<128, Count24>::new();
         histogram.add_frame(counts, &gate);
-        let detection = detect(&histogram, &gate, &rule(), &DepthEstimator::default()).unwrap();
+        let detection = detect(&histogram, &gate, config.rule(), config.estimator()).unwrap();
         DepthEvent {
             pixel: PixelAddress(3),
             cycle: LaserCycle(cycle),

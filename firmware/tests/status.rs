@@ -247,9 +247,20 @@ fn refused() -> Vec<(Vec<u8>, Refusal)> {
         ..CONFIGURATION
     };
     let mut all = vec![(good.to_le_bytes()[1..].to_vec(), Refusal::Unknown)];
-    let bad: [(Change, Refusal); 15] = [
+    let bad: [(Change, Refusal); 20] = [
         (|bad| bad.source = 2, Refusal::Unknown),
-        (|bad| bad.rule = 1, Refusal::Unknown),
+        (|bad| bad.rule = 2, Refusal::Unknown),
+        (|bad| bad.rule = 1, Refusal::WindowWidth),
+        (|bad| (bad.rule, bad.window) = (1, 8), Refusal::WindowWidth),
+        (|bad| bad.estimator = 2, Refusal::Unknown),
+        (
+            |bad| (bad.estimator, bad.half_width) = (1, 255),
+            Refusal::HalfWidth,
+        ),
+        (
+            |bad| (bad.estimator, bad.half_width) = (1, 1025),
+            Refusal::HalfWidth,
+        ),
         (|bad| bad.x = 0, Refusal::ZeroX),
         (|bad| bad.x = 21, Refusal::XAboveL1),
         (|bad| bad.l2 = 20, Refusal::L2NotAboveL1),
@@ -320,7 +331,8 @@ fn every_refused_configuration_names_its_reason_and_changes_nothing() {
     let mut numbers: Vec<u8> = all.iter().map(|&(_, refusal)| refusal as u8).collect();
     numbers.sort_unstable();
     numbers.dedup();
-    assert_eq!(numbers, Vec::from_iter(1..=11));
+    // 12 takes a sensor.
+    assert_eq!(numbers, Vec::from_iter((1..=11).chain(13..=14)));
 
     let undisturbed = photons_between(&[]);
     assert_eq!((undisturbed.0.len(), undisturbed.2), (2 * 25, 600));

@@ -6,9 +6,10 @@ mod capture_log;
 use std::path::PathBuf;
 
 use capture_log::{ground_truth, log, tell};
+use dtof::detection::{Estimator, Rule};
 use dtof::engine::host_engine;
 use dtof::recorded::{RecordedHistograms, RecordingLength};
-use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use dtof::settings::{I24F8Number, Settings, U16F16Number};
 use dtof::source::PhotonSource;
 use dtof::tmf8820;
 use dtof_core::fixed::types::U8F8;
@@ -32,7 +33,8 @@ fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES
         bin_width_ps: U16F16Number(tmf8820::BIN_WIDTH_PS),
         offset_mm: I24F8Number(tmf8820::OFFSET_MM),
         gate: None,
-        alpha: U8F8Number(U8F8::lit("4")),
+        rule: Rule::paper(U8F8::lit("4")),
+        estimator: Estimator::default(),
         min_count,
         l1: 40,
         l2: 2000,

@@ -1,8 +1,9 @@
 //! False events of whole exposures: the table against new simulations and
 //! against what lies between its points, and `tune` against the engine.
 
+use dtof::detection::{Estimator, Rule};
 use dtof::engine::host_engine;
-use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use dtof::settings::{I24F8Number, Settings, U16F16Number};
 use dtof::simulation::{Rates, SimulatedArray, SimulatedPixel};
 use dtof::source::{Geometry, PhotonSource, pixel_rng};
 use dtof::theory::binomial::{alike, plausible};
@@ -303,7 +304,8 @@ fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec
         bin_width_ps: U16F16Number(U16F16::lit("250")),
         offset_mm: I24F8Number(I24F8::ZERO),
         gate: None,
-        alpha: U8F8Number(tuned.alpha),
+        rule: Rule::paper(tuned.alpha),
+        estimator: Estimator::default(),
         min_count: request.minimum_count,
         l1: tuned.l1,
         l2: request.l2,
@@ -399,7 +401,7 @@ fn time_and_depth_error_are_those_of_the_engine() {
         (mean - expected).abs() / (variance * (1.0 / times + 1.0 / near)).sqrt()
     };
     let time = distance(&cycles, near_cycles / near);
-    let depth = distance(&squares, tuned.depth_error_bins().powi(2));
+    let depth = distance(&squares, tuned.detections.depth_error_bins().powi(2));
     assert!(time < 4.5 && depth < 4.5, "{time} {depth}");
 }
 

@@ -1,7 +1,9 @@
 //! The engine: photons in, depth events out.
 
 use anyhow::{Result, bail};
-use dtof_core::{AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig, Statistics};
+use dtof_core::{
+    AnyRule, AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig, Statistics,
+};
 use rayon::prelude::*;
 
 use crate::settings::Settings;
@@ -24,7 +26,7 @@ pub trait Engine {
 /// `dtof-core` on this computer, pixels spread over its threads.
 #[derive(Debug)]
 struct HostEngine<const BINS: usize> {
-    config: PixelConfig<BINS>,
+    config: PixelConfig<BINS, AnyRule>,
     pixels: Vec<AsyncPixel<BINS>>,
 }
 
@@ -82,7 +84,7 @@ impl<const BINS: usize> Engine for HostEngine<BINS> {
 /// One pixel through one slice; its link takes each event at once.
 fn run_pixel<const BINS: usize>(
     pixel: &mut AsyncPixel<BINS>,
-    config: &PixelConfig<BINS>,
+    config: &PixelConfig<BINS, AnyRule>,
     first_cycle: u64,
     received: &PixelPhotons,
 ) -> Vec<DepthEvent> {

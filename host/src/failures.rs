@@ -20,8 +20,8 @@ pub fn document(part: &Part) -> Result<String> {
          every other case differs from it in what its name says. Backgrounds are in counts a bin at L1 (after 40\n\
          laser cycles), at the same signal to noise; a weak signal is about a quarter of it (A/√B 0.54 in place of 2.24 in a\n\
          laser cycle). Photons are those of a laser cycle; \"one hit\" is a TDC that takes the first of them only. The numbers\n\
-         are in [figures/data/failures.csv](figures/data/failures.csv). The commands know the paper's rule only so far; the window\n\
-         rule is for programs that use `dtof-core`.\n\n\
+         are in [figures/data/failures.csv](figures/data/failures.csv). `--rule window` chooses the window rule,\n\
+         `--sigma-bins 1` the centred window.\n\n\
          A cell is of one rule and one depth estimator: the share of its events that are farther than 3 bins from\n\
          every surface (99 % interval), the share of exposures that end without an event, the root mean square\n\
          error of the other events, and flags and events of another surface than the first where they are more than 1 %. A method\n\n\

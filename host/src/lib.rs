@@ -11,6 +11,7 @@
 
 pub mod aer_file;
 pub mod chart;
+pub mod detection;
 pub mod device;
 pub mod engine;
 pub mod events_csv;

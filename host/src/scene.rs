@@ -12,7 +12,8 @@ use anyhow::{Result, ensure};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 
-use crate::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use crate::detection::{Estimator, Rule};
+use crate::settings::{I24F8Number, Settings, U16F16Number};
 use crate::simulation::effects::{Effects, Timing};
 use crate::simulation::{MM_PER_PS, Rates, RatesAt, SimulatedArray, SimulatedPixel};
 use crate::source::{Geometry, PhotonSource, pixel_rng};
@@ -227,7 +228,8 @@ pub fn settings(seed: u64) -> Settings {
         bin_width_ps: U16F16Number(U16F16::lit("250")),
         offset_mm: I24F8Number(I24F8::ZERO),
         gate: None,
-        alpha: U8F8Number(U8F8::lit("8")),
+        rule: Rule::paper(U8F8::lit("8")),
+        estimator: Estimator::default(),
         min_count: 5,
         l1: 100,
         l2: 2000,

@@ -1,9 +1,11 @@
 //! How the pixels operate, in the units the command line uses.
 
 use anyhow::{Context, Result, ensure};
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
-use dtof_core::{Count, PaperRule, PixelConfig, RangeGate, RangeScale};
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
+use dtof_core::{AnyRule, PixelConfig, RangeGate, RangeScale};
 use serde::Serialize;
+
+use crate::detection::{Estimator, Rule};
 
 /// Everything an engine and the output need beside the photons.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -16,9 +18,13 @@ pub struct Settings {
     pub offset_mm: I24F8Number,
     /// First and last bin that may hold the peak, both inclusive.
     pub gate: Option<(u16, u16)>,
-    /// Standard deviations of the background a peak must exceed it by.
-    pub alpha: U8F8Number,
-    /// Photons a reported peak holds at least.
+    /// What decides whether a peak stands clear.
+    #[serde(flatten)]
+    pub rule: Rule,
+    /// What finds its depth.
+    #[serde(flatten)]
+    pub estimator: Estimator,
+    /// Photons a reported peak, or the window around it, holds at least.
     pub min_count: u16,
     /// The exposure a decision must exceed, in laser cycles.
     pub l1: u16,
@@ -44,6 +50,7 @@ macro_rules! number {
         }
     };
 }
+number!(U4F12Number, U4F12);
 number!(U8F8Number, U8F8);
 number!(U16F16Number, U16F16);
 number!(I24F8Number, I24F8);
@@ -53,16 +60,17 @@ impl Settings {
     ///
     /// # Errors
     /// The constraint the settings break.
-    pub fn config<const BINS: usize>(&self) -> Result<PixelConfig<BINS>> {
+    pub fn config<const BINS: usize>(&self) -> Result<PixelConfig<BINS, AnyRule>> {
         let gate = match self.gate {
             None => RangeGate::full(),
             Some((first, last)) => RangeGate::new(first, last)
                 .with_context(|| format!("--gate {first}..{last} with {BINS} bins"))?,
         };
         ensure!(self.min_count >= 1, "--min-count must be at least 1");
-        let rule = PaperRule::new(self.alpha.0, Count::saturating(self.min_count.into()));
-        PixelConfig::new(self.x, self.l1, self.l2, gate, rule)
-            .with_context(|| format!("--x {} --l1 {} --l2 {}", self.x, self.l1, self.l2))
+        let rule = self.rule.with_minimum_count(self.min_count)?;
+        let config = PixelConfig::new(self.x, self.l1, self.l2, gate, rule)
+            .with_context(|| format!("--x {} --l1 {} --l2 {}", self.x, self.l1, self.l2))?;
+        Ok(config.with_estimator(self.estimator.in_core()))
     }
 
     /// From bins to millimetres.

@@ -151,20 +151,16 @@ impl Settings {
         let gate = self.gate.map_or("none".to_owned(), |(first, last)| {
             format!("{first}..{last}")
         });
-        vec![
+        let mut rows = vec![
             row(
                 "bins",
                 format!("{} of {} ps", self.bins, self.bin_width_ps.0),
             ),
             row("range offset", format!("{} mm", self.offset_mm.0)),
             row("range gate", gate),
-            row(
-                "threshold",
-                format!(
-                    "background + {} × its square root (α), at least {} photons",
-                    self.alpha.0, self.min_count
-                ),
-            ),
+        ];
+        rows.extend(self.detection_rows());
+        rows.extend([
             row(
                 "decisions",
                 format!(
@@ -173,7 +169,14 @@ impl Settings {
                 ),
             ),
             row("seed", self.seed.to_string()),
-        ]
+        ]);
+        rows
+    }
+
+    /// Rule and estimator.
+    #[must_use]
+    pub fn detection_rows(&self) -> [Row; 2] {
+        [self.rule.row(self.min_count), self.estimator.row()]
     }
 }
 

@@ -7,12 +7,14 @@ use std::net::{TcpListener, TcpStream};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use dtof::detection::{Estimator, Rule};
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::{Engine, host_engine};
 use dtof::scene;
 use dtof::settings::Settings;
 use dtof::source::{Geometry, PhotonSource};
 use dtof_core::DepthEvent;
+use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::sidecar::Sidecar;
 
@@ -20,6 +22,15 @@ const PIXELS: usize = 64;
 
 fn settings() -> Settings {
     scene::settings(1)
+}
+
+/// The same with the other rule and the other estimator.
+fn with_windows() -> Settings {
+    Settings {
+        rule: Rule::window(2, U4F12::lit("4.5")),
+        estimator: Estimator::for_pulse(U8F8::lit("0.55")),
+        ..settings()
+    }
 }
 
 /// Serves one connection after the other, each with a sidecar fresh from
@@ -76,7 +87,8 @@ fn serve(stream: &mut TcpStream, lives: Option<Duration>) {
     }
 }
 
-/// All events of `cycles` laser cycles of the demo's scene.
+/// All events of `cycles` laser cycles of the demo's scene, which is the same with all
+/// settings.
 fn events(engine: &mut dyn Engine, cycles: u64) -> anyhow::Result<Vec<DepthEvent>> {
     let geometry = Geometry {
         columns: 8,
@@ -94,29 +106,61 @@ fn addresses() -> Vec<dtof_core::PixelAddress> {
     (0..64).map(dtof_core::PixelAddress).collect()
 }
 
+/// The same events on the device and on the host, and gives them.
 #[track_caller]
-fn same_events(cycles: u64, reads_every: Duration, at_least: u64) {
+fn same_events(
+    settings: &Settings,
+    cycles: u64,
+    reads_every: Duration,
+    at_least: u64,
+) -> Vec<DepthEvent> {
     let mut client = Client::new(device::open(&device(None)).unwrap()).unwrap();
     assert_eq!((client.bins(), client.pixels()), (128, 64));
     client.reads_every = reads_every;
-    let mut on_device = DeviceEngine::new(client, &settings(), &addresses()).unwrap();
-    let mut on_host = host_engine(&settings(), &addresses()).unwrap();
+    let mut on_device = DeviceEngine::new(client, settings, &addresses()).unwrap();
+    let mut on_host = host_engine(settings, &addresses()).unwrap();
     let expected = events(on_host.as_mut(), cycles).unwrap();
     let actual = events(&mut on_device, cycles).unwrap();
     assert!(!expected.is_empty() && actual == expected);
     assert_eq!(on_device.statistics(), on_host.statistics());
     assert_eq!(on_device.report().cycles, cycles);
     assert!(on_device.statistics().counted >= at_least);
+    actual
 }
 
 #[test]
 fn a_million_photons_give_the_same_events_on_a_device() {
-    same_events(6_000, Duration::ZERO, 1_000_000);
+    same_events(&settings(), 6_000, Duration::ZERO, 1_000_000);
 }
 
 #[test]
 fn a_host_that_seldom_reads_gets_the_same_events() {
-    same_events(1_500, Duration::from_millis(20), 100_000);
+    same_events(&settings(), 1_500, Duration::from_millis(20), 100_000);
+}
+
+#[test]
+fn every_rule_and_estimator_gives_the_same_events_on_a_device() {
+    let with_windows = with_windows();
+    let variants = [
+        Settings {
+            estimator: Estimator::default(),
+            ..with_windows.clone()
+        },
+        Settings {
+            rule: settings().rule,
+            ..with_windows.clone()
+        },
+        with_windows,
+        settings(),
+    ];
+    let events: Vec<_> = variants
+        .iter()
+        .map(|settings| same_events(settings, 1_000, Duration::ZERO, 100_000))
+        .collect();
+    // And not because the device decides as it always does.
+    for (index, one) in events.iter().enumerate() {
+        assert!(!events[index + 1..].contains(one));
+    }
 }
 
 #[test]

@@ -9,12 +9,13 @@ use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use dtof::detection::{Estimator, Rule};
 use dtof::device::{self, Client};
 use dtof::events_csv;
 use dtof::monitor::{losses, monitor};
-use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use dtof::settings::{I24F8Number, Settings, U16F16Number};
 use dtof_core::fixed::types::{I24F8, U0F32, U8F8, U8F24, U16F16};
-use dtof_core::{AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig};
+use dtof_core::{AnyRule, AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig};
 use dtof_firmware::link::endpoint::LinkCounters;
 use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::link::message::Report;
@@ -31,7 +32,8 @@ fn settings() -> Settings {
         bin_width_ps: U16F16Number(U16F16::lit("250")),
         offset_mm: I24F8Number(I24F8::ZERO),
         gate: None,
-        alpha: U8F8Number(U8F8::lit("4")),
+        rule: Rule::paper(U8F8::lit("4")),
+        estimator: Estimator::default(),
         min_count: 5,
         l1: 40,
         l2: 2000,
@@ -182,7 +184,7 @@ fn serve<S: Sensor>(
 
 /// Pixels whose link takes every event at once.
 struct Reference {
-    config: PixelConfig<128>,
+    config: PixelConfig<128, AnyRule>,
     pixels: Vec<AsyncPixel<128>>,
     cycle: u64,
     events: Vec<DepthEvent>,

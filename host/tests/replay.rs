@@ -316,7 +316,7 @@ fn replay_takes_the_stated_defaults_and_keeps_quiet() {
     let summary: serde_json::Value =
         serde_json::from_str(&scratch.read("out/summary.json")).unwrap();
     let settings = serde_json::json!({
-        "bins": 128, "bin_width_ps": 250.0, "offset_mm": 0.0, "gate": null, "alpha": 4.0,
+        "bins": 128, "bin_width_ps": 250.0, "offset_mm": 0.0, "gate": null, "rule": "paper", "alpha": 4.0, "estimator": "centre-of-mass-3",
         "min_count": 5, "l1": 40, "l2": 2000, "x": 4, "seed": 1
     });
     assert_eq!(summary["settings"], settings);

@@ -210,3 +210,88 @@ fn options_that_are_missing_or_no_numbers_are_named() {
         );
     }
 }
+
+const WINDOW: &str = "--background 0.05 --signal 0.4 --sigma-bins 0.8 --rule window";
+
+#[test]
+fn the_window_rule_has_a_z_a_window_and_an_estimator() {
+    let text = text(WINDOW);
+    let (results, options) = text.split_once("\n\n").unwrap();
+    for line in results.lines() {
+        let sources = ["formula: ", "simulation: "];
+        assert!(sources.iter().any(|source| line.contains(source)), "{line}");
+    }
+    assert!(!results.contains('α'), "{results}");
+    let options: Vec<&str> = options.split_whitespace().collect();
+    let scratch = Scratch::new();
+    let photons = scratch.file("photons.csv", "pixel,cycle,bin\n0,1,2\n");
+    let settings = &scratch.replayed(&photons, &options)["settings"];
+    let result = json(WINDOW);
+    for (name, of_result) in [("z", "z"), ("window", "window"), ("l1", "l1")] {
+        let value = value(&result, of_result);
+        assert_eq!(settings[name].as_f64(), Some(value), "{name}");
+    }
+    assert_eq!(settings["rule"], "window");
+    assert_eq!(settings["estimator"], "centred-window");
+    // 0.8 to the nearest 1/256, and twice that and 1/2.
+    assert_eq!(settings["sigma_bins"], 205.0 / 256.0);
+    assert_eq!(value(&result, "half_width"), 538.0 / 256.0);
+    assert_eq!(value(&result, "window"), 3.0);
+}
+
+#[test]
+fn z_is_that_of_the_core_and_keeps_false_events_down() {
+    let gate = dtof_core::RangeGate::<128>::full();
+    for one_in in [10, 100, 1000] {
+        let result = json(&format!(
+            "{WINDOW} --l1 40 --false-per-exposure {}",
+            1.0 / f64::from(one_in)
+        ));
+        let z = dtof_core::z_for(one_in, &gate, 4, 40, 2000).to_num::<f64>();
+        assert_eq!(value(&result, "z"), z);
+        // `z_for`: 0.4 to 1.2 times as many; 4 standard deviations of 4000 exposures.
+        let wanted = 1.0 / f64::from(one_in);
+        let deviation = (wanted / 4000.0).sqrt();
+        let found = value(&result, "false_events");
+        let source = result["false_events"]["source"].as_str().unwrap();
+        assert!(source.contains("in 4000 exposures"), "{source}");
+        assert!(found < 1.2 * wanted + 4.0 * deviation, "{found} {wanted}");
+        assert!(found > 0.4 * wanted - 4.0 * deviation, "{found} {wanted}");
+    }
+}
+
+/// A window with the z for 1 % false events is faster than the paper's rule with the α
+/// for it, and the centred window nearer.
+#[test]
+fn the_window_rule_is_faster_and_nearer() {
+    let (paper, window) = (json(PIXEL), json(WINDOW));
+    let cycles = |result| value(result, "cycles_to_event");
+    assert!(cycles(&window) < cycles(&paper), "{window} {paper}");
+    // At the same exposures, that is the same photons.
+    let [paper, window] =
+        [PIXEL, WINDOW].map(|rule| value(&json(&format!("{rule} --l1 400")), "depth_error_mm"));
+    assert!(window < paper, "{window} {paper}");
+}
+
+#[test]
+fn the_window_rule_refuses_what_the_papers_does() {
+    refused(
+        "--background 0.05 --signal 0.001 --sigma-bins 0.8 --rule window",
+        &["the signal is too weak", "L2 = 2000"],
+    );
+    refused(
+        "--background 1 --signal 1 --sigma-bins 0.8 --rule window",
+        &["fills the 10-bit counters", "lower --l2 to 860"],
+    );
+    refused(
+        &format!("{WINDOW} --l1 2000"),
+        &["L2 must be greater than L1"],
+    );
+    refused(
+        &format!("{WINDOW} --bins 100"),
+        &["--bins 100", "power of two"],
+    );
+    // However rare: z ends at its highest.
+    let rare = json(&format!("{WINDOW} --l1 40 --false-per-exposure 1e-300"));
+    assert!(value(&rare, "z") > 6.0);
+}

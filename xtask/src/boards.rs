@@ -4,13 +4,14 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
+use dtof::detection::{Estimator, Rule};
 use dtof::device::{Client, DeviceEngine, configuration};
 use dtof::engine::{Engine, host_engine};
 use dtof::monitor;
 use dtof::scene;
-use dtof::settings::{Settings, U8F8Number, U16F16Number};
+use dtof::settings::{Settings, U16F16Number};
 use dtof::source::{Geometry, PhotonSource};
-use dtof_core::fixed::types::U8F8;
+use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_firmware::sensor::SensorFault;
 
 use crate::firmware::{Board, Sensor};
@@ -30,9 +31,9 @@ pub fn check(root: &Path) -> Result<()> {
         columns: 8,
         rows: 8,
     };
-    for reads_every in [0, 150] {
+    for (settings, reads_every) in [(settings(), 0), (with_windows(), 150)] {
         let reads_every = Duration::from_millis(reads_every);
-        used.push(agrees(board, &image, array, 5300, reads_every)?);
+        used.push(agrees(board, &image, &settings, array, 5300, reads_every)?);
     }
     used.push(senses(board, &image)?);
     stack::check(board, &image, &used)?;
@@ -46,7 +47,8 @@ pub fn check(root: &Path) -> Result<()> {
                 rows: 2,
             };
             let used = [
-                agrees(board, &image, array, 200, Duration::ZERO)?,
+                agrees(board, &image, &settings(), array, 200, Duration::ZERO)?,
+                agrees(board, &image, &with_windows(), array, 200, Duration::ZERO)?,
                 senses(board, &image)?,
             ];
             stack::check(board, &image, &used)?;
@@ -109,18 +111,28 @@ fn ends(board: Board, image: &Path) -> Result<Vec<u64>> {
 /// What decides the events: a setting at which there are many.
 fn settings() -> Settings {
     Settings {
-        alpha: U8F8Number(U8F8::lit("4")),
+        rule: Rule::paper(U8F8::lit("4")),
         l1: 20,
         x: 4,
         ..scene::settings(1)
     }
 }
 
+/// The other rule and the other estimator.
+fn with_windows() -> Settings {
+    Settings {
+        rule: Rule::window(2, U4F12::lit("4.5")),
+        estimator: Estimator::for_pulse(U8F8::lit("0.55")),
+        ..settings()
+    }
+}
+
 /// The demo's scene on a board and on this computer gives the same events and
-/// the same counts, however seldom the host reads. Gives the bytes of stack used.
+/// the same counts, whatever the rule and however seldom the host reads. Gives the bytes of stack used.
 fn agrees(
     board: Board,
     image: &Path,
+    settings: &Settings,
     geometry: Geometry,
     cycles: u16,
     reads_every: Duration,
@@ -129,7 +141,7 @@ fn agrees(
     let mut emulator = Emulator::start(board, image, &[])?;
     let mut client = Client::new(emulator.connect()?).context(name)?;
     client.reads_every = reads_every;
-    let decided = decides_alike(client, geometry, cycles).context(name)?;
+    let decided = decides_alike(client, settings, geometry, cycles).context(name)?;
     let stack = emulator.stop()?;
     println!(
         "{name}: {decided}; read every {} ms; {stack} bytes of stack",
@@ -140,15 +152,19 @@ fn agrees(
 
 /// What the device makes of the demo's photons is what this computer does. Says
 /// how much that was.
-fn decides_alike(client: Client, geometry: Geometry, cycles: u16) -> Result<String> {
+fn decides_alike(
+    client: Client,
+    settings: &Settings,
+    geometry: Geometry,
+    cycles: u16,
+) -> Result<String> {
     let start = Instant::now();
-    let settings = settings();
-    let mut photons = scene::photons(geometry, &settings, cycles.into())?;
+    let mut photons = scene::photons(geometry, settings, cycles.into())?;
     let addresses = photons.addresses();
     let slice = photons.next_slice(cycles)?;
-    let mut on_host = host_engine(&settings, &addresses)?;
+    let mut on_host = host_engine(settings, &addresses)?;
     let expected = on_host.run(&slice)?;
-    let mut on_board = DeviceEngine::new(client, &settings, &addresses)?;
+    let mut on_board = DeviceEngine::new(client, settings, &addresses)?;
     let events = on_board.run(&slice)?;
     ensure!(events == expected, "not the events of this computer");
     let statistics = on_board.statistics();
@@ -234,7 +250,7 @@ fn says_unplugged(board: Board, image: &Path, sensor: Sensor, array: Geometry) -
         report.statistics.photons() == 0,
         "{name}: photons without a sensor"
     );
-    let decided = decides_alike(client, array, 100).with_context(|| name.clone())?;
+    let decided = decides_alike(client, &settings(), array, 100).with_context(|| name.clone())?;
     let stack = emulator.stop()?;
     println!("{name} unplugged: \"{fault}\"; then {decided}; {stack} bytes of stack");
     Ok(stack)

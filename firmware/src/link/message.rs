@@ -2,7 +2,7 @@
 //!
 //! | kind | to | message | body |
 //! |---|---|---|---|
-//! | 0x01 | device | configure | [`Configuration`], 26 bytes |
+//! | 0x01 | device | configure | [`Configuration`], 32 bytes |
 //! | 0x02 | device | photons | [`Token`]s |
 //! | 0x03 | device | synchronise | anything |
 //! | 0x04 | device | statistics request | none |
@@ -15,14 +15,14 @@
 //! | 0x86 | host | sensor | [`About`], 10 bytes |
 
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{ConfigError, GateError, RangeScaleError, Statistics};
+use dtof_core::{ConfigError, GateError, RangeScaleError, Statistics, WindowWidthError};
 use heapless::Vec;
 
 use super::endpoint::LinkCounters;
 use crate::sensor::About;
 
 /// The version both ends announce when a session begins.
-pub const LINK_VERSION: u16 = 2;
+pub const LINK_VERSION: u16 = 3;
 
 /// Host to device: a [`Configuration`].
 pub const CONFIGURE: u8 = 0x01;
@@ -166,9 +166,9 @@ pub enum Source {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Configuration {
-    /// α in 1/256.
+    /// α in 1/256; of the paper's rule.
     pub alpha: u16,
-    /// Photons a reported peak holds at least.
+    /// Photons a reported peak, or the window around it, holds at least.
     pub minimum_count: u16,
     /// Laser cycles between looks.
     pub x: u16,
@@ -188,13 +188,21 @@ pub struct Configuration {
     pub offset: i32,
     /// 0: link, 1: sensor.
     pub source: u8,
-    /// 0: the paper's rule.
+    /// 0: the paper's rule, 1: a window.
     pub rule: u8,
+    /// Bins in the window of the rule.
+    pub window: u8,
+    /// z in 1/4096; of the window's rule.
+    pub z: u16,
+    /// 0: centre of mass of three bins, 1: centred window.
+    pub estimator: u8,
+    /// Half the width of the centred window in 1/256 bin.
+    pub half_width: u16,
 }
 
 impl Configuration {
     /// Bytes of the record.
-    pub const BYTES: usize = 26;
+    pub const BYTES: usize = 32;
 
     /// As it is sent.
     #[must_use]
@@ -215,11 +223,14 @@ impl Configuration {
             .to_le_bytes()
             .into_iter()
             .chain(self.offset.to_le_bytes());
+        let [z, z_high] = self.z.to_le_bytes();
+        let [half_width, half_width_high] = self.half_width.to_le_bytes();
         let all = fields
             .into_iter()
             .flat_map(u16::to_le_bytes)
             .chain(wide)
-            .chain([self.source, self.rule]);
+            .chain([self.source, self.rule, self.window, z, z_high])
+            .chain([self.estimator, half_width, half_width_high]);
         for (place, byte) in bytes.iter_mut().zip(all) {
             *place = byte;
         }
@@ -245,6 +256,10 @@ impl Configuration {
             offset: i32::from_le_bytes(four(20)?),
             source: *bytes.get(24)?,
             rule: *bytes.get(25)?,
+            window: *bytes.get(26)?,
+            z: two(27)?,
+            estimator: *bytes.get(29)?,
+            half_width: two(30)?,
         })
     }
 }
@@ -254,7 +269,7 @@ impl Configuration {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Refusal {
-    /// Not as long as the record, or of an unknown source or rule.
+    /// Not as long as the record, or of an unknown source, rule or estimator.
     Unknown = 1,
     /// X is 0.
     ZeroX = 2,
@@ -278,10 +293,14 @@ pub enum Refusal {
     NoSensor = 11,
     /// The bins of the sensor are not as wide as that.
     BinWidth = 12,
+    /// The window of the rule is not 1 to 7 bins wide.
+    WindowWidth = 13,
+    /// The centred window is not 1 to 4 bins wide on either side.
+    HalfWidth = 14,
 }
 
 impl Refusal {
-    const ALL: [Self; 12] = [
+    const ALL: [Self; 14] = [
         Self::Unknown,
         Self::ZeroX,
         Self::XAboveL1,
@@ -294,6 +313,8 @@ impl Refusal {
         Self::MinimumCount,
         Self::NoSensor,
         Self::BinWidth,
+        Self::WindowWidth,
+        Self::HalfWidth,
     ];
 
     /// From its number on the wire.
@@ -320,6 +341,8 @@ impl core::fmt::Display for Refusal {
             Self::MinimumCount => f.write_str("the minimum peak count must be from 1 to 1023"),
             Self::NoSensor => f.write_str("the device has no sensor"),
             Self::BinWidth => f.write_str("the bins of the sensor are not as wide as that"),
+            Self::WindowWidth => WindowWidthError.fmt(f),
+            Self::HalfWidth => f.write_str("the centred window must be 1 to 4 bins to either side"),
         }
     }
 }
@@ -344,6 +367,12 @@ impl From<GateError> for Refusal {
             GateError::PastLastBin => Self::GatePastLastBin,
             GateError::TooNarrow => Self::GateTooNarrow,
         }
+    }
+}
+
+impl From<WindowWidthError> for Refusal {
+    fn from(_: WindowWidthError) -> Self {
+        Self::WindowWidth
     }
 }
 

@@ -1,7 +1,10 @@
 //! Taking a configuration on.
 
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
-use dtof_core::{AsyncPixel, Count, PaperRule, PixelAddress, PixelConfig, RangeGate, RangeScale};
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
+use dtof_core::{
+    AnyRule, AsyncPixel, CentredWindow, Count, DepthEstimator, PaperRule, PixelAddress,
+    PixelConfig, RangeGate, RangeScale, WindowRule,
+};
 
 use super::Sidecar;
 use crate::link::message::{Configuration, Refusal, Source};
@@ -11,11 +14,11 @@ impl Sidecar<'_> {
     /// an exposure. The one before stays if it is refused.
     pub(super) fn configure(&mut self, wanted: &Configuration) -> Result<(), Refusal> {
         let bin_width = U16F16::from_bits(wanted.bin_width);
-        let source = match (wanted.source, wanted.rule, self.sensor) {
-            (0, 0, _) => Source::Link,
-            (1, 0, Some(sensor)) if sensor.has_bins_of(bin_width) => Source::Sensor,
-            (1, 0, Some(_)) => return Err(Refusal::BinWidth),
-            (1, 0, None) => return Err(Refusal::NoSensor),
+        let source = match (wanted.source, self.sensor) {
+            (0, _) => Source::Link,
+            (1, Some(sensor)) if sensor.has_bins_of(bin_width) => Source::Sensor,
+            (1, Some(_)) => return Err(Refusal::BinWidth),
+            (1, None) => return Err(Refusal::NoSensor),
             _ => return Err(Refusal::Unknown),
         };
         let minimum = Count::saturating(wanted.minimum_count.into());
@@ -26,8 +29,9 @@ impl Sidecar<'_> {
             return Err(Refusal::Pixels);
         }
         let gate = RangeGate::new(wanted.gate_first, wanted.gate_last)?;
-        let rule = PaperRule::new(U8F8::from_bits(wanted.alpha), minimum);
-        let config = PixelConfig::new(wanted.x, wanted.l1, wanted.l2, gate, rule)?;
+        let rule = rule(wanted, minimum)?;
+        let config = PixelConfig::new(wanted.x, wanted.l1, wanted.l2, gate, rule)?
+            .with_estimator(estimator(wanted)?);
         RangeScale::new(bin_width, I24F8::from_bits(wanted.offset))?;
         self.pixels.clear();
         for address in 0..wanted.pixels {
@@ -40,5 +44,24 @@ impl Sidecar<'_> {
         self.started = false;
         self.restart_counts();
         Ok(())
+    }
+}
+
+/// What a configuration has for the other rule is not looked at.
+fn rule(wanted: &Configuration, minimum: Count) -> Result<AnyRule, Refusal> {
+    Ok(match wanted.rule {
+        0 => PaperRule::new(U8F8::from_bits(wanted.alpha), minimum).into(),
+        1 => WindowRule::new(wanted.window, U4F12::from_bits(wanted.z), minimum)?.into(),
+        _ => return Err(Refusal::Unknown),
+    })
+}
+
+fn estimator(wanted: &Configuration) -> Result<DepthEstimator, Refusal> {
+    match wanted.estimator {
+        0 => Ok(DepthEstimator::CentreOfMass3),
+        1 => CentredWindow::new(U8F8::from_bits(wanted.half_width))
+            .map(DepthEstimator::CentredWindow)
+            .ok_or(Refusal::HalfWidth),
+        _ => Err(Refusal::Unknown),
     }
 }

@@ -17,7 +17,7 @@ mod photons;
 mod sensor;
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{
-    AER_VERSION, AerEncoder, AerWord, AsyncPixel, DepthEvent, PixelConfig, Statistics,
+    AER_VERSION, AerEncoder, AerWord, AnyRule, AsyncPixel, DepthEvent, PixelConfig, Statistics,
 };
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::spsc::Queue;
@@ -53,7 +53,7 @@ pub struct Sidecar<'a> {
     wire_length: usize,
     wire_sent: usize,
     pixels: &'a mut VecView<AsyncPixel<BINS>>,
-    config: Option<PixelConfig<BINS>>,
+    config: Option<PixelConfig<BINS, AnyRule>>,
     /// Of the configuration in force, for sensors that measure times.
     bin_width: U16F16,
     source: Source,

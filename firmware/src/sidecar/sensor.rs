@@ -1,8 +1,6 @@
 //! Photons and histograms of a sensor, which does not wait.
 
-use dtof_core::{
-    Count24, DepthEstimator, DepthEvent, Histogram, LaserCycle, PixelAddress, Statistics, detect,
-};
+use dtof_core::{Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, Statistics, detect};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
 use super::{BINS, Sidecar, has_room_for_event};
@@ -118,13 +116,7 @@ impl PhotonSink for Sidecar<'_> {
         if !has_room_for_event(&self.words) {
             done.deferred = 1;
         } else if let Some(detection) =
-            // The link knows no other estimator: the code of others is left out.
-            detect(
-                &histogram,
-                config.gate(),
-                config.rule(),
-                &DepthEstimator::CentreOfMass3,
-            )
+            detect(&histogram, config.gate(), config.rule(), config.estimator())
         {
             self.enqueue(&DepthEvent {
                 pixel,

@@ -22,6 +22,10 @@ pub const CONFIGURATION: Configuration = Configuration {
     offset: 0,
     source: 1,
     rule: 0,
+    window: 0,
+    z: 0,
+    estimator: 0,
+    half_width: 0,
 };
 
 pub struct Host {

@@ -2,6 +2,7 @@
 
 pub mod decode;
 pub mod demo;
+mod detection;
 pub mod figures;
 pub mod monitor;
 mod operation;
@@ -13,16 +14,18 @@ pub mod tune;
 use std::io::{self, Write};
 use std::path::Path;
 
-use dtof::summary::{Row, aligned};
+use dtof::summary::{Row, Summary, aligned};
 
 /// What a run came to, on the terminal.
-fn print_summary(rows: &[Row], folder: &Path) -> io::Result<()> {
+fn print_summary(summary: &Summary, more: &[Row], folder: &Path) -> io::Result<()> {
+    let detection = summary.settings.detection_rows();
+    let rows = [&summary.rows()[..], more, &detection].concat();
     let report = folder.join("report.html");
     let mut out = io::stdout().lock();
     write!(
         out,
         "{}\nOpen {} in a browser.\n",
-        aligned(rows),
+        aligned(&rows),
         report.display()
     )?;
     out.flush()

@@ -58,7 +58,7 @@ impl Monitor {
             self.bin_width_ps.or(sensor.bin_width).unwrap_or(any),
             self.offset_mm.unwrap_or(sensor.offset),
             0, // nothing is drawn here
-        );
+        )?;
         let length = self
             .seconds
             .map(|seconds| Duration::from_secs(seconds.into()));

@@ -2,21 +2,23 @@
 
 use std::str::FromStr;
 
+use anyhow::{Context, Result};
 use clap::Args;
-use dtof::settings::{I24F8Number, Settings, U8F8Number, U16F16Number};
+use dtof::settings::{I24F8Number, Settings, U16F16Number};
+use dtof_core::RangeGate;
 use dtof_core::fixed::traits::Fixed;
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::fixed::types::{I24F8, U16F16};
+
+use super::detection::Detection;
 
 #[derive(Args)]
 pub struct Operation {
     /// Only these bins may hold the peak, both inclusive [default: all]
     #[arg(long, value_name = "FIRST..LAST", value_parser = gate)]
     gate: Option<(u16, u16)>,
-    /// Standard deviations of the background a peak must exceed it by, 0 to 255.996, rounded to
-    /// 1/256
-    #[arg(long, value_parser = number::<U8F8>, default_value = "4", allow_hyphen_values = true)]
-    alpha: U8F8,
-    /// Photons a reported peak holds at least
+    #[command(flatten)]
+    detection: Detection,
+    /// Photons a reported peak, or the window around it, holds at least
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1023))]
     min_count: u16,
     /// The exposure a decision must exceed, in laser cycles
@@ -32,25 +34,39 @@ pub struct Operation {
 
 impl Operation {
     /// With what the options do not say.
+    ///
+    /// # Errors
+    /// Options that contradict each other.
     pub fn settings(
         &self,
         bins: usize,
         bin_width_ps: U16F16,
         offset_mm: I24F8,
         seed: u64,
-    ) -> Settings {
-        Settings {
+    ) -> Result<Settings> {
+        let z_for = |one_in| {
+            // Only how many bins the gate leaves counts; a number of bins that cannot be is
+            // refused by the engine.
+            #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
+            let last_bin = bins.clamp(8, 1024) as u16 - 1;
+            let (first, last) = self.gate.unwrap_or((0, last_bin));
+            let gate = RangeGate::<1024>::new(first, last)
+                .with_context(|| format!("--gate {first}..{last} with {bins} bins"))?;
+            Ok(dtof_core::z_for(one_in, &gate, self.x, self.l1, self.l2))
+        };
+        Ok(Settings {
             bins,
             bin_width_ps: U16F16Number(bin_width_ps),
             offset_mm: I24F8Number(offset_mm),
             gate: self.gate,
-            alpha: U8F8Number(self.alpha),
+            rule: self.detection.rule(z_for)?,
+            estimator: self.detection.estimator(),
             min_count: self.min_count,
             l1: self.l1,
             l2: self.l2,
             x: self.x,
             seed,
-        }
+        })
     }
 }
 

@@ -77,7 +77,7 @@ impl Replay {
             self.bin_width_ps.unwrap_or(bin_width_ps),
             self.offset_mm.unwrap_or(offset_mm),
             self.seed,
-        );
+        )?;
         let mut engine = host_engine(&settings, &photons.addresses())?;
         let mut output = Output::create(&self.out, &settings, photons.geometry())?;
         let mut summary = run(
@@ -92,7 +92,7 @@ impl Replay {
         summary.input = Some(input);
         output.finish(&summary, "Asynchronous depth events", &lead, &[])?;
         if !self.quiet {
-            print_summary(&summary.rows(), &self.out)?;
+            print_summary(&summary, &[], &self.out)?;
         }
         Ok(())
     }

@@ -54,7 +54,7 @@ impl Simulate {
         let bins = scene.bins.into();
         let settings = self
             .operation
-            .settings(bins, bin_width_ps, I24F8::ZERO, self.seed);
+            .settings(bins, bin_width_ps, I24F8::ZERO, self.seed)?;
         let file = self.scene.display().to_string();
         let Geometry { columns, rows } = scene.geometry;
         let lead = format!("Simulated photons of {file}, {columns}×{rows} macropixels.");
@@ -110,7 +110,7 @@ impl Simulation<'_> {
         }];
         output.finish(&summary, "Asynchronous depth events", self.lead, &sections)?;
         if !self.quiet {
-            print_summary(&[summary.rows(), surfaces].concat(), self.out)?;
+            print_summary(&summary, &surfaces, self.out)?;
         }
         Ok(())
     }

@@ -1,4 +1,6 @@
-//! `dtof tune`: α and L1 for a wanted rate of false events.
+//! `dtof tune`: the threshold and L1 for a wanted rate of false events.
+
+mod window;
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -6,14 +8,20 @@ use std::io::{self, Write};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::simulation::MM_PER_PS;
+use dtof::theory::detections::Detections;
 use dtof::theory::gaussian;
 use dtof::theory::rates::{signal_for_snr, snr};
 use dtof::theory::table::Table;
-use dtof::theory::tune::{Request, Source, Tuned, Wanted, tune};
+use dtof::theory::tune::{Request, Source, Wanted, tune};
 use serde_json::json;
+
+use super::detection::RuleName;
 
 #[derive(Args)]
 pub struct Tune {
+    /// The rule to find settings for
+    #[arg(long, value_enum, default_value_t = RuleName::Paper)]
+    rule: RuleName,
     /// Background photons a bin and laser cycle (B)
     #[arg(long, value_name = "B", value_parser = positive)]
     background: f64,
@@ -71,9 +79,10 @@ struct Line(&'static str, &'static str, f64, &'static str, String);
 impl Tune {
     pub fn run(&self) -> Result<()> {
         let request = self.request()?;
-        let table = Table::kept()?;
-        let tuned = tune(&request, &table)?;
-        let lines = self.lines(&request, &tuned, &table);
+        let (lines, rule) = match self.rule {
+            RuleName::Paper => self.paper(&request)?,
+            RuleName::Window => self.window(&request)?,
+        };
         let mut out = io::stdout().lock();
         if self.json {
             let fields = lines.iter().map(|Line(name, _, value, unit, source)| {
@@ -83,7 +92,7 @@ impl Tune {
             let object: serde_json::Map<_, _> = fields.collect();
             writeln!(out, "{}", serde_json::to_string_pretty(&object)?)?;
         } else {
-            out.write_all(text(&lines, &request, &tuned, self.bin_width_ps).as_bytes())?;
+            out.write_all(self.text(&lines, &rule).as_bytes())?;
         }
         Ok(out.flush()?)
     }
@@ -125,10 +134,10 @@ impl Tune {
         })
     }
 
-    #[allow(clippy::cast_precision_loss)]
-    fn lines(&self, request: &Request, tuned: &Tuned, table: &Table) -> Vec<Line> {
-        let exposures = tuned.detections.exposures;
-        let simulated = format!("simulation: seed {}, {exposures} exposures", request.seed);
+    /// α, L1 and what to expect of them; the options for it.
+    fn paper(&self, request: &Request) -> Result<(Vec<Line>, String)> {
+        let table = Table::kept()?;
+        let tuned = tune(request, &table)?;
         let false_events = match tuned.source {
             Source::Table => format!("simulation: table, {} exposures a point", table.exposures),
             Source::TableAtMost => format!(
@@ -138,23 +147,11 @@ impl Tune {
             Source::Bound => "formula: upper bound, single looks (exact) added up".to_owned(),
         };
         let exact = |what: &str| format!("formula: {what}, single look (exact)");
-        let cycles = tuned.cycles_to_event();
-        let mm = tuned.depth_error_bins() * self.bin_width_ps * MM_PER_PS;
         let alpha = format!("smallest for the false events wanted; {false_events}");
         let gaussian = gaussian::alpha_min(tuned.wanted, u32::from(request.bins) - 1);
-        let detected = tuned.detections.near as f64 / exposures as f64;
         let mut lines = vec![
             Line("alpha", "α", tuned.alpha.to_num(), "", alpha),
-            Line(
-                "l1",
-                "L1",
-                tuned.l1.into(),
-                "laser cycles",
-                match self.l1 {
-                    Some(_) => "as given".to_owned(),
-                    None => format!("shortest time to an event; {simulated}"),
-                },
-            ),
+            self.l1(tuned.l1, &tuned.detections),
             Line(
                 "false_events",
                 "false events",
@@ -176,14 +173,46 @@ impl Tune {
                 "an exposure",
                 exact("sum over looks"),
             ),
-            Line(
-                "cycles_to_event",
-                "time to an event",
-                cycles,
-                "laser cycles",
-                simulated.clone(),
-            ),
         ];
+        lines.extend(self.expected(request, &tuned.detections));
+        lines.push(Line(
+            "gaussian_alpha",
+            "α by Eq. 11",
+            gaussian,
+            "",
+            "formula: Eq. 11, one look, background known; not for use".to_owned(),
+        ));
+        // All digits: fewer may be another multiple of 1/256.
+        let alpha = tuned.alpha.to_num::<f64>();
+        Ok((lines, format!("--alpha {alpha} --l1 {}", tuned.l1)))
+    }
+
+    fn simulated(&self, detections: &Detections) -> String {
+        format!(
+            "simulation: seed {}, {} exposures",
+            self.seed, detections.exposures
+        )
+    }
+
+    fn l1(&self, l1: u16, detections: &Detections) -> Line {
+        let source = match self.l1 {
+            Some(_) => "as given".to_owned(),
+            None => format!("shortest time to an event; {}", self.simulated(detections)),
+        };
+        Line("l1", "L1", l1.into(), "laser cycles", source)
+    }
+
+    /// What to expect of the settings, whatever the rule.
+    fn expected(&self, request: &Request, detections: &Detections) -> Vec<Line> {
+        let simulated = self.simulated(detections);
+        let cycles = detections.cycles_to_event();
+        let mut lines = vec![Line(
+            "cycles_to_event",
+            "time to an event",
+            cycles,
+            "laser cycles",
+            simulated.clone(),
+        )];
         if let Some(laser_hz) = self.laser_hz {
             let seconds = cycles / laser_hz;
             lines.push(Line(
@@ -194,12 +223,13 @@ impl Tune {
                 simulated.clone(),
             ));
         }
+        let mm = detections.depth_error_bins() * self.bin_width_ps * MM_PER_PS;
         let at_l2 = snr(request.signal, request.background, request.l2.into());
         lines.extend([
             Line(
                 "detected",
                 "exposures with one",
-                detected,
+                detections.detected(),
                 "",
                 simulated.clone(),
             ),
@@ -211,42 +241,30 @@ impl Tune {
                 "",
                 "formula: N·A/√(N·B)".to_owned(),
             ),
-            Line(
-                "gaussian_alpha",
-                "α by Eq. 11",
-                gaussian,
-                "",
-                "formula: Eq. 11, one look, background known; not for use".to_owned(),
-            ),
         ]);
         lines
     }
-}
 
-/// For people; the last line is what other commands take.
-fn text(lines: &[Line], request: &Request, tuned: &Tuned, bin_width_ps: f64) -> String {
-    // Without them `replay` takes another histogram than these settings are for.
-    let histogram = if (request.bins, bin_width_ps) == (128, 250.0) {
-        String::new()
-    } else {
-        format!(" --bins {} --bin-width-ps {bin_width_ps}", request.bins)
-    };
-    let mut text = String::new();
-    for Line(_, name, value, unit, source) in lines {
-        let value = format!("{} {unit}", number(*value));
-        let _ = writeln!(text, "{name:<18}  {value:<24}  {source}");
+    /// For people; the last line is what other commands take.
+    fn text(&self, lines: &[Line], rule: &str) -> String {
+        // Without them `replay` takes another histogram than these settings are for.
+        let histogram = if (self.bins, self.bin_width_ps) == (128, 250.0) {
+            String::new()
+        } else {
+            format!(" --bins {} --bin-width-ps {}", self.bins, self.bin_width_ps)
+        };
+        let mut text = String::new();
+        for Line(_, name, value, unit, source) in lines {
+            let value = format!("{} {unit}", number(*value));
+            let _ = writeln!(text, "{name:<18}  {value:<24}  {source}");
+        }
+        let _ = writeln!(
+            text,
+            "\n{rule} --l2 {} --x {} --min-count {}{histogram}",
+            self.l2, self.x, self.min_count
+        );
+        text
     }
-    let _ = writeln!(
-        text,
-        "\n--alpha {} --l1 {} --l2 {} --x {} --min-count {}{histogram}",
-        // All digits: fewer may be another multiple of 1/256.
-        tuned.alpha.to_num::<f64>(),
-        tuned.l1,
-        request.l2,
-        request.x,
-        request.minimum_count
-    );
-    text
 }
 
 /// Whole numbers as they are, others to four significant digits.

@@ -6,13 +6,14 @@ mod port;
 mod qemu;
 
 use anyhow::{Result, bail, ensure};
-use dtof_core::{DepthEvent, PixelAddress, Statistics};
+use dtof_core::{DepthEstimator, DepthEvent, PixelAddress, Statistics};
 use dtof_firmware::link::endpoint::BODY_BYTES;
 use dtof_firmware::link::message::{self, Configuration, Report, Token};
 
 pub use client::Client;
 pub use port::{Port, open};
 
+use crate::detection::Rule;
 use crate::engine::Engine;
 use crate::settings::Settings;
 use crate::source::Slice;
@@ -75,8 +76,16 @@ impl DeviceEngine {
 pub fn configuration(settings: &Settings, pixels: u16, source: u8) -> Result<Configuration> {
     let last_bin = u16::try_from(settings.bins)? - 1;
     let (gate_first, gate_last) = settings.gate.unwrap_or((0, last_bin));
+    let (rule, alpha, window, z) = match settings.rule {
+        Rule::Paper { alpha } => (0, alpha.0.to_bits(), 0, 0),
+        Rule::Window { window, z } => (1, 0, window, z.0.to_bits()),
+    };
+    let (estimator, half_width) = match settings.estimator.in_core() {
+        DepthEstimator::CentreOfMass3 => (0, 0),
+        DepthEstimator::CentredWindow(window) => (1, window.half_width().to_bits()),
+    };
     Ok(Configuration {
-        alpha: settings.alpha.0.to_bits(),
+        alpha,
         minimum_count: settings.min_count,
         x: settings.x,
         l1: settings.l1,
@@ -87,7 +96,11 @@ pub fn configuration(settings: &Settings, pixels: u16, source: u8) -> Result<Con
         bin_width: settings.bin_width_ps.0.to_bits(),
         offset: settings.offset_mm.0.to_bits(),
         source,
-        rule: 0,
+        rule,
+        window,
+        z,
+        estimator,
+        half_width,
     })
 }
 

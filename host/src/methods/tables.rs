@@ -21,7 +21,8 @@ pub(super) fn decision(
          By the standard deviation of the pulse and the background. The signal is such that the likelihood ratio needs\n\
          100 to 300 laser cycles. Times are means over a pulse in the middle of its bin and on an edge, with 1 % false\n\
          events in 1000 laser cycles, over those of the likelihood ratio that knows the scene; how sure the latter are, which\n\
-         is the same for all rules, is not in the intervals. Photons are those of the pulse until the event.\n\n\
+         is the same for all rules, is not in the intervals. Photons are those of the pulse until the event. Commands\n\
+         take them as `--rule window --window 3 --z 4.38`.\n\n\
          | pulse σ, bins | background a bin and cycle | signal a cycle | rule | α or z | time | photons | instructions | the paper's rule: time |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );

@@ -7,8 +7,8 @@
 
 use anyhow::{Context, Result};
 use dtof_core::{
-    BinPosition, Count, Count10, CounterWidth, DepthEstimator, Detection, Histogram, PaperRule,
-    PixelAddress, RangeGate, background, detect,
+    AnyRule, Count, Count10, CounterWidth, DepthEstimator, Detection, Histogram, PixelAddress,
+    RangeGate, background, detect,
 };
 use rand_core::Rng;
 use rand_distr::{Distribution, Poisson};
@@ -169,17 +169,13 @@ impl Exposures {
     /// One exposure: the laser cycles it lasted, and its event if there was one.
     pub fn event<const BINS: usize>(
         &self,
-        rule: &PaperRule,
+        rule: &AnyRule,
+        estimator: &DepthEstimator,
         rng: &mut Pcg64,
     ) -> (u32, Option<Detection>) {
         let mut event = None;
         let cycles = self.run::<BINS>(rng, |_, histogram| {
-            event = detect(
-                histogram,
-                &RangeGate::full(),
-                rule,
-                &DepthEstimator::default(),
-            );
+            event = detect(histogram, &RangeGate::full(), rule, estimator);
             event.is_some()
         });
         (cycles, event)
@@ -232,82 +228,10 @@ pub fn trial_rng(seed: u64, trial: u16) -> Pcg64 {
     pixel_rng(seed, PixelAddress(trial))
 }
 
-/// What some exposures with a target came to; sums of integers, so that they
-/// add up the same in any order.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Detections {
-    /// Exposures.
-    pub exposures: u64,
-    /// Laser cycles of all of them.
-    pub cycles: u64,
-    /// Those with an event whose depth lies within [`Self::NEAR_BINS`] of the
-    /// target's.
-    pub near: u64,
-    /// Those with an event elsewhere.
-    pub far: u64,
-    /// Laser cycles of the exposures counted in `near`.
-    pub near_cycles: u64,
-    /// Squared depth errors of the events in `near`, in (1/256 bin)².
-    pub squared_errors: u64,
-}
-
-impl Detections {
-    /// An event farther from the target is a false one.
-    pub const NEAR_BINS: f64 = 3.0;
-
-    /// As many as `exposures`, of trial number `trial`.
-    ///
-    /// # Errors
-    /// If a rate is negative or not a number.
-    pub fn trial<const BINS: usize>(
-        seed: u64,
-        trial: u16,
-        rates: &Rates,
-        looks: Looks,
-        rule: &PaperRule,
-        exposures: u32,
-    ) -> Result<Self> {
-        let bins = u16::try_from(BINS)?;
-        let simulated = Exposures::new(rates, bins, looks)?;
-        let mut rng = trial_rng(seed, trial);
-        let mut sum = Self::default();
-        for _ in 0..exposures {
-            let (cycles, event) = simulated.event::<BINS>(rule, &mut rng);
-            sum.exposures += 1;
-            sum.cycles += u64::from(cycles);
-            let Some(event) = event else { continue };
-            let found = BinPosition::of(event.peak.bin, event.depth.offset);
-            let error = f64::from(found.raw()) - rates.position * 256.0;
-            if error.abs() > Self::NEAR_BINS * 256.0 {
-                sum.far += 1;
-                continue;
-            }
-            sum.near += 1;
-            sum.near_cycles += u64::from(cycles);
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            {
-                sum.squared_errors += error.powi(2).round() as u64;
-            }
-        }
-        Ok(sum)
-    }
-}
-
-impl std::ops::AddAssign for Detections {
-    fn add_assign(&mut self, other: Self) {
-        self.exposures += other.exposures;
-        self.cycles += other.cycles;
-        self.near += other.near;
-        self.far += other.far;
-        self.near_cycles += other.near_cycles;
-        self.squared_errors += other.squared_errors;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use dtof_core::fixed::types::U8F8;
-    use dtof_core::{AsyncPixel, LaserCycle, Look, PixelConfig};
+    use dtof_core::{AsyncPixel, LaserCycle, Look, PaperRule, PixelConfig};
 
     use super::*;
 

@@ -22,6 +22,7 @@
 
 pub mod binomial;
 pub mod cramer_rao;
+pub mod detections;
 pub mod exposure;
 pub mod gaussian;
 pub mod known_background;

@@ -6,19 +6,23 @@
 //! upper limit has to be below by the table's [`MARGIN`]; where the table saw no events,
 //! or was not made for the settings, from the sum over looks of the exact
 //! single-look probability, which it cannot exceed. Of all L1 the one with the shortest mean
-//! time to an event is taken, found by simulating exposures.
+//! time to an event is taken, found by simulating exposures ([`window`] does the same for
+//! the window rule).
+
+mod shortest;
+pub mod window;
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{Count, Count10, CounterWidth, PaperRule, Threshold};
-use rayon::prelude::*;
+use dtof_core::{Count, Count10, CounterWidth, DepthEstimator, PaperRule, Threshold};
 
-use super::exposure::{Detections, Looks};
+use self::shortest::shortest;
+use super::detections::{Decisions, Detections};
+use super::exposure::Looks;
 use super::poisson::Poisson;
 use super::repeated_looks::{BINS, Bounds, MINIMUM_COUNT, RepeatedLooks, single_looks};
 use super::single_look::SingleLook;
 use super::table::{MARGIN, Table};
-use crate::simulation::Rates;
 
 /// The wanted limit on false events of a pixel without a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,38 +105,6 @@ pub struct Tuned {
     pub detections: Detections,
 }
 
-impl Tuned {
-    /// Mean laser cycles to an event near the target, expired exposures and
-    /// those with a false event included.
-    #[must_use]
-    pub fn cycles_to_event(&self) -> f64 {
-        cycles_to_event(&self.detections)
-    }
-
-    /// Root mean square depth error of the events near the target, in bins.
-    #[must_use]
-    #[allow(clippy::cast_precision_loss)]
-    pub fn depth_error_bins(&self) -> f64 {
-        let Detections {
-            squared_errors,
-            near,
-            ..
-        } = self.detections;
-        (squared_errors as f64 / near as f64).sqrt() / 256.0
-    }
-}
-
-#[allow(clippy::cast_precision_loss)]
-fn cycles_to_event(detections: &Detections) -> f64 {
-    detections.cycles as f64 / detections.near as f64
-}
-
-/// Places of the pulse within a bin that are simulated, evenly spread.
-const POSITIONS: u16 = 8;
-/// Exposures at each place to compare L1 with, and for the L1 chosen.
-const EXPOSURES: (u32, u32) = (50, 500);
-/// An exposure reports the target less often than this: too weak.
-const LEAST_DETECTED: f64 = 0.01;
 /// The chance that one of the counters is full at the last look.
 const MOST_SATURATED: f64 = 0.01;
 
@@ -149,42 +121,30 @@ pub fn tune(request: &Request, table: &Table) -> Result<Tuned> {
     let last = u32::from(request.l2 - 1) / u32::from(request.x);
     let steps = single_looks(request.bins.into(), mean_a_step, last);
 
-    let mut best: Option<Tuned> = None;
-    let mut reached = false;
-    for l1 in candidates(request) {
-        let looks = Looks::new(request.x, l1, request.l2);
-        let Some(tuned) = calibrated(request, table, &steps, l1, looks) else {
-            continue;
-        };
-        reached = true;
-        let detections = detections(request, &tuned, 0, EXPOSURES.0)?;
-        let time = cycles_to_event(&detections);
-        if detections.near > 0 && best.is_none_or(|best| time < best.cycles_to_event()) {
-            best = Some(Tuned {
-                detections,
-                ..tuned
-            });
-        }
-    }
+    let minimum_count = Count::saturating(request.minimum_count.into());
+    let all: Vec<(Decisions, Tuned)> = candidates(request)
+        .into_iter()
+        .filter_map(|l1| {
+            let looks = Looks::new(request.x, l1, request.l2);
+            let tuned = calibrated(request, table, &steps, l1, looks)?;
+            let decisions = Decisions {
+                looks,
+                rule: PaperRule::new(tuned.alpha, minimum_count).into(),
+                estimator: DepthEstimator::CentreOfMass3,
+            };
+            Some((decisions, tuned))
+        })
+        .collect();
     ensure!(
-        reached,
+        !all.is_empty(),
         "no α keeps false events below the wanted rate with so little background: raise --min-count \
          or --l1"
     );
-    if let Some(best) = &mut best {
-        // Other photons than those it was chosen by, which flatter it.
-        best.detections = detections(request, best, POSITIONS, EXPOSURES.1)?;
-    }
-    #[allow(clippy::cast_precision_loss)]
-    let detected = |tuned: &Tuned| tuned.detections.near as f64 / tuned.detections.exposures as f64;
-    best.filter(|best| detected(best) >= LEAST_DETECTED)
-        .with_context(|| {
-            format!(
-                "the signal is too weak: fewer than {} % of exposures report the target before L2 = {}",
-                LEAST_DETECTED * 100.0,
-                request.l2
-            )
-        })
+    let (tuned, detections) = shortest(request, &all)?;
+    Ok(Tuned {
+        detections,
+        ..tuned
+    })
 }
 
 /// Refuses what cannot work.
@@ -341,44 +301,4 @@ fn calibrated(
         bounds,
         detections: Detections::default(),
     })
-}
-
-/// Exposures with the target, at all places within a bin: trials `first_trial` on.
-fn detections(
-    request: &Request,
-    tuned: &Tuned,
-    first_trial: u16,
-    exposures: u32,
-) -> Result<Detections> {
-    let trial = match request.bins {
-        8 => Detections::trial::<8>,
-        16 => Detections::trial::<16>,
-        32 => Detections::trial::<32>,
-        64 => Detections::trial::<64>,
-        128 => Detections::trial::<128>,
-        256 => Detections::trial::<256>,
-        512 => Detections::trial::<512>,
-        _ => Detections::trial::<1024>,
-    };
-    let rule = PaperRule::new(tuned.alpha, Count::saturating(request.minimum_count.into()));
-    let trials: Vec<Detections> = (0..POSITIONS)
-        .into_par_iter()
-        .map(|place| {
-            // In the second quadrant, clear of the middle and of both ends.
-            let bin = f64::from(request.bins / 8 * 3);
-            let rates = Rates {
-                background: request.background,
-                signal: request.signal,
-                position: bin + (f64::from(place) + 0.5) / f64::from(POSITIONS),
-                sigma: request.sigma,
-            };
-            let number = first_trial + place;
-            trial(request.seed, number, &rates, tuned.looks, &rule, exposures)
-        })
-        .collect::<Result<_>>()?;
-    let mut sum = Detections::default();
-    for trial in trials {
-        sum += trial;
-    }
-    Ok(sum)
 }

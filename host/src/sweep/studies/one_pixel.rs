@@ -4,8 +4,8 @@
 use anyhow::Result;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AsyncPixel, BinPosition, Count, Count16, DepthEstimator, Histogram, LaserCycle, PaperRule,
-    PixelAddress, PixelConfig, RangeGate, detect,
+    AnyRule, AsyncPixel, BinPosition, Count, Count16, DepthEstimator, Histogram, LaserCycle,
+    PaperRule, PixelAddress, PixelConfig, RangeGate, detect,
 };
 
 use crate::scene;
@@ -34,7 +34,7 @@ pub const SENSORS: [&str; 5] = [
 pub const PROTOTYPE_X: u16 = 4;
 
 /// The paper's FPGA prototype: α = 8, X = 4, L2 = 2000, and `l1`.
-pub fn prototype(l1: u16) -> Result<PixelConfig<BINS>> {
+pub fn prototype(l1: u16) -> Result<PixelConfig<BINS, AnyRule>> {
     let settings = Settings {
         l1,
         x: PROTOTYPE_X,
@@ -118,7 +118,7 @@ impl FramePixel {
 /// a laser cycle.
 pub fn watch(
     cycles: u64,
-    config: &PixelConfig<BINS>,
+    config: &PixelConfig<BINS, AnyRule>,
     phases: [u64; 4],
     mut photons: impl FnMut(u64, &mut dyn FnMut(u16)) -> Result<()>,
 ) -> Result<[Vec<Reading>; 5]> {

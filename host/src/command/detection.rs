@@ -1,0 +1,99 @@
+//! The options that say which rule decides and which estimator finds the depth, the
+//! same for every command.
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, ValueEnum};
+use dtof::detection::{Estimator, Rule};
+use dtof_core::WindowRule;
+use dtof_core::fixed::types::{U4F12, U8F8};
+
+use super::operation::number;
+
+#[derive(Args)]
+pub struct Detection {
+    /// What decides whether a peak stands clear of the background
+    #[arg(long, value_enum, default_value_t = RuleName::Paper)]
+    rule: RuleName,
+    /// Paper's rule: standard deviations of the background a peak must exceed it by, 0 to 255.996,
+    /// rounded to 1/256 [default: 4]
+    #[arg(long, value_parser = number::<U8F8>, allow_hyphen_values = true)]
+    alpha: Option<U8F8>,
+    /// Window rule: bins in the window, 1 to 7 [default: as suits --sigma-bins]
+    #[arg(long, value_name = "BINS", value_parser = window, allow_hyphen_values = true)]
+    window: Option<u8>,
+    /// Window rule: standard deviations of the background the photons in the window must exceed it
+    /// by, 0 to 15.9998, rounded to 1/4096
+    #[arg(long, value_parser = number::<U4F12>, conflicts_with = "false_one_in", allow_hyphen_values = true)]
+    z: Option<U4F12>,
+    /// Window rule, instead: the z with which one in N exposures without a target brings a false
+    /// event [default: 100]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    false_one_in: Option<u32>,
+    /// Standard deviation of the pulse in bins, rounded to 1/256: takes the depth from a window that
+    /// suits it [default: depth from three bins, whatever the pulse]
+    #[arg(long, value_name = "S", value_parser = sigma, allow_hyphen_values = true)]
+    sigma_bins: Option<U8F8>,
+}
+
+/// The rules.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum RuleName {
+    /// The highest bin against the background, as in the paper
+    Paper,
+    /// All photons in a window around the highest bin against all the others
+    Window,
+}
+
+impl Detection {
+    /// The rule; `z_for` gives the z for a false event in so many exposures.
+    pub fn rule(&self, z_for: impl FnOnce(u32) -> Result<U4F12>) -> Result<Rule> {
+        match self.rule {
+            RuleName::Paper => {
+                let of_window = [
+                    ("--window", self.window.is_some()),
+                    ("--z", self.z.is_some()),
+                    ("--false-one-in", self.false_one_in.is_some()),
+                ];
+                if let Some((option, _)) = of_window.iter().find(|option| option.1) {
+                    bail!("{option} is for --rule window");
+                }
+                Ok(Rule::paper(self.alpha.unwrap_or(const { U8F8::lit("4") })))
+            }
+            RuleName::Window => {
+                if self.alpha.is_some() {
+                    bail!("--alpha is for --rule paper; --rule window takes --z or --false-one-in");
+                }
+                let suits = self.sigma_bins.map(WindowRule::width_for_pulse);
+                let window = self
+                    .window
+                    .or(suits)
+                    .context("--rule window needs --window or --sigma-bins")?;
+                let z = match self.z {
+                    Some(z) => z,
+                    None => z_for(self.false_one_in.unwrap_or(100))?,
+                };
+                Ok(Rule::window(window, z))
+            }
+        }
+    }
+
+    pub fn estimator(&self) -> Estimator {
+        self.sigma_bins
+            .map_or(Estimator::CentreOfMass3, Estimator::for_pulse)
+    }
+}
+
+fn window(text: &str) -> Result<u8, String> {
+    let width = text.parse().ok();
+    width
+        .filter(|width| (1..=WindowRule::MAX_WIDTH).contains(width))
+        .ok_or(format!("must be 1 to {}", WindowRule::MAX_WIDTH))
+}
+
+fn sigma(text: &str) -> Result<U8F8, String> {
+    let sigma = number::<U8F8>(text)?;
+    if sigma == U8F8::ZERO {
+        return Err("must be above 0".to_owned());
+    }
+    Ok(sigma)
+}

@@ -1,0 +1,66 @@
+//! The window rule.
+
+use anyhow::Result;
+use dtof::theory::tune::{Request, window};
+use dtof_core::DepthEstimator;
+
+use super::{Line, Tune};
+
+impl Tune {
+    /// z, L1 and what to expect of them; the options for it.
+    #[allow(clippy::cast_precision_loss)]
+    pub(super) fn window(&self, request: &Request) -> Result<(Vec<Line>, String)> {
+        let tuned = window::tune(request)?;
+        let (exposures, events) = tuned.false_events;
+        let mut lines = vec![
+            Line(
+                "z",
+                "z",
+                tuned.z.to_num(),
+                "",
+                format!(
+                    "for a false event in {} exposures; simulation: table",
+                    tuned.one_in
+                ),
+            ),
+            Line(
+                "window",
+                "window",
+                tuned.window.into(),
+                "bins",
+                "formula: 2 up to σ = 0.6 bins, 3 up to 1.25, 5 above".to_owned(),
+            ),
+        ];
+        if let DepthEstimator::CentredWindow(window) = tuned.estimator {
+            lines.push(Line(
+                "half_width",
+                "depth from, ±",
+                window.half_width().to_num(),
+                "bins",
+                "formula: 2σ + 1/2, from 1 to 4; centred window".to_owned(),
+            ));
+        }
+        lines.extend([
+            self.l1(tuned.l1, &tuned.detections),
+            Line(
+                "false_events",
+                "false events",
+                events as f64 / exposures as f64,
+                "an exposure",
+                format!(
+                    "simulation: seed {}, {events} events in {exposures} exposures without a target",
+                    self.seed
+                ),
+            ),
+        ]);
+        lines.extend(self.expected(request, &tuned.detections));
+        // All digits: fewer may be another multiple of the smallest step.
+        let options = format!(
+            "--rule window --sigma-bins {} --z {} --l1 {}",
+            tuned.sigma.to_num::<f64>(),
+            tuned.z.to_num::<f64>(),
+            tuned.l1
+        );
+        Ok((lines, options))
+    }
+}
