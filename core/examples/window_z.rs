@@ -89,7 +89,7 @@ fn z_reached(counts: &[u32; BINS], total: u32, width: usize) -> f64 {
     let [bins, w, inside, total] = [BINS as f64, width as f64, inside.into(), total.into()];
     let outside_bins = bins - w;
     let above = bins * inside - w * total;
-    let variance = bins * w * (total - inside);
+    let variance = outside_bins * w * total;
     let skew = (outside_bins - w) / 6.0;
     // above = z·√variance + z²·skew
     let discriminant = (variance + 4.0 * skew * above.max(0.0)).sqrt();

@@ -54,9 +54,9 @@ pub trait CounterWidth: sealed::Sealed {
     fn square_root(count: u32) -> u32;
 
     /// The largest root of a count of this width for which
-    /// `root² + alpha·root < level`, and what is left of `level`; `alpha` and
-    /// `level` in 1/256.
-    fn root_below(level: u32, alpha: u32) -> (u32, u32);
+    /// `root² + alpha·root < level`, or 0, and what is left of `level`; `alpha` and
+    /// `level` in 1/256. None overflows.
+    fn root_below(level: u32, alpha: u16) -> (u32, u32);
 }
 
 /// 10-bit counters (0..=1023), those of the paper's FPGA and the default.
@@ -86,7 +86,7 @@ macro_rules! counter_width {
                 isqrt::<{ <$name as CounterWidth>::BITS.div_ceil(2) }>(count)
             }
             #[inline]
-            fn root_below(level: u32, alpha: u32) -> (u32, u32) {
+            fn root_below(level: u32, alpha: u16) -> (u32, u32) {
                 root_below::<{ <$name as CounterWidth>::BITS.div_ceil(2) }>(level, alpha)
             }
         }

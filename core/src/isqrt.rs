@@ -53,13 +53,14 @@ pub const fn isqrt<const ITERATIONS: u32>(value: u32) -> u32 {
 /// The largest `r` for which `r² + alpha·r < level`, or 0, and what is left of
 /// `level`; the latter and `alpha` in 1/256.
 ///
-/// The same algorithm with an addition more. `ITERATIONS` is at most 12, `alpha`
-/// less than 2¹⁶.
+/// The same algorithm with an addition more. `ITERATIONS` is at most 12 (checked when
+/// compiled), so that nothing reaches 2³¹.
 #[inline]
 #[must_use]
-pub(crate) const fn root_below<const ITERATIONS: u32>(level: u32, alpha: u32) -> (u32, u32) {
+pub(crate) const fn root_below<const ITERATIONS: u32>(level: u32, alpha: u16) -> (u32, u32) {
     const { assert!(ITERATIONS >= 1 && ITERATIONS <= 12) };
     // alpha + 2·root, in 1/256
+    let alpha = alpha as u32;
     let mut slope = alpha;
     let mut remainder = level;
     for_each_shift!(ITERATIONS, |shift| {

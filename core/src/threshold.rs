@@ -88,7 +88,7 @@ impl Threshold {
     #[inline]
     #[must_use]
     pub fn lowest_background<W: CounterWidth>(&self, peak: Count) -> u32 {
-        let (root, left) = W::root_below(peak.raw() << 8, self.alpha.to_bits().into());
+        let (root, left) = W::root_below(peak.raw() << 8, self.alpha.to_bits());
         root * root + left.div_ceil(256).min(2 * root + 1)
     }
 }

@@ -1,24 +1,23 @@
 //! A calibrated detection rule: all photons of the pulse against all the others.
 //!
-//! With `S` the photons in a window of `w` bins, of all that hold the peak bin the one
-//! with most, and `λ` the mean of the gated bins outside it, the peak is a detection if
+//! With `T` photons in `B` gated bins, and `S` of them in a window of `w` bins, of all that
+//! hold the peak bin the one with most, the peak is a detection if
 //!
 //! ```text
-//! S > wλ + z·√(wλ·(1 + w/n)) + z²/6·(1 - w/n)
+//! S > Tp + z·√(Tp·(1 - p)) + z²/6·(1 - 2p)     p = w/B
 //! ```
 //!
-//! with `n` the number of these bins, from which `λ` is known no better than it is; most
-//! often there are many and what is in brackets is nearly 1.
-//! The last term is for the skew of small counts: with it one `z` gives the same
-//! rate of false events from fractions of a count a bin to hundreds, and for every
-//! width that leaves 15 bins outside for each of its own, where the α of the paper's rule has to follow the background. The total of the histogram
-//! is known, so that `λ` takes no pass over the bins.
+//! the last term at least 0. That is the binomial distribution of `T` photons that fall
+//! into every bin alike: mean, standard deviation and the skew of small counts. What the
+//! background is need not be known, so that one `z` gives the same rate of false events
+//! from fractions of a count a bin to hundreds, for every width and from 8 bins on, where
+//! the α of the paper's rule has to follow the background. The total of the histogram is
+//! known, so that this takes no pass over the bins.
 //!
-//! With `B = n + w` gated bins and `T` photons in them, multiplied by `n` and squared,
-//! this is
+//! With `n = B - w` bins outside, multiplied by `B` and squared, this is
 //!
 //! ```text
-//! (B·S - w·T - z²/6·(n - w))² > z²·B·w·(T - S)      if what is squared is positive
+//! (B·S - w·T - z²/6·(n - w))² > z²·n·w·T      if what is squared is positive
 //! ```
 //!
 //! without a division or a root.
@@ -47,7 +46,7 @@ use crate::peak::Peak;
 use crate::rule::DetectionRule;
 use crate::units::Count;
 
-/// The sum of a window around the peak against the mean of all other bins.
+/// The sum of a window around the peak against the photons of all bins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WindowRule {
@@ -77,6 +76,10 @@ impl WindowRule {
     /// at least `minimum_count` photons in the window.
     ///
     /// [`Self::width_for_pulse`] says which width suits the pulse.
+    ///
+    /// Of `B` gated bins; more than `z²·width/(B - width)` photons make a detection even
+    /// without any background. Where the window leaves few bins that is many: with 7 of 8
+    /// and z 4 more than 112.
     ///
     /// # Errors
     /// [`WindowWidthError`] unless `width` is 1 to [`Self::MAX_WIDTH`].
@@ -169,7 +172,6 @@ impl DetectionRule for WindowRule {
         let width = u32::from(self.width);
         let bins = u32::from(gate.last() + 1 - gate.first());
         let bins_outside = bins - width;
-        let outside = histogram.total().wrapping_sub(inside);
 
         // In 1/16 counts.
         let z_squared = u32::from(self.z.to_bits()) * u32::from(self.z.to_bits());
@@ -186,10 +188,13 @@ impl DetectionRule for WindowRule {
             u32::try_from(above).unwrap_or(u32::MAX)
         };
         // At most 8 + 3 + 32 + 16 bits, or 10 + 3 + 26 + 16.
-        let variance = u64::from(bins * width) * u64::from(outside) * u64::from(z_squared >> 16);
+        let variance = u64::from(bins_outside * width)
+            * u64::from(histogram.total())
+            * u64::from(z_squared >> 16);
         if above == 0 || u64::from(above) * u64::from(above) <= variance {
             return None;
         }
+        let outside = histogram.total().wrapping_sub(inside);
         let whole = outside.checked_div(bins_outside)?;
         let rest = ((outside - whole * bins_outside) << 8).checked_div(bins_outside)?;
         Some(U24F8::from_bits((whole << 8) + rest))

@@ -6,8 +6,8 @@
 use dtof_core::fixed::types::U8F8;
 use dtof_core::peak::ComparatorTree;
 use dtof_core::{
-    AsyncPixel, BinIndex, Count, LaserCycle, PaperRule, PixelAddress, PixelConfig, RangeGate,
-    background,
+    AsyncPixel, BinIndex, Count, LaserCycle, PaperRule, PhotonCount, PixelAddress, PixelConfig,
+    RangeGate, background,
 };
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
@@ -155,6 +155,25 @@ fn counts_of_every_width_give_the_same() {
 }
 
 proptest! {
+    #[test]
+    fn the_bits_of_some_counts_and_the_first_that_reaches_a_level(
+        counts in prop::collection::vec(0u16.., 0..40),
+        level: u16,
+    ) {
+        let wide: Vec<u32> = counts.iter().map(|&count| count.into()).collect();
+        let union = counts.iter().fold(0, |union, &count| union | u32::from(count));
+        prop_assert_eq!(u16::union(&counts), union);
+        prop_assert_eq!(u32::union(&wide), union);
+        let highest = u16::highest(&counts);
+        prop_assert!(highest <= union && (union < 2 * highest || union == 0));
+        for level in [level.into(), highest] {
+            let first = wide.iter().position(|&count| count >= level);
+            prop_assert_eq!(u16::first_reaching(&counts, level), first);
+            prop_assert_eq!(u32::first_reaching(&wide, level), first);
+            prop_assert_eq!(u16::any_reaches(&counts, level), first.is_some());
+        }
+    }
+
     #[test]
     fn bins_outside_the_gate_do_not_matter(
         counts in prop::array::uniform32(0u32..1000),

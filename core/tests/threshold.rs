@@ -197,6 +197,34 @@ fn the_lowest_background_is_right_for_wider_peaks() {
     }
 }
 
+/// Of any level and α, the largest there are among them.
+#[test]
+fn no_root_below_a_level_overflows() {
+    fn check<W: CounterWidth>(level: u32, alpha: u16) {
+        let squared = |root: u32| {
+            let (root, alpha) = (u64::from(root), u64::from(alpha));
+            root * root * 256 + alpha * root
+        };
+        let (root, left) = W::root_below(level, alpha);
+        assert_eq!(u64::from(level), squared(root) + u64::from(left));
+        assert!(root == 0 || left > 0);
+        let most = (1 << W::BITS.div_ceil(2)) - 1;
+        assert!(root == most || squared(root + 1) >= u64::from(level));
+    }
+    let mut rng = Pcg32::seed_from_u64(10);
+    for round in 0..100_000 {
+        let (level, alpha) = match round % 4 {
+            0 => (u32::MAX, rng.next_u32()),
+            1 => (rng.next_u32(), u32::MAX),
+            _ => (rng.next_u32() >> (rng.next_u32() % 32), rng.next_u32()),
+        };
+        let alpha = u16::try_from(alpha & 0xffff).unwrap();
+        check::<Count10>(level, alpha);
+        check::<Count16>(level, alpha);
+        check::<Count24>(level, alpha);
+    }
+}
+
 proptest! {
     #[test]
     fn any_alpha_background_and_peak(

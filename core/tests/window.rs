@@ -51,17 +51,15 @@ fn as_written<const BINS: usize, W: CounterWidth>(
         i128::from(width),
     );
     let above = 16 * (n * s - w * r) - (n - w).max(0) * skew;
-    let clear = above > 0 && above.pow(2) > z_squared * (n + w) * w * r;
+    let clear = above > 0 && above.pow(2) > z_squared * n * w * (s + r);
 
     #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
-    let (inside_real, mean) = (
-        inside as f64,
-        f64::from(width) * outside as f64 / bins as f64,
-    );
-    let share = f64::from(width) / bins as f64;
-    let deviation = (mean * (1.0 + share)).sqrt();
+    let (inside_real, total) = (inside as f64, (inside + outside) as f64);
+    #[allow(clippy::cast_precision_loss, reason = "at most 1024")]
+    let share = f64::from(width) / (bins + u64::from(width)) as f64;
+    let deviation = (total * share * (1.0 - share)).sqrt();
     let z = rule.z().to_num::<f64>();
-    let level = mean + z * deviation + (1.0 - share).max(0.0) * z * z / 6.0;
+    let level = total * share + z * deviation + (1.0 - 2.0 * share).max(0.0) * z * z / 6.0;
     // Two roundings: the skew's, and that of z².
     let tolerance = 0.0626 + deviation * (z - (z * z - 1.0 / 256.0).max(0.0).sqrt());
     if inside_real > level + 1e-6 * level {
@@ -170,6 +168,18 @@ fn an_empty_histogram_is_no_detection() {
         let gate = RangeGate::full();
         let found = detect(&histogram, &gate, &rule, &DepthEstimator::default());
         assert_eq!(found, None);
+    }
+}
+
+#[test]
+fn a_window_of_most_bins_needs_many_photons() {
+    let rule = WindowRule::new(7, U4F12::lit("4"), Count::default()).unwrap();
+    for (photons, expected) in [(112, false), (113, true)] {
+        let mut histogram = Histogram::<8>::new();
+        histogram.add_batch(&vec![3; photons]);
+        let gate = RangeGate::full();
+        let found = detect(&histogram, &gate, &rule, &DepthEstimator::default());
+        assert_eq!(found.is_some(), expected);
     }
 }
 

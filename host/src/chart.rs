@@ -1,13 +1,17 @@
 //! Line charts as SVG documents: what was measured as dots with the interval it
 //! lies in, what was worked out as lines.
 
+mod legend;
+
 use anyhow::{Result, ensure};
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 
+use self::legend::Legend;
 use crate::picture::one_line;
 
+/// Of the picture above the legend.
 const SIZE: (u32, u32) = (760, 480);
 /// Told apart by people who see colours differently, too: those of Okabe and Ito.
 const COLOURS: [RGBColor; 7] = [
@@ -56,6 +60,15 @@ impl<'a> Axis<'a> {
         }
     }
 
+    /// From 0 to 1.
+    #[must_use]
+    pub const fn share(label: &'a str) -> Self {
+        Self {
+            range: Some((0.0, 1.0)),
+            ..Self::linear(label)
+        }
+    }
+
     /// Equal factors are equal distances, all points fit.
     #[must_use]
     pub const fn logarithmic(label: &'a str) -> Self {
@@ -79,6 +92,12 @@ pub struct Series {
     pub points: Vec<Point>,
 }
 
+impl Series {
+    fn colour(&self) -> RGBAColor {
+        COLOURS[self.colour % COLOURS.len()].to_rgba()
+    }
+}
+
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
@@ -92,7 +111,23 @@ pub enum Style {
     JoinedDots,
 }
 
-/// A point, with an interval if it was measured.
+impl Style {
+    /// In pixels, where there is a line.
+    const fn line_width(self) -> Option<u32> {
+        match self {
+            Self::Line => Some(2),
+            Self::Thin | Self::JoinedDots => Some(1),
+            Self::Dots => None,
+        }
+    }
+
+    const fn has_dots(self) -> bool {
+        matches!(self, Self::Dots | Self::JoinedDots)
+    }
+}
+
+/// A point, with an interval if it was measured. One of 0 on a logarithmic axis is drawn
+/// as an upper limit: an open dot at the end of its interval, with a line down.
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
     /// To the right.
@@ -145,29 +180,35 @@ pub fn line_chart(chart: &Chart) -> Result<String> {
     });
     let (left, right) = range(&chart.x, points.map(|point| point.x))?;
     let (low, high) = range(&chart.y, heights)?;
+    let legend = Legend::of(&chart.series);
     let mut svg = String::new();
     {
-        let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        area.fill(&WHITE)?;
+        let size = (SIZE.0, SIZE.1 + legend.height());
+        let whole = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        whole.fill(&WHITE)?;
+        let (area, below) = whole.split_vertically(SIZE.1);
         match (chart.x.logarithmic, chart.y.logarithmic) {
-            (false, false) => draw(&area, chart, left..right, low..high)?,
-            (false, true) => draw(&area, chart, left..right, (low..high).log_scale())?,
-            (true, false) => draw(&area, chart, (left..right).log_scale(), low..high)?,
+            (false, false) => draw(&area, chart, left..right, low..high, low)?,
+            (false, true) => draw(&area, chart, left..right, (low..high).log_scale(), low)?,
+            (true, false) => draw(&area, chart, (left..right).log_scale(), low..high, low)?,
             (true, true) => draw(
                 &area,
                 chart,
                 (left..right).log_scale(),
                 (low..high).log_scale(),
+                low,
             )?,
         }
-        area.present()?;
+        legend.draw(&below)?;
+        whole.present()?;
     }
     Ok(svg)
 }
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-fn draw<X, Y>(area: &Area, chart: &Chart, x: X, y: Y) -> Result<()>
+/// `bottom` is where `y` starts.
+fn draw<X, Y>(area: &Area, chart: &Chart, x: X, y: Y, bottom: f64) -> Result<()>
 where
     X: AsRangedCoord<Value = f64>,
     X::CoordDescType: ValueFormatter<f64>,
@@ -192,49 +233,29 @@ where
         .bold_line_style(BLACK.mix(0.12))
         .draw()?;
     for series in &chart.series {
-        let colour = COLOURS[series.colour % COLOURS.len()].to_rgba();
+        let colour = series.colour();
         let points = || series.points.iter().filter(|point| is_drawn(chart, point));
         let at = |point: &Point| (point.x, point.y);
-        let width = match series.style {
-            Style::Line => Some(2),
-            Style::Thin | Style::JoinedDots => Some(1),
-            Style::Dots => None,
-        };
-        let mut legend = None;
-        if let Some(width) = width {
+        if let Some(width) = series.style.line_width() {
             let line = LineSeries::new(points().map(at), colour.stroke_width(width));
-            legend = Some(context.draw_series(line)?);
+            context.draw_series(line)?;
         }
-        if matches!(series.style, Style::Dots | Style::JoinedDots) {
+        if series.style.has_dots() {
             context.draw_series(points().filter_map(|point| {
                 let (low, high) = point.interval?;
                 let ends = [low, high].map(|end| (point.x, clamped(&chart.y, end)));
                 Some(PathElement::new(ends, colour))
             }))?;
-            let dots = points().map(|point| Circle::new(at(point), 3, colour.filled()));
-            legend = Some(context.draw_series(dots)?);
-        }
-        if let (Some(legend), Some(name)) = (legend, &series.name) {
-            let is_line = matches!(series.style, Style::Line | Style::Thin);
-            let stroke = colour.stroke_width(width.unwrap_or(1));
-            let (line, dot) = if is_line {
-                (vec![(0, 0), (18, 0)], 0)
-            } else {
-                (Vec::new(), 3)
-            };
-            legend.label(one_line(name)).legend(move |at| {
-                EmptyElement::at(at)
-                    + PathElement::new(line.clone(), stroke)
-                    + Circle::new((9, 0), dot, colour.filled())
-            });
+            let limits = || series.points.iter().filter_map(|point| limit(chart, point));
+            context.draw_series(limits().map(|limit| {
+                let ends = [(limit.x, bottom), (limit.x, limit.y)];
+                PathElement::new(ends, colour)
+            }))?;
+            context.draw_series(limits().map(|limit| Circle::new(at(&limit), 3, colour)))?;
+            context
+                .draw_series(points().map(|point| Circle::new(at(point), 3, colour.filled())))?;
         }
     }
-    context
-        .configure_series_labels()
-        .label_font(FONT)
-        .background_style(WHITE.mix(0.85))
-        .border_style(BLACK.mix(0.3))
-        .draw()?;
     Ok(())
 }
 
@@ -248,6 +269,12 @@ fn is_drawn(chart: &Chart, point: &Point) -> bool {
                 .is_none_or(|(low, high)| (low..=high).contains(&value))
     };
     fits(&chart.x, point.x) && fits(&chart.y, point.y)
+}
+
+/// Where an axis without a place for 0 shows what is no more than the end of its interval.
+fn limit(chart: &Chart, point: &Point) -> Option<Point> {
+    let end = Point::exact(point.x, point.interval?.1);
+    (chart.y.logarithmic && point.y == 0.0 && is_drawn(chart, &end)).then_some(end)
 }
 
 /// The end of an interval, drawn to the edge if it lies beyond.
@@ -309,6 +336,19 @@ mod tests {
         let mut narrow = chart(false, points);
         narrow.x.range = Some((0.5, 20.0));
         assert_eq!(dots(&line_chart(&narrow).unwrap()), 2);
+    }
+
+    #[test]
+    fn zero_is_an_upper_limit_on_a_logarithmic_axis() {
+        let zero = Point {
+            interval: Some((0.0, 0.5)),
+            ..Point::exact(2.0, 0.0)
+        };
+        let points = vec![Point::exact(1.0, 0.1), zero, Point::exact(3.0, 1.0)];
+        let svg = line_chart(&chart(true, points)).unwrap();
+        assert_eq!(dots(&svg), 3);
+        let open = |line: &&str| line.starts_with("<circle") && line.contains("fill=\"none\"");
+        assert_eq!(svg.lines().filter(open).count(), 1, "{svg}");
     }
 
     #[test]

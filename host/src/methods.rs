@@ -1,20 +1,22 @@
 //! Which method for which scene: what the studies of time and error found, against
 //! the instructions it takes.
 
-use std::fmt::Write as _;
+mod tables;
+
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 
 use crate::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
-use crate::sweep::Part;
+use crate::sweep::mean::Measured;
 use crate::sweep::studies::depth_error::{self, Method as Estimator};
 use crate::sweep::studies::passage::Method as Rule;
 use crate::sweep::studies::time_to_detect::{self, Outcome};
+use crate::sweep::{Part, PointTally};
 
 /// The instruction counts, below the documentation.
 pub const INSTRUCTIONS: &str = "bench/instructions.csv";
-/// The cheapest method no more than this share above the best is chosen.
+/// The cheapest method that may be no more than this share above the best is chosen.
 const MARGIN: f64 = 0.1;
 
 /// Instructions of the operations of the core on a Cortex-M4F, optimised for speed.
@@ -63,34 +65,48 @@ impl Instructions<'_> {
 struct Entry {
     label: String,
     cost: f64,
-    /// Time or error over the reference's: mean, least, largest.
-    mean: f64,
+    /// Mean over the scenes of the time or error over the reference's. The interval is
+    /// the mean of theirs, which may have their errors in common.
+    mean: Measured,
+    /// From the best scene to the worst.
     range: (f64, f64),
 }
 
 impl Entry {
     #[allow(clippy::cast_precision_loss, reason = "a few scenes")]
-    fn new(label: String, cost: f64, ratios: &[f64]) -> Self {
-        let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
-        let largest = ratios.iter().copied().fold(0.0, f64::max);
+    fn new(label: String, cost: f64, scenes: &[Measured]) -> Self {
+        let values = || scenes.iter().map(|scene| scene.value);
+        let mean = |of: fn(&Measured) -> f64| {
+            scenes.iter().map(of).sum::<f64>() / scenes.len().max(1) as f64
+        };
         Self {
             label,
             cost,
-            mean: ratios.iter().sum::<f64>() / ratios.len().max(1) as f64,
-            range: (least, largest),
+            mean: Measured {
+                value: mean(|scene| scene.value),
+                interval: (
+                    mean(|scene| scene.interval.0),
+                    mean(|scene| scene.interval.1),
+                ),
+            },
+            range: (
+                values().fold(f64::INFINITY, f64::min),
+                values().fold(0.0, f64::max),
+            ),
         }
     }
 }
 
-/// The chosen: the cheapest within [`MARGIN`] of the best.
+/// The chosen: the cheapest whose interval starts within [`MARGIN`] of where that of the
+/// best ends.
 fn chosen(entries: &[Entry]) -> Result<&Entry> {
     let best = entries
         .iter()
-        .map(|entry| entry.mean)
-        .fold(f64::INFINITY, f64::min);
+        .min_by(|a, b| a.mean.value.total_cmp(&b.mean.value));
+    let limit = best.context("no methods")?.mean.interval.1 * (1.0 + MARGIN);
     let good = entries
         .iter()
-        .filter(|entry| entry.mean <= best * (1.0 + MARGIN));
+        .filter(|entry| entry.mean.interval.0 <= limit);
     good.min_by(|a, b| a.cost.total_cmp(&b.cost))
         .context("no methods")
 }
@@ -98,16 +114,20 @@ fn chosen(entries: &[Entry]) -> Result<&Entry> {
 /// Those that no other is both cheaper and better than, by cost.
 fn frontier(entries: &[Entry]) -> Vec<Dot> {
     let mut by_cost: Vec<&Entry> = entries.iter().collect();
-    by_cost.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.mean.total_cmp(&b.mean)));
+    by_cost.sort_by(|a, b| {
+        a.cost
+            .total_cmp(&b.cost)
+            .then(a.mean.value.total_cmp(&b.mean.value))
+    });
     let mut dots: Vec<Dot> = Vec::new();
     for entry in by_cost {
         let before = dots.last().map_or(f64::INFINITY, |dot| dot.y);
-        if entry.mean < before {
+        if entry.mean.value < before {
             // A step: what costs less than this does no better than the one before.
             if let Some(last) = dots.last().copied() {
                 dots.push(Dot::exact(entry.cost, last.y));
             }
-            dots.push(Dot::exact(entry.cost, entry.mean));
+            dots.push(Dot::exact(entry.cost, entry.mean.value));
         }
     }
     dots
@@ -127,18 +147,14 @@ fn chart(title: &str, y: &str, entries: &[Entry]) -> Result<String> {
             style: Style::Dots,
             points: vec![Dot {
                 x: entry.cost,
-                y: entry.mean,
+                y: entry.mean.value,
                 interval: Some(entry.range),
             }],
         });
     }
-    let dearest = entries.iter().map(|entry| entry.cost).fold(0.0, f64::max);
     line_chart(&Chart {
         title,
-        x: Axis {
-            range: Some((0.0, dearest * 2.2)),
-            ..Axis::linear("instructions on a Cortex-M4F")
-        },
+        x: Axis::linear("instructions on a Cortex-M4F"),
         y: Axis::logarithmic(y),
         series,
     })
@@ -154,7 +170,12 @@ fn rules(
         let those = outcomes
             .iter()
             .filter(|outcome| outcome.method == rule && of(outcome));
-        let ratios: Vec<f64> = those.map(|outcome| outcome.ratio).collect();
+        // Without how sure the likelihood ratio's time is, the same for all rules.
+        let ratios = those.map(|outcome| {
+            let one = outcome.ratio.value / outcome.cycles.value;
+            outcome.cycles.times(one)
+        });
+        let ratios: Vec<Measured> = ratios.collect();
         Ok(Entry::new(rule.label(), counts.rule(rule)?, &ratios))
     };
     Rule::RULES.into_iter().map(entry).collect()
@@ -166,7 +187,9 @@ fn suited(counts: &Instructions, outcomes: &[Outcome]) -> Result<Entry> {
     let (mut ratios, mut cost) = (Vec::new(), 0.0f64);
     for sigma in time_to_detect::SIGMAS {
         let entries = rules(counts, outcomes, |outcome| outcome.sigma == sigma)?;
-        let fastest = entries.iter().min_by(|a, b| a.mean.total_cmp(&b.mean));
+        let fastest = entries
+            .iter()
+            .min_by(|a, b| a.mean.value.total_cmp(&b.mean.value));
         let fastest = fastest.context("no rules")?;
         cost = cost.max(fastest.cost);
         let those = outcomes
@@ -181,21 +204,17 @@ fn suited(counts: &Instructions, outcomes: &[Outcome]) -> Result<Entry> {
     ))
 }
 
-/// Every estimator over the points of these pulses and signals.
+/// Every estimator over the points that `of` takes.
 fn estimators(
     counts: &Instructions,
     part: &Part,
-    sigmas: &[f64],
-    signals: &[f64],
+    of: impl Fn(&PointTally) -> bool,
 ) -> Result<Vec<Entry>> {
     let entry = |(estimator, name): (Estimator, &str)| {
         let (mut ratios, mut cost) = (Vec::new(), 0.0f64);
-        for &sigma in sigmas {
-            cost = cost.max(counts.estimator(estimator, sigma)?);
-            for &signal in signals {
-                let points = part.at([("sigma", sigma), ("signal", signal)]);
-                ratios.extend(points.map(|point| depth_error::over_bound(point, name)));
-            }
+        for point in part.points().iter().filter(|&point| of(point)) {
+            cost = cost.max(counts.estimator(estimator, point.parameter("sigma"))?);
+            ratios.push(depth_error::over_bound(point, name));
         }
         Ok(Entry::new(estimator.label(), cost, &ratios))
     };
@@ -212,7 +231,7 @@ pub fn documents(instructions: &str, time: &Part, depth: &Part) -> Result<Vec<(P
     let photon = counts.of("photon", "AsyncPixel::count_batch")?;
     let mut all_rules = rules(&counts, &outcomes, |_| true)?;
     all_rules.push(suited(&counts, &outcomes)?);
-    let all_estimators = estimators(&counts, depth, &depth_error::SIGMAS, &depth_error::SIGNALS)?;
+    let all_estimators = estimators(&counts, depth, |_| true)?;
     let decision_svg = chart(
         "A decision: its cost against the time to an event",
         "laser cycles over the likelihood ratio's",
@@ -223,21 +242,27 @@ pub fn documents(instructions: &str, time: &Part, depth: &Part) -> Result<Vec<(P
         "root mean square error over the Cramér-Rao bound",
         &all_estimators,
     )?;
+    let (worst, elsewhere) = depth_error::elsewhere(depth)?;
+    let [sigma, signal, background] =
+        ["sigma", "signal", "background"].map(|name| worst.parameter(name));
     let mut text = format!(
         "# Which method for which scene\n\n\
          Made by `cargo xtask figures` from the studies `time-to-detect` and `depth-error` and from the\n\
-         [instruction counts](bench/README.md); do not edit. The tables name the cheapest method that is no more than\n\
-         {:.0} % above the best one.\n\n\
+         [instruction counts](bench/README.md); do not edit. The tables name the cheapest method whose 99 % interval\n\
+         starts no more than {:.0} % above where that of the best one ends.\n\n\
          ## What it costs\n\n\
          A photon takes {photon:.1} instructions whatever the method. A dot is the mean over all scenes of the studies,\n\
          its bar from the best scene to the worst; the line is the frontier, methods that no other is both cheaper and\n\
          better than.\n\n\
          ![Cost of a decision against time to an event](figures/cost-time-to-detect.svg)\n\n\
-         ![Cost of a depth against its error](figures/cost-depth-error.svg)\n\n",
-        MARGIN * 100.0
+         ![Cost of a depth against its error](figures/cost-depth-error.svg)\n\n\
+         Errors are those of peaks in the pulse. Peaks farther than 2 σ + 1 bins from it are false events and left out:\n\
+         at most {:.1} %, with σ {sigma}, {signal} signal photons and {background} background counts a bin.\n\n",
+        MARGIN * 100.0,
+        elsewhere * 100.0
     );
-    decision_table(&mut text, &counts, &outcomes)?;
-    depth_table(&mut text, &counts, depth)?;
+    tables::decision(&mut text, &counts, &outcomes)?;
+    tables::depth(&mut text, &counts, depth)?;
     Ok(vec![
         ("figures/cost-time-to-detect.svg".into(), decision_svg),
         ("figures/cost-depth-error.svg".into(), depth_svg),
@@ -245,74 +270,14 @@ pub fn documents(instructions: &str, time: &Part, depth: &Part) -> Result<Vec<(P
     ])
 }
 
-/// For each pulse and background.
-#[allow(clippy::float_cmp, reason = "parameters are as they were written")]
-fn decision_table(text: &mut String, counts: &Instructions, outcomes: &[Outcome]) -> Result<()> {
-    text.push_str(
-        "## Which rule\n\n\
-         By the standard deviation of the pulse and the background. Times are means over a pulse in the middle of its\n\
-         bin and on an edge, with 1 % false events in 1000 laser cycles, over those of the likelihood ratio that knows\n\
-         the scene. Commands take them as `--rule window --window 3 --z 4.38`.\n\n\
-         | pulse σ, bins | background a bin and cycle | rule | α or z | time | instructions | the paper's rule: time |\n\
-         |---|---|---|---|---|---|---|\n",
-    );
-    for sigma in time_to_detect::SIGMAS {
-        for background in time_to_detect::BACKGROUNDS {
-            let is_here =
-                |outcome: &Outcome| outcome.sigma == sigma && outcome.background == background;
-            let entries = rules(counts, outcomes, is_here)?;
-            let chosen = chosen(&entries)?;
-            let paper = entries.first().context("no rules")?;
-            let of_chosen =
-                |outcome: &&Outcome| is_here(outcome) && outcome.method.label() == chosen.label;
-            let threshold = outcomes
-                .iter()
-                .find(of_chosen)
-                .map_or(0.0, |outcome| outcome.threshold);
-            writeln!(
-                text,
-                "| {sigma} | {background} | {} | {threshold:.2} | {:.2} | {:.0} | {:.2} |",
-                chosen.label, chosen.mean, chosen.cost, paper.mean
-            )?;
-        }
-    }
-    Ok(())
-}
-
-/// For each pulse and number of signal photons.
-fn depth_table(text: &mut String, counts: &Instructions, part: &Part) -> Result<()> {
-    text.push_str(
-        "\n## Which depth estimator\n\n\
-         By the standard deviation of the pulse and the signal photons of an event. Errors are means over backgrounds of\n\
-         0.5 to 5 counts a bin, over the Cramér-Rao bound. The background is the mean that a window rule gives; the paper's is\n\
-         from its quadrants.\n\n\
-         | pulse σ, bins | signal photons | estimator | error | instructions | the paper's: error |\n\
-         |---|---|---|---|---|---|\n",
-    );
-    for sigma in depth_error::SIGMAS {
-        for signal in depth_error::SIGNALS {
-            let all = estimators(counts, part, &[sigma], &[signal])?;
-            let (papers, others): (Vec<_>, _) = all
-                .into_iter()
-                .partition(|entry| entry.label == Estimator::Paper.label());
-            let paper = papers.first().context("no estimators")?;
-            let chosen = chosen(&others)?;
-            writeln!(
-                text,
-                "| {sigma} | {signal} | {} | {:.2} | {:.0} | {:.2} |",
-                chosen.label, chosen.mean, chosen.cost, paper.mean
-            )?;
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn entry(cost: f64, mean: f64) -> Entry {
-        Entry::new(format!("{cost}"), cost, &[mean])
+    /// As sure as 0.02 either way.
+    fn entry(cost: f64, value: f64) -> Entry {
+        let interval = (value - 0.02, value + 0.02);
+        Entry::new(format!("{cost}"), cost, &[Measured { value, interval }])
     }
 
     #[test]
@@ -339,11 +304,15 @@ mod tests {
         assert_eq!(found, expected);
     }
 
+    /// The best ends at 1.02: what starts at 1.122 may be within a tenth of it.
     #[test]
-    fn the_cheapest_within_the_margin_is_chosen() {
-        let entries =
-            [(300.0, 1.0), (100.0, 1.2), (200.0, 1.09)].map(|(cost, mean)| entry(cost, mean));
-        assert_eq!(chosen(&entries).unwrap().label, "200");
+    fn the_cheapest_that_may_be_within_the_margin_is_chosen() {
+        let chosen = |second: f64| {
+            let entries = [(300.0, 1.0), (100.0, 1.2), (200.0, second)];
+            let entries = entries.map(|(cost, mean)| entry(cost, mean));
+            chosen(&entries).unwrap().label.clone()
+        };
+        assert_eq!([1.141, 1.143].map(chosen), ["200", "300"]);
     }
 
     #[test]

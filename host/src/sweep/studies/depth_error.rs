@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
 use dtof_core::{
     BinPosition, Count, Count10, DepthEstimator, DetectionRule, Histogram, Peak, RangeGate,
@@ -14,6 +14,7 @@ use rand_pcg::Pcg64;
 use crate::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
 use crate::simulation::Rates;
 use crate::summary::grouped;
+use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use crate::theory::cramer_rao::Pulse;
@@ -21,7 +22,7 @@ use crate::theory::exposure::{Exposures, Looks};
 
 const BINS: usize = 128;
 /// Standard deviations of the pulse in bins.
-pub const SIGMAS: [f64; 6] = [0.4, 0.6, 0.8, 1.0, 1.25, 1.5];
+pub const SIGMAS: [f64; 7] = [0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.5];
 /// Signal photons.
 pub const SIGNALS: [f64; 4] = [30.0, 60.0, 100.0, 200.0];
 /// Background counts a bin.
@@ -33,7 +34,7 @@ const POSITIONS: u32 = 64;
 pub const STUDY: Study = Study {
     name: "depth-error",
     about: "depth error against the Cramér-Rao bound, by pulse, signal and background",
-    revision: 1,
+    revision: 2,
     few_seeds: 30,
     all_seeds: 300,
     points,
@@ -165,11 +166,10 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             continue;
         }
         for (method, name) in Method::ALL {
-            let error = method
-                .position(&histogram, peak, sigma)
-                .raw()
-                .abs_diff(place.cast_signed());
-            count(name, u64::from(error).pow(2));
+            let position = method.position(&histogram, peak, sigma).raw();
+            let square = u64::from(position.abs_diff(place.cast_signed())).pow(2);
+            count(name, square);
+            count(&format!("{name} fourths"), square.pow(2));
         }
     }
     Ok(tally)
@@ -177,17 +177,33 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 
 /// Root mean square error of a method at a point, in bins, over the smallest
 /// possible.
-#[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
 #[must_use]
-pub fn over_bound(point: &PointTally, name: &str) -> f64 {
+pub fn over_bound(point: &PointTally, name: &str) -> Measured {
     let near = point.count("histograms") - point.count("elsewhere");
-    let mean = point.count(name) as f64 / near.max(1) as f64;
+    let fourths = point.count(&format!("{name} fourths"));
+    let [near, squares, fourths] = [near, point.count(name), fourths].map(u128::from);
     let bound = Pulse {
         signal: point.parameter("signal"),
         background: point.parameter("background"),
         sigma: point.parameter("sigma"),
     };
-    mean.sqrt() / 256.0 / bound.position_error()
+    let error = Measured::root_of_squares(near, squares, fourths);
+    error.times(1.0 / 256.0 / bound.position_error())
+}
+
+/// Where most peaks lie outside the pulse, which are left out of its error, and their
+/// share.
+///
+/// # Errors
+/// If there is no point.
+pub fn elsewhere(part: &Part) -> Result<(&PointTally, f64)> {
+    let shares = part.points().iter().map(|point| {
+        let share = point.share("elsewhere", "histograms");
+        (point, share.value)
+    });
+    shares
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .context("depth-error: no points")
 }
 
 /// Over all signals and backgrounds: the root mean square of [`over_bound`], and the
@@ -195,7 +211,7 @@ pub fn over_bound(point: &PointTally, name: &str) -> f64 {
 fn summary(part: &Part, sigma: f64, name: &str) -> (f64, (f64, f64)) {
     let ratios: Vec<f64> = part
         .at([("sigma", sigma)])
-        .map(|point| over_bound(point, name))
+        .map(|point| over_bound(point, name).value)
         .collect();
     let squares: f64 = ratios.iter().map(|ratio| ratio * ratio).sum();
     #[allow(clippy::cast_precision_loss)]
@@ -224,10 +240,7 @@ fn results(part: &Part) -> Result<Results> {
     }
     let svg = line_chart(&Chart {
         title: "Depth error over the Cramér-Rao bound",
-        x: Axis {
-            range: Some((0.3, 3.3)),
-            ..Axis::linear("pulse σ (bins)")
-        },
+        x: Axis::linear("pulse σ (bins)"),
         y: Axis {
             range: Some((0.9, 9.0)),
             ..Axis::logarithmic("root mean square error over the bound")
@@ -249,8 +262,10 @@ fn results(part: &Part) -> Result<Results> {
             caption: format!(
                 "Root mean square depth error over the Cramér-Rao bound (shape known, amplitude and background not), \
                  averaged over positions in a bin: 30 to 200 signal photons on 0.5 to 5 background counts a bin; \
-                 bars from the least to the largest of the 16 combinations. The centred window for the pulse's σ has {} ({} histograms \
+                 bars from the least to the largest of the 16 combinations. Peaks outside the pulse, farther than 2 σ + 1 \
+                 bins from it, are left out: they are false events, up to {:.1} %. The centred window for the pulse's σ has {} ({} histograms \
                  a combination)",
+                100.0 * elsewhere(part)?.1,
                 own.join(", "),
                 grouped(histograms)
             ),
@@ -264,20 +279,19 @@ fn results(part: &Part) -> Result<Results> {
 }
 
 fn csv(part: &Part) -> Result<String> {
-    let mut csv = "sigma,signal,background,elsewhere".to_owned();
-    for (_, name) in Method::ALL {
-        write!(csv, ",{name}")?;
-    }
-    csv.push('\n');
+    let mut csv = "sigma,signal,background,elsewhere,method,error,low,high\n".to_owned();
     for point in part.points() {
         let [sigma, signal, background] =
             ["sigma", "signal", "background"].map(|name| point.parameter(name));
         let elsewhere = point.share("elsewhere", "histograms").value;
-        write!(csv, "{sigma},{signal},{background},{elsewhere:.4}")?;
         for (_, name) in Method::ALL {
-            write!(csv, ",{:.3}", over_bound(point, name))?;
+            let Measured { value, interval } = over_bound(point, name);
+            let (low, high) = interval;
+            writeln!(
+                csv,
+                "{sigma},{signal},{background},{elsewhere:.4},{name},{value:.3},{low:.3},{high:.3}"
+            )?;
         }
-        csv.push('\n');
     }
     Ok(csv)
 }

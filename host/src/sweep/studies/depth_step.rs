@@ -143,10 +143,7 @@ fn results(part: &Part) -> Result<Results> {
         });
         lines.collect::<Vec<_>>()
     };
-    let x = Axis {
-        range: Some((0.08, 8.0)),
-        ..axis("signal photons a laser cycle", true)
-    };
+    let x = axis("signal photons a laser cycle", true);
     let reaction = line_chart(&Chart {
         title: "From a step of 20 bins to the first reading of the new surface",
         x,

@@ -269,11 +269,7 @@ fn chart(part: &Part, last: u32) -> Result<String> {
         } else {
             "False events of an exposure of 36 looks: simulated, Eq. 10 (thin)"
         },
-        x: Axis {
-            // With room for the legend.
-            range: Some((0.09, 1500.0)),
-            ..Axis::logarithmic("mean background counts a bin at the first look")
-        },
+        x: Axis::logarithmic("mean background counts a bin at the first look"),
         y: Axis {
             range: Some((1e-5, 1.0)),
             ..Axis::logarithmic("probability")

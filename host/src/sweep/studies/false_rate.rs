@@ -19,14 +19,16 @@ use crate::theory::exposure::Exposures;
 const BACKGROUNDS: [f64; 9] = [0.4, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
 /// False events an exposure that are wanted, and the figures' names.
 const WANTED: [(f64, &str); 2] = [(0.01, "false-rate"), (0.001, "false-rate-low")];
-/// Exposures of a trial.
-const EXPOSURES: u64 = 50;
+/// Exposures of a trial at each background to set the threshold by, and others to count
+/// its false events.
+const CALIBRATED: u64 = 20;
+const TESTED: u64 = 50;
 
 /// Every rule with one threshold for all backgrounds.
 pub const STUDY: Study = Study {
     name: "false-rate",
     about: "false events with one threshold from 0.4 to 200 background counts a bin",
-    revision: 1,
+    revision: 2,
     few_seeds: 40,
     all_seeds: 400,
     points,
@@ -35,14 +37,20 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    let point = |first_mean| point([("first_mean", first_mean)]);
-    BACKGROUNDS.map(point).to_vec()
+    let mut points = Vec::new();
+    for first_mean in BACKGROUNDS {
+        for tested in [0.0, 1.0] {
+            points.push(point([("first_mean", first_mean), ("tested", tested)]));
+        }
+    }
+    points
 }
 
+/// So fine that two neighbours differ by a third in their false events.
 fn ladders() -> Vec<Ladder> {
     let ladder = |method| match method {
-        Method::Paper => Ladder::new(method, 8, 32, 4),
-        _ => Ladder::new(method, 28, 44, 8),
+        Method::Paper => Ladder::new(method, 16, 64, 8),
+        _ => Ladder::new(method, 56, 88, 16),
     };
     Method::RULES.map(ladder).to_vec()
 }
@@ -57,92 +65,70 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let ladders = ladders();
     let exposures = Exposures::new(&rates, u16::try_from(BINS)?, LOOKS)?;
     let mut passage = Passage::new(&ladders, exposures, None)?;
-    Ok(count_false(&mut passage, EXPOSURES, rng))
+    let count = if point["tested"] > 0.0 {
+        TESTED
+    } else {
+        CALIBRATED
+    };
+    Ok(count_false(&mut passage, count, rng))
 }
 
 /// A rule with one threshold.
 struct Outcome {
     method: Method,
-    wanted: f64,
     threshold: f64,
     /// False events an exposure at each background.
     shares: Vec<(f64, Share)>,
 }
 
 impl Outcome {
-    /// The largest factor between a share and the wanted one, up or down.
-    fn worst_factor(&self) -> f64 {
-        let factors = self.shares.iter().map(|(_, share)| {
-            let ratio = share.value / self.wanted;
-            ratio.max(1.0 / ratio)
-        });
-        factors.fold(1.0, f64::max)
-    }
-}
-
-/// False events of `point` at a threshold, in exposures, between those of the two
-/// beside it.
-#[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
-fn false_events(ladder: &Ladder, point: &PointTally, threshold: f64) -> f64 {
-    // Equal factors for equal steps; none is less than one.
-    let count = |index| (point.count(&ladder.key(index, "false")) as f64).max(0.5);
-    ladder
-        .interpolated(threshold, |index| count(index).ln())
-        .exp()
-}
-
-/// The threshold whose shares at all backgrounds have the geometric mean `wanted`.
-#[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
-fn one_threshold(ladder: &Ladder, part: &Part, wanted: f64) -> f64 {
-    let is_more = |threshold: f64| {
-        let excess = part.points().iter().map(|point| {
-            let exposures = point.count("exposures") as f64;
-            (false_events(ladder, point, threshold) / (exposures * wanted)).ln()
-        });
-        excess.sum::<f64>() > 0.0
-    };
-    let (mut low, mut high) = (0.0, 16.0);
-    for _ in 0..40 {
-        let middle = (low + high) / 2.0;
-        if is_more(middle) {
-            low = middle;
-        } else {
-            high = middle;
+    /// The threshold with `wanted` false events an exposure on average over the
+    /// backgrounds, and its false events in other exposures.
+    fn new(ladder: &Ladder, part: &Part, wanted: f64) -> Self {
+        let calibrated: Vec<&PointTally> = part.at([("tested", 0.0)]).collect();
+        let index = ladder.nearest(ladder.calibrated(&calibrated, wanted));
+        let key = ladder.key(index, "false");
+        let share = |point: &PointTally| {
+            let share = point.share(&key, "exposures");
+            (point.parameter("first_mean"), share)
+        };
+        Self {
+            method: ladder.method,
+            threshold: ladder.thresholds[index],
+            shares: part.at([("tested", 1.0)]).map(share).collect(),
         }
     }
-    low.clamp(
-        ladder.thresholds[0],
-        ladder.thresholds[ladder.thresholds.len() - 1],
-    )
-}
 
-fn outcome(ladder: &Ladder, part: &Part, wanted: f64) -> Outcome {
-    let threshold = one_threshold(ladder, part, wanted);
-    let share = |point: &PointTally| {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let events = false_events(ladder, point, threshold).round() as u64;
-        let share = Share::new(events, point.count("exposures"));
-        (point.parameter("first_mean"), share)
-    };
-    Outcome {
-        method: ladder.method,
-        wanted,
-        threshold,
-        shares: part.points().iter().map(share).collect(),
+    /// The largest factor between a share and `wanted`, up or down. No false event is
+    /// as many as the interval ends with, "at least".
+    fn worst_factor(&self, wanted: f64) -> String {
+        let factor = |(_, share): &(f64, Share)| {
+            let is_limit = share.value == 0.0;
+            let value = if is_limit {
+                share.interval.1.min(wanted)
+            } else {
+                share.value
+            };
+            ((value / wanted).max(wanted / value), is_limit)
+        };
+        let factors = self.shares.iter().map(factor);
+        let worst = factors.max_by(|a, b| a.0.total_cmp(&b.0));
+        let (factor, is_limit) = worst.unwrap_or((1.0, false));
+        format!("{}{factor:.1}", if is_limit { "at least " } else { "" })
     }
 }
 
 fn results(part: &Part) -> Result<Results> {
     let mut figures = Vec::new();
     let mut csv = "wanted,method,threshold,first_mean,share,low,high\n".to_owned();
-    let exposures = part
-        .points()
-        .first()
-        .map_or(0, |point| point.count("exposures"));
+    let exposures = |tested: f64| {
+        let point = part.at([("tested", tested)]).next();
+        grouped(point.map_or(0, |point| point.count("exposures")))
+    };
     for (wanted, name) in WANTED {
         let outcomes: Vec<Outcome> = ladders()
             .iter()
-            .map(|ladder| outcome(ladder, part, wanted))
+            .map(|ladder| Outcome::new(ladder, part, wanted))
             .collect();
         let mut series = Vec::new();
         let mut factors = Vec::new();
@@ -163,14 +149,13 @@ fn results(part: &Part) -> Result<Results> {
                 points: outcome
                     .shares
                     .iter()
-                    .filter(|(_, share)| share.value > 0.0)
                     .map(|(background, share)| share.at(*background))
                     .collect(),
             });
             factors.push(format!(
-                "{} {:.1}",
+                "{} {}",
                 outcome.method.label(),
-                outcome.worst_factor()
+                outcome.worst_factor(wanted)
             ));
             for (background, share) in &outcome.shares {
                 let (low, high) = share.interval;
@@ -196,20 +181,13 @@ fn results(part: &Part) -> Result<Results> {
             });
         }
         let percent = wanted * 100.0;
-        let axis = |label, range| Axis {
-            range,
-            ..Axis::logarithmic(label)
-        };
         let svg = line_chart(&Chart {
             title: &format!("One threshold for all backgrounds, {percent} % wanted"),
-            x: axis(
-                "background counts a bin at the first look",
-                Some((0.3, 30_000.0)),
-            ),
-            y: axis(
-                "false events an exposure",
-                Some((wanted / 100.0, wanted * 40.0)),
-            ),
+            x: Axis::logarithmic("background counts a bin at the first look"),
+            y: Axis {
+                range: Some((wanted / 100.0, wanted * 40.0)),
+                ..Axis::logarithmic("false events an exposure")
+            },
             series,
         })?;
         figures.push(Figure {
@@ -217,9 +195,11 @@ fn results(part: &Part) -> Result<Results> {
             svg,
             caption: format!(
                 "False events of a 1000-cycle exposure with one threshold for all backgrounds, set to {percent} % on \
-                 (geometric) average. Largest factor off, up or down: {} ({} exposures a dot)",
-                factors.join(", "),
-                grouped(exposures)
+                 average over the backgrounds in {} exposures of each (in steps of 1/16, α 1/8), counted in {} others a dot; an open dot is an \
+                 upper limit where there was none. Largest factor off, up or down: {}",
+                exposures(0.0),
+                exposures(1.0),
+                factors.join(", ")
             ),
         });
     }

@@ -282,11 +282,7 @@ fn rates(part: &Part, rate: Rate) -> Result<String> {
         } else {
             "The pulse's bin passes: simulated, exact, Eq. 8 (thin)"
         },
-        x: Axis {
-            // With room for the legend.
-            range: Some((0.09, 1500.0)),
-            ..Axis::logarithmic("mean background counts a bin")
-        },
+        x: Axis::logarithmic("mean background counts a bin"),
         y: Axis {
             logarithmic: is_false,
             range: is_false.then_some((1e-7, 1.0)),
@@ -311,11 +307,7 @@ fn ratio() -> Result<String> {
     });
     line_chart(&Chart {
         title: "False positive rate: Eq. 10 over exact",
-        x: Axis {
-            // With room for the legend.
-            range: Some((0.09, 1500.0)),
-            ..Axis::logarithmic("mean background counts a bin")
-        },
+        x: Axis::logarithmic("mean background counts a bin"),
         y: Axis::logarithmic("Gaussian / exact"),
         series: series.collect(),
     })

@@ -272,12 +272,8 @@ fn chart(part: &Part, neighbours: f64) -> Result<String> {
         } else {
             "The highest bin is the pulse's: simulated, exact, Eq. 7 (thin)"
         },
-        x: Axis {
-            // With room for the legend.
-            range: Some((0.0, 42.0)),
-            ..Axis::linear("SNR, N·A / √(N·B)")
-        },
-        y: Axis::linear("probability"),
+        x: Axis::linear("SNR, N·A / √(N·B)"),
+        y: Axis::share("probability"),
         series,
     })
 }

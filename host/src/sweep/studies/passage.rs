@@ -73,7 +73,7 @@ impl Method {
 pub struct Ladder {
     /// What decides.
     pub method: Method,
-    /// Equally spaced, in quarters or eighths: exact in every format.
+    /// Equally spaced, by powers of two: exact in every format.
     pub thresholds: Vec<f64>,
 }
 
@@ -123,6 +123,22 @@ impl Ladder {
             }
         }
         self.thresholds.last().copied().unwrap_or_default()
+    }
+
+    /// The number of the threshold nearest to `threshold`.
+    #[must_use]
+    pub fn nearest(&self, threshold: f64) -> usize {
+        let above = self.thresholds.partition_point(|&at| at < threshold);
+        let distance = |index: usize| {
+            let at = self.thresholds.get(index);
+            at.map_or(f64::INFINITY, |at| (at - threshold).abs())
+        };
+        let below = above.saturating_sub(1);
+        if distance(below) < distance(above) {
+            below
+        } else {
+            above
+        }
     }
 
     /// `value` of the thresholds' numbers, linear between the two beside
@@ -359,6 +375,8 @@ mod tests {
         // Equal factors: 10 is halfway from 100 to 1.
         assert!((at(0.01) - 3.375).abs() < 1e-12);
         assert_eq!(at(1e-6), 3.5);
+        let nearest = [0.0, 3.1, 3.2, 3.4, 9.0].map(|threshold| ladder.nearest(threshold));
+        assert_eq!(nearest, [0, 0, 1, 2, 2]);
         let linear = ladder.interpolated(3.375, |index| [0.0, 4.0, 8.0][index]);
         assert!((linear - 6.0).abs() < 1e-12);
         assert_eq!(

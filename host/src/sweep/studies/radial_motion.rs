@@ -160,11 +160,7 @@ fn figure(part: &Part, name: &'static str, laser_rate_mhz: f64) -> Result<Figure
         format!("Lag behind a surface that goes away or comes nearer, {laser_rate_mhz} MHz");
     let svg = line_chart(&Chart {
         title: &title,
-        x: Axis {
-            label: "speed, m/s",
-            logarithmic: true,
-            range: Some((0.07, 1500.0)),
-        },
+        x: Axis::logarithmic("speed, m/s"),
         y: Axis {
             label: "how far the reading is behind at the end of the exposure, mm",
             logarithmic: true,

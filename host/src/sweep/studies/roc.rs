@@ -242,12 +242,8 @@ fn chart(part: &Part) -> Result<String> {
     }
     line_chart(&Chart {
         title: "ROC by SNR: simulated, exact, Gaussian (thin)",
-        x: Axis {
-            // With room for the legend.
-            range: Some((0.0, 1.25)),
-            ..Axis::linear("false positive rate")
-        },
-        y: Axis::linear("true positive rate"),
+        x: Axis::share("false positive rate"),
+        y: Axis::share("true positive rate"),
         series,
     })
 }

@@ -1,14 +1,18 @@
 //! How fast a pulse is found, against whoever knows everything but where it lies.
 
+mod time;
+
 use std::fmt::Write as _;
 
 use anyhow::Result;
 use rand_pcg::Pcg64;
 
+use self::time::time;
 use crate::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
 use crate::simulation::Rates;
 use crate::summary::grouped;
-use crate::sweep::results::{Figure, Results, Table, Z_99};
+use crate::sweep::mean::Measured;
+use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::studies::passage::{BINS, LOOKS, Ladder, Method, Passage, count_false};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use crate::theory::exposure::Exposures;
@@ -32,7 +36,7 @@ const EXPOSURES: u64 = 50;
 pub const STUDY: Study = Study {
     name: "time-to-detect",
     about: "laser cycles to an event against the likelihood ratio, by pulse and background",
-    revision: 1,
+    revision: 2,
     few_seeds: 20,
     all_seeds: 200,
     points,
@@ -74,13 +78,14 @@ fn ladders() -> Vec<Ladder> {
 
 /// The same at every place, as the likelihood ratio does not know it: that of
 /// halfway from the middle of a bin to its edge.
-fn signal(point: &Point) -> f64 {
-    signal_for_information(point["background"], 0.25, point["sigma"], INFORMATION)
+#[must_use]
+pub fn signal(sigma: f64, background: f64) -> f64 {
+    signal_for_information(background, 0.25, sigma, INFORMATION)
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let (background, sigma) = (point["background"], point["sigma"]);
-    let signal = signal(point);
+    let signal = signal(sigma, background);
     let rates = Rates {
         background,
         signal: signal * point["target"],
@@ -128,19 +133,17 @@ pub struct Outcome {
     /// With a share of [`FALSE_SHARE`] of false events.
     pub threshold: f64,
     /// Mean laser cycles to an event; an exposure that expires is followed by
-    /// another.
-    pub cycles: f64,
-    /// Standard error of `cycles`, as a share of it.
-    pub error: f64,
+    /// another. The interval is that of the times, of the share that expires and of
+    /// the threshold together.
+    pub cycles: Measured,
     /// `cycles` over those of the likelihood ratio.
-    pub ratio: f64,
+    pub ratio: Measured,
 }
 
 /// Every method in every scene with a target.
 ///
 /// # Errors
 /// If `part` is not of this study.
-#[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
 pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
     let mut outcomes = Vec::new();
     for sigma in SIGMAS {
@@ -162,15 +165,7 @@ pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
                         method != Method::Oracle || point.is_at([("sigma", sigma)])
                     };
                     let points: Vec<&PointTally> = all.filter(is_known).collect();
-                    let threshold = ladder.calibrated(&points, FALSE_SHARE);
-                    let count = |index, what| with_target.count(&ladder.key(index, what)) as f64;
-                    let of = |what| ladder.interpolated(threshold, |index| count(index, what));
-                    let exposures = with_target.count("exposures") as f64;
-                    let cycles = ladder.interpolated(threshold, |index| {
-                        count(index, "cycles") / count(index, "events").max(1.0)
-                    });
-                    let mean = of("cycles") / exposures;
-                    let variance = of("squares") / exposures - mean * mean;
+                    let (threshold, cycles) = time(&ladder, &points, with_target);
                     outcomes.push(Outcome {
                         sigma,
                         place,
@@ -178,16 +173,14 @@ pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
                         method,
                         threshold,
                         cycles,
-                        error: (variance.max(0.0) / exposures).sqrt() / mean,
-                        ratio: 1.0,
+                        ratio: cycles,
                     });
                 }
-                // The likelihood ratio is the last.
-                let oracle = outcomes
-                    .last()
-                    .map_or(1.0, |oracle: &Outcome| oracle.cycles);
+                // The likelihood ratio is the last. It sees the same photons; that the
+                // two are alike makes their ratio surer than this says.
+                let oracle = outcomes.last().map(|oracle| oracle.cycles);
                 for outcome in &mut outcomes[first..] {
-                    outcome.ratio = outcome.cycles / oracle;
+                    outcome.ratio = outcome.cycles.over(oracle.unwrap_or(outcome.cycles));
                 }
             }
         }
@@ -204,7 +197,7 @@ fn is(outcome: &Outcome, sigma: f64, method: Method) -> bool {
 /// the largest.
 fn mean_and_worst(outcomes: &[Outcome], sigma: f64, method: Method) -> (f64, f64) {
     let ratios = outcomes.iter().filter(|outcome| is(outcome, sigma, method));
-    let ratios = ratios.map(|outcome| outcome.ratio);
+    let ratios = ratios.map(|outcome| outcome.ratio.value);
     let count = ratios.clone().count().max(1);
     #[allow(clippy::cast_precision_loss)]
     let mean = ratios.clone().sum::<f64>() / count as f64;
@@ -235,8 +228,8 @@ fn results(part: &Part) -> Result<Results> {
                     .filter(|outcome| is(outcome, sigma, method) && outcome.place == place);
                 let dot = |outcome: &Outcome| Dot {
                     x: outcome.background,
-                    y: outcome.ratio,
-                    interval: Some(interval(outcome)),
+                    y: outcome.ratio.value,
+                    interval: Some(outcome.ratio.interval),
                 };
                 series.push(Series {
                     name: (place == "centred").then(|| method.label()),
@@ -249,10 +242,7 @@ fn results(part: &Part) -> Result<Results> {
         let title = format!("Time to an event, pulse σ {sigma} bins (thin: on a bin edge)");
         let svg = line_chart(&Chart {
             title: &title,
-            x: Axis {
-                range: Some((0.0, 0.36)),
-                ..Axis::linear("background a bin and laser cycle")
-            },
+            x: Axis::linear("background a bin and laser cycle"),
             y: Axis {
                 range: Some((0.95, 7.0)),
                 ..Axis::logarithmic("laser cycles over the likelihood ratio's")
@@ -265,7 +255,7 @@ fn results(part: &Part) -> Result<Results> {
             caption: format!(
                 "Mean laser cycles to an event as a multiple of the likelihood ratio's that knows background, signal \
                  and shape of a pulse of {sigma} bins; all with 1 % false events in 1000 laser cycles. The best rule \
-                 for this pulse is the {}: {:.2} on average, {:.2} at most ({} exposures a dot)",
+                 for this pulse is the {}: {:.2} on average, {:.2} at most ({} exposures a dot; the intervals hold the uncertainty of the threshold)",
                 best.0.label(),
                 best.1,
                 best.2,
@@ -283,25 +273,21 @@ fn results(part: &Part) -> Result<Results> {
     })
 }
 
-/// What the ratio lies in; that of the likelihood ratio's time is as wide.
-fn interval(outcome: &Outcome) -> (f64, f64) {
-    let half = Z_99 * outcome.error * std::f64::consts::SQRT_2;
-    (outcome.ratio * (1.0 - half), outcome.ratio * (1.0 + half))
-}
-
 fn csv(outcomes: &[Outcome]) -> Result<String> {
-    let mut csv = "sigma,place,background,method,threshold,cycles,ratio\n".to_owned();
+    let mut csv = "sigma,place,background,method,threshold,cycles,ratio,low,high\n".to_owned();
     for outcome in outcomes {
         writeln!(
             csv,
-            "{},{},{},{},{:.3},{:.1},{:.3}",
+            "{},{},{},{},{:.3},{:.1},{:.3},{:.3},{:.3}",
             outcome.sigma,
             outcome.place,
             outcome.background,
             outcome.method.name(),
             outcome.threshold,
-            outcome.cycles,
-            outcome.ratio
+            outcome.cycles.value,
+            outcome.ratio.value,
+            outcome.ratio.interval.0,
+            outcome.ratio.interval.1
         )?;
     }
     Ok(csv)

@@ -64,11 +64,7 @@ fn by_signal(
     }
     line_chart(&Chart {
         title,
-        x: Axis {
-            label: "signal photons a laser cycle, mean of a surface",
-            logarithmic: true,
-            range: Some((0.03, 40.0)),
-        },
+        x: Axis::logarithmic("signal photons a laser cycle, mean of a surface"),
         y: Axis {
             label: y_axis.0,
             logarithmic: y_axis.1,
