@@ -26,12 +26,13 @@ const PROFILES: [&str; 2] = ["firmware", "firmware-small"];
 const UNDEFINED: &str = "dtof_core_has_a_reachable_panic";
 
 /// The functions of `core_image.rs` that between them use all of dtof-core.
-const PARTS: [&str; 12] = [
+const PARTS: [&str; 13] = [
     "units",
     "roots",
     "ranges",
     "words",
     "slot",
+    "products",
     "texts",
     "gates",
     "trees",

@@ -30,10 +30,11 @@ use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::peak::ComparatorTree;
 use dtof_core::{
     AerDecoder, AerEncoder, AerWord, AsyncPixel, BinIndex, BinPosition, CentredWindow, Count,
-    Count10, Count16, Count24, CounterWidth, DepthEstimator, DepthEvent, DetectionRule, EventSlot,
-    Flags, Histogram, LaserCycle, Macropixel, PaperRule, Peak, PixelAddress, PixelConfig,
-    ProcessingElement, RangeGate, RangeScale, Statistics, SubBinOffset, Threshold, WindowRule,
-    background, centre_of_mass, detect, isqrt, whole_background, z_for,
+    Count10, Count16, Count24, CounterWidth, DepthEstimator, DepthEvent, DetectionRule,
+    DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, EventSlot, Flags, Histogram,
+    LaserCycle, Macropixel, PaperRule, Peak, PixelAddress, PixelConfig, ProcessingElement,
+    RangeGate, RangeScale, Reference, Reflectivity, RunningMean, Statistics, SubBinOffset,
+    Threshold, WindowRule, background, centre_of_mass, detect, isqrt, whole_background, z_for,
 };
 
 #[allow(unsafe_code, reason = "the linker knows the entry by this name")]
@@ -45,6 +46,7 @@ extern "C" fn _start() -> ! {
         ranges();
         words();
         slot();
+        products();
         texts();
         for_bins::<8>();
         for_bins::<128>();
@@ -74,6 +76,7 @@ fn units() {
     keep(Flags::from_bits(byte()));
     keep(flags().contains(flags()));
     keep(position().raw());
+    keep(BinPosition::new(word().cast_signed()));
 }
 
 #[inline(never)]
@@ -87,7 +90,13 @@ fn roots() {
 #[inline(never)]
 fn ranges() {
     match RangeScale::new(U16F16::from_bits(word()), millimetres()) {
-        Ok(scale) => keep((scale.range(position()), scale.range(event().position()))),
+        Ok(scale) => {
+            keep((scale.range(position()), scale.range(event().position())));
+            keep((
+                scale.distance(word().cast_signed()),
+                scale.bins_of(distance()),
+            ));
+        }
         Err(error) => keep(error),
     }
 }
@@ -101,6 +110,10 @@ fn words() {
     while more() {
         let (time, word) = encoder.encode(&event());
         keep((time.map(AerWord::to_le_bytes), word.to_le_bytes()));
+        if let Some(change) = change() {
+            let (time, word) = encoder.encode_dynamic_depth(&change);
+            keep((time.map(AerWord::to_le_bytes), word.to_le_bytes()));
+        }
         keep(decoder.decode(AerWord::from_le_bytes(values(byte))));
     }
     keep(AerWord::end(double(), word()).to_le_bytes());
@@ -114,6 +127,47 @@ fn slot() {
         keep(slot.request());
         keep(slot.acknowledge());
     }
+}
+
+/// What is made of the events of a pixel.
+#[inline(never)]
+fn products() {
+    products_of::<1>();
+    products_of::<3>();
+    products_of::<10>();
+    let mut reflectivity = Reflectivity::new();
+    while more() {
+        reflectivity.add(&event());
+    }
+    keep((reflectivity.events(), reflectivity.signal()));
+    let range = millimetres();
+    keep((reflectivity.of_events(range), reflectivity.of_signal(range)));
+}
+
+fn products_of<const N: usize>() {
+    let reference = if more() {
+        Reference::Previous
+    } else {
+        Reference::Reported
+    };
+    let Ok(scale) = RangeScale::new(U16F16::from_bits(word()), millimetres()) else {
+        return;
+    };
+    let config = match DynamicDepthConfig::new(distance(), &scale, reference) {
+        Ok(config) => config,
+        Err(error) => return keep(error),
+    };
+    keep((config.threshold(), config.reference()));
+    let mut pixel = DynamicDepthPixel::<N>::new();
+    let mut mean = RunningMean::<N>::new();
+    while more() {
+        if let Some(change) = pixel.observe(&config, &event()) {
+            keep((change.change(), change.polarity(), change));
+        }
+        mean.push(position());
+        keep((mean.mean(), mean.len(), mean.is_empty(), mean.is_full()));
+    }
+    keep(pixel.recent().sum());
 }
 
 /// Every error and unit can be written out.
@@ -334,6 +388,16 @@ fn event() -> DepthEvent {
         background: count(),
         flags: flags(),
     }
+}
+
+/// Out of range as often as not.
+fn change() -> Option<DynamicDepthEvent> {
+    let position = BinPosition::new(word().cast_signed())?;
+    DynamicDepthEvent::new(address(), cycle(), position, word().cast_signed(), flags())
+}
+
+fn distance() -> U24F8 {
+    U24F8::from_bits(word())
 }
 
 fn macropixel() -> Macropixel {

@@ -13,6 +13,7 @@ compile_error!("an image for a board: cargo xtask bench");
 mod counter;
 mod decisions;
 mod operations;
+mod products;
 mod report;
 mod roots;
 mod scene;
@@ -42,6 +43,7 @@ fn main() -> ! {
     operations::run(&mut report, &counter, &mut state);
     decisions::run(&mut report, &counter, &mut state);
     windows::run(&mut report, &counter, &mut state);
+    products::run(&mut report, &counter, &mut state);
     roots::run(&mut report, &counter, &mut state);
     ExitCode::SUCCESS.exit_process()
 }

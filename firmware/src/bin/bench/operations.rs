@@ -83,10 +83,7 @@ fn frame(state: &mut State, number: u32) {
 }
 
 fn with_event(state: &mut State, number: u32) {
-    state.counted(number, true);
-    state.wait_for_last_look();
-    let _ = state.pixel.end_laser_cycle(&state.config, LaserCycle(43));
-    state.event = state.pixel.acknowledge();
+    state.target(number);
 }
 
 fn at_l2(state: &mut State, number: u32) {

@@ -1,10 +1,11 @@
 //! What the operations work on: exposures of 256 photons over 44 laser cycles
 //! into 128 bins, with and without a target.
 
-use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
-    AerEncoder, AsyncPixel, ConfigError, Count, DepthEstimator, DepthEvent, Histogram, LaserCycle,
-    PaperRule, PixelAddress, PixelConfig, RangeGate, WindowRule,
+    AerEncoder, AsyncPixel, ConfigError, Count, DepthEstimator, DepthEvent, DynamicDepthConfig,
+    DynamicDepthPixel, Histogram, LaserCycle, PaperRule, PixelAddress, PixelConfig, RangeGate,
+    RangeScale, Reference, Reflectivity, RunningMean, WindowRule,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -40,16 +41,35 @@ pub struct State {
     pub window: WindowRule,
     /// Which is measured.
     pub estimator: DepthEstimator,
+    pub mean_of_3: RunningMean<3>,
+    pub mean_of_10: RunningMean<10>,
+    pub changes: DynamicDepthPixel<3>,
+    /// Which is measured.
+    pub dynamic_depth: DynamicDepthConfig,
+    /// With a threshold that no change exceeds, and with one that nearly all do.
+    pub dynamic_depths: [DynamicDepthConfig; 2],
+    pub reflectivity: Reflectivity,
 }
 
 impl State {
     pub fn new() -> Option<Self> {
+        let scale = RangeScale::new(const { U16F16::lit("250") }, I24F8::ZERO).ok()?;
+        let dynamic_depth =
+            |threshold| DynamicDepthConfig::new(threshold, &scale, Reference::Previous).ok();
+        let still = dynamic_depth(const { U24F8::lit("100000") })?;
+        let moving = dynamic_depth(const { U24F8::lit("1") })?;
         Some(Self {
             config: Self::config(40, 2000, 5, RangeGate::full()).ok()?,
             gated: Self::config(40, 2000, 5, RangeGate::new(3, 124).ok()?).ok()?,
             never_fires: Self::config(4, CYCLES, 1023, RangeGate::full()).ok()?,
             window: WindowRule::new(1, U4F12::ZERO, Count::saturating(5)).ok()?,
             estimator: DepthEstimator::default(),
+            mean_of_3: RunningMean::new(),
+            mean_of_10: RunningMean::new(),
+            changes: DynamicDepthPixel::new(),
+            dynamic_depth: still,
+            dynamic_depths: [still, moving],
+            reflectivity: Reflectivity::new(),
             codes: [0; PHOTONS as usize],
             pixel: AsyncPixel::new(PixelAddress(7)),
             histogram: Histogram::new(),
@@ -117,6 +137,16 @@ impl State {
                 *sum += count;
             }
         }
+    }
+
+    /// The event of exposure `number` with a target.
+    pub fn target(&mut self, number: u32) {
+        self.counted(number, true);
+        self.wait_for_last_look();
+        let _ = self
+            .pixel
+            .end_laser_cycle(&self.config, LaserCycle(u64::from(CYCLES) - 1));
+        self.event = self.pixel.acknowledge();
     }
 
     /// Counts the pixel's photons again, through a gate.
