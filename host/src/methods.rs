@@ -1,10 +1,15 @@
 //! Which method for which scene: what the studies of time and error found, against
 //! the instructions it takes.
 
+mod recorded;
+
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
+
+pub use self::recorded::RECORDED;
+use self::recorded::recorded;
 
 use crate::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
 use crate::sweep::Part;
@@ -202,11 +207,17 @@ fn estimators(
     Estimator::ALL.into_iter().map(entry).collect()
 }
 
-/// The documents, below `docs`: the table and its two figures.
+/// The documents, below `docs`: the table and its figures.
 ///
 /// # Errors
-/// If an operation was not counted, or a part is not the study's.
-pub fn documents(instructions: &str, time: &Part, depth: &Part) -> Result<Vec<(PathBuf, String)>> {
+/// If an operation was not counted, a part is not the study's, or the file of recorded
+/// photons has another form.
+pub fn documents(
+    instructions: &str,
+    recorded_rules: &str,
+    time: &Part,
+    depth: &Part,
+) -> Result<Vec<(PathBuf, String)>> {
     let counts = Instructions(instructions);
     let outcomes = time_to_detect::outcomes(time)?;
     let photon = counts.of("photon", "AsyncPixel::count_batch")?;
@@ -223,6 +234,11 @@ pub fn documents(instructions: &str, time: &Part, depth: &Part) -> Result<Vec<(P
         "root mean square error over the Cramér-Rao bound",
         &all_estimators,
     )?;
+    let recorded_svg = chart(
+        "Recorded photons: cost of a decision and a depth against its error",
+        "millimetres: median error, line to 95 %",
+        &recorded(&counts, recorded_rules)?,
+    )?;
     let mut text = format!(
         "# Which method for which scene\n\n\
          Made by `cargo xtask figures` from the studies `time-to-detect` and `depth-error` and from the\n\
@@ -233,7 +249,11 @@ pub fn documents(instructions: &str, time: &Part, depth: &Part) -> Result<Vec<(P
          its bar from the best scene to the worst; the line is the frontier, methods that no other is both cheaper and\n\
          better than.\n\n\
          ![Cost of a decision against time to an event](figures/cost-time-to-detect.svg)\n\n\
-         ![Cost of a depth against its error](figures/cost-depth-error.svg)\n\n",
+         ![Cost of a depth against its error](figures/cost-depth-error.svg)\n\n\
+         On recorded photons, all rules set to one false event in 100 exposures, and the minimum count of window rules\n\
+         so that they take no more photons an event than the paper's ([all rows](figures/data/recorded_rules.csv), made by the\n\
+         test `recorded_rules`):\n\n\
+         ![Recorded photons: cost against error](figures/cost-recorded.svg)\n\n",
         MARGIN * 100.0
     );
     decision_table(&mut text, &counts, &outcomes)?;
@@ -241,6 +261,7 @@ pub fn documents(instructions: &str, time: &Part, depth: &Part) -> Result<Vec<(P
     Ok(vec![
         ("figures/cost-time-to-detect.svg".into(), decision_svg),
         ("figures/cost-depth-error.svg".into(), depth_svg),
+        ("figures/cost-recorded.svg".into(), recorded_svg),
         ("methods.md".into(), text),
     ])
 }
