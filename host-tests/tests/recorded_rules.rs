@@ -226,6 +226,14 @@ fn window_rules_need_fewer_photons_than_the_papers() {
     )
     .unwrap();
     let slice = photons.next_slice(CYCLES).unwrap();
+    for pixels in slice.pixels.chunks(ZONES) {
+        let mut counts = [0; BINS];
+        for photon in &pixels[CENTRE].photons {
+            counts[usize::from(photon.code)] += 1;
+        }
+        counts.sort_unstable();
+        assert!(f64::from(counts[BINS / 2]) <= RECORDED * f64::from(CYCLES));
+    }
     let methods = [Method::Paper, Method::Window(2), Method::Window(3)];
     let mut csv = "added_background,rule,threshold,minimum,false_share,estimator,events,photons_an_event,median_mm,\
                    within_95_mm,beyond_50_mm,as_good_as_the_papers\n"

@@ -118,7 +118,7 @@ fn frontier(entries: &[Entry]) -> Vec<Dot> {
     dots
 }
 
-fn chart(title: &str, y: &str, entries: &[Entry]) -> Result<String> {
+fn chart(title: &str, y: Axis, entries: &[Entry]) -> Result<String> {
     let mut series = vec![Series {
         name: Some("frontier".to_owned()),
         colour: 6,
@@ -144,7 +144,7 @@ fn chart(title: &str, y: &str, entries: &[Entry]) -> Result<String> {
             range: Some((0.0, dearest * 2.2)),
             ..Axis::linear("instructions on a Cortex-M4F")
         },
-        y: Axis::logarithmic(y),
+        y,
         series,
     })
 }
@@ -226,17 +226,17 @@ pub fn documents(
     let all_estimators = estimators(&counts, depth, &depth_error::SIGMAS, &depth_error::SIGNALS)?;
     let decision_svg = chart(
         "A decision: its cost against the time to an event",
-        "laser cycles over the likelihood ratio's",
+        Axis::logarithmic("laser cycles over the likelihood ratio's"),
         &all_rules,
     )?;
     let depth_svg = chart(
         "A depth: its cost against its error",
-        "root mean square error over the Cramér-Rao bound",
+        Axis::logarithmic("root mean square error over the Cramér-Rao bound"),
         &all_estimators,
     )?;
     let recorded_svg = chart(
         "Recorded photons: cost of a decision and a depth against its error",
-        "millimetres: median error, line to 95 %",
+        Axis::linear("millimetres: median error, line to 95 %"),
         &recorded(&counts, recorded_rules)?,
     )?;
     let mut text = format!(
