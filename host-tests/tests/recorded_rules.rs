@@ -232,7 +232,8 @@ fn window_rules_need_fewer_photons_than_the_papers() {
             counts[usize::from(photon.code)] += 1;
         }
         counts.sort_unstable();
-        assert!(f64::from(counts[BINS / 2]) <= RECORDED * f64::from(CYCLES));
+        // To the nearest photon.
+        assert!(f64::from(counts[BINS / 2]) < RECORDED * f64::from(CYCLES) + 0.5);
     }
     let methods = [Method::Paper, Method::Window(2), Method::Window(3)];
     let mut csv = "added_background,rule,threshold,minimum,false_share,estimator,events,photons_an_event,median_mm,\
