@@ -350,13 +350,17 @@ mod tests {
                 let looks = Looks::new(X, L1, L2);
                 let exposures = Exposures::new(&rates, 128, looks).unwrap();
                 let mut passage = Passage::new(&ladders, exposures, None).unwrap();
-                count_false(&mut passage, 1000, &mut trial_rng(5, number))
+                count_false(&mut passage, 2000, &mut trial_rng(5, number))
             })
             .collect();
         let share = |index| {
             let key = ladders[0].key(index, "false");
-            Share::new(tallies.iter().map(|tally| tally[&key]).sum(), 8000)
+            Share::new(tallies.iter().map(|tally| tally[&key]).sum(), 16_000)
         };
-        assert!(share(0).interval.0 > 0.01 && share(1).interval.1 < 0.01);
+        let (below, at) = (share(0), share(1));
+        assert!(
+            below.interval.0 > 0.01 && at.interval.1 < 0.01,
+            "{below:?} {at:?}"
+        );
     }
 }
