@@ -21,6 +21,11 @@ impl Flags {
     /// Bit 2: a decision was put off while the slot was full, so that the
     /// exposure may be longer than the photons asked for.
     pub const DEFERRED: Self = Self(1 << 2);
+    /// Bit 3: the TDC takes one hit a laser cycle and took one in more than half of
+    /// the exposure's, so that early photons hide late ones: the depth is drawn
+    /// towards the sensor, and the peak may be no target. See
+    /// [`PixelConfig::with_one_hit_tdc`](crate::PixelConfig::with_one_hit_tdc).
+    pub const PILE_UP: Self = Self(1 << 3);
 
     /// From bits, or `None` above six bits.
     #[must_use]

@@ -273,6 +273,7 @@ fn the_flags_are_those_of_the_document() {
         ("saturated", Flags::SATURATED),
         ("clipped", Flags::CLIPPED),
         ("deferred", Flags::DEFERRED),
+        ("pile-up", Flags::PILE_UP),
     ] {
         let rows = rows(&section("### Flags"));
         let row = rows.iter().find(|row| row[1] == name).unwrap();

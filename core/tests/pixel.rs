@@ -28,6 +28,7 @@ struct Settings {
     /// In 1/256.
     alpha: u16,
     minimum: u32,
+    is_one_hit: bool,
 }
 
 impl Settings {
@@ -37,7 +38,12 @@ impl Settings {
             Count::new(self.minimum).unwrap(),
         );
         let gate = RangeGate::new(self.first as u16, self.last as u16).unwrap();
-        PixelConfig::new(self.x, self.l1, self.l2, gate, rule).unwrap()
+        let config = PixelConfig::new(self.x, self.l1, self.l2, gate, rule).unwrap();
+        if self.is_one_hit {
+            config.with_one_hit_tdc()
+        } else {
+            config
+        }
     }
 }
 
@@ -48,6 +54,8 @@ struct Model {
     /// N.
     exposure: u32,
     since_look: u32,
+    /// Photons of the exposure with the code of a bin.
+    in_bins: u32,
     put_off: bool,
     waiting: Option<DepthEvent>,
     statistics: Statistics,
@@ -60,6 +68,7 @@ impl Model {
             counts: vec![0; bins],
             exposure: 0,
             since_look: 0,
+            in_bins: 0,
             put_off: false,
             waiting: None,
             statistics: Statistics::default(),
@@ -67,6 +76,7 @@ impl Model {
     }
 
     fn count(&mut self, code: usize) {
+        self.in_bins += u32::from(code < self.counts.len());
         if code >= self.counts.len() {
             self.statistics.rejected += 1;
         } else if code < self.settings.first || code > self.settings.last {
@@ -112,6 +122,7 @@ impl Model {
     fn reset(&mut self) {
         self.counts.fill(0);
         self.exposure = 0;
+        self.in_bins = 0;
         self.put_off = false;
     }
 
@@ -141,6 +152,9 @@ impl Model {
         }
         if self.put_off {
             flags |= 4;
+        }
+        if self.settings.is_one_hit && f64::from(self.in_bins) > 0.5 * f64::from(self.exposure) {
+            flags |= 8;
         }
         let above =
             |count: Option<&u32>| f64::from(count.map_or(0, |c| c.saturating_sub(background)));
@@ -265,6 +279,7 @@ fn random_pixels_follow_the_flow_chart() {
             last: 15 - (rng.next_u32() % 4) as usize,
             alpha: (rng.next_u32() % (8 * 256)) as u16,
             minimum: rng.next_u32() % 10,
+            is_one_hit: rng.next_u32().is_multiple_of(2),
         };
         let patience = 1 + rng.next_u32() % 100;
         let cycles = random_cycles(16, 1000, patience, &mut rng);
@@ -298,6 +313,7 @@ fn the_paper_s_settings_on_128_bins() {
             last: 127,
             alpha: 8 * 256,
             minimum: 5,
+            is_one_hit: false,
         };
         for _ in 0..10 {
             let cycles = random_cycles(128, 10_000, 60, &mut rng);
@@ -314,9 +330,9 @@ fn the_paper_s_settings_on_128_bins() {
 fn settings() -> impl Strategy<Value = Settings> {
     let exposures = (1u16..=6, 0u16..10, 1u16..60);
     let gate = (0usize..=8, 8usize..=16);
-    (exposures, gate, 0u16..1024, 0u32..6)
+    (exposures, gate, 0u16..1024, 0u32..6, any::<bool>())
         .prop_map(
-            |((x, more, beyond), (first, width), alpha, minimum)| Settings {
+            |((x, more, beyond), (first, width), alpha, minimum, is_one_hit)| Settings {
                 x,
                 l1: x + more,
                 l2: x + more + beyond,
@@ -324,6 +340,7 @@ fn settings() -> impl Strategy<Value = Settings> {
                 last: (first + width - 1).min(15),
                 alpha,
                 minimum,
+                is_one_hit,
             },
         )
         .prop_filter("no look", |s| (s.l1 + 1..s.l2).any(|n| n % s.x == 0))
@@ -423,6 +440,7 @@ fn frames_of_five_laser_cycles_are_their_photons_one_cycle_at_a_time() {
             last: 14,
             alpha: (rng.next_u32() % 1500) as u16,
             minimum: 5,
+            is_one_hit: false,
         };
         let config = settings.config::<16>();
         let mut single = AsyncPixel::<16>::new(PixelAddress(5));
@@ -466,6 +484,7 @@ fn the_first_decision_is_the_first_look_above_l1_and_the_last_below_l2() {
         last: 7,
         alpha: 0,
         minimum: 1,
+        is_one_hit: false,
     };
     let config = settings.config::<8>();
     let mut pixel = AsyncPixel::<8>::new(PixelAddress(0));
@@ -494,6 +513,7 @@ fn an_exposure_longer_than_its_counter_expires() {
         last: 7,
         alpha: 0,
         minimum: 1,
+        is_one_hit: false,
     };
     let config = settings.config::<8>();
     let mut pixel = AsyncPixel::<8>::new(PixelAddress(0));
@@ -618,5 +638,56 @@ proptest! {
                 inside = Some(event);
             }
         }
+    }
+}
+
+/// More than half of 44 laser cycles, whatever became of the photons, and those of
+/// the exposure alone.
+#[test]
+fn pile_up_is_more_than_a_photon_in_every_other_laser_cycle() {
+    let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+    let gate = RangeGate::new(1, 15).unwrap();
+    let multi = PixelConfig::<16>::new(4, 40, 2000, gate, rule).unwrap();
+    let one_hit = multi.with_one_hit_tdc();
+    assert!(one_hit.is_one_hit() && !multi.is_one_hit());
+    // In the peak, gated out, past the last bin.
+    for (photons, is_flagged) in [
+        ([22, 0, 0], false),
+        ([23, 0, 0], true),
+        ([10, 12, 22], false),
+        ([10, 13, 0], true),
+    ] {
+        for (config, may_be_flagged) in [(&multi, false), (&one_hit, true)] {
+            let mut pixel = AsyncPixel::<16>::new(PixelAddress(0));
+            for exposure in 0..2 {
+                for (code, photons) in [9, 0, 16].into_iter().zip(photons) {
+                    (0..photons).for_each(|_| pixel.count(config, code));
+                }
+                let last = LaserCycle(exposure * 44 + 43);
+                assert_eq!(pixel.end_laser_cycles(config, last, 44), Look::Event);
+                let flags = pixel.acknowledge().unwrap().flags;
+                let expected = is_flagged && may_be_flagged;
+                assert_eq!(flags.contains(Flags::PILE_UP), expected, "{photons:?}");
+            }
+        }
+    }
+}
+
+/// A full counter counts no more, but its photons came.
+#[test]
+fn photons_that_met_a_full_counter_pile_up_too() {
+    let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+    let config = PixelConfig::<8>::new(4, 40, 4000, RangeGate::full(), rule);
+    let config = config.unwrap().with_one_hit_tdc();
+    for (photons, is_flagged) in [(1500, false), (1501, true)] {
+        let mut pixel = AsyncPixel::<8>::new(PixelAddress(0));
+        (0..photons).for_each(|_| pixel.count(&config, 5));
+        assert_eq!(
+            pixel.end_laser_cycles(&config, LaserCycle(2999), 3000),
+            Look::Event
+        );
+        let flags = pixel.acknowledge().unwrap().flags;
+        assert_eq!(flags.contains(Flags::PILE_UP), is_flagged);
+        assert!(flags.contains(Flags::SATURATED));
     }
 }

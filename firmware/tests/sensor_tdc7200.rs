@@ -229,7 +229,9 @@ fn stopped_it_is_off_until_it_is_started() {
 /// 240 ns are 35.975 m.
 #[test]
 fn it_says_where_its_bins_start() {
-    let about = armed().sensor.about();
+    let bench = armed();
+    assert!(bench.sensor.is_one_hit());
+    let about = bench.sensor.about();
     assert_eq!((about.pixels, about.bin_width), (8, None));
     assert_eq!(about.offset, I24F8::from_num(240_000.0 * 0.149_896_229));
 }
@@ -296,6 +298,7 @@ fn reads_in_chunks_and_gives_the_stops_that_came() {
         });
         let mut registers = MODE_1;
         registers[0] = (0x01, 0x44);
+        assert!(!bench.sensor.is_one_hit());
         bench.bring_up(registers, ARM_1 | 0b10);
         bench.interrupt.set(false);
 

@@ -591,3 +591,64 @@ fn the_host_is_told_what_the_sensor_is() {
     assert_eq!(message::about_from_le_bytes(&body), Some(None));
     assert_eq!(message::about_from_le_bytes(&body[1..]), None);
 }
+
+/// A sensor that gives the first photon of a laser cycle only.
+struct OneHit<'a, S>(&'a mut S);
+
+impl<S: Sensor> Sensor for OneHit<'_, S> {
+    type Error = S::Error;
+
+    fn about(&self) -> About {
+        self.0.about()
+    }
+
+    fn is_one_hit(&self) -> bool {
+        true
+    }
+
+    fn start(&mut self, bin_width: U16F16) {
+        self.0.start(bin_width);
+    }
+
+    fn stop(&mut self) {
+        self.0.stop();
+    }
+
+    fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, S::Error> {
+        self.0.poll(now_ms, sink)
+    }
+}
+
+#[test]
+fn events_of_a_sensor_that_gives_one_photon_a_laser_cycle_say_so_at_high_rates() {
+    for is_one_hit in [false, true] {
+        // A photon in 20 of 24 laser cycles, then in 11 of 24.
+        let call = |cycle: u64| {
+            let is_dark = if cycle < 24 { cycle < 4 } else { cycle < 37 };
+            let mut calls = vec![Call::Photon(0, 40), Call::End(1)];
+            calls.drain(..usize::from(is_dark));
+            calls
+        };
+        let mut script = Scripted((0..48).map(call).map(Some));
+        let mut pixels = Pixels::new();
+        let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
+        let mut host = Host::new(1, 0);
+        host.configure(&mut device, 0, &CONFIGURATION);
+        for now_ms in 0..100 {
+            if is_one_hit {
+                device.poll_sensor(&mut OneHit(&mut script), now_ms);
+            } else {
+                device.poll_sensor(&mut script, now_ms);
+            }
+            host.exchange(&mut device, now_ms);
+            host.read(4);
+        }
+        let flags: Vec<Flags> = host.events.iter().map(|event| event.flags).collect();
+        let first = if is_one_hit {
+            Flags::PILE_UP
+        } else {
+            Flags::NONE
+        };
+        assert_eq!(flags, [first, Flags::NONE]);
+    }
+}

@@ -39,6 +39,7 @@ fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES
         l1: 40,
         l2: 2000,
         x: 4,
+        one_hit_tdc: false,
         seed: 1,
     };
     let truth = ground_truth(log);

@@ -310,6 +310,7 @@ fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec
         l1: tuned.l1,
         l2: request.l2,
         x: request.x,
+        one_hit_tdc: false,
         seed: 11,
     };
     let geometry = Geometry {

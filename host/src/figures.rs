@@ -81,9 +81,12 @@ pub fn documents(
     }
     let part = |study: Study| parts.get(study.name).context(study.name);
     let [time, depth] = [time_to_detect::STUDY, depth_error::STUDY].map(part);
-    let counts = docs.join(methods::INSTRUCTIONS);
-    let counts = fs::read_to_string(&counts).with_context(|| counts.display().to_string())?;
-    documents.extend(methods::documents(&counts, time?, depth?)?);
+    let read = |path| {
+        let path = docs.join(path);
+        fs::read_to_string(&path).with_context(|| path.display().to_string())
+    };
+    let (counts, recorded) = (read(methods::INSTRUCTIONS)?, read(methods::RECORDED)?);
+    documents.extend(methods::documents(&counts, &recorded, time?, depth?)?);
     let failures = failures::document(part(FAILURES)?)?;
     documents.push(("failures.md".into(), failures));
     documents.push(("figures/README.md".into(), captions(&all)?));

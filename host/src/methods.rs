@@ -1,11 +1,15 @@
 //! Which method for which scene: what the studies of time and error found, against
 //! the instructions it takes.
 
+mod recorded;
 mod tables;
 
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
+
+pub use self::recorded::RECORDED;
+use self::recorded::recorded;
 
 use crate::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
 use crate::sweep::mean::Measured;
@@ -133,7 +137,7 @@ fn frontier(entries: &[Entry]) -> Vec<Dot> {
     dots
 }
 
-fn chart(title: &str, y: &str, entries: &[Entry]) -> Result<String> {
+fn chart(title: &str, y: Axis, entries: &[Entry]) -> Result<String> {
     let mut series = vec![Series {
         name: Some("frontier".to_owned()),
         colour: 6,
@@ -155,7 +159,7 @@ fn chart(title: &str, y: &str, entries: &[Entry]) -> Result<String> {
     line_chart(&Chart {
         title,
         x: Axis::linear("instructions on a Cortex-M4F"),
-        y: Axis::logarithmic(y),
+        y,
         series,
     })
 }
@@ -221,11 +225,17 @@ fn estimators(
     Estimator::ALL.into_iter().map(entry).collect()
 }
 
-/// The documents, below `docs`: the table and its two figures.
+/// The documents, below `docs`: the table and its figures.
 ///
 /// # Errors
-/// If an operation was not counted, or a part is not the study's.
-pub fn documents(instructions: &str, time: &Part, depth: &Part) -> Result<Vec<(PathBuf, String)>> {
+/// If an operation was not counted, a part is not the study's, or the file of recorded
+/// photons has another form.
+pub fn documents(
+    instructions: &str,
+    recorded_rules: &str,
+    time: &Part,
+    depth: &Part,
+) -> Result<Vec<(PathBuf, String)>> {
     let counts = Instructions(instructions);
     let outcomes = time_to_detect::outcomes(time)?;
     let photon = counts.of("photon", "AsyncPixel::count_batch")?;
@@ -234,13 +244,18 @@ pub fn documents(instructions: &str, time: &Part, depth: &Part) -> Result<Vec<(P
     let all_estimators = estimators(&counts, depth, |_| true)?;
     let decision_svg = chart(
         "A decision: its cost against the time to an event",
-        "laser cycles over the likelihood ratio's",
+        Axis::logarithmic("laser cycles over the likelihood ratio's"),
         &all_rules,
     )?;
     let depth_svg = chart(
         "A depth: its cost against its error",
-        "root mean square error over the Cramér-Rao bound",
+        Axis::logarithmic("root mean square error over the Cramér-Rao bound"),
         &all_estimators,
+    )?;
+    let recorded_svg = chart(
+        "Recorded photons: cost of a decision and a depth against its error",
+        Axis::linear("millimetres: median error, line to 95 %"),
+        &recorded(&counts, recorded_rules)?,
     )?;
     let (worst, elsewhere) = depth_error::elsewhere(depth)?;
     let [sigma, signal, background] =
@@ -257,7 +272,11 @@ pub fn documents(instructions: &str, time: &Part, depth: &Part) -> Result<Vec<(P
          ![Cost of a decision against time to an event](figures/cost-time-to-detect.svg)\n\n\
          ![Cost of a depth against its error](figures/cost-depth-error.svg)\n\n\
          Errors are those of peaks in the pulse. Peaks farther than 2 σ + 1 bins from it are false events and left out:\n\
-         at most {:.1} %, with σ {sigma}, {signal} signal photons and {background} background counts a bin.\n\n",
+         at most {:.1} %, with σ {sigma}, {signal} signal photons and {background} background counts a bin.\n\n\
+         On recorded photons, all rules set to one false event in 100 exposures, and the minimum count of window rules\n\
+         so that they take no more photons an event than the paper's ([all rows](figures/data/recorded_rules.csv), made by the\n\
+         test `recorded_rules`):\n\n\
+         ![Recorded photons: cost against error](figures/cost-recorded.svg)\n\n",
         MARGIN * 100.0,
         elsewhere * 100.0
     );
@@ -266,6 +285,7 @@ pub fn documents(instructions: &str, time: &Part, depth: &Part) -> Result<Vec<(P
     Ok(vec![
         ("figures/cost-time-to-detect.svg".into(), decision_svg),
         ("figures/cost-depth-error.svg".into(), depth_svg),
+        ("figures/cost-recorded.svg".into(), recorded_svg),
         ("methods.md".into(), text),
     ])
 }

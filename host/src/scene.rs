@@ -234,6 +234,7 @@ pub fn settings(seed: u64) -> Settings {
         l1: 100,
         l2: 2000,
         x: 10,
+        one_hit_tdc: false,
         seed,
     }
 }

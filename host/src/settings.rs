@@ -32,6 +32,9 @@ pub struct Settings {
     pub l2: u16,
     /// Laser cycles between looks.
     pub x: u16,
+    /// Whether the TDC takes one photon a laser cycle, so that events say when that
+    /// makes for pile-up.
+    pub one_hit_tdc: bool,
     /// Seed of every random number.
     pub seed: u64,
 }
@@ -69,8 +72,13 @@ impl Settings {
         ensure!(self.min_count >= 1, "--min-count must be at least 1");
         let rule = self.rule.with_minimum_count(self.min_count)?;
         let config = PixelConfig::new(self.x, self.l1, self.l2, gate, rule)
-            .with_context(|| format!("--x {} --l1 {} --l2 {}", self.x, self.l1, self.l2))?;
-        Ok(config.with_estimator(self.estimator.in_core()))
+            .with_context(|| format!("--x {} --l1 {} --l2 {}", self.x, self.l1, self.l2))?
+            .with_estimator(self.estimator.in_core());
+        Ok(if self.one_hit_tdc {
+            config.with_one_hit_tdc()
+        } else {
+            config
+        })
     }
 
     /// From bins to millimetres.

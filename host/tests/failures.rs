@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use dtof::sweep::studies::failures::cases::Case;
-use dtof::sweep::studies::failures::{Outcome, Rule, STUDY, Verdict, outcomes};
+use dtof::sweep::studies::failures::{Outcome, Rule, STUDY, Verdict, Warning, outcomes};
 use dtof::sweep::{self, SeedRange};
 
 /// Those of a case, whose name starts with `name`.
@@ -27,44 +27,67 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
 
     for outcome in of(&all, "plain") {
         assert!(surely_false(outcome) < 0.02 && outcome.without.value < 0.1);
-        assert!(outcome.verdict != Verdict::Fails && !outcome.is_silent);
+        assert!(outcome.verdict != Verdict::Fails && outcome.warning != Warning::Silent);
     }
     // The cover glass is the brightest: nothing says so. A gate helps.
     for outcome in of(&all, "cover glass 10 × the signal") {
         assert!(surely_false(outcome) > 0.8, "{outcome:?}");
-        assert!(outcome.verdict == Verdict::Fails && outcome.is_silent);
+        assert!(outcome.verdict == Verdict::Fails && outcome.warning == Warning::Silent);
     }
     for outcome in of(&all, "cover glass 10 × the signal, gate") {
         assert!(surely_false(outcome) < 0.02 && outcome.without.value < 0.1);
-        assert!(outcome.verdict != Verdict::Fails && !outcome.is_silent);
+        assert!(outcome.verdict != Verdict::Fails && outcome.warning != Warning::Silent);
     }
     // Full counters and windows past the histogram are flagged.
     for name in ["signal of 80 photons", "signal of 400 photons"] {
         for outcome in of(&all, name) {
             assert!(
-                outcome.saturated > 0.99 && !outcome.is_silent,
+                outcome.saturated > 0.99 && outcome.warning != Warning::Silent,
                 "{outcome:?}"
             );
         }
     }
     for name in ["pulse at 0.3 bins", "pulse at 127.7 bins"] {
         for outcome in of(&all, name) {
-            assert!(outcome.clipped > 0.6 && !outcome.is_silent, "{outcome:?}");
+            assert!(
+                outcome.clipped > 0.6 && outcome.warning != Warning::Silent,
+                "{outcome:?}"
+            );
         }
     }
     // With light in each quadrant the paper's rule has no background left; the mean has.
     for outcome in of(&all, "a pulse in each quadrant") {
-        match outcome.rule {
+        match outcome.method.rule {
             Rule::Window => assert!(outcome.without.value < 0.1, "{outcome:?}"),
             Rule::Paper(_) => assert!(outcome.without.value > 0.3, "{outcome:?}"),
         }
     }
-    // Of the photons of a cycle only the first counts: the slope is taken for the peak.
+    // Of the photons of a cycle only the first counts: the slope is taken for the peak,
+    // and every event says so.
     for outcome in of(&all, "one hit, 6 photons") {
-        assert!(
-            surely_false(outcome) > 0.8 && outcome.is_silent,
-            "{outcome:?}"
-        );
+        assert!(surely_false(outcome) > 0.8 && outcome.piled_up > 0.999);
+        assert!(outcome.warning == Warning::Flagged, "{outcome:?}");
+    }
+    for name in ["one hit, 1.5 photons", "one hit, 2 photons"] {
+        for outcome in of(&all, name) {
+            assert!(outcome.piled_up > 0.95, "{outcome:?}");
+        }
+    }
+    // At half of the laser cycles nothing is false yet, and the flag begins.
+    for outcome in of(&all, "one hit, 0.7 photons") {
+        assert!(surely_false(outcome) < 0.02 && outcome.verdict != Verdict::Fails);
+        assert!((0.1..0.9).contains(&outcome.piled_up), "{outcome:?}");
+    }
+    // A bright pulse hides its own end. An event's error is 0.3 bins.
+    for outcome in of(&all, "one hit, a pulse of 0.7 photons") {
+        assert!((-0.35..-0.08).contains(&outcome.mean_error), "{outcome:?}");
+    }
+    for outcome in of(&all, "one hit, a pulse of 3 photons") {
+        assert!((-0.95..-0.6).contains(&outcome.mean_error) && outcome.piled_up > 0.999);
+    }
+    // Without a target there is little to report, and it is false.
+    for outcome in of(&all, "no target") {
+        assert!(outcome.verdict == Verdict::Survives && outcome.false_share.is_some());
     }
     for outcome in of(&all, "hot pixel") {
         assert!(outcome.without.value > 0.8, "{outcome:?}");
@@ -78,7 +101,7 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
     // A target that moves while it is exposed is reported where it was.
     let still = of(&all, "weak signal").iter();
     for (still, drifting) in still.zip(of(&all, "weak signal, the same drift")) {
-        if still.rule == Rule::Window {
+        if still.method.rule == Rule::Window {
             assert!(drifting.error > 1.5 * still.error, "{drifting:?}");
         }
     }
@@ -92,7 +115,22 @@ fn the_document_has_a_row_for_every_case() {
     let part = sweep::run(&STUDY, seeds, &path, Duration::MAX, |_| ()).unwrap();
     let text = dtof::failures::document(&part).unwrap();
     assert!(!text.contains("NaN"), "{text}");
-    let rows: Vec<&str> = text.lines().filter(|line| line.starts_with('|')).collect();
+    let table = text.split("## What those").next().unwrap();
+    let rows: Vec<&str> = table.lines().filter(|line| line.starts_with('|')).collect();
     assert_eq!(rows.len(), part.points().len() + 2);
     assert!(rows.iter().all(|row| row.matches('|').count() == 9));
+    for row in &rows[2..] {
+        let mut cells = row.split('|').skip(2).take(6);
+        assert!(cells.all(|cell| cell.chars().count() < 40), "{row}");
+    }
+    // Where no flag tells, the page says why.
+    for (case, outcomes) in outcomes(&part).unwrap() {
+        if outcomes
+            .iter()
+            .any(|outcome| outcome.warning == Warning::Silent)
+        {
+            assert!(case.silence.is_some(), "{}", case.name);
+        }
+    }
+    assert!(!text.contains("not known"));
 }

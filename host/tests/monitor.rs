@@ -42,6 +42,7 @@ fn settings() -> Settings {
         l1: 40,
         l2: 2000,
         x: 4,
+        one_hit_tdc: false,
         seed: 0,
     }
 }

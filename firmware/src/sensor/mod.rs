@@ -58,6 +58,13 @@ pub trait Sensor {
     /// What a host has to know of it.
     fn about(&self) -> About;
 
+    /// Whether it gives the first photon of a laser cycle only, so that at high rates
+    /// early photons hide late ones. Events then say so:
+    /// [`PixelConfig::with_one_hit_tdc`](dtof_core::PixelConfig::with_one_hit_tdc).
+    fn is_one_hit(&self) -> bool {
+        false
+    }
+
     /// A configuration comes into force: whatever is under way is given up, and
     /// what the next polls give begins anew. A sensor that measures times makes its
     /// TDC codes `bin_width` picoseconds wide, which is above 0; for one with bins

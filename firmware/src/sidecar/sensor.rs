@@ -1,6 +1,8 @@
 //! Photons and histograms of a sensor, which does not wait.
 
-use dtof_core::{Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, Statistics, detect};
+use dtof_core::{
+    Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, PixelConfig, Statistics, detect,
+};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
 use super::{BINS, Sidecar, has_room_for_event};
@@ -36,6 +38,9 @@ impl Sidecar<'_> {
         let wanted = self.config.is_some() && self.source == Source::Sensor;
         if wanted && !self.started {
             sensor.start(self.bin_width);
+            if sensor.is_one_hit() {
+                self.config = self.config.map(PixelConfig::with_one_hit_tdc);
+            }
             (self.started, self.running) = (true, true);
         } else if !wanted && self.running {
             sensor.stop();

@@ -65,6 +65,7 @@ impl Operation {
             l1: self.l1,
             l2: self.l2,
             x: self.x,
+            one_hit_tdc: false,
             seed,
         })
     }

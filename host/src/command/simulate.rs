@@ -1,5 +1,6 @@
 //! `dtof simulate`: the photons of a scene file through the engine.
 
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -52,9 +53,12 @@ impl Simulate {
         scene.geometry = self.array.unwrap_or(scene.geometry);
         let bin_width_ps = U16F16::from_num(scene.bin_width_ps);
         let bins = scene.bins.into();
-        let settings = self
-            .operation
-            .settings(bins, bin_width_ps, I24F8::ZERO, self.seed)?;
+        let settings = Settings {
+            one_hit_tdc: scene.effects.one_hit_tdc(),
+            ..self
+                .operation
+                .settings(bins, bin_width_ps, I24F8::ZERO, self.seed)?
+        };
         let file = self.scene.display().to_string();
         let Geometry { columns, rows } = scene.geometry;
         let lead = format!("Simulated photons of {file}, {columns}×{rows} macropixels.");
@@ -103,7 +107,7 @@ impl Simulation<'_> {
             self.quiet,
         )?;
         summary.input = self.file;
-        let surfaces = self.scene.against_truth(output.maps());
+        let surfaces = self.scene.against_truth(output.maps(), self.cycles);
         let sections = [Section {
             heading: "Surfaces",
             rows: &surfaces,
@@ -125,6 +129,13 @@ fn engine(
     let Some(device) = device else {
         return host_engine(settings, addresses);
     };
+    if settings.one_hit_tdc {
+        // Nobody may be reading it.
+        let _ = writeln!(
+            io::stderr(),
+            "pile-up is not flagged: the device is not told that the TDC takes one hit a laser cycle"
+        );
+    }
     let client = Client::new(device::open(device)?).with_context(|| device.to_owned())?;
     Ok(Box::new(DeviceEngine::new(client, settings, addresses)?))
 }

@@ -11,10 +11,11 @@ use crate::summary::{Row, grouped};
 const FALSE_BEYOND_BINS: f64 = 3.0;
 
 impl Scene {
-    /// How the events compare with the scene, surface by surface. A pixel counts
-    /// for the surface it saw at its last event.
+    /// How the events of `cycles` laser cycles compare with the scene, surface by
+    /// surface. A pixel counts for the surface it saw at its last event. False events
+    /// are counted, and left out of the errors.
     #[must_use]
-    pub fn against_truth(&self, maps: &Maps) -> Vec<Row> {
+    pub fn against_truth(&self, maps: &Maps, cycles: u64) -> Vec<Row> {
         let mut rows = Vec::new();
         let pixels: Vec<(PixelAddress, &PixelHistory)> =
             (0..=u16::MAX).map(PixelAddress).zip(&maps.pixels).collect();
@@ -35,31 +36,77 @@ impl Scene {
                     first.min().map_or("-".to_owned(), grouped),
                 ),
             ));
-            let errors = |of: fn(&[f64]) -> f64| {
-                seen.iter()
-                    .map(|(address, pixel)| self.errors(*address, pixel))
-                    .filter(|errors| !errors.is_empty())
-                    .map(|errors| of(&errors))
-                    .collect::<Vec<f64>>()
-            };
-            let last = errors(|errors| errors[errors.len() - 1]);
-            let mean = errors(mean);
-            if last.is_empty() {
-                continue; // no event, no error
+            let lost = self.pixels_beyond(index, cycles);
+            if lost > 0 {
+                rows.push((
+                    format!("{}, beyond the last bin", surface.name),
+                    format!(
+                        "at the start or the end in {lost} of {} pixels: no photons from {:.0} mm on",
+                        pixels.len(),
+                        self.end_mm()
+                    ),
+                ));
             }
             let limit_mm = FALSE_BEYOND_BINS * self.mm_per_bin();
-            let false_events = last.iter().filter(|error| error.abs() > limit_mm).count();
+            let errors: Vec<Vec<f64>> = seen
+                .iter()
+                .map(|(address, pixel)| self.errors(*address, pixel))
+                .filter(|errors| !errors.is_empty())
+                .collect();
+            if errors.is_empty() {
+                continue; // no event, no error
+            }
+            let right = |error: &f64| error.abs() <= limit_mm;
+            let last: Vec<f64> = errors
+                .iter()
+                .filter_map(|errors| errors.last().copied())
+                .filter(right)
+                .collect();
+            let mean: Vec<f64> = errors
+                .iter()
+                .map(|errors| errors.iter().copied().filter(right).collect::<Vec<f64>>())
+                .filter(|errors| !errors.is_empty())
+                .map(|errors| mean(&errors))
+                .collect();
             rows.push((
-                format!("{}, rms error", surface.name),
+                format!("{}, false events", surface.name),
                 format!(
-                    "{:.1} mm last event of each pixel ({false_events} beyond {FALSE_BEYOND_BINS} bins), \
-                     {:.1} mm mean of ten",
-                    root_mean_square(&last),
-                    root_mean_square(&mean),
+                    "{} of {} last events of a pixel, beyond {FALSE_BEYOND_BINS} bins",
+                    grouped((errors.len() - last.len()) as u64),
+                    grouped(errors.len() as u64),
                 ),
             ));
+            if !last.is_empty() {
+                rows.push((
+                    format!("{}, rms error", surface.name),
+                    format!(
+                        "{:.1} mm last event of each pixel, {:.1} mm mean of ten, without the false ones",
+                        root_mean_square(&last),
+                        root_mean_square(&mean),
+                    ),
+                ));
+            }
         }
         rows
+    }
+
+    /// Where the last bin ends.
+    fn end_mm(&self) -> f64 {
+        f64::from(self.bins) * self.mm_per_bin()
+    }
+
+    /// Pixels that see a surface at the start or the end of `cycles` laser cycles too
+    /// far away for the histogram.
+    fn pixels_beyond(&self, surface: usize, cycles: u64) -> usize {
+        let is_beyond = |address, cycle| {
+            let view = self.truth(address, cycle);
+            view.is_some_and(|view| view.surface == surface && view.range_mm >= self.end_mm())
+        };
+        let pixels = (0..=u16::MAX).map(PixelAddress);
+        pixels
+            .take(self.geometry.addresses())
+            .filter(|&address| is_beyond(address, 0) || is_beyond(address, cycles))
+            .count()
     }
 
     /// Range less truth of the last events of a pixel, oldest first.

@@ -61,6 +61,12 @@ impl Effects {
         *self != Self::default()
     }
 
+    /// Does the TDC take one photon a laser cycle?
+    #[must_use]
+    pub fn one_hit_tdc(&self) -> bool {
+        self.tdc.as_ref().is_some_and(|tdc| tdc.hits_per_cycle == 1)
+    }
+
     /// Are all numbers in their ranges?
     ///
     /// # Errors

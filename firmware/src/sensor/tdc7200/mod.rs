@@ -381,6 +381,10 @@ where
         }
     }
 
+    fn is_one_hit(&self) -> bool {
+        matches!(self.config.settings().stops, Stops::One)
+    }
+
     fn start(&mut self, bin_width: U16F16) {
         self.config.set_bin_width(bin_width);
         self.state = State::Off;
