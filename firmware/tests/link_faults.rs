@@ -37,6 +37,7 @@ const CONFIGURATION: Configuration = Configuration {
     output: 0,
     reference: 0,
     threshold: 0,
+    one_hit: 0,
 };
 
 /// Faults done to the bytes so far.

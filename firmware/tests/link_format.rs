@@ -101,6 +101,7 @@ fn a_host_configures_with_the_golden_frame() {
         output: 1,
         reference: 1,
         threshold: 100 << 8,
+        one_hit: 1,
     };
     host.offer(CONFIGURE, &configuration.to_le_bytes()).unwrap();
     assert_eq!(hex(&next(&mut host, 0)), hex(&golden("configure 0")));
@@ -199,14 +200,14 @@ proptest! {
 
     #[test]
     fn configurations_come_back(
-        words in any::<[u16; 10]>(), bin_width: u32, offset: i32, bytes in any::<[u8; 6]>(),
+        words in any::<[u16; 10]>(), bin_width: u32, offset: i32, bytes in any::<[u8; 7]>(),
         threshold: u32,
     ) {
         let [alpha, minimum_count, x, l1, l2, gate_first, gate_last, pixels, z, half_width] = words;
-        let [source, rule, window, estimator, output, reference] = bytes;
+        let [source, rule, window, estimator, output, reference, one_hit] = bytes;
         let configuration = Configuration {
             alpha, minimum_count, x, l1, l2, gate_first, gate_last, pixels, bin_width, offset,
-            source, rule, window, z, estimator, half_width, output, reference, threshold,
+            source, rule, window, z, estimator, half_width, output, reference, threshold, one_hit,
         };
         let bytes = configuration.to_le_bytes();
         prop_assert_eq!(Configuration::from_le_bytes(&bytes), Some(configuration));

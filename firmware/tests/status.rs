@@ -247,7 +247,7 @@ fn refused() -> Vec<(Vec<u8>, Refusal)> {
         ..CONFIGURATION
     };
     let mut all = vec![(good.to_le_bytes()[1..].to_vec(), Refusal::Unknown)];
-    let bad: [(Change, Refusal); 24] = [
+    let bad: [(Change, Refusal); 25] = [
         (|bad| bad.source = 2, Refusal::Unknown),
         (|bad| bad.rule = 2, Refusal::Unknown),
         (|bad| bad.rule = 1, Refusal::WindowWidth),
@@ -261,6 +261,7 @@ fn refused() -> Vec<(Vec<u8>, Refusal)> {
             |bad| (bad.estimator, bad.half_width) = (1, 1025),
             Refusal::HalfWidth,
         ),
+        (|bad| bad.one_hit = 2, Refusal::Unknown),
         (|bad| bad.output = 2, Refusal::Unknown),
         (
             |bad| (bad.output, bad.reference, bad.threshold) = (1, 2, 256),

@@ -2,7 +2,7 @@
 //!
 //! | kind | to | message | body |
 //! |---|---|---|---|
-//! | 0x01 | device | configure | [`Configuration`], 38 bytes |
+//! | 0x01 | device | configure | [`Configuration`], 39 bytes |
 //! | 0x02 | device | photons | [`Token`]s |
 //! | 0x03 | device | synchronise | anything |
 //! | 0x04 | device | statistics request | none |
@@ -207,11 +207,14 @@ pub struct Configuration {
     pub reference: u8,
     /// How far a mean depth has to move, in 1/256 mm; of dynamic depth.
     pub threshold: u32,
+    /// 1: the TDC takes one photon a laser cycle, so that events say when it piles up;
+    /// 0: any number.
+    pub one_hit: u8,
 }
 
 impl Configuration {
     /// Bytes of the record.
-    pub const BYTES: usize = 38;
+    pub const BYTES: usize = 39;
 
     /// As it is sent.
     #[must_use]
@@ -241,7 +244,8 @@ impl Configuration {
             .chain([self.source, self.rule, self.window, z, z_high])
             .chain([self.estimator, half_width, half_width_high])
             .chain([self.output, self.reference])
-            .chain(self.threshold.to_le_bytes());
+            .chain(self.threshold.to_le_bytes())
+            .chain([self.one_hit]);
         for (place, byte) in bytes.iter_mut().zip(all) {
             *place = byte;
         }
@@ -274,6 +278,7 @@ impl Configuration {
             output: *bytes.get(32)?,
             reference: *bytes.get(33)?,
             threshold: u32::from_le_bytes(four(34)?),
+            one_hit: *bytes.get(38)?,
         })
     }
 }
@@ -283,8 +288,8 @@ impl Configuration {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Refusal {
-    /// Not as long as the record, or of an unknown source, rule, estimator, output or
-    /// reference.
+    /// Not as long as the record, or of an unknown source, rule, estimator, output,
+    /// reference or number of hits.
     Unknown = 1,
     /// X is 0.
     ZeroX = 2,

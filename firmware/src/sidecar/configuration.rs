@@ -32,6 +32,11 @@ impl Sidecar<'_> {
         let rule = rule(wanted, minimum)?;
         let config = PixelConfig::new(wanted.x, wanted.l1, wanted.l2, gate, rule)?
             .with_estimator(estimator(wanted)?);
+        let config = match wanted.one_hit {
+            0 => config,
+            1 => config.with_one_hit_tdc(),
+            _ => return Err(Refusal::Unknown),
+        };
         let scale = RangeScale::new(bin_width, I24F8::from_bits(wanted.offset))?;
         let dynamic_depth = dynamic_depth(wanted, &scale)?;
         self.pixels.clear();

@@ -29,6 +29,7 @@ pub const CONFIGURATION: Configuration = Configuration {
     output: 0,
     reference: 0,
     threshold: 0,
+    one_hit: 0,
 };
 
 pub struct Host {

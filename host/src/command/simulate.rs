@@ -1,6 +1,5 @@
 //! `dtof simulate`: the photons of a scene file through the engine.
 
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -129,13 +128,6 @@ fn engine(
     let Some(device) = device else {
         return host_engine(settings, addresses);
     };
-    if settings.one_hit_tdc {
-        // Nobody may be reading it.
-        let _ = writeln!(
-            io::stderr(),
-            "pile-up is not flagged: the device is not told that the TDC takes one hit a laser cycle"
-        );
-    }
     let client = Client::new(device::open(device)?).with_context(|| device.to_owned())?;
     Ok(Box::new(DeviceEngine::new(client, settings, addresses)?))
 }

@@ -123,6 +123,7 @@ pub fn configuration(
         output,
         reference,
         threshold,
+        one_hit: settings.one_hit_tdc.into(),
     })
 }
 

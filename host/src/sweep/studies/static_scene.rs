@@ -4,7 +4,7 @@
 mod results;
 
 use anyhow::Result;
-use dtof_core::{DepthEvent, PixelAddress};
+use dtof_core::{DepthEvent, PixelAddress, Reflectivity};
 use rand_core::Rng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
@@ -47,7 +47,7 @@ const NOISES: [&str; 3] = [
 pub const STUDY: Study = Study {
     name: "static-scene",
     about: "first events, event rates, depth errors and reflectivity of two static scenes",
-    revision: 2,
+    revision: 3,
     few_seeds: 4,
     all_seeds: 40,
     points,
@@ -101,10 +101,7 @@ fn scene(point: &Point, shift: f64) -> Result<Scene> {
 struct Pixel {
     /// Of its events.
     positions: Vec<i64>,
-    /// Their counts in the peak, less the background.
-    counts: u64,
-    /// Their exposures.
-    exposed: u64,
+    reflectivity: Reflectivity,
     /// Of its frames.
     frames: Vec<i64>,
 }
@@ -112,12 +109,7 @@ struct Pixel {
 impl Pixel {
     fn add(&mut self, event: &DepthEvent) {
         self.positions.push(event.position().raw().into());
-        let above = event
-            .peak_count
-            .raw()
-            .saturating_sub(event.background.raw());
-        self.counts += u64::from(above);
-        self.exposed += u64::from(event.exposure);
+        self.reflectivity.add(event);
     }
 }
 
@@ -247,8 +239,8 @@ fn add_scene(tally: &mut Tally, scene: &Scene, addresses: &[PixelAddress], pixel
         (correlation * MILLION).round() as i64,
     );
     let estimates: [fn(&Pixel) -> f64; 2] = [
-        |pixel| pixel.positions.len() as f64,
-        |pixel| pixel.counts as f64 / pixel.exposed as f64,
+        |pixel| pixel.reflectivity.events().into(),
+        |pixel| pixel.reflectivity.signal().to_num(),
     ];
     for (name, estimate) in ESTIMATES.into_iter().zip(estimates) {
         // Estimate over truth, up to one scale for all. A pixel without an event is
