@@ -6,6 +6,7 @@ use dtof_core::{
 };
 use rayon::prelude::*;
 
+use crate::frame::FrameEngine;
 use crate::settings::Settings;
 use crate::source::{PixelPhotons, Slice};
 
@@ -50,6 +51,11 @@ pub fn host_engine(settings: &Settings, addresses: &[PixelAddress]) -> Result<Bo
 
 impl<const BINS: usize> HostEngine<BINS> {
     fn boxed(settings: &Settings, addresses: &[PixelAddress]) -> Result<Box<dyn Engine>> {
+        if let Some(length) = settings.frame {
+            return Ok(Box::new(FrameEngine::<BINS>::new(
+                settings, length, addresses,
+            )?));
+        }
         Ok(Box::new(Self {
             config: settings.config()?,
             pixels: addresses.iter().copied().map(AsyncPixel::new).collect(),

@@ -18,6 +18,7 @@ pub mod engine;
 pub mod events_csv;
 pub mod failures;
 pub mod figures;
+pub mod frame;
 pub mod maps;
 pub mod methods;
 pub mod monitor;

@@ -235,6 +235,7 @@ pub fn settings(seed: u64) -> Settings {
         l2: 2000,
         x: 10,
         one_hit_tdc: false,
+        frame: None,
         seed,
     }
 }

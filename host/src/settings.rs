@@ -35,6 +35,10 @@ pub struct Settings {
     /// Whether the TDC takes one photon a laser cycle, so that events say when that
     /// makes for pile-up.
     pub one_hit_tdc: bool,
+    /// A frame-based sensor instead: all pixels read their highest bin every so many
+    /// laser cycles, and rule, minimum, L1, L2 and X mean nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame: Option<u16>,
     /// Seed of every random number.
     pub seed: u64,
 }
@@ -64,11 +68,7 @@ impl Settings {
     /// # Errors
     /// The constraint the settings break.
     pub fn config<const BINS: usize>(&self) -> Result<PixelConfig<BINS, AnyRule>> {
-        let gate = match self.gate {
-            None => RangeGate::full(),
-            Some((first, last)) => RangeGate::new(first, last)
-                .with_context(|| format!("--gate {first}..{last} with {BINS} bins"))?,
-        };
+        let gate = self.range_gate()?;
         ensure!(self.min_count >= 1, "--min-count must be at least 1");
         let rule = self.rule.with_minimum_count(self.min_count)?;
         let config = PixelConfig::new(self.x, self.l1, self.l2, gate, rule)
@@ -78,6 +78,18 @@ impl Settings {
             config.with_one_hit_tdc()
         } else {
             config
+        })
+    }
+
+    /// The gate among `BINS` bins.
+    ///
+    /// # Errors
+    /// If it ends past the last, or is too narrow.
+    pub fn range_gate<const BINS: usize>(&self) -> Result<RangeGate<BINS>> {
+        Ok(match self.gate {
+            None => RangeGate::full(),
+            Some((first, last)) => RangeGate::new(first, last)
+                .with_context(|| format!("--gate {first}..{last} with {BINS} bins"))?,
         })
     }
 

@@ -114,15 +114,11 @@ impl Summary {
             ),
             row("exposures without an event", self.expired),
         ]);
-        let (x, l1) = (self.settings.x, self.settings.l1);
-        let last_look = self.cycles - self.cycles % u64::from(x);
-        if last_look <= u64::from(l1) {
+        let first_decision = self.settings.first_decision();
+        if self.cycles < first_decision {
             rows.push((
                 "too short for an event".to_owned(),
-                format!(
-                    "the first decision comes after {} laser cycles",
-                    (l1 / x + 1) * x
-                ),
+                format!("the first decision comes after {first_decision} laser cycles"),
             ));
         }
         // Losses are named where there are any.
@@ -159,18 +155,29 @@ impl Settings {
             row("range offset", format!("{} mm", self.offset_mm.0)),
             row("range gate", gate),
         ];
-        rows.extend(self.detection_rows());
-        rows.extend([
-            row(
-                "decisions",
+        let [threshold, depth] = self.detection_rows();
+        let decisions = match self.frame {
+            None => {
+                rows.push(threshold);
                 format!(
                     "every {} laser cycles (X), in exposures longer than {} (L1) and shorter than {} (L2)",
                     self.x, self.l1, self.l2
-                ),
-            ),
+                )
+            }
+            Some(length) => format!("the highest bin of each frame of {length} laser cycles"),
+        };
+        rows.extend([
+            depth,
+            row("decisions", decisions),
             row("seed", self.seed.to_string()),
         ]);
         rows
+    }
+
+    /// Laser cycles until the first.
+    fn first_decision(&self) -> u64 {
+        let (x, l1) = (u64::from(self.x), u64::from(self.l1));
+        self.frame.map_or((l1 / x + 1) * x, u64::from)
     }
 
     /// Rule and estimator.

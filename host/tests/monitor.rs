@@ -43,6 +43,7 @@ fn settings() -> Settings {
         l2: 2000,
         x: 4,
         one_hit_tdc: false,
+        frame: None,
         seed: 0,
     }
 }

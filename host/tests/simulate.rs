@@ -256,3 +256,33 @@ fn the_documents_defaults_are_those_of_an_empty_file() {
     }
     assert_eq!(defaults, 12);
 }
+
+/// A frame has an event of each pixel with a target, at its end, and nothing between.
+#[test]
+fn frames_read_all_pixels_at_once() {
+    let scratch = Scratch::new();
+    let scene = repository("scenes/static.toml");
+    let frames = ["--frame", "2000", "--cycles", "4500", "--quiet"];
+    let summary = simulated(&scratch, &scene, &frames);
+    assert_eq!(summary["settings"]["frame"], 2000);
+    let events = scratch.read("out/events.csv");
+    let rows: Vec<Vec<&str>> = events
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').collect())
+        .collect();
+    for cycle in ["1999", "3999"] {
+        let of_frame = rows
+            .iter()
+            .filter(|row| row[0] == cycle && row[2] == "2000");
+        assert!(of_frame.count() > 32 * 16 * 9 / 10);
+    }
+    assert!(rows.len() <= 2 * 32 * 16);
+
+    for more in [["--l1", "20"], ["--alpha", "4"], ["--device", "qemu"]] {
+        let refused = scratch.simulate(&scene, &[&frames[..], &more].concat());
+        assert!(!refused.status.success());
+        let lines = refused.stderr.iter().filter(|&&byte| byte == b'\n');
+        assert_eq!(lines.count(), 1);
+    }
+}

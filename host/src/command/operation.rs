@@ -30,6 +30,11 @@ pub struct Operation {
     /// Laser cycles between looks
     #[arg(long, value_name = "N", default_value_t = 4)]
     x: u16,
+    /// A frame-based sensor instead, to compare with: every pixel reads its highest bin every N
+    /// laser cycles, whatever stands in it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..),
+        conflicts_with_all = ["rule", "alpha", "window", "z", "false_one_in", "min_count", "l1", "l2", "x"])]
+    frame: Option<u16>,
 }
 
 impl Operation {
@@ -66,6 +71,7 @@ impl Operation {
             l2: self.l2,
             x: self.x,
             one_hit_tdc: false,
+            frame: self.frame,
             seed,
         })
     }

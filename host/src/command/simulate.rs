@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::{Engine, host_engine};
@@ -128,6 +128,10 @@ fn engine(
     let Some(device) = device else {
         return host_engine(settings, addresses);
     };
+    ensure!(
+        settings.frame.is_none(),
+        "--frame is not for --device: a device reports events"
+    );
     let client = Client::new(device::open(device)?).with_context(|| device.to_owned())?;
     Ok(Box::new(DeviceEngine::new(client, settings, addresses)?))
 }

@@ -2,12 +2,12 @@
 //! photons.
 
 use anyhow::Result;
-use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AnyRule, AsyncPixel, BinPosition, Count, Count16, DepthEstimator, Histogram, LaserCycle,
-    PaperRule, PixelAddress, PixelConfig, RangeGate, detect,
+    AnyRule, AsyncPixel, BinPosition, DepthEstimator, DepthEvent, LaserCycle, PixelAddress,
+    PixelConfig, RangeGate,
 };
 
+use crate::frame::FramePixel;
 use crate::scene;
 use crate::settings::Settings;
 
@@ -55,62 +55,32 @@ pub struct Reading {
 }
 
 impl Reading {
+    /// What an event or a frame reports.
+    pub fn of(event: &DepthEvent) -> Self {
+        Self {
+            first: event.cycle.0 + 1 - u64::from(event.exposure),
+            last: event.cycle.0,
+            position: event.position().raw().into(),
+        }
+    }
+
     /// How many laser cycles it was exposed for.
     pub const fn exposure(&self) -> u64 {
         self.last + 1 - self.first
     }
 }
 
-/// A pixel of a frame-based sensor: exposures of equal length, each read out with
-/// its highest bin, whatever that is, and the same centre of mass as that of
-/// events. Counters are 16 bits wide, so that they hold a frame.
-pub struct FramePixel {
-    first: u64,
-    length: u64,
-    histogram: Histogram<BINS, Count16>,
+/// Frames of a pixel of 128 bins, the first from laser cycle `first` on.
+pub fn frames(first: u64, length: u64) -> FramePixel<BINS> {
+    let length = u16::try_from(length).unwrap_or(u16::MAX);
+    FramePixel::new(PixelAddress(0), first, length)
 }
 
-impl FramePixel {
-    /// The first frame begins with laser cycle `first`.
-    pub const fn new(first: u64, length: u64) -> Self {
-        Self {
-            first,
-            length,
-            histogram: Histogram::new(),
-        }
-    }
-
-    /// Counts a photon of laser cycle `cycle`.
-    pub fn count(&mut self, cycle: u64, code: u16) {
-        if cycle >= self.first {
-            self.histogram.add(code);
-        }
-    }
-
-    /// Ends laser cycle `cycle`. None until the frame ends, or if no bin stands
-    /// above the background.
-    pub fn end_laser_cycle(&mut self, cycle: u64) -> Option<Reading> {
-        if cycle + 1 < self.first + self.length {
-            return None;
-        }
-        let any = PaperRule::new(U8F8::ZERO, Count::saturating(1));
-        let found = detect(
-            &self.histogram,
-            &RangeGate::full(),
-            &any,
-            &DepthEstimator::default(),
-        );
-        let first = self.first;
-        self.first = cycle + 1;
-        self.histogram.clear();
-        found.map(|found| Reading {
-            first,
-            last: cycle,
-            position: BinPosition::of(found.peak.bin, found.depth.offset)
-                .raw()
-                .into(),
-        })
-    }
+/// Ends a laser cycle of frames; without a gate, and with the same centre of mass as that
+/// of events.
+pub fn end_laser_cycle(frames: &mut FramePixel<BINS>, cycle: u64) -> Option<Reading> {
+    let read = frames.end_laser_cycle(&RangeGate::full(), &DepthEstimator::default(), cycle);
+    read.as_ref().map(Reading::of)
 }
 
 /// What each of [`SENSORS`] reports of `cycles` laser cycles. The frames of each
@@ -124,24 +94,20 @@ pub fn watch(
 ) -> Result<[Vec<Reading>; 5]> {
     let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(0));
     let mut lengths = FRAMES.into_iter();
-    let mut frames = phases.map(|first| FramePixel::new(first, lengths.next().unwrap_or_default()));
+    let mut frames = phases.map(|first| frames(first, lengths.next().unwrap_or_default()));
     let mut readings: [Vec<Reading>; 5] = Default::default();
     for cycle in 0..cycles {
         photons(cycle, &mut |code| {
             pixel.count(config, code);
             for frame in &mut frames {
-                frame.count(cycle, code);
+                frame.count(&RangeGate::full(), cycle, code);
             }
         })?;
         pixel.end_laser_cycle(config, LaserCycle(cycle));
         let [events, of_frames @ ..] = &mut readings;
-        events.extend(pixel.acknowledge().map(|event| Reading {
-            first: cycle + 1 - u64::from(event.exposure),
-            last: cycle,
-            position: event.position().raw().into(),
-        }));
+        events.extend(pixel.acknowledge().as_ref().map(Reading::of));
         for (readings, frame) in of_frames.iter_mut().zip(&mut frames) {
-            readings.extend(frame.end_laser_cycle(cycle));
+            readings.extend(end_laser_cycle(frame, cycle));
         }
     }
     Ok(readings)

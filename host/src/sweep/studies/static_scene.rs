@@ -4,12 +4,12 @@
 mod results;
 
 use anyhow::Result;
-use dtof_core::{DepthEvent, PixelAddress, Reflectivity};
+use dtof_core::{DepthEvent, PixelAddress, RangeGate, Reflectivity};
 use rand_core::Rng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 
-use super::one_pixel::{FramePixel, PER_BIN, in_parts};
+use super::one_pixel::{self, PER_BIN, in_parts};
 use super::ranks::rank_correlation;
 use crate::engine::host_engine;
 use crate::scene::{self, Light, Scene};
@@ -120,9 +120,9 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let addresses = photons.addresses();
     let mut engine = host_engine(&settings, &addresses)?;
     let mut pixels: Vec<Pixel> = addresses.iter().map(|_| Pixel::default()).collect();
-    let mut frames: Vec<FramePixel> = addresses
+    let mut frames: Vec<_> = addresses
         .iter()
-        .map(|_| FramePixel::new(0, FRAME))
+        .map(|_| one_pixel::frames(0, FRAME))
         .collect();
     let mut tally = Tally::new();
     for _ in 0..CYCLES / u64::from(SLICE) {
@@ -140,9 +140,9 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             for cycle in 0..SLICE {
                 let now = slice.first_cycle + u64::from(cycle);
                 while let Some(photon) = codes.next_if(|photon| photon.cycle == cycle) {
-                    frame.count(now, photon.code);
+                    frame.count(&RangeGate::full(), now, photon.code);
                 }
-                let reading = frame.end_laser_cycle(now);
+                let reading = one_pixel::end_laser_cycle(frame, now);
                 pixel.frames.extend(reading.map(|reading| reading.position));
             }
         }
