@@ -1,6 +1,8 @@
 //! A device with a sensor: its events as they come, and once a second what it
 //! does.
 
+pub mod map;
+
 use std::io::{self, ErrorKind, Write};
 use std::time::{Duration, Instant};
 
@@ -13,6 +15,7 @@ use dtof_firmware::sensor::SensorFault;
 use crate::device::{Client, configuration};
 use crate::events_csv;
 use crate::settings::Settings;
+use map::LiveMap;
 
 /// How often there are statistics.
 const EVERY: Duration = Duration::from_secs(1);
@@ -34,7 +37,15 @@ pub fn monitor(
     done: impl Fn(Duration) -> bool,
     events: &mut impl Write,
     statistics: &mut impl Write,
+    mut map: Option<&mut LiveMap>,
 ) -> Result<()> {
+    let mut state = |line: String, map: &mut Option<&mut LiveMap>| match map {
+        None => still_open(writeln!(statistics, "{line}")),
+        Some(map) => {
+            map.tell(line);
+            still_open(map.draw())
+        }
+    };
     let scale = settings.range_scale()?;
     client.configure(&configuration(settings, pixels, 1)?)?;
     let started = Instant::now();
@@ -52,9 +63,14 @@ pub fn monitor(
             asked = true;
         }
         let report = client.poll_report()?;
-        open = still_open(write(events, &client.take_events(), &scale))?;
+        let new = client.take_events();
+        open = still_open(write(events, &new, &scale))?;
+        if let Some(map) = &mut map {
+            map.add(&new, &scale);
+            open &= still_open(map.draw_when_due())?;
+        }
         if let Some(report) = report {
-            open &= still_open(writeln!(statistics, "{}", figures.line(client, &report)))?;
+            open &= state(figures.line(client, &report), &mut map)?;
             asked = false;
         }
     }
@@ -68,7 +84,7 @@ pub fn monitor(
                 break report;
             }
         };
-        open &= still_open(writeln!(statistics, "{}", figures.line(client, &report)))?;
+        open &= state(figures.line(client, &report), &mut map)?;
     }
     // After the answer there are no more events.
     client.configure(&configuration(settings, pixels, 0)?)?;

@@ -249,6 +249,7 @@ fn events_come_out_as_the_pixels_report_them_and_statistics_once_a_second() {
         |elapsed| elapsed >= length,
         &mut events,
         &mut statistics,
+        None,
     )
     .unwrap();
     assert!((3.8..8.0).contains(&started.elapsed().as_secs_f64()));
@@ -327,6 +328,7 @@ fn a_sensor_that_does_not_answer_is_named() {
         |elapsed| elapsed >= Duration::from_secs(1),
         &mut events,
         &mut statistics,
+        None,
     )
     .unwrap();
     let statistics = String::from_utf8(statistics).unwrap();
@@ -364,6 +366,7 @@ fn a_reader_that_has_seen_enough_ends_it() {
             |_| false,
             &mut events,
             &mut statistics,
+            None,
         )
         .unwrap();
     }
@@ -380,6 +383,7 @@ fn a_device_that_goes_or_has_no_sensor_is_an_error() {
         |_| false,
         &mut events,
         &mut statistics,
+        None,
     );
     let error = format!("{:#}", error.unwrap_err());
     assert!(error.contains("the device cannot be"), "{error}");
@@ -394,6 +398,7 @@ fn a_device_that_goes_or_has_no_sensor_is_an_error() {
         |_| false,
         &mut events,
         &mut statistics,
+        None,
     );
     let error = format!("{:#}", error.unwrap_err());
     assert!(error.contains("the device has no sensor"), "{error}");
@@ -455,4 +460,49 @@ fn the_command_prints_rows_and_says_when_the_device_is_gone() {
     let error = String::from_utf8(output.stderr).unwrap();
     assert!(error.contains("error: tcp:127.0.0.1:"), "{error}");
     assert!(output.stdout.len() > 200);
+}
+
+#[test]
+fn a_map_needs_a_terminal() {
+    let output = Command::new(env!("CARGO_BIN_EXE_dtof"))
+        .args(["monitor", "--device", "tcp:127.0.0.1:1", "--map"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(
+        String::from_utf8(output.stderr).unwrap(),
+        "error: --map draws on standard error, which is no terminal here\n"
+    );
+}
+
+/// `script` of util-linux gives the command a terminal.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_map_is_drawn_on_a_terminal_and_ctrl_c_gives_the_cursor_back() {
+    let name = device(true, Duration::from_secs(60));
+    let dtof = env!("CARGO_BIN_EXE_dtof");
+    let command = format!("'{dtof}' monitor --pixels 4 --map --device {name}");
+    let mut terminal = Command::new("script")
+        .args(["--quiet", "--return", "--flush", "--command"])
+        .args([&command, "/dev/null"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut screen = BufReader::new(terminal.stdout.take().unwrap());
+    let mut drawn = String::new();
+    // Until a second has passed.
+    while !drawn.contains("events/s ") {
+        assert!(screen.read_line(&mut drawn).unwrap() > 0, "{drawn}");
+    }
+    // Ctrl-C.
+    terminal.stdin.as_mut().unwrap().write_all(b"\x03").unwrap();
+    screen.read_to_string(&mut drawn).unwrap();
+    assert!(terminal.wait().unwrap().success(), "{drawn}");
+
+    assert!(drawn.contains("4 of 4 pixels"), "{drawn}");
+    assert!(drawn.contains("\x1b[3A"), "drawn in place: {drawn}");
+    assert!(drawn.contains('▀') && !drawn.contains("cycle,pixel"));
+    let (_, end) = drawn.rsplit_once("\x1b[?25l").unwrap();
+    assert!(end.ends_with("\x1b[?25h"), "{end}");
 }

@@ -179,6 +179,7 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
         |elapsed| elapsed >= Duration::from_secs(3),
         &mut events,
         &mut statistics,
+        None,
     )
     .context(name)?;
     // Less their header.
