@@ -147,7 +147,9 @@ function drawAxes(lines, sides, eye, { ink, soft }) {
     lines.textBaseline = "middle";
     lines.strokeStyle = lines.fillStyle = soft;
     let widest = 0;
-    for (const value of ticks(side.low, side.high, length / 55, side.whole)) {
+    // Numbers beside an upright edge need less of it than those below a level one.
+    const most = length / (24 + 36 * Math.abs(outY));
+    for (const value of ticks(side.low, side.high, most, side.whole)) {
       const at = share(value, side.low, side.high);
       const tick = [from.x + at * x, from.y + at * y];
       lines.beginPath();

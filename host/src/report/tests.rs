@@ -179,6 +179,13 @@ fn a_page_says_how_many_of_the_events_it_shows() {
 }
 
 #[test]
+fn the_most_events_stay_below_the_documented_size() {
+    assert_eq!(Sample::LIMIT, 262_144);
+    let base64 = base64::encoded_len(10 * Sample::LIMIT, true).unwrap();
+    assert!((3_450_000..3_550_000).contains(&base64)); // 3.5 MB
+}
+
+#[test]
 fn without_scripting_the_maps_are_left() {
     let page = page(&sample(10, 10), 10, &[], &[]);
     let (_, note) = page.split_once("id=\"unscripted\">").unwrap();
