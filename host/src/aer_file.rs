@@ -7,8 +7,8 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
-    AER_VERSION, AerDecoder, AerEncoder, AerRecord, AerWord, DepthEvent, DynamicDepthEvent,
-    LaserCycle, PixelAddress,
+    AER_VERSION, AerDecoder, AerEncoder, AerRecord, AerWord, BinPosition, DepthEvent,
+    DynamicDepthEvent, LaserCycle, PixelAddress,
 };
 
 use crate::source::Geometry;
@@ -35,6 +35,15 @@ impl Event {
         match self {
             Self::Depth(event) => event.pixel,
             Self::DynamicDepth(event) => event.pixel,
+        }
+    }
+
+    /// Where: the pulse, or the mean of the last ones.
+    #[must_use]
+    pub fn position(&self) -> BinPosition {
+        match self {
+            Self::Depth(event) => event.position(),
+            Self::DynamicDepth(event) => event.position,
         }
     }
 

@@ -32,7 +32,11 @@ pub fn header(event: &Event) -> &'static str {
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write_event(out: &mut impl Write, event: &Event, scale: &RangeScale) -> io::Result<()> {
+pub fn write_event(
+    out: &mut (impl Write + ?Sized),
+    event: &Event,
+    scale: &RangeScale,
+) -> io::Result<()> {
     match event {
         Event::Depth(event) => write(out, event, scale),
         Event::DynamicDepth(event) => write_dynamic_depth(out, event, scale),
@@ -49,7 +53,11 @@ pub fn range_mm(event: &DepthEvent, scale: &RangeScale) -> f64 {
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write(out: &mut impl Write, event: &DepthEvent, scale: &RangeScale) -> io::Result<()> {
+pub fn write(
+    out: &mut (impl Write + ?Sized),
+    event: &DepthEvent,
+    scale: &RangeScale,
+) -> io::Result<()> {
     let depth_bins = f64::from(event.position().raw()) / 256.0;
     writeln!(
         out,
@@ -70,7 +78,7 @@ pub fn write(out: &mut impl Write, event: &DepthEvent, scale: &RangeScale) -> io
 /// # Errors
 /// Those of the writer.
 pub fn write_dynamic_depth(
-    out: &mut impl Write,
+    out: &mut (impl Write + ?Sized),
     event: &DynamicDepthEvent,
     scale: &RangeScale,
 ) -> io::Result<()> {

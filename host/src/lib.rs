@@ -29,6 +29,7 @@ pub mod picture;
 pub mod recorded;
 pub mod report;
 pub mod run;
+pub mod sample;
 pub mod scene;
 pub mod settings;
 pub mod simulation;

@@ -1,6 +1,8 @@
 //! A device with a sensor: its events as they come, and once a second what it
 //! does.
 
+pub mod map;
+
 use std::io::{self, ErrorKind, Write};
 use std::time::{Duration, Instant};
 
@@ -15,15 +17,57 @@ use crate::device::{Client, configuration};
 use crate::dynamic_depth::DynamicDepth;
 use crate::events_csv;
 use crate::settings::Settings;
+use map::LiveMap;
 
 /// How often there are statistics.
 const EVERY: Duration = Duration::from_secs(1);
 
-/// Has the device take photons from its sensor and writes its events as CSV to
-/// `events` as they come, and a line of statistics a second to `statistics`: rates,
-/// and of what was lost or went wrong all that did, counted from the beginning.
-///
-/// With `dynamic_depth` the events are changes of depth.
+/// What the device is to do.
+#[derive(Clone, Copy, Debug)]
+pub struct Task<'a> {
+    /// How its pixels operate.
+    pub settings: &'a Settings,
+    /// How many, addresses 0 up.
+    pub pixels: u16,
+    /// It is to send changes of depth in place of depth events.
+    pub dynamic_depth: Option<DynamicDepth>,
+}
+
+/// Where what it does is written.
+pub struct Outputs<'a> {
+    /// Its events as CSV, as they come.
+    pub events: &'a mut dyn Write,
+    /// A line a second: rates, and of what was lost or went wrong all that did, counted
+    /// from the beginning.
+    pub statistics: &'a mut dyn Write,
+    /// The ranges as a picture, and then the lines of statistics below it.
+    pub map: Option<&'a mut LiveMap>,
+}
+
+impl Outputs<'_> {
+    /// A line of statistics. Says whether somebody still reads them.
+    fn tell(&mut self, line: String) -> io::Result<bool> {
+        match &mut self.map {
+            None => still_open(writeln!(self.statistics, "{line}")),
+            Some(map) => {
+                map.tell(line);
+                still_open(map.draw())
+            }
+        }
+    }
+
+    /// Events. Says whether somebody still reads them.
+    fn write(&mut self, events: &[Event], scale: &RangeScale) -> io::Result<bool> {
+        let open = still_open(write(self.events, events, scale))?;
+        let Some(map) = &mut self.map else {
+            return Ok(open);
+        };
+        map.add(events, scale);
+        Ok(still_open(map.draw_when_due())? && open)
+    }
+}
+
+/// Has the device take photons from its sensor, and writes what it does to `outputs`.
 ///
 /// Ends when `done`, asked again and again, says so of the time it has taken, or
 /// when nobody reads the output any more. The device takes no photons from its
@@ -33,15 +77,14 @@ const EVERY: Duration = Duration::from_secs(1);
 /// If the device refuses the settings or is gone, or what is written cannot be.
 pub fn monitor(
     client: &mut Client,
-    settings: &Settings,
-    pixels: u16,
-    dynamic_depth: Option<DynamicDepth>,
+    task: &Task,
     done: impl Fn(Duration) -> bool,
-    events: &mut impl Write,
-    statistics: &mut impl Write,
+    outputs: &mut Outputs,
 ) -> Result<()> {
-    let scale = settings.range_scale()?;
-    client.configure(&configuration(settings, pixels, 1, dynamic_depth)?)?;
+    let configuration =
+        |source| configuration(task.settings, task.pixels, source, task.dynamic_depth);
+    let scale = task.settings.range_scale()?;
+    client.configure(&configuration(1)?)?;
     let started = Instant::now();
     let mut figures = Figures {
         since: started,
@@ -49,11 +92,11 @@ pub fn monitor(
         first: client.report()?,
         last: Statistics::default(),
     };
-    let columns = match dynamic_depth {
+    let columns = match task.dynamic_depth {
         None => events_csv::HEADER,
         Some(_) => events_csv::DYNAMIC_DEPTH_HEADER,
     };
-    let mut open = still_open(header(events, columns))?;
+    let mut open = still_open(header(outputs.events, columns))?;
     let mut asked = false;
     while open && !done(started.elapsed()) {
         if !asked && figures.since.elapsed() >= EVERY {
@@ -61,9 +104,9 @@ pub fn monitor(
             asked = true;
         }
         let report = client.poll_report()?;
-        open = still_open(write(events, &client.take_events(), &scale))?;
+        open = outputs.write(&client.take_events(), &scale)?;
         if let Some(report) = report {
-            open &= still_open(writeln!(statistics, "{}", figures.line(client, &report)))?;
+            open &= outputs.tell(figures.line(client, &report))?;
             asked = false;
         }
     }
@@ -77,24 +120,24 @@ pub fn monitor(
                 break report;
             }
         };
-        open &= still_open(writeln!(statistics, "{}", figures.line(client, &report)))?;
+        open &= outputs.tell(figures.line(client, &report))?;
     }
     // After the answer there are no more events.
-    client.configure(&configuration(settings, pixels, 0, dynamic_depth)?)?;
+    client.configure(&configuration(0)?)?;
     if open {
-        still_open(write(events, &client.take_events(), &scale))?;
+        outputs.write(&client.take_events(), &scale)?;
     }
     Ok(())
 }
 
-fn header(out: &mut impl Write, columns: &str) -> io::Result<()> {
+fn header(out: &mut dyn Write, columns: &str) -> io::Result<()> {
     writeln!(out, "{columns}")?;
     out.flush()
 }
 
-fn write(out: &mut impl Write, events: &[Event], scale: &RangeScale) -> io::Result<()> {
+fn write(out: &mut dyn Write, events: &[Event], scale: &RangeScale) -> io::Result<()> {
     for event in events {
-        events_csv::write_event(out, event, scale)?;
+        events_csv::write_event(&mut *out, event, scale)?;
     }
     if events.is_empty() {
         return Ok(());

@@ -4,6 +4,8 @@
 //! Every file is written beside its place. When all are whole they are moved
 //! there, the summary last: a folder with a summary is complete.
 
+mod pictures;
+
 use std::fs;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -13,13 +15,14 @@ use dtof_core::{DepthEvent, RangeScale};
 use tempfile::NamedTempFile;
 
 use crate::aer_file;
-use crate::events_csv;
+use crate::events_csv::{self, range_mm};
 use crate::maps::Maps;
-use crate::picture::{Map, heat_map};
-use crate::report::{self, Figure, Section};
+use crate::report::{self, Cloud, Figure, Section};
+use crate::sample::Sample;
 use crate::settings::Settings;
 use crate::source::Geometry;
 use crate::summary::Summary;
+use pictures::pictures;
 
 /// What makes a folder complete: moved to its place last.
 const SUMMARY: &str = "summary.json";
@@ -33,6 +36,7 @@ pub struct Output {
     aer: aer_file::Writer<BufWriter<NamedTempFile>>,
     scale: RangeScale,
     maps: Maps,
+    sample: Sample,
 }
 
 impl Output {
@@ -60,6 +64,7 @@ impl Output {
             aer,
             scale,
             maps: Maps::new(geometry),
+            sample: Sample::new(Sample::LIMIT),
         })
     }
 
@@ -73,6 +78,7 @@ impl Output {
                 .and_then(|()| self.aer.write(&aer_file::Event::Depth(*event)))
                 .with_context(|| self.folder.display().to_string())?;
             self.maps.add(event, &self.scale);
+            self.sample.add(event, range_mm(event, &self.scale));
         }
         Ok(())
     }
@@ -95,7 +101,7 @@ impl Output {
         lead: &str,
         sections: &[Section],
     ) -> Result<()> {
-        let pictures = pictures(&self.maps)?;
+        let pictures = pictures(&self.maps, summary.cycles)?;
         let figures: Vec<Figure> = pictures
             .iter()
             .map(|picture| Figure {
@@ -117,7 +123,13 @@ impl Output {
             heading: "Settings",
             rows: &settings,
         });
-        let report = report::html(title, lead, &all, &figures);
+        let cloud = Cloud {
+            geometry: self.maps.geometry,
+            cycles: summary.cycles,
+            sample: &self.sample,
+            pixels: &self.maps.spread(),
+        };
+        let report = report::html(title, lead, &all, &figures, &cloud);
 
         let aside = |text: &str| -> Result<NamedTempFile> {
             let mut file = aside(&self.folder)?;
@@ -189,51 +201,4 @@ fn flushed(file: BufWriter<NamedTempFile>) -> Result<NamedTempFile> {
         .map_err(std::io::IntoInnerError::into_error)?;
     file.as_file().sync_all()?;
     Ok(file)
-}
-
-struct Picture {
-    name: &'static str,
-    svg: String,
-    caption: &'static str,
-}
-
-/// The three maps of a run.
-#[allow(clippy::cast_precision_loss, reason = "a picture")]
-fn pictures(maps: &Maps) -> Result<[Picture; 3]> {
-    let draw = |name, title, unit, caption, values: Vec<Option<f64>>| -> Result<Picture> {
-        let Geometry { columns, rows } = maps.geometry;
-        let (columns, rows) = (columns as usize, rows as usize);
-        let svg = heat_map(&Map {
-            title,
-            unit,
-            columns,
-            rows,
-            values: &values,
-        })?;
-        Ok(Picture { name, svg, caption })
-    };
-    let pixels = || maps.pixels.iter();
-    Ok([
-        draw(
-            "depth-last.svg",
-            "Range, last event",
-            "mm",
-            "The range of the last event of each pixel.",
-            pixels().map(|pixel| pixel.last_mm()).collect(),
-        )?,
-        draw(
-            "depth-mean.svg",
-            "Range, mean of the last ten events",
-            "mm",
-            "The mean range of the last ten events of each pixel, or of as many as it has.",
-            pixels().map(|pixel| pixel.mean_mm()).collect(),
-        )?,
-        draw(
-            "event-counts.svg",
-            "Events",
-            "events",
-            "How many events each pixel reported. Near and bright surfaces report more often.",
-            pixels().map(|pixel| Some(pixel.events as f64)).collect(),
-        )?,
-    ])
 }

@@ -15,6 +15,8 @@ mod tests;
 
 use anyhow::{Result, ensure};
 
+use plotters::prelude::{RGBColor, ViridisRGB};
+
 use layout::Layout;
 use scale::Scale;
 
@@ -62,14 +64,28 @@ pub fn heat_map(map: &Map) -> Result<String> {
     ensure!(!map.values.is_empty(), "a map without pixels");
 
     let scale = Scale::new(map.values);
-    let levels: Vec<_> = map
-        .values
-        .iter()
-        .map(|value| Some(scale.as_ref()?.level(finite(*value)?)))
-        .collect();
+    let levels = levels(map.values);
     let silent = levels.iter().filter(|level| level.is_none()).count();
     let layout = Layout::new(map, scale.as_ref(), silent);
     draw::document(&layout, &levels)
+}
+
+/// What the colours of a map span, lowest and highest; `None` without values.
+pub(crate) fn span(values: &[Option<f64>]) -> Option<(f64, f64)> {
+    Scale::new(values).map(|scale| scale.span())
+}
+
+/// The places of `values` in the colours, as a map shows them.
+pub(crate) fn levels(values: &[Option<f64>]) -> Vec<Option<u8>> {
+    let scale = Scale::new(values);
+    let level = |value: &Option<f64>| Some(scale.as_ref()?.level(finite(*value)?));
+    values.iter().map(level).collect()
+}
+
+/// The colour of a level: red, green and blue.
+pub(crate) fn colour(level: u8) -> (u8, u8, u8) {
+    let RGBColor(red, green, blue) = ViridisRGB::get_color(f64::from(level) / f64::from(u8::MAX));
+    (red, green, blue)
 }
 
 /// The value of a pixel that has one.

@@ -1,7 +1,14 @@
 //! The report on a run: one HTML page with everything in it.
 
+mod cloud;
 #[cfg(test)]
 mod tests;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use sha2::{Digest, Sha256};
+
+pub use cloud::Cloud;
 
 use crate::picture::{escape, one_line};
 
@@ -25,50 +32,37 @@ pub struct Section<'a> {
 }
 
 /// Colours follow the reader's scheme, the columns the width of the window.
-const STYLE: &str = "\
-:root{color-scheme:light dark;\
---page:#f6f8fa;--card:#fff;--ink:#1f2328;--soft:#59636e;--line:#d1d9e0}
-@media (prefers-color-scheme:dark){:root{\
---page:#010409;--card:#0d1117;--ink:#e6edf3;--soft:#9198a1;--line:#30363d}}
-*{box-sizing:border-box}
-body{margin:0;background:var(--page);color:var(--ink);\
-font:1rem/1.5 system-ui,sans-serif;-webkit-text-size-adjust:100%}
-main{max-width:84rem;margin:0 auto;padding:clamp(1rem,4vw,3rem)}
-h1{font-size:clamp(1.5rem,4vw,2.1rem);line-height:1.2;margin:0 0 .5rem}
-h1,h2,p,figcaption,th,td{overflow-wrap:anywhere}
-h2{font-size:1.1rem;line-height:1.3;margin:0;padding:1rem 1rem .5rem}
-header p{max-width:44rem;margin:0;color:var(--soft)}
-.cards{columns:2 30rem;column-gap:1.25rem;margin-top:1.75rem}
-figure,section{margin:0 0 1.25rem;overflow:hidden;break-inside:avoid;background:var(--card);\
-border:1px solid var(--line);border-radius:.6rem}
-svg{display:block;margin:0 auto;max-width:100%;height:auto}
-figcaption{padding:.7rem 1rem .8rem;border-top:1px solid var(--line);color:var(--soft)}
-table{width:100%;border-collapse:collapse}
-th,td{padding:.4rem 1rem;border-top:1px solid var(--line);text-align:left;vertical-align:top}
-th{width:42%;font-weight:400;color:var(--soft)}
-td{font-variant-numeric:tabular-nums}
-@media (max-width:34rem){main{padding:1rem .6rem}figure,section{margin-bottom:.9rem}}
-";
+const STYLE: &str = include_str!("report/page.css");
 
-/// A page with `title` and the paragraph `lead`, then all `figures`, then all
-/// `sections`.
+/// A page with `title` and the paragraph `lead`, the events to turn and look at, then
+/// all `figures`, then all `sections`.
 ///
-/// The page is whole: it loads nothing and runs no script. All texts are
-/// escaped. Figures are taken as they are, and define no identifiers.
+/// The page is whole: it loads nothing, and runs no script but its own, which the
+/// policy at its head names by its hash. All texts are escaped. Figures are taken as
+/// they are, and define no identifiers.
 #[must_use]
-pub fn html(title: &str, lead: &str, sections: &[Section], figures: &[Figure]) -> String {
+pub fn html(
+    title: &str,
+    lead: &str,
+    sections: &[Section],
+    figures: &[Figure],
+    events: &Cloud,
+) -> String {
     let title = text(title);
     let lead = text(lead);
+    let hash = BASE64.encode(Sha256::digest(cloud::SCRIPT));
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n\
          <meta http-equiv=\"Content-Security-Policy\" \
-         content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">\n\
+         content=\"default-src 'none'; script-src 'sha256-{hash}'; \
+         style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'\">\n\
          <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n\
-         <body>\n<main>\n<header>\n<h1>{title}</h1>\n<p>{lead}</p>\n</header>\n\
-         <div class=\"cards\">\n"
+         <body>\n<main>\n<header>\n<h1>{title}</h1>\n<p>{lead}</p>\n</header>\n"
     );
+    page += &events.html();
+    page += "<div class=\"cards\">\n";
     for figure in figures {
         let svg = element(figure.svg);
         let caption = text(figure.caption);

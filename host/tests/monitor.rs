@@ -9,11 +9,12 @@ use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use anyhow::Result;
 use dtof::detection::{Estimator, Rule};
 use dtof::device::{self, Client};
 use dtof::dynamic_depth::DynamicDepth;
 use dtof::events_csv;
-use dtof::monitor::{losses, monitor};
+use dtof::monitor::{Outputs, Task, losses, monitor};
 use dtof::settings::{I24F8Number, Settings, U16F16Number};
 use dtof_core::fixed::types::{I24F8, U0F32, U8F8, U8F24, U16F16, U24F8};
 use dtof_core::{
@@ -245,6 +246,27 @@ fn reference(cycles: u64) -> String {
     String::from_utf8(csv).unwrap()
 }
 
+/// What the device does, without a picture.
+fn watch(
+    client: &mut Client,
+    dynamic_depth: Option<DynamicDepth>,
+    done: impl Fn(Duration) -> bool,
+    events: &mut dyn Write,
+    statistics: &mut dyn Write,
+) -> Result<()> {
+    let task = Task {
+        settings: &settings(),
+        pixels: PIXELS,
+        dynamic_depth,
+    };
+    let mut outputs = Outputs {
+        events,
+        statistics,
+        map: None,
+    };
+    monitor(client, &task, done, &mut outputs)
+}
+
 fn client(name: &str) -> Client {
     Client::new(device::open(name).unwrap()).unwrap()
 }
@@ -255,10 +277,8 @@ fn events_come_out_as_the_pixels_report_them_and_statistics_once_a_second() {
     let (mut events, mut statistics) = (Vec::new(), Vec::new());
     let length = Duration::from_millis(3_800);
     let started = Instant::now();
-    monitor(
+    watch(
         &mut client,
-        &settings(),
-        PIXELS,
         None,
         |elapsed| elapsed >= length,
         &mut events,
@@ -334,10 +354,8 @@ fn every_loss_is_shown_and_only_losses() {
 fn a_sensor_that_does_not_answer_is_named() {
     let (name, _rests) = device_of(Unplugged, true, Duration::from_secs(60));
     let (mut events, mut statistics) = (Vec::new(), Vec::new());
-    monitor(
+    watch(
         &mut client(&name),
-        &settings(),
-        PIXELS,
         None,
         |elapsed| elapsed >= Duration::from_secs(1),
         &mut events,
@@ -372,16 +390,7 @@ fn a_reader_that_has_seen_enough_ends_it() {
     for (events, statistics) in [(10, 10_000), (500, 10_000), (100_000, 10)] {
         let mut client = client(&device(true, Duration::from_secs(60)));
         let (mut events, mut statistics) = (Closing(events), Closing(statistics));
-        monitor(
-            &mut client,
-            &settings(),
-            PIXELS,
-            None,
-            |_| false,
-            &mut events,
-            &mut statistics,
-        )
-        .unwrap();
+        watch(&mut client, None, |_| false, &mut events, &mut statistics).unwrap();
     }
 }
 
@@ -389,30 +398,14 @@ fn a_reader_that_has_seen_enough_ends_it() {
 fn a_device_that_goes_or_has_no_sensor_is_an_error() {
     let mut gone = client(&device(true, Duration::from_millis(700)));
     let (mut events, mut statistics) = (Vec::new(), Vec::new());
-    let error = monitor(
-        &mut gone,
-        &settings(),
-        PIXELS,
-        None,
-        |_| false,
-        &mut events,
-        &mut statistics,
-    );
+    let error = watch(&mut gone, None, |_| false, &mut events, &mut statistics);
     let error = format!("{:#}", error.unwrap_err());
     assert!(error.contains("the device cannot be"), "{error}");
     // What came before is there.
     assert!(events.len() > 200);
 
     let mut without = client(&device(false, Duration::from_secs(60)));
-    let error = monitor(
-        &mut without,
-        &settings(),
-        PIXELS,
-        None,
-        |_| false,
-        &mut events,
-        &mut statistics,
-    );
+    let error = watch(&mut without, None, |_| false, &mut events, &mut statistics);
     let error = format!("{:#}", error.unwrap_err());
     assert!(error.contains("the device has no sensor"), "{error}");
 }
@@ -426,10 +419,8 @@ fn changes_of_depth_are_those_of_the_events() {
     };
     let name = device(true, Duration::from_secs(60));
     let (mut events, mut statistics) = (Vec::new(), Vec::new());
-    monitor(
+    watch(
         &mut client(&name),
-        &settings(),
-        PIXELS,
         Some(wanted),
         |elapsed| elapsed >= Duration::from_secs(2),
         &mut events,
@@ -510,4 +501,49 @@ fn the_command_prints_rows_and_says_when_the_device_is_gone() {
     let error = String::from_utf8(output.stderr).unwrap();
     assert!(error.contains("error: tcp:127.0.0.1:"), "{error}");
     assert!(output.stdout.len() > 200);
+}
+
+#[test]
+fn a_map_needs_a_terminal() {
+    let output = Command::new(env!("CARGO_BIN_EXE_dtof"))
+        .args(["monitor", "--device", "tcp:127.0.0.1:1", "--map"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(
+        String::from_utf8(output.stderr).unwrap(),
+        "error: --map draws on standard error, which is no terminal here\n"
+    );
+}
+
+/// `script` of util-linux gives the command a terminal.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_map_is_drawn_on_a_terminal_and_ctrl_c_gives_the_cursor_back() {
+    let name = device(true, Duration::from_secs(60));
+    let dtof = env!("CARGO_BIN_EXE_dtof");
+    let command = format!("'{dtof}' monitor --pixels 4 --map --device {name}");
+    let mut terminal = Command::new("script")
+        .args(["--quiet", "--return", "--flush", "--command"])
+        .args([&command, "/dev/null"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut screen = BufReader::new(terminal.stdout.take().unwrap());
+    let mut drawn = String::new();
+    // Until a second has passed.
+    while !drawn.contains("events/s ") {
+        assert!(screen.read_line(&mut drawn).unwrap() > 0, "{drawn}");
+    }
+    // Ctrl-C.
+    terminal.stdin.as_mut().unwrap().write_all(b"\x03").unwrap();
+    screen.read_to_string(&mut drawn).unwrap();
+    assert!(terminal.wait().unwrap().success(), "{drawn}");
+
+    assert!(drawn.contains("4 of 4 pixels"), "{drawn}");
+    assert!(drawn.contains("\x1b[3A"), "drawn in place: {drawn}");
+    assert!(drawn.contains('▀') && !drawn.contains("cycle,pixel"));
+    let (_, end) = drawn.rsplit_once("\x1b[?25l").unwrap();
+    assert!(end.ends_with("\x1b[?25h"), "{end}");
 }

@@ -190,12 +190,17 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
     let (mut events, mut statistics) = (Vec::new(), Vec::new());
     monitor::monitor(
         &mut client,
-        &settings(),
-        16,
-        None,
+        &monitor::Task {
+            settings: &settings(),
+            pixels: 16,
+            dynamic_depth: None,
+        },
         |elapsed| elapsed >= Duration::from_secs(3),
-        &mut events,
-        &mut statistics,
+        &mut monitor::Outputs {
+            events: &mut events,
+            statistics: &mut statistics,
+            map: None,
+        },
     )
     .context(name)?;
     // Less their header.

@@ -9,7 +9,9 @@ mod firmware;
 mod image;
 mod log;
 mod panics;
+mod python;
 mod qemu;
+mod report;
 mod self_test;
 mod sizes;
 mod source;
@@ -30,7 +32,8 @@ const HELP: &str = "\
 cargo xtask <command>
 
   setup         install what rust-toolchain.toml names and is not there yet;
-                QEMU, defmt-print and GNU parallel as well if that needs no question
+                QEMU, defmt-print, GNU parallel, Chromium and Python's venv as well if
+                that needs no question
   check-image   link dtof-core for every target; no panic, float or allocation
   check-source  no floating-point type and no unsafe in core/src
 
@@ -47,6 +50,9 @@ cargo xtask <command>
                 that of the Discovery
   check-boards  the images start, decide and end in QEMU, and keep to their
                 stack
+  check-report [--picture]
+                the reports in headless Chromium: drawn, turned, without a network;
+                --picture writes docs/figures/report.png
   figures [--all] [--check]
                 work out the figures of the documentation and the verdicts on the
                 paper's claims, from the seeds of a quick look and the kept rest or
@@ -82,6 +88,8 @@ fn run() -> Result<()> {
         ["emulate", ref rest @ ..] => emulate::emulate(root()?, rest),
         ["flash", ref rest @ ..] => emulate::flash(root()?, rest),
         ["check-boards"] => boards::check(root()?),
+        ["check-report"] => report::check(root()?, false),
+        ["check-report", "--picture"] => report::check(root()?, true),
         ["figures", ref rest @ ..] => figures::make(root()?, rest),
         ["self-test"] => self_test::run(root()?),
         ["self-test", "--bless"] => self_test::bless(root()?),

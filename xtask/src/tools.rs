@@ -5,6 +5,8 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result};
 
+use crate::python;
+
 /// A program, and the one line that installs it.
 pub struct Tool {
     pub program: &'static str,
@@ -25,6 +27,12 @@ pub const DEFMT_PRINT: Tool = Tool {
 pub const PARALLEL: Tool = Tool {
     program: "parallel",
     install: "sudo apt-get install --yes parallel",
+};
+
+/// For the reports, as readers see them.
+pub const CHROMIUM: Tool = Tool {
+    program: "chromium",
+    install: "sudo apt-get install --yes chromium",
 };
 
 pub const PROBE_RS: Tool = Tool {
@@ -61,12 +69,14 @@ impl Tool {
     }
 }
 
-/// Installs the emulator, the log's decoder and GNU parallel if they are missing
-/// and that needs no question; else says what to type. Nothing else needs them, so
-/// that this never fails.
+/// Installs the emulator, the log's decoder, GNU parallel, the browser and Python's
+/// `venv` if they are missing and that needs no question; else says what to type. What
+/// needs them says so itself, so that this never fails.
 pub fn set_up() {
     install(&QEMU, || debian_package("qemu-system-arm"));
     install(&PARALLEL, || debian_package("parallel"));
+    install(&CHROMIUM, || debian_package("chromium"));
+    python::set_up(debian_package);
     install(&DEFMT_PRINT, || {
         let mut cargo = Command::new("cargo");
         cargo.args(["install", "--locked", "--quiet", "defmt-print"]);

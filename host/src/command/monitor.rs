@@ -1,14 +1,16 @@
 //! `dtof monitor`: the events of a device with a sensor, as they come.
 
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, IsTerminal, Write};
 use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
+use console::Term;
 use dtof::device::{self, Client};
-use dtof::monitor::monitor;
+use dtof::monitor::map::{LiveMap, SHOW_CURSOR};
+use dtof::monitor::{Outputs, Task, monitor};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_firmware::sensor::About;
 
@@ -40,6 +42,14 @@ pub struct Monitor {
     dynamic_depth: bool,
     #[command(flatten)]
     of_dynamic_depth: dynamic_depth::Options,
+    /// Draw the ranges of all pixels on the terminal that is standard error; the events are
+    /// written where standard output goes, unless that is a terminal, too
+    #[arg(long)]
+    map: bool,
+    /// Columns of the array that is drawn, pixel = row × columns + column [default: as high as
+    /// wide]
+    #[arg(long, value_name = "N", requires = "map", value_parser = clap::value_parser!(u16).range(1..))]
+    columns: Option<u16>,
     #[command(flatten)]
     operation: Operation,
 }
@@ -50,11 +60,18 @@ impl Monitor {
             self.dynamic_depth || !self.of_dynamic_depth.are_given(),
             "--threshold-mm and --reference are of --dynamic-depth"
         );
+        ensure!(
+            !self.map || io::stderr().is_terminal(),
+            "--map draws on standard error, which is no terminal here"
+        );
         let name = || self.device.clone();
         let mut client = Client::new(device::open(&self.device)?).with_context(name)?;
         ctrlc::set_handler(|| {
             // Who asks a second time does not wait for the device.
             if INTERRUPTED.swap(true, Ordering::Relaxed) {
+                if io::stderr().is_terminal() {
+                    eprint!("{SHOW_CURSOR}");
+                }
                 process::exit(130);
             }
         })?;
@@ -72,18 +89,36 @@ impl Monitor {
         let length = self
             .seconds
             .map(|seconds| Duration::from_secs(seconds.into()));
+        let mut map = self.map.then(|| {
+            let terminal = Term::stderr();
+            let (lines, columns) = terminal.size();
+            let room = (lines.into(), columns.into());
+            LiveMap::new(Box::new(terminal), room, pixels, self.columns)
+        });
+        let mut events: Box<dyn Write> = if self.map && io::stdout().is_terminal() {
+            Box::new(io::sink())
+        } else {
+            Box::new(BufWriter::new(io::stdout().lock()))
+        };
+        let task = Task {
+            settings: &settings,
+            pixels,
+            dynamic_depth: self
+                .dynamic_depth
+                .then(|| self.of_dynamic_depth.dynamic_depth()),
+        };
         monitor(
             &mut client,
-            &settings,
-            pixels,
-            self.dynamic_depth
-                .then(|| self.of_dynamic_depth.dynamic_depth()),
+            &task,
             |elapsed| {
                 INTERRUPTED.load(Ordering::Relaxed)
                     || length.is_some_and(|length| elapsed >= length)
             },
-            &mut BufWriter::new(io::stdout().lock()),
-            &mut io::stderr(),
+            &mut Outputs {
+                events: &mut events,
+                statistics: &mut io::stderr(),
+                map: map.as_mut(),
+            },
         )
         .with_context(name)
     }

@@ -3,8 +3,9 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use plotters::prelude::{RGBColor, ViridisRGB};
+use plotters::prelude::Color as _;
 
+use super::colour;
 use super::draw::NO_EVENT;
 use super::layout::Frame;
 
@@ -37,10 +38,10 @@ pub(super) fn write_cells(
     )?;
     for (path, shape) in paths.iter().enumerate() {
         if !shape.is_empty() {
-            let RGBColor(r, g, b) = match path.checked_sub(1) {
-                None => NO_EVENT,
-                Some(level) => ViridisRGB::get_color(level as f64 / f64::from(u8::MAX)),
-            };
+            let level = path
+                .checked_sub(1)
+                .and_then(|level| u8::try_from(level).ok());
+            let (r, g, b) = level.map_or_else(|| NO_EVENT.rgb(), colour);
             writeln!(
                 document,
                 "<path fill=\"#{r:02x}{g:02x}{b:02x}\" d=\"{shape}\"/>"

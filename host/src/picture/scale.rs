@@ -64,6 +64,11 @@ impl Scale {
         })
     }
 
+    /// What the colours span.
+    pub fn span(&self) -> (f64, f64) {
+        (self.low, self.high)
+    }
+
     /// What the colours span, in words.
     pub fn note(&self) -> &'static str {
         if self.low == self.high {

@@ -1,0 +1,119 @@
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_core::{BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, SubBinOffset};
+
+use super::*;
+
+/// `text` without colours.
+fn characters(text: &str) -> String {
+    let mut parts = text.split('\x1b');
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |all, part| {
+        let end = part.find(|c: char| c.is_ascii_alphabetic()).unwrap();
+        all + &part[end + 1..]
+    })
+}
+
+#[test]
+fn two_rows_share_a_line_and_no_range_is_empty() {
+    let (near, far) = (Some(1000.0), Some(2000.0));
+    let lines = picture(&[near, None, far, far, None, None], 2, 10, 10);
+    assert_eq!(lines.len(), 2);
+    assert_eq!(characters(&lines[0]), "▀▄");
+    assert_eq!(characters(&lines[1]), "  ");
+    // The upper pixel in front, the lower one behind.
+    let ((r, g, b), (red, green, blue)) = (colour(0), colour(255));
+    let expected = format!("\x1b[38;2;{r};{g};{b}m\x1b[48;2;{red};{green};{blue}m▀");
+    assert!(lines[0].starts_with(&expected), "{:?}", lines[0]);
+    assert!(r < red && g < green, "purple to yellow");
+    assert!(lines.iter().all(|line| line.ends_with(PLAIN)));
+}
+
+#[test]
+fn too_little_room_leaves_pixels_out() {
+    let ranges: Vec<Option<f64>> = (0..64 * 32).map(|pixel| Some(f64::from(pixel))).collect();
+    for (most_lines, most_columns, lines, columns) in [
+        (100, 100, 16, 64),
+        (16, 64, 16, 64),
+        (15, 64, 8, 32),
+        (16, 63, 8, 32),
+        (1, 1, 1, 1),
+        (0, 0, 1, 1),
+    ] {
+        let picture = picture(&ranges, 64, most_lines, most_columns);
+        assert_eq!(picture.len(), lines);
+        for line in picture {
+            assert_eq!(characters(&line).chars().count(), columns);
+        }
+    }
+}
+
+#[test]
+fn arrays_are_as_high_as_wide_if_they_can_be() {
+    let columns = [1, 2, 4, 9, 64, 128, 2048, 7, 0].map(squarest);
+    assert_eq!(columns, [1, 2, 2, 3, 8, 16, 64, 7, 0]);
+}
+
+/// What was written, for all to see.
+#[derive(Clone, Default)]
+struct Screen(Rc<RefCell<Vec<u8>>>);
+
+impl Write for Screen {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.borrow_mut().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Screen {
+    fn taken(&self) -> String {
+        String::from_utf8(self.0.take()).unwrap()
+    }
+}
+
+#[test]
+fn it_is_drawn_in_place_and_gives_the_cursor_back() {
+    let screen = Screen::default();
+    let mut map = LiveMap::new(Box::new(screen.clone()), (24, 30), 4, None);
+    map.draw_when_due().unwrap();
+    let first = screen.taken();
+    assert!(first.starts_with(HIDE_CURSOR));
+    assert!(characters(&first).contains("no event yet of 4 pixels"));
+    assert_eq!(first.matches('\n').count(), 3);
+
+    let event = DepthEvent {
+        pixel: PixelAddress(3),
+        cycle: LaserCycle(9),
+        exposure: 10,
+        peak_bin: BinIndex::saturating(40),
+        offset: SubBinOffset::CENTRE,
+        peak_count: Count::saturating(9),
+        background: Count::saturating(1),
+        flags: Flags::NONE,
+    };
+    let foreign = DepthEvent {
+        pixel: PixelAddress(4),
+        ..event
+    };
+    let scale = RangeScale::new(U16F16::lit("250"), I24F8::ZERO).unwrap();
+    map.add(&[event, foreign].map(Event::Depth), &scale);
+    map.tell("events/s 12, and so much more than fits".to_owned());
+    map.draw_when_due().unwrap();
+    assert_eq!(screen.taken(), "", "not so soon");
+    map.draw().unwrap();
+    let second = screen.taken();
+    // Back over three lines, and the same three lines again.
+    assert!(second.starts_with("\r\x1b[3A"));
+    assert_eq!(second.matches('\n').count(), 3);
+    let second = characters(&second);
+    assert!(second.contains(" ▄") && second.contains("1 of 4 pixels"));
+    assert!(second.contains("events/s 12, and so much more") && !second.contains("than fits"));
+
+    drop(map);
+    assert_eq!(screen.taken(), format!("{PLAIN}{SHOW_CURSOR}"));
+}

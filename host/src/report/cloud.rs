@@ -1,0 +1,117 @@
+//! The events of a run, to turn and to look at in time: what the script of the page
+//! is given, and the script.
+
+use base64::Engine as _;
+use serde_json::json;
+
+use super::BASE64;
+use crate::picture;
+use crate::sample::Sample;
+use crate::source::Geometry;
+use crate::summary::grouped;
+use dtof_core::PixelAddress;
+
+/// The events of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Cloud<'a> {
+    /// The array.
+    pub geometry: Geometry,
+    /// Laser cycles of the run.
+    pub cycles: u64,
+    /// The events, or evenly some of them.
+    pub sample: &'a Sample,
+    /// Pixels whose spikes are shown first.
+    pub pixels: &'a [PixelAddress],
+}
+
+/// The only script of the page, between its tags. A module: it has names of its own.
+pub(super) const SCRIPT: &str = concat!(
+    "\n",
+    include_str!("events.js"),
+    "\n",
+    include_str!("projection.js"),
+    "\n",
+    include_str!("cloud.js"),
+    "\n",
+    include_str!("spikes.js"),
+    "\n",
+    include_str!("controls.js"),
+);
+
+/// What the script works on, hidden until it runs.
+const CARDS: &str = include_str!("cloud.html");
+
+impl Cloud<'_> {
+    /// The cards with the events and the spikes, nothing if there are no events.
+    pub(super) fn html(&self) -> String {
+        if self.sample.events().len() == 0 {
+            return String::new();
+        }
+        let data = self.data();
+        let note = self.note();
+        format!(
+            "<p class=\"notice\" id=\"unscripted\">Without scripting the events cannot be \
+             turned; the maps below show them pixel by pixel.</p>\n\
+             {}<script type=\"application/json\" id=\"data\">{data}</script>\n\
+             <script type=\"module\">{SCRIPT}</script>\n",
+            CARDS.replace("<!-- how many -->", &note)
+        )
+    }
+
+    /// How many events there are, and how many of them are shown.
+    fn note(&self) -> String {
+        let seen = grouped(self.sample.seen());
+        match self.sample.one_of() {
+            1 => format!("All {seen} events are shown."),
+            k => format!(
+                "<strong>1 of {} events shown</strong>: {} of {seen}, evenly spread.",
+                grouped(k),
+                grouped(self.sample.events().len() as u64)
+            ),
+        }
+    }
+
+    /// One JSON object, safe between tags: it holds numbers and base64 alone.
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "a unit is chosen that fits"
+    )]
+    fn data(&self) -> serde_json::Value {
+        // Laser cycles of a run beyond 2³² are told in a larger unit.
+        let unit = (self.cycles >> 32) + 1;
+        let mut records = Vec::with_capacity(self.sample.events().len() * RECORD);
+        for event in self.sample.events() {
+            records.extend(((event.cycle / unit) as u32).to_le_bytes());
+            records.extend(event.range_mm.to_le_bytes());
+            records.extend(event.pixel.0.to_le_bytes());
+        }
+        let colours: String = (0..=u8::MAX)
+            .map(|level| {
+                let (r, g, b) = picture::colour(level);
+                format!("{r:02x}{g:02x}{b:02x}")
+            })
+            .collect();
+        let ranges: Vec<_> = self
+            .sample
+            .events()
+            .map(|event| Some(event.range_mm.into()))
+            .collect();
+        let (low, high) = picture::span(&ranges).unwrap_or_default();
+        let spikes: Vec<u16> = self.pixels.iter().map(|pixel| pixel.0).collect();
+        json!({
+            "columns": self.geometry.columns,
+            "rows": self.geometry.rows,
+            "cycles": self.cycles,
+            "unit": unit,
+            "oneOf": self.sample.one_of(),
+            "low": low,
+            "high": high,
+            "colours": colours,
+            "spikes": spikes,
+            "records": BASE64.encode(records),
+        })
+    }
+}
+
+/// Bytes of an event: laser cycle, range in millimetres, pixel, all little-endian.
+const RECORD: usize = 4 + 4 + 2;

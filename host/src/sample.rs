@@ -1,0 +1,149 @@
+//! A sample of a run's events that is small however many there are.
+//!
+//! All events as long as there are few. At the limit every other one is dropped, and
+//! from then on one of two is kept, then one of four, and so on: which ones depends on
+//! their number in the run alone, so that the same run gives the same sample.
+//!
+//! Which number is kept follows multiples of the golden ratio. They spread evenly (of k
+//! in a row one is kept, or two, or none), but not in step with the columns of an array,
+//! which a plain k-th would show as stripes.
+
+use dtof_core::{DepthEvent, PixelAddress};
+
+/// What is kept of an event.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampledEvent {
+    /// The laser cycle whose end brought it.
+    pub cycle: u64,
+    /// Its pixel.
+    pub pixel: PixelAddress,
+    /// Its range in millimetres.
+    pub range_mm: f32,
+}
+
+/// Evenly one of 1, 2, 4 … events.
+#[derive(Clone, Debug)]
+pub struct Sample {
+    limit: usize,
+    halvings: u32,
+    seen: u64,
+    /// Each with its place in 0..2⁶⁴.
+    kept: Vec<(u64, SampledEvent)>,
+}
+
+impl Sample {
+    /// Events of a report: 3.5 MB of it, and 6 MB of memory.
+    pub const LIMIT: usize = 1 << 18;
+
+    /// Keeps at most `limit` events.
+    #[must_use]
+    pub fn new(limit: usize) -> Self {
+        Self {
+            limit,
+            halvings: 0,
+            seen: 0,
+            kept: Vec::new(),
+        }
+    }
+
+    /// Takes the next event in, or leaves it out.
+    #[allow(clippy::cast_possible_truncation, reason = "24 bits for a picture")]
+    pub fn add(&mut self, event: &DepthEvent, range_mm: f64) {
+        // 2⁶⁴ divided by the golden ratio, made odd.
+        let place = self.seen.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        self.seen += 1;
+        if place.leading_zeros() < self.halvings {
+            return;
+        }
+        if self.kept.len() == self.limit {
+            self.halvings += 1;
+            let halvings = self.halvings;
+            self.kept
+                .retain(|(place, _)| place.leading_zeros() >= halvings);
+            if place.leading_zeros() < halvings || self.kept.len() == self.limit {
+                return;
+            }
+        }
+        let event = SampledEvent {
+            cycle: event.cycle.0,
+            pixel: event.pixel,
+            range_mm: range_mm as f32,
+        };
+        self.kept.push((place, event));
+    }
+
+    /// k, if one of k events is kept: a power of two.
+    #[must_use]
+    pub fn one_of(&self) -> u64 {
+        1 << self.halvings
+    }
+
+    /// How many events there were.
+    #[must_use]
+    pub fn seen(&self) -> u64 {
+        self.seen
+    }
+
+    /// The events that were kept, in the order they came.
+    #[must_use]
+    pub fn events(&self) -> impl ExactSizeIterator<Item = &SampledEvent> {
+        self.kept.iter().map(|(_, event)| event)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dtof_core::{BinIndex, Count, Flags, LaserCycle, SubBinOffset};
+
+    fn event(number: u64) -> DepthEvent {
+        DepthEvent {
+            pixel: PixelAddress(u16::try_from(number % 64).unwrap()),
+            cycle: LaserCycle(number),
+            exposure: 100,
+            peak_bin: BinIndex::saturating(3),
+            offset: SubBinOffset::CENTRE,
+            peak_count: Count::saturating(9),
+            background: Count::saturating(1),
+            flags: Flags::NONE,
+        }
+    }
+
+    fn sampled(limit: usize, events: u64) -> Sample {
+        let mut sample = Sample::new(limit);
+        for number in 0..events {
+            sample.add(&event(number), 1.5);
+            assert!(sample.events().len() <= limit);
+        }
+        assert_eq!(sample.seen(), events);
+        sample
+    }
+
+    #[test]
+    fn up_to_the_limit_all_are_kept() {
+        let sample = sampled(100, 100);
+        assert_eq!(sample.one_of(), 1);
+        assert!(sample.events().map(|event| event.cycle).eq(0..100));
+        assert!(sample.events().all(|event| event.range_mm == 1.5));
+    }
+
+    #[test]
+    fn beyond_it_one_of_k_is_kept_at_every_time_and_of_every_column() {
+        for events in [101, 1000, 12_345, 100_000] {
+            let sample = sampled(100, events);
+            let kept = sample.events().len() as u64;
+            let expected = events / sample.one_of();
+            assert!(kept.abs_diff(expected) <= 2, "{kept} of {events}");
+            assert!(kept >= 45, "{kept} of {events}");
+            let cycles: Vec<u64> = sample.events().map(|event| event.cycle).collect();
+            let longest = cycles.windows(2).map(|pair| pair[1] - pair[0]).max();
+            assert!(longest.unwrap() < 3 * sample.one_of());
+        }
+        let sample = sampled(1000, 64_000);
+        assert!(sample.one_of() >= 64);
+        for column in 0..64 {
+            let kept = sample.events().filter(|event| event.pixel.0 == column);
+            assert!((4..32).contains(&kept.count()), "column {column}");
+        }
+    }
+}

@@ -1,0 +1,276 @@
+"""Reports of `dtof` in a real browser: `cargo xtask check-report`.
+
+Arguments: the browser, the folder for the pictures, the report of a static scene, that of a
+moving one with more events than a report shows. Ends with an error at the first thing that is
+not as it should be.
+"""
+
+import shutil
+import sys
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+
+MOST_BYTES = 5_000_000
+
+
+def check(what, holds):
+    if not holds:
+        sys.exit(f"error: {what}: no")
+    print(f"  {what}")
+
+
+class Report:
+    """A report in a window of its own, and everything it complained of or asked for."""
+
+    def __init__(self, browser, path, width=1100, height=900, **options):
+        size = {"width": width, "height": height}
+        self.address = path.resolve().as_uri()
+        self.complaints, self.requests = [], []
+        self.window = browser.new_context(viewport=size, **options)
+        self.page = self.window.new_page()
+        self.page.on("console", lambda message: self.complaints.append(message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(self.address)
+        self.settle()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        if error[0] is None:
+            check(f"no complaint {self.complaints}", not self.complaints)
+            check("no request beside the file", self.requests == [self.address])
+        self.window.close()
+
+    def run(self, script):
+        return self.page.evaluate(script)
+
+    def settle(self):
+        """Waits until what was asked for is drawn."""
+        if self.run("Boolean(document.querySelector('#interactive:not([hidden])'))"):
+            twice = "requestAnimationFrame(() => requestAnimationFrame(done))"
+            self.run(f"new Promise((done) => {twice})")
+
+    def picture(self):
+        """What the point cloud shows."""
+        self.settle()
+        return self.run("document.getElementById('cloud').toDataURL()")
+
+    def colours(self):
+        """How many colours are drawn."""
+        return self.run(
+            """(() => {
+                const { width, height } = document.getElementById("cloud");
+                const context = document.getElementById("cloud").getContext("2d");
+                const bytes = context.getImageData(0, 0, width, height).data;
+                return new Set(new Uint32Array(bytes.buffer)).size;
+            })()"""
+        )
+
+    def changes(self, what, act):
+        """Whether the picture is another one after `act`."""
+        before = self.picture()
+        act()
+        check(f"{what} changes the picture", self.picture() != before)
+
+    def width_is(self, width):
+        wide = self.run("document.documentElement.scrollWidth")
+        check(f"no scrolling sideways at {width} pixels", wide <= width)
+
+
+def turns(report):
+    page, cloud = report.page, report.page.locator("#cloud")
+    first = report.picture()
+    cloud.scroll_into_view_if_needed()
+    box = cloud.bounding_box()
+    middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def drag():
+        page.mouse.move(*middle)
+        page.mouse.down()
+        page.mouse.move(middle[0] + 80, middle[1] + 30, steps=4)
+        page.mouse.up()
+
+    def touch():
+        fingers = page.context.new_cdp_session(page)
+
+        def send(kind, *points):
+            places = [{"x": x, "y": y} for x, y in points]
+            fingers.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+
+        send("touchStart", middle)
+        for step in range(1, 6):
+            send("touchMove", (middle[0] + 12 * step, middle[1]))
+        send("touchEnd")
+
+    def wheel():
+        page.keyboard.down("Control")
+        page.mouse.move(*middle)
+        page.mouse.wheel(0, -120)
+        page.keyboard.up("Control")
+
+    report.changes("the mouse", drag)
+    report.changes("a finger", touch)
+    report.changes("Ctrl + wheel", wheel)
+    cloud.focus()
+    for key in ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "+", "-"]:
+        report.changes(f"the key {key}", lambda: page.keyboard.press(key))
+    page.keyboard.press("0")
+    check("the key 0 gives back the first picture", report.picture() == first)
+    for view in ["front", "side", "top"]:
+        report.changes(f"the view {view}", page.locator(f"[data-view={view}]").click)
+    page.locator("[data-view=reset]").click()
+    check("Reset gives back the first picture", report.picture() == first)
+    report.changes("the range as third axis", lambda: page.select_option("#third", "range"))
+    page.select_option("#third", "cycle")
+    report.changes("leaving out what is far", lambda: page.locator("#far").fill("50"))
+    page.locator("#far").fill("100")
+    check("any range gives back the first picture", report.picture() == first)
+
+
+def moves_in_time(report):
+    page = report.page
+    status = page.locator("#status")
+    report.changes("a window of time", lambda: page.select_option("#width", index=3))
+    report.changes("the slider", lambda: page.locator("#start").fill("100"))
+    page.locator("#start").focus()
+    said = status.evaluate("e => e.value")
+    report.changes("a key on the slider", lambda: page.keyboard.press("ArrowRight"))
+    check("the text says what is shown", status.evaluate("e => e.value") != said)
+
+    def play():
+        page.locator("#play").click()
+        page.wait_for_timeout(400)
+        page.locator("#play").click()
+
+    report.changes("playing", play)
+    check("Pause becomes Play", page.locator("#play").inner_text() == "Play")
+    page.select_option("#width", index=0)
+
+
+def shows_spikes(report):
+    page, lanes = report.page, report.page.locator("#lanes li:not(.scale)")
+    check("five pixels at first", lanes.count() == 5)
+    page.locator("#column").fill("7")
+    page.locator("#line").fill("3")
+    page.keyboard.press("Enter")
+    check("a pixel by its place", "column 7, row 3: " in lanes.first.inner_text())
+    page.locator("[data-view=front]").click()
+    report.settle()
+    box = page.locator("#cloud").bounding_box()
+    page.mouse.click(box["x"] + box["width"] / 2 + 40, box["y"] + box["height"] / 2)
+    report.settle()
+    chosen = page.locator("#status").evaluate("e => e.value")
+    name = lanes.first.locator("span").inner_text().split(":")[0]
+    check("a click chooses an event", f"Chosen: {name}," in chosen)
+    count = lanes.count()
+    lanes.first.locator("button").click()
+    check("a pixel can be removed", lanes.count() == count - 1)
+    page.locator("[data-view=reset]").click()
+
+
+def is_named(report):
+    nameless = report.run(
+        """[...document.querySelectorAll("button, input, select, canvas, output")]
+            .filter((e) => !e.closest("[aria-hidden]") && e.checkVisibility({ visibilityProperty: true }))
+            .filter((e) => e.ariaHidden !== "true" && e.tagName !== "OUTPUT")
+            .filter((e) => !e.labels?.length && !e.ariaLabel && !e.textContent.trim())
+            .map((e) => e.outerHTML)"""
+    )
+    check(f"everything to use has a name {nameless}", not nameless)
+    report.page.locator("#play").focus()
+    report.page.keyboard.press("Tab")
+    outline = report.run("getComputedStyle(document.activeElement).outlineStyle")
+    check("the focus can be seen", outline == "solid")
+
+
+def is_closed(report):
+    """What is not the page's own script does not run, and nothing is loaded."""
+    report.run(
+        """(() => {
+            const script = document.createElement("script");
+            script.textContent = "window.foreign = true";
+            document.body.append(script);
+        })()"""
+    )
+    check("no other script runs", report.run("window.foreign === undefined"))
+    fetched = "fetch('data:,x').then(() => true, () => false)"
+    check("nothing is fetched", report.run(fetched) is False)
+    check("the policy said so", len(report.complaints) >= 2)
+    report.complaints.clear()
+
+
+def main(chromium, pictures, static, moving):
+    pictures, static, moving = Path(pictures), Path(static), Path(moving)
+    with sync_playwright() as driver:
+        # Root, as in a container, has no sandbox.
+        browser = driver.chromium.launch(executable_path=shutil.which(chromium), args=["--no-sandbox"])
+        print(f"browser {browser.version}")
+
+        print("static scene")
+        check("smaller than 5 MB", static.stat().st_size < MOST_BYTES)
+        with Report(browser, static, has_touch=True) as report:
+            check("drawn in colours", report.colours() > 50)
+            check("no word on scripting", not report.page.locator("#unscripted").is_visible())
+            turns(report)
+            moves_in_time(report)
+            shows_spikes(report)
+            is_named(report)
+        with Report(browser, static) as report:
+            shot = pictures / "report.png"
+            report.page.locator("#interactive section").first.screenshot(path=shot)
+            report.page.screenshot(path=pictures / "light.png", full_page=True)
+            is_closed(report)
+            report.requests[:] = report.requests[:1]
+
+        print("moving scene")
+        check("smaller than 5 MB", moving.stat().st_size < MOST_BYTES)
+        with Report(browser, moving, has_touch=True) as report:
+            text = report.page.locator("#cloud-hint").inner_text()
+            check("says that not all events are shown", " events shown: " in text)
+            check("drawn in colours", report.colours() > 50)
+            turns(report)
+            moves_in_time(report)
+
+        print("dark")
+        with Report(browser, static, color_scheme="dark") as report:
+            light = report.picture()
+            page = report.run("getComputedStyle(document.body).backgroundColor")
+            check("a dark page", page == "rgb(1, 4, 9)")
+            check("drawn in colours", report.colours() > 50)
+            report.changes(
+                "the other scheme", lambda: report.page.emulate_media(color_scheme="light")
+            )
+            report.page.emulate_media(color_scheme="dark")
+            check("and back", report.picture() == light)
+            report.page.screenshot(path=pictures / "dark.png", full_page=True)
+
+        print("narrow")
+        for path in [static, moving]:
+            with Report(browser, path, width=360, height=740, has_touch=True) as report:
+                report.width_is(360)
+                check("drawn in colours", report.colours() > 50)
+                report.page.screenshot(path=pictures / "narrow.png", full_page=True)
+
+        print("less motion")
+        with Report(browser, static, reduced_motion="reduce") as report:
+            report.page.locator("#play").click()
+            report.page.wait_for_timeout(500)
+            value = report.page.locator("#start").input_value
+            check("no motion within half a second", value() == "0")
+            report.page.wait_for_timeout(1000)
+            check("a step after a second", value() != "0")
+
+        print("no scripting")
+        with Report(browser, static, java_script_enabled=False) as report:
+            page = report.page
+            check("says so", page.locator("#unscripted").is_visible())
+            check("nothing that does nothing", not page.locator("#interactive").is_visible())
+            check("all maps", page.locator("figure svg").count() == 6)
+            check("maps are seen", page.locator("figure svg").last.is_visible())
+        browser.close()
+
+
+main(*sys.argv[1:])
