@@ -2,6 +2,7 @@
 
 pub mod decode;
 pub mod demo;
+pub mod export;
 pub mod figures;
 pub mod monitor;
 mod operation;
