@@ -4,20 +4,12 @@
 mod common;
 
 use common::Scratch;
-use common::aer::{HEADER, byte_of, depth, dynamic, file};
+use common::aer::{HEADER, byte_of, depth, dynamic, exported, file};
 use dtof::aer_file::{Event, Header};
-use dtof::export::{Exported, Format, LaserClock, Options, export};
+use dtof::export::{Format, LaserClock, Options};
 use dtof::source::Geometry;
 use dtof_core::Reference;
 use dtof_core::fixed::types::U24F8;
-
-fn exported(bytes: &[u8], format: Format, options: &Options) -> (Exported, Vec<u8>) {
-    let scratch = Scratch::new();
-    let input = scratch.file("events.aer", bytes);
-    let out = scratch.path("out");
-    let exported = export(&input, &out, format, options, true).unwrap();
-    (exported, std::fs::read(out).unwrap())
-}
 
 /// Time, column, row and whether it is ON, of each event.
 fn evt2(bytes: &[u8]) -> Vec<(u64, u32, u32, bool)> {

@@ -10,6 +10,7 @@ mod image;
 mod log;
 mod panics;
 mod qemu;
+mod readers;
 mod self_test;
 mod sizes;
 mod source;
@@ -21,7 +22,7 @@ mod toolchain;
 mod tools;
 
 use std::env;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
@@ -30,7 +31,7 @@ const HELP: &str = "\
 cargo xtask <command>
 
   setup         install what rust-toolchain.toml names and is not there yet;
-                QEMU, defmt-print and GNU parallel as well if that needs no question
+                QEMU, defmt-print, GNU parallel and Python as well if that needs no question
   check-image   link dtof-core for every target; no panic, float or allocation
   check-source  no floating-point type and no unsafe in core/src
 
@@ -47,6 +48,8 @@ cargo xtask <command>
                 that of the Discovery
   check-boards  the images start, decide and end in QEMU, and keep to their
                 stack
+  check-export  the files of dtof export agree with what other projects' readers find in
+                them; installs those below target/ first
   figures [--all] [--check]
                 work out the figures of the documentation and the verdicts on the
                 paper's claims, from the seeds of a quick look and the kept rest or
@@ -82,6 +85,7 @@ fn run() -> Result<()> {
         ["emulate", ref rest @ ..] => emulate::emulate(root()?, rest),
         ["flash", ref rest @ ..] => emulate::flash(root()?, rest),
         ["check-boards"] => boards::check(root()?),
+        ["check-export"] => readers::check(root()?),
         ["figures", ref rest @ ..] => figures::make(root()?, rest),
         ["self-test"] => self_test::run(root()?),
         ["self-test", "--bless"] => self_test::bless(root()?),
@@ -100,4 +104,10 @@ fn root() -> Result<&'static Path> {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .context("xtask lies in no workspace")
+}
+
+/// Where cargo builds.
+fn target_folder(root: &Path) -> PathBuf {
+    let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
+    root.join(folder)
 }

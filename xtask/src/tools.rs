@@ -8,35 +8,53 @@ use anyhow::{Context, Result};
 /// A program, and the one line that installs it.
 pub struct Tool {
     pub program: &'static str,
+    /// What it is asked to find out whether it is there: it prints its version.
+    ask: &'static [&'static str],
     pub install: &'static str,
 }
 
+const VERSION: &[&str] = &["--version"];
+
 pub const QEMU: Tool = Tool {
     program: "qemu-system-arm",
+    ask: VERSION,
     install: "sudo apt-get install --yes qemu-system-arm",
 };
 
 pub const DEFMT_PRINT: Tool = Tool {
     program: "defmt-print",
+    ask: VERSION,
     install: "cargo install --locked defmt-print",
 };
 
 /// For sweeps in parts, as `docs/sweeps.md` has them.
 pub const PARALLEL: Tool = Tool {
     program: "parallel",
+    ask: VERSION,
     install: "sudo apt-get install --yes parallel",
 };
 
 pub const PROBE_RS: Tool = Tool {
     program: "probe-rs",
+    ask: VERSION,
     install: "cargo install --locked probe-rs-tools",
+};
+
+/// For `check-export`: with what makes virtual environments, which Debian has apart.
+pub const PYTHON: Tool = Tool {
+    program: "python3",
+    ask: &[
+        "-c",
+        "import ensurepip, platform, venv; print('Python', platform.python_version())",
+    ],
+    install: "sudo apt-get install --yes python3-venv",
 };
 
 impl Tool {
     /// What it says of its version, if it is there.
     pub fn version(&self) -> Option<String> {
         let output = Command::new(self.program)
-            .arg("--version")
+            .args(self.ask)
             .stdin(Stdio::null())
             .stderr(Stdio::null())
             .output()
@@ -61,12 +79,13 @@ impl Tool {
     }
 }
 
-/// Installs the emulator, the log's decoder and GNU parallel if they are missing
+/// Installs the emulator, the log's decoder, GNU parallel and Python if they are missing
 /// and that needs no question; else says what to type. Nothing else needs them, so
 /// that this never fails.
 pub fn set_up() {
     install(&QEMU, || debian_package("qemu-system-arm"));
     install(&PARALLEL, || debian_package("parallel"));
+    install(&PYTHON, || debian_package("python3-venv"));
     install(&DEFMT_PRINT, || {
         let mut cargo = Command::new("cargo");
         cargo.args(["install", "--locked", "--quiet", "defmt-print"]);

@@ -95,6 +95,15 @@ fn a_calibration_gives_directions_and_takes_the_bias_off() {
 }
 
 #[test]
+fn the_calibration_of_the_documentation_is_one() {
+    let docs = include_str!("../../../docs/export.md");
+    let (_, rest) = docs.split_once("```toml\n").unwrap();
+    let (text, _) = rest.split_once("```").unwrap();
+    let rays = calibration::parse(text, array(2, 1)).unwrap();
+    assert_eq!(rays[1].bias_mm, -12.5);
+}
+
+#[test]
 fn calibrations_that_cannot_be_are_refused_with_the_line() {
     let pixels = |rows: &str| format!("columns = 2\nrows = 1\npixels = [\n{rows}]\n");
     for (text, parts) in [

@@ -3,12 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use dtof::aer_file::{Event, Header, Writer};
+use dtof::export::{Exported, Format, Options, export};
 use dtof::source::Geometry;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
     BinIndex, BinPosition, Count, DepthEvent, DynamicDepthEvent, Flags, LaserCycle, PixelAddress,
     SubBinOffset,
 };
+
+use super::Scratch;
 
 /// 64 columns, 32 rows, 128 bins of 250 ps.
 pub const HEADER: Header = Header {
@@ -69,4 +72,21 @@ pub fn folder(path: &Path) -> Vec<PathBuf> {
     let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
     paths.sort();
     paths
+}
+
+/// Twelve events, one of them in the laser cycle of another time word.
+pub fn events() -> Vec<Event> {
+    let near = (0..11).map(|index| depth(index * 150, u64::from(index) * 13, 20 + index));
+    near.chain([depth(2047, 1 << 20, 60)]).collect()
+}
+
+/// Exports `bytes`, and gives what was written.
+pub fn exported(bytes: &[u8], format: Format, options: &Options) -> (Exported, Vec<u8>) {
+    let scratch = Scratch::new();
+    let input = scratch.file("events.aer", bytes);
+    let out = scratch.path("out");
+    let exported = export(&input, &out, format, options, true).unwrap();
+    let written = std::fs::read(out).unwrap();
+    assert_eq!(folder(&scratch.path("")).len(), 2, "files were left");
+    (exported, written)
 }
