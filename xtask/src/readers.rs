@@ -66,11 +66,11 @@ fn install(folder: &Path, requirements: &Path) -> Result<PathBuf> {
     Ok(python)
 }
 
-/// Builds the program and says where it is.
+/// Builds the program as `cargo run --release` does, and says where it is.
 fn build(root: &Path, target: &Path) -> Result<PathBuf> {
     let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.args(["build", "--locked", "--quiet", "--release"]);
-    cargo.args(["--package", "dtof", "--bin", "dtof", "--target-dir"]);
+    cargo.args(["--bin", "dtof", "--target-dir"]);
     succeed(cargo.arg(target).current_dir(root), "cargo build")?;
     Ok(target.join("release/dtof"))
 }
