@@ -147,10 +147,13 @@ pub fn export(
     let folder = place_of(out, input)?;
     let survey = Survey::of(input, quiet).with_context(name)?;
     let kind = survey.kind(options.kind).with_context(name)?;
-    options
-        .clock
-        .check(format, survey.latest)
-        .with_context(name)?;
+    let held = options.clock.check(format, survey.latest);
+    // A damaged time may be any; the damage is named with it.
+    let held = match &survey.damage {
+        Some(damage) => held.with_context(|| damage.clone()),
+        None => held,
+    };
+    held.with_context(name)?;
     let header = survey.header;
     let array = header.geometry;
     let projection = Projection {

@@ -136,6 +136,24 @@ fn what_is_no_aer_file_leaves_the_output_as_it_was() {
 }
 
 #[test]
+fn a_time_that_is_damaged_is_refused_with_the_damage() {
+    let scratch = Scratch::new();
+    let mut bytes = file(&HEADER, &events());
+    bytes[byte_of(0) + 12] = 1; // 2^52 laser cycles
+    scratch.file("events.aer", bytes);
+    let output = scratch.dtof(&["export", "events.aer", "--format", "pcd", "--out", "x.pcd"]);
+    scratch.refused(
+        &output,
+        &[
+            "events.aer: byte 288: the checksum",
+            "laser cycle 4503599627370",
+            "PCD holds",
+        ],
+    );
+    assert!(!scratch.path("x.pcd").exists());
+}
+
+#[test]
 fn an_interrupted_export_leaves_no_output() {
     let scratch = Scratch::new();
     let events: Vec<Event> = (0..300_000).map(|cycle| depth(7, cycle, 40)).collect();
