@@ -156,7 +156,7 @@ fn a_time_that_is_damaged_is_refused_with_the_damage() {
 #[test]
 fn an_interrupted_export_leaves_no_output() {
     let scratch = Scratch::new();
-    let events: Vec<Event> = (0..300_000).map(|cycle| depth(7, cycle, 40)).collect();
+    let events: Vec<Event> = (0..1_000_000).map(|cycle| depth(7, cycle, 40)).collect();
     scratch.file("events.aer", file(&HEADER, &events));
     let mut dtof = std::process::Command::new(env!("CARGO_BIN_EXE_dtof"));
     dtof.current_dir(scratch.path(""));

@@ -58,9 +58,11 @@ fn install(folder: &Path, requirements: &Path) -> Result<PathBuf> {
     venv.args(["-m", "venv", "--clear"]).arg(folder);
     succeed(&mut venv, "python3 -m venv")?;
     let mut pip = Command::new(&python);
+    // From Python 3.12 on expelliarmus comes as its source, which needs a C compiler.
     pip.args(["-m", "pip", "install", "--quiet", "--no-input"]);
-    pip.args(["--disable-pip-version-check", "--only-binary", ":all:"]);
-    pip.arg("--requirement").arg(requirements);
+    pip.arg("--disable-pip-version-check")
+        .arg("--requirement")
+        .arg(requirements);
     succeed(&mut pip, "pip install")?;
     fs::write(&installed, wanted).with_context(|| installed.display().to_string())?;
     Ok(python)

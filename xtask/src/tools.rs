@@ -40,14 +40,15 @@ pub const PROBE_RS: Tool = Tool {
     install: "cargo install --locked probe-rs-tools",
 };
 
-/// For `check-export`: with what makes virtual environments, which Debian has apart.
+/// For `check-export`: with what makes virtual environments, and the headers that a
+/// package may be compiled with, which Debian has apart.
 pub const PYTHON: Tool = Tool {
     program: "python3",
     ask: &[
         "-c",
         "import ensurepip, platform, venv; print('Python', platform.python_version())",
     ],
-    install: "sudo apt-get install --yes python3-venv",
+    install: "sudo apt-get install --yes python3-venv python3-dev",
 };
 
 impl Tool {
@@ -85,7 +86,7 @@ impl Tool {
 pub fn set_up() {
     install(&QEMU, || debian_package("qemu-system-arm"));
     install(&PARALLEL, || debian_package("parallel"));
-    install(&PYTHON, || debian_package("python3-venv"));
+    install(&PYTHON, || debian_package("python3-venv python3-dev"));
     install(&DEFMT_PRINT, || {
         let mut cargo = Command::new("cargo");
         cargo.args(["install", "--locked", "--quiet", "defmt-print"]);
@@ -93,8 +94,8 @@ pub fn set_up() {
     });
 }
 
-/// How root installs a package on Debian.
-fn debian_package(name: &str) -> Option<Command> {
+/// How root installs packages on Debian.
+fn debian_package(names: &str) -> Option<Command> {
     let is_root = Command::new("id").arg("-u").output().ok()?.stdout == b"0\n";
     if !(is_root && Path::new("/etc/debian_version").exists()) {
         return None;
@@ -102,7 +103,7 @@ fn debian_package(name: &str) -> Option<Command> {
     // A new machine may never have heard of its packages.
     let install = format!(
         "apt-get update --quiet && \
-         apt-get install --yes --quiet --no-install-recommends {name}"
+         apt-get install --yes --quiet --no-install-recommends {names}"
     );
     let mut apt = Command::new("sh");
     apt.env("DEBIAN_FRONTEND", "noninteractive");
