@@ -8,7 +8,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
     AER_VERSION, AerDecoder, AerEncoder, AerRecord, AerWord, BinPosition, DepthEvent,
-    DynamicDepthEvent, LaserCycle, PixelAddress,
+    DynamicDepthEvent, Flags, LaserCycle, PixelAddress,
 };
 
 use crate::source::Geometry;
@@ -28,7 +28,25 @@ pub enum Event {
     DynamicDepth(DynamicDepthEvent),
 }
 
+/// Which kind of event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum EventKind {
+    /// Depth events.
+    Depth,
+    /// Dynamic depth events.
+    DynamicDepth,
+}
+
 impl Event {
+    /// Which kind it is.
+    #[must_use]
+    pub fn kind(&self) -> EventKind {
+        match self {
+            Self::Depth(_) => EventKind::Depth,
+            Self::DynamicDepth(_) => EventKind::DynamicDepth,
+        }
+    }
+
     /// Which macropixel.
     #[must_use]
     pub fn pixel(&self) -> PixelAddress {
@@ -38,7 +56,16 @@ impl Event {
         }
     }
 
-    /// Where: the pulse, or the mean of the last ones.
+    /// When.
+    #[must_use]
+    pub fn cycle(&self) -> LaserCycle {
+        match self {
+            Self::Depth(event) => event.cycle,
+            Self::DynamicDepth(event) => event.cycle,
+        }
+    }
+
+    /// Where: the pulse, or the mean after the change.
     #[must_use]
     pub fn position(&self) -> BinPosition {
         match self {
@@ -47,12 +74,12 @@ impl Event {
         }
     }
 
-    /// When.
+    /// What is to be said against it.
     #[must_use]
-    pub fn cycle(&self) -> LaserCycle {
+    pub fn flags(&self) -> Flags {
         match self {
-            Self::Depth(event) => event.cycle,
-            Self::DynamicDepth(event) => event.cycle,
+            Self::Depth(event) => event.flags,
+            Self::DynamicDepth(event) => event.flags,
         }
     }
 }
@@ -210,6 +237,11 @@ impl<R: Read> Reader<R> {
     /// The header.
     pub fn header(&self) -> &Header {
         &self.header
+    }
+
+    /// The byte of the file at which the next word begins.
+    pub fn offset(&self) -> u64 {
+        self.offset
     }
 
     /// The next event, or `None` after the end word.

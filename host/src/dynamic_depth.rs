@@ -13,6 +13,16 @@ pub struct DynamicDepth {
     pub reference: Reference,
 }
 
+impl Default for DynamicDepth {
+    /// The paper's: 0.1 m between the means of adjacent events.
+    fn default() -> Self {
+        Self {
+            threshold_mm: U24F8::lit("100"),
+            reference: Reference::Previous,
+        }
+    }
+}
+
 impl DynamicDepth {
     /// Events of which the mean is: the paper's.
     pub const MEAN_OF: usize = 3;

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use dtof_core::{DepthEvent, DynamicDepthEvent, Polarity, RangeScale};
 
-use crate::aer_file::Event;
+use crate::aer_file::{Event, EventKind};
 
 /// The columns of depth events.
 ///
@@ -21,10 +21,10 @@ pub const DYNAMIC_DEPTH_HEADER: &str = "cycle,pixel,polarity,range_mm,change_mm,
 
 /// The columns of events of this kind.
 #[must_use]
-pub fn header(event: &Event) -> &'static str {
-    match event {
-        Event::Depth(_) => HEADER,
-        Event::DynamicDepth(_) => DYNAMIC_DEPTH_HEADER,
+pub fn header(kind: EventKind) -> &'static str {
+    match kind {
+        EventKind::Depth => HEADER,
+        EventKind::DynamicDepth => DYNAMIC_DEPTH_HEADER,
     }
 }
 

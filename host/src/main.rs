@@ -27,6 +27,8 @@ enum Command {
     Replay(Box<command::replay::Replay>),
     /// Print the events of an AER file as CSV.
     Decode(command::decode::Decode),
+    /// Write the events of an AER file as points, or as an event camera's.
+    Export(Box<command::export::Export>),
     /// Print the events of a device with a sensor as CSV, as they come.
     Monitor(Box<command::monitor::Monitor>),
     /// Find α and L1 for a wanted rate of false events, and say what to expect.
@@ -50,6 +52,7 @@ fn main() -> ExitCode {
         Some(Command::Simulate(simulate)) => simulate.run(),
         Some(Command::Replay(replay)) => replay.run(),
         Some(Command::Decode(decode)) => decode.run(),
+        Some(Command::Export(export)) => export.run(),
         Some(Command::Monitor(monitor)) => monitor.run(),
         Some(Command::Tune(tune)) => tune.run(),
         Some(Command::Sweep(sweep)) => sweep.run(),

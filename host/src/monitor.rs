@@ -2,6 +2,7 @@
 //! does.
 
 pub mod map;
+mod recording;
 
 use std::io::{self, ErrorKind, Write};
 use std::time::{Duration, Instant};
@@ -18,6 +19,7 @@ use crate::dynamic_depth::DynamicDepth;
 use crate::events_csv;
 use crate::settings::Settings;
 use map::LiveMap;
+pub use recording::Recording;
 
 /// How often there are statistics.
 const EVERY: Duration = Duration::from_secs(1);
@@ -42,6 +44,8 @@ pub struct Outputs<'a> {
     pub statistics: &'a mut dyn Write,
     /// The ranges as a picture, and then the lines of statistics below it.
     pub map: Option<&'a mut LiveMap>,
+    /// All events once more.
+    pub recording: Option<&'a mut Recording>,
 }
 
 impl Outputs<'_> {
@@ -57,7 +61,10 @@ impl Outputs<'_> {
     }
 
     /// Events. Says whether somebody still reads them.
-    fn write(&mut self, events: &[Event], scale: &RangeScale) -> io::Result<bool> {
+    fn write(&mut self, events: &[Event], scale: &RangeScale) -> Result<bool> {
+        if let Some(recording) = &mut self.recording {
+            recording.write(events)?;
+        }
         let open = still_open(write(self.events, events, scale))?;
         let Some(map) = &mut self.map else {
             return Ok(open);

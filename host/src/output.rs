@@ -180,7 +180,7 @@ fn remove_leftovers(folder: &Path) {
 }
 
 /// A file in `folder` that vanishes unless it is moved to its place.
-fn aside(folder: &Path) -> Result<NamedTempFile> {
+pub(crate) fn aside(folder: &Path) -> Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(ASIDE.0).suffix(ASIDE.1);
     #[cfg(unix)]
@@ -195,7 +195,7 @@ fn aside(folder: &Path) -> Result<NamedTempFile> {
 }
 
 /// What was buffered is on disk, or an error says that it is not.
-fn flushed(file: BufWriter<NamedTempFile>) -> Result<NamedTempFile> {
+pub(crate) fn flushed(file: BufWriter<NamedTempFile>) -> Result<NamedTempFile> {
     let file = file
         .into_inner()
         .map_err(std::io::IntoInnerError::into_error)?;

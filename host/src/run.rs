@@ -1,12 +1,10 @@
 //! One run: photons through an engine into an output folder.
 
-use std::time::{Duration, Instant};
-
 use anyhow::Result;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::engine::Engine;
 use crate::output::Output;
+use crate::progress::Progress;
 use crate::settings::Settings;
 use crate::source::PhotonSource;
 use crate::summary::Summary;
@@ -29,7 +27,7 @@ pub fn run(
     quiet: bool,
 ) -> Result<Summary> {
     let cycles = source.cycles();
-    let progress = Progress::new(cycles, quiet);
+    let progress = Progress::new(cycles, "laser cycles", quiet);
     let mut done = 0;
     while done < cycles {
         #[allow(
@@ -44,7 +42,7 @@ pub fn run(
         done += u64::from(next);
         progress.at(done);
     }
-    progress.bar.finish_and_clear();
+    progress.finish();
     let reporting = output.maps().reporting();
     Ok(Summary::new(
         &engine.statistics(),
@@ -52,35 +50,4 @@ pub fn run(
         reporting,
         settings,
     ))
-}
-
-/// A progress bar that is not worth showing for short work.
-struct Progress {
-    bar: ProgressBar,
-    since: Instant,
-    quiet: bool,
-}
-
-impl Progress {
-    fn new(cycles: u64, quiet: bool) -> Self {
-        let bar = ProgressBar::with_draw_target(Some(cycles), ProgressDrawTarget::hidden());
-        let style = ProgressStyle::with_template(
-            "{bar:40} {human_pos} of {human_len} laser cycles, {eta} left",
-        );
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        Self {
-            bar,
-            since: Instant::now(),
-            quiet,
-        }
-    }
-
-    fn at(&self, cycle: u64) {
-        let long = self.since.elapsed() > Duration::from_secs(1);
-        if self.bar.is_hidden() && long && !self.quiet {
-            // Stays hidden where standard error is not a terminal.
-            self.bar.set_draw_target(ProgressDrawTarget::stderr());
-        }
-        self.bar.set_position(cycle);
-    }
 }

@@ -13,12 +13,13 @@ use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 
 use crate::detection::{Estimator, Rule};
+use crate::geometry::FieldOfView;
 use crate::settings::{I24F8Number, Settings, U16F16Number};
 use crate::simulation::effects::{Effects, Timing};
 use crate::simulation::{MM_PER_PS, Rates, RatesAt, SimulatedArray, SimulatedPixel};
 use crate::source::{Geometry, PhotonSource, pixel_rng};
 
-pub use surface::{Ball, Fan, Light, Rectangle, Shape, Surface};
+pub use surface::{Ball, Fan, Light, Plane, Rectangle, Shape, Surface};
 
 /// Signal photons a laser cycle that a pixel may have.
 const MOST_SIGNAL: f64 = 10_000.0;
@@ -37,6 +38,8 @@ pub struct Scene {
     pub geometry: Geometry,
     /// The array that the places in `surfaces` are given in.
     pub layout: Geometry,
+    /// What the array sees; [`FieldOfView::of`] the array unless given. Planes need it.
+    pub field_of_view: Option<FieldOfView>,
     /// Laser cycles.
     pub cycles: u64,
     /// Bins of a histogram.
@@ -79,11 +82,11 @@ impl Scene {
     /// compared with. None if there is nothing at its place.
     #[must_use]
     pub fn truth(&self, pixel: PixelAddress, cycle: u64) -> Option<View> {
-        let place = self.place(pixel);
+        let (place, ray) = (self.place(pixel), self.ray(pixel));
         let seconds = self.seconds(cycle);
         let mut nearest: Option<View> = None;
         for (index, surface) in self.surfaces.iter().enumerate() {
-            let Some(range_mm) = surface.range_mm(place, seconds, self.layout) else {
+            let Some(range_mm) = surface.range_mm(place, ray, seconds, self.layout) else {
                 continue;
             };
             if nearest.is_none_or(|other| range_mm < other.range_mm) {
@@ -164,8 +167,26 @@ impl Scene {
         let Geometry { columns, rows } = self.geometry;
         let across = f64::from(self.layout.columns) / f64::from(columns);
         let down = f64::from(self.layout.rows) / f64::from(rows);
-        let (column, row) = (u32::from(pixel.0) % columns, u32::from(pixel.0) / columns);
-        [f64::from(column) * across, f64::from(row) * down]
+        let [column, row] = self.column_and_row(pixel);
+        [column * across, row * down]
+    }
+
+    /// The unit ray through the middle of a pixel, as `dtof export` has it.
+    fn ray(&self, pixel: PixelAddress) -> [f64; 3] {
+        let view = self.field_of_view;
+        let view = view.unwrap_or_else(|| FieldOfView::of(self.geometry));
+        let Geometry { columns, rows } = self.geometry;
+        let [column, row] = self.column_and_row(pixel);
+        view.ray(
+            (column + 0.5) / f64::from(columns),
+            (row + 0.5) / f64::from(rows),
+        )
+    }
+
+    fn column_and_row(&self, pixel: PixelAddress) -> [f64; 2] {
+        let columns = self.geometry.columns;
+        let pixel = u32::from(pixel.0);
+        [f64::from(pixel % columns), f64::from(pixel / columns)]
     }
 
     #[allow(clippy::cast_precision_loss, reason = "2^53 laser cycles are years")]

@@ -82,6 +82,10 @@ fn numbers_that_cannot_be_are_named_by_key() {
             "photons a laser cycle: more than 10000000",
         ),
         ("pulse_sigma_bins = -1", "pulse_sigma_bins -1"),
+        (
+            "field_of_view_degrees = [60, 180]",
+            "field_of_view_degrees: must be HORIZONTALxVERTICAL in degrees",
+        ),
         ("signal_at_one_metre = -1", "signal_at_one_metre -1"),
         (
             "[tail]\nshare = 1.5\ndecay_bins = 5",
@@ -217,9 +221,25 @@ fn surfaces_that_cannot_be_are_named() {
             "fan blade_share 1.5",
         ),
         (
+            "range_mm = 1000\nsignal = 1\nplane = { normal = [1, 0, 0] }",
+            "plane normal [1, 0, 0]: its z is too small",
+        ),
+        (
+            "range_mm = 1000\nsignal = 1\nplane = { normal = [0, nan, 1] }",
+            "plane normal NaN",
+        ),
+        (
+            "range_mm = 1000\nsignal = 1\ncolumns_per_s = 1\nplane = { normal = [0, 0, 1] }",
+            "a plane has no range_right_mm, columns_per_s or rows_per_s",
+        ),
+        (
+            "range_mm = 2\nsignal = 1\nplane = { normal = [2, 0, 1] }",
+            "comes as near as 0.9 mm",
+        ),
+        (
             "range_mm = 1000\nsignal = 1\nrectangle = { columns = [0, 2], rows = [0, 1] }\n\
              ball = { centre = [0, 2], radius = 1, radius_mm = 1 }",
-            "is more than one of rectangle, ball and fan",
+            "is more than one of rectangle, ball, fan and plane",
         ),
     ] {
         refused(&format!("[[surface]]\n{keys}\n"), &["surface 1: ", part]);

@@ -263,6 +263,7 @@ fn watch(
         events,
         statistics,
         map: None,
+        recording: None,
     };
     monitor(client, &task, done, &mut outputs)
 }
@@ -470,6 +471,37 @@ fn ctrl_c_stops_the_sensor() {
         assert!(monitor.wait().unwrap().success());
         assert!(rests.recv_timeout(lives).unwrap());
     }
+}
+
+#[test]
+fn what_is_recorded_is_what_is_printed_also_when_the_device_is_gone() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("events.aer");
+    for (lives, seconds, whole) in [(60_000, "1", true), (1_000, "30", false)] {
+        let name = device(true, Duration::from_millis(lives));
+        let mut monitor = Command::new(env!("CARGO_BIN_EXE_dtof"));
+        monitor.args([
+            "monitor",
+            "--pixels",
+            "4",
+            "--columns",
+            "2",
+            "--device",
+            &name,
+        ]);
+        monitor.args(["--seconds", seconds, "--record"]).arg(&file);
+        let output = monitor.output().unwrap();
+        assert_eq!(output.status.success(), whole, "{output:?}");
+        let decoded = Command::new(env!("CARGO_BIN_EXE_dtof"))
+            .arg("decode")
+            .arg(&file)
+            .output()
+            .unwrap();
+        assert!(decoded.status.success(), "{decoded:?}");
+        assert!(decoded.stdout == output.stdout && decoded.stdout.len() > 500);
+    }
+    let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
+    assert_eq!(left.len(), 1);
 }
 
 #[test]

@@ -50,7 +50,7 @@ fn every_scene_of_the_repository_runs_and_says_what_it_holds() {
         assert!(scratch.read("out/report.html").contains("Surfaces"));
         scenes += 1;
     }
-    assert_eq!(scenes, 7);
+    assert_eq!(scenes, 8);
 }
 
 #[test]

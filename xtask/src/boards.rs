@@ -200,6 +200,7 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
             events: &mut events,
             statistics: &mut statistics,
             map: None,
+            recording: None,
         },
     )
     .context(name)?;

@@ -8,7 +8,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::toolchain;
+use crate::{target_folder, toolchain};
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 const PROFILE: &str = "firmware";
@@ -152,8 +152,7 @@ fn build(
     profile: &str,
 ) -> Result<PathBuf> {
     toolchain::ensure_target(TARGET)?;
-    let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
-    let folder = root.join(folder);
+    let folder = target_folder(root);
     let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     match program {
         Some(path) => cargo.env(IMAGE, path),

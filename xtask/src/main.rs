@@ -11,6 +11,7 @@ mod log;
 mod panics;
 mod python;
 mod qemu;
+mod readers;
 mod report;
 mod self_test;
 mod sizes;
@@ -23,7 +24,7 @@ mod toolchain;
 mod tools;
 
 use std::env;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
@@ -32,7 +33,7 @@ const HELP: &str = "\
 cargo xtask <command>
 
   setup         install what rust-toolchain.toml names and is not there yet;
-                QEMU, defmt-print, GNU parallel, Chromium and Python's venv as well if
+                QEMU, defmt-print, GNU parallel, Chromium and Python as well if
                 that needs no question
   check-image   link dtof-core for every target; no panic, float or allocation
   check-source  no floating-point type and no unsafe in core/src
@@ -53,6 +54,8 @@ cargo xtask <command>
   check-report [--picture]
                 the reports in headless Chromium: drawn, turned, without a network;
                 --picture writes docs/figures/report.png
+  check-export  the files of dtof export agree with what other projects' readers find in
+                them; installs those below target/ first
   figures [--all] [--check]
                 work out the figures of the documentation and the verdicts on the
                 paper's claims, from the seeds of a quick look and the kept rest or
@@ -90,6 +93,7 @@ fn run() -> Result<()> {
         ["check-boards"] => boards::check(root()?),
         ["check-report"] => report::check(root()?, false),
         ["check-report", "--picture"] => report::check(root()?, true),
+        ["check-export"] => readers::check(root()?),
         ["figures", ref rest @ ..] => figures::make(root()?, rest),
         ["self-test"] => self_test::run(root()?),
         ["self-test", "--bless"] => self_test::bless(root()?),
@@ -108,4 +112,10 @@ fn root() -> Result<&'static Path> {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .context("xtask lies in no workspace")
+}
+
+/// Where cargo builds.
+fn target_folder(root: &Path) -> PathBuf {
+    let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
+    root.join(folder)
 }

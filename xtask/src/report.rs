@@ -10,9 +10,6 @@ use anyhow::{Context, Result, ensure};
 use crate::python;
 use crate::tools::CHROMIUM;
 
-/// What drives the browser.
-const PLAYWRIGHT: &str = "playwright==1.56.0";
-
 /// The picture of the README.
 const PICTURE: &str = "docs/figures/report.png";
 const MOST_BYTES: u64 = 300_000;
@@ -25,7 +22,12 @@ const MOST_BYTES: u64 = 300_000;
 /// If the browser or its driver are not there, or a report is not as it should be.
 pub fn check(root: &Path, picture: bool) -> Result<()> {
     CHROMIUM.require()?;
-    let python = python::venv(&[PLAYWRIGHT])?;
+    let xtask = root.join("xtask");
+    let python = python::environment(
+        root,
+        "browser",
+        &xtask.join("check-report.requirements.txt"),
+    )?;
     let folder = root.join("out").join("check-report");
     let (still, moving) = (folder.join("static"), folder.join("moving"));
     dtof(root, &["demo", "--quiet", "--out"], &still)?;
@@ -34,7 +36,7 @@ pub fn check(root: &Path, picture: bool) -> Result<()> {
     dtof(root, &fan.split(' ').collect::<Vec<_>>(), &moving)?;
 
     let status = Command::new(python)
-        .arg(root.join("xtask").join("check-report.py"))
+        .arg(xtask.join("check-report.py"))
         .args([CHROMIUM.program.as_ref(), folder.as_path()])
         .args([still.join("report.html"), moving.join("report.html")])
         .status()

@@ -5,46 +5,64 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result};
 
-use crate::python;
-
 /// A program, and the one line that installs it.
 pub struct Tool {
     pub program: &'static str,
+    /// What it is asked to find out whether it is there: it prints its version.
+    ask: &'static [&'static str],
     pub install: &'static str,
 }
 
+const VERSION: &[&str] = &["--version"];
+
 pub const QEMU: Tool = Tool {
     program: "qemu-system-arm",
+    ask: VERSION,
     install: "sudo apt-get install --yes qemu-system-arm",
 };
 
 pub const DEFMT_PRINT: Tool = Tool {
     program: "defmt-print",
+    ask: VERSION,
     install: "cargo install --locked defmt-print",
 };
 
 /// For sweeps in parts, as `docs/sweeps.md` has them.
 pub const PARALLEL: Tool = Tool {
     program: "parallel",
+    ask: VERSION,
     install: "sudo apt-get install --yes parallel",
 };
 
 /// For the reports, as readers see them.
 pub const CHROMIUM: Tool = Tool {
     program: "chromium",
+    ask: VERSION,
     install: "sudo apt-get install --yes chromium",
 };
 
 pub const PROBE_RS: Tool = Tool {
     program: "probe-rs",
+    ask: VERSION,
     install: "cargo install --locked probe-rs-tools",
+};
+
+/// For `check-export`: with what makes virtual environments, and the headers that a
+/// package may be compiled with, which Debian has apart.
+pub const PYTHON: Tool = Tool {
+    program: "python3",
+    ask: &[
+        "-c",
+        "import ensurepip, platform, venv; print('Python', platform.python_version())",
+    ],
+    install: "sudo apt-get install --yes python3-venv python3-dev",
 };
 
 impl Tool {
     /// What it says of its version, if it is there.
     pub fn version(&self) -> Option<String> {
         let output = Command::new(self.program)
-            .arg("--version")
+            .args(self.ask)
             .stdin(Stdio::null())
             .stderr(Stdio::null())
             .output()
@@ -69,14 +87,14 @@ impl Tool {
     }
 }
 
-/// Installs the emulator, the log's decoder, GNU parallel, the browser and Python's
-/// `venv` if they are missing and that needs no question; else says what to type. What
-/// needs them says so itself, so that this never fails.
+/// Installs the emulator, the log's decoder, GNU parallel, the browser and Python if
+/// they are missing and that needs no question; else says what to type. What needs them
+/// says so itself, so that this never fails.
 pub fn set_up() {
     install(&QEMU, || debian_package("qemu-system-arm"));
     install(&PARALLEL, || debian_package("parallel"));
     install(&CHROMIUM, || debian_package("chromium"));
-    python::set_up(debian_package);
+    install(&PYTHON, || debian_package("python3-venv python3-dev"));
     install(&DEFMT_PRINT, || {
         let mut cargo = Command::new("cargo");
         cargo.args(["install", "--locked", "--quiet", "defmt-print"]);
@@ -84,8 +102,8 @@ pub fn set_up() {
     });
 }
 
-/// How root installs a package on Debian.
-fn debian_package(name: &str) -> Option<Command> {
+/// How root installs packages on Debian.
+fn debian_package(names: &str) -> Option<Command> {
     let is_root = Command::new("id").arg("-u").output().ok()?.stdout == b"0\n";
     if !(is_root && Path::new("/etc/debian_version").exists()) {
         return None;
@@ -93,7 +111,7 @@ fn debian_package(name: &str) -> Option<Command> {
     // A new machine may never have heard of its packages.
     let install = format!(
         "apt-get update --quiet && \
-         apt-get install --yes --quiet --no-install-recommends {name}"
+         apt-get install --yes --quiet --no-install-recommends {names}"
     );
     let mut apt = Command::new("sh");
     apt.env("DEBIAN_FRONTEND", "noninteractive");

@@ -33,14 +33,14 @@ impl Decode {
         let first = reader.next_event();
         // The columns are those of the first event.
         let header = match &first {
-            Ok(Some(event)) => events_csv::header(event),
+            Ok(Some(event)) => events_csv::header(event.kind()),
             _ => events_csv::HEADER,
         };
         writeln!(out, "{header}")?;
         let mut next = first.with_context(name)?;
         while let Some(event) = next {
             ensure!(
-                events_csv::header(&event) == header,
+                events_csv::header(event.kind()) == header,
                 "{}: depth events and dynamic depth events in one file have no columns in common",
                 name()
             );

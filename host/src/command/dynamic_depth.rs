@@ -31,10 +31,12 @@ impl Options {
     }
 
     pub fn dynamic_depth(&self) -> DynamicDepth {
+        let default = DynamicDepth::default();
         DynamicDepth {
-            threshold_mm: self.threshold_mm.unwrap_or(const { U24F8::lit("100") }),
+            threshold_mm: self.threshold_mm.unwrap_or(default.threshold_mm),
             reference: match self.reference {
-                None | Some(Reference::Previous) => dtof_core::Reference::Previous,
+                None => default.reference,
+                Some(Reference::Previous) => dtof_core::Reference::Previous,
                 Some(Reference::Reported) => dtof_core::Reference::Reported,
             },
         }

@@ -4,6 +4,7 @@ pub mod decode;
 pub mod demo;
 mod detection;
 mod dynamic_depth;
+pub mod export;
 pub mod figures;
 pub mod monitor;
 mod operation;

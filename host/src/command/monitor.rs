@@ -1,6 +1,7 @@
 //! `dtof monitor`: the events of a device with a sensor, as they come.
 
 use std::io::{self, BufWriter, IsTerminal, Write};
+use std::path::PathBuf;
 use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -8,9 +9,11 @@ use std::time::Duration;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use console::Term;
+use dtof::aer_file::Header;
 use dtof::device::{self, Client};
 use dtof::monitor::map::{LiveMap, SHOW_CURSOR};
-use dtof::monitor::{Outputs, Task, monitor};
+use dtof::monitor::{Outputs, Recording, Task, monitor};
+use dtof::source::Geometry;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_firmware::sensor::About;
 
@@ -46,9 +49,12 @@ pub struct Monitor {
     /// written where standard output goes, unless that is a terminal, too
     #[arg(long)]
     map: bool,
-    /// Columns of the array that is drawn, pixel = row × columns + column [default: as high as
-    /// wide]
-    #[arg(long, value_name = "N", requires = "map", value_parser = clap::value_parser!(u16).range(1..))]
+    /// Write the events into an AER file as well, for `dtof decode` and `dtof export`
+    #[arg(long, value_name = "FILE.aer")]
+    record: Option<PathBuf>,
+    /// Columns of the array that is drawn or recorded, pixel = row × columns + column [default: drawn
+    /// as high as wide, recorded in one row]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     columns: Option<u16>,
     #[command(flatten)]
     operation: Operation,
@@ -63,6 +69,10 @@ impl Monitor {
         ensure!(
             !self.map || io::stderr().is_terminal(),
             "--map draws on standard error, which is no terminal here"
+        );
+        ensure!(
+            self.columns.is_none() || self.map || self.record.is_some(),
+            "--columns is of --map and --record"
         );
         let name = || self.device.clone();
         let mut client = Client::new(device::open(&self.device)?).with_context(name)?;
@@ -100,6 +110,23 @@ impl Monitor {
         } else {
             Box::new(BufWriter::new(io::stdout().lock()))
         };
+        let mut recording = match &self.record {
+            None => None,
+            Some(file) => {
+                let columns = u32::from(self.columns.unwrap_or(pixels)).max(1);
+                let geometry = Geometry {
+                    columns,
+                    rows: u32::from(pixels).div_ceil(columns),
+                };
+                let header = Header {
+                    bins: client.bins().into(),
+                    geometry,
+                    bin_width_ps: settings.bin_width_ps.0,
+                    offset_mm: settings.offset_mm.0,
+                };
+                Some(Recording::new(file, &header)?)
+            }
+        };
         let task = Task {
             settings: &settings,
             pixels,
@@ -107,7 +134,7 @@ impl Monitor {
                 .dynamic_depth
                 .then(|| self.of_dynamic_depth.dynamic_depth()),
         };
-        monitor(
+        let monitored = monitor(
             &mut client,
             &task,
             |elapsed| {
@@ -118,8 +145,12 @@ impl Monitor {
                 events: &mut events,
                 statistics: &mut io::stderr(),
                 map: map.as_mut(),
+                recording: recording.as_mut(),
             },
         )
-        .with_context(name)
+        .with_context(name);
+        // What came before a device was gone is kept.
+        let recorded = recording.map_or(Ok(()), Recording::finish);
+        monitored.and(recorded)
     }
 }

@@ -76,13 +76,17 @@ impl DeviceEngine {
 /// in place of depth events.
 ///
 /// # Errors
-/// If there are no bins.
+/// If there are no bins, or it is to read frames.
 pub fn configuration(
     settings: &Settings,
     pixels: u16,
     source: u8,
     dynamic_depth: Option<DynamicDepth>,
 ) -> Result<Configuration> {
+    ensure!(
+        settings.frame.is_none(),
+        "a device reports events: it has no --frame"
+    );
     let last_bin = u16::try_from(settings.bins)? - 1;
     let (gate_first, gate_last) = settings.gate.unwrap_or((0, last_bin));
     let (rule, alpha, window, z) = match settings.rule {

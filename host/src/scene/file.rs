@@ -7,7 +7,8 @@ use anyhow::{Context, Result, anyhow, ensure};
 use serde::Deserialize;
 
 use super::Scene;
-use super::surface::{Ball, Fan, Light, Rectangle, Shape, Surface};
+use super::surface::{Ball, Fan, Light, Plane, Rectangle, Shape, Surface};
+use crate::geometry::FieldOfView;
 use crate::simulation::MM_PER_PS;
 use crate::simulation::effects::{Effects, within};
 use crate::simulation::{
@@ -28,6 +29,7 @@ struct SceneFile {
     background: f64,
     pulse_sigma_bins: f64,
     signal_at_one_metre: f64,
+    field_of_view_degrees: Option<[f64; 2]>,
     surface: Vec<SurfaceEntry>,
     tail: Option<Tail>,
     second_echo: Option<SecondEcho>,
@@ -51,6 +53,7 @@ impl Default for SceneFile {
             background: 0.0,
             pulse_sigma_bins: 1.0,
             signal_at_one_metre: 4.0,
+            field_of_view_degrees: None,
             surface: Vec::new(),
             tail: None,
             second_echo: None,
@@ -82,6 +85,7 @@ struct SurfaceEntry {
     rectangle: Option<Rectangle>,
     ball: Option<Ball>,
     fan: Option<Fan>,
+    plane: Option<Plane>,
 }
 
 impl Scene {
@@ -135,9 +139,11 @@ impl SceneFile {
             columns: self.columns.into(),
             rows: self.rows.into(),
         };
+        let view = self.field_of_view_degrees.map(FieldOfView::new);
         let scene = Scene {
             geometry,
             layout: geometry,
+            field_of_view: view.transpose().context("field_of_view_degrees")?,
             cycles: self.cycles,
             bins: self.bins,
             bin_width_ps: self.bin_width_ps,
@@ -199,12 +205,20 @@ impl SurfaceEntry {
         within("velocity_m_per_s", self.velocity_m_per_s, -1e5..=1e5)?;
         within("columns_per_s", self.columns_per_s, -1e7..=1e7)?;
         within("rows_per_s", self.rows_per_s, -1e7..=1e7)?;
-        let shape = match (self.rectangle, self.ball, self.fan) {
-            (None, None, None) => Shape::Everywhere,
-            (Some(rectangle), None, None) => Shape::Rectangle(rectangle.checked()?),
-            (None, Some(ball), None) => Shape::Ball(ball.checked()?),
-            (None, None, Some(fan)) => Shape::Fan(fan.checked()?),
-            _ => anyhow::bail!("is more than one of rectangle, ball and fan"),
+        let shape = match (self.rectangle, self.ball, self.fan, self.plane) {
+            (None, None, None, None) => Shape::Everywhere,
+            (Some(rectangle), None, None, None) => Shape::Rectangle(rectangle.checked()?),
+            (None, Some(ball), None, None) => Shape::Ball(ball.checked()?),
+            (None, None, Some(fan), None) => Shape::Fan(fan.checked()?),
+            (None, None, None, Some(plane)) => {
+                let across = [self.columns_per_s, self.rows_per_s] == [0.0; 2];
+                ensure!(
+                    self.range_right_mm.is_none() && across,
+                    "a plane has no range_right_mm, columns_per_s or rows_per_s"
+                );
+                Shape::Plane(plane.checked()?)
+            }
+            _ => anyhow::bail!("is more than one of rectangle, ball, fan and plane"),
         };
         Ok(Surface {
             name: name.to_owned(),
@@ -246,6 +260,20 @@ impl Ball {
         place("ball centre", self.centre)?;
         within("ball radius", self.radius, 0.001..=1e6)?;
         within("ball radius_mm", self.radius_mm, 0.0..=1e6)?;
+        Ok(self)
+    }
+}
+
+impl Plane {
+    fn checked(self) -> Result<Self> {
+        for side in self.normal {
+            within("plane normal", side, -1e6..=1e6)?;
+        }
+        let [x, y, z] = self.normal;
+        ensure!(
+            z.abs() >= 0.001 * x.hypot(y) && z.abs() >= 1e-6,
+            "plane normal [{x}, {y}, {z}]: its z is too small, the optical axis must meet the plane"
+        );
         Ok(self)
     }
 }

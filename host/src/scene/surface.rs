@@ -6,6 +6,9 @@ use serde::Deserialize;
 
 use crate::source::Geometry;
 
+/// Nothing is farther away.
+const FARTHEST_MM: f64 = 1e9;
+
 /// Something that photons come back from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
@@ -46,6 +49,8 @@ pub enum Shape {
     Ball(Ball),
     /// A fan.
     Fan(Fan),
+    /// A plane, wherever a ray meets it.
+    Plane(Plane),
 }
 
 /// From the first column (row) up to the second, which is not covered.
@@ -87,6 +92,15 @@ pub struct Fan {
     pub rpm: f64,
 }
 
+/// A flat surface at any angle. The optical axis meets it at `range_mm`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// At right angles to it, of any length: x to the right, y down, z forward. Its z is
+    /// not 0.
+    pub normal: [f64; 3],
+}
+
 impl Surface {
     /// Does what a pixel sees of it change?
     #[must_use]
@@ -95,9 +109,15 @@ impl Surface {
         turns || self.velocity_m_per_s != 0.0 || self.drift_per_s != [0.0; 2]
     }
 
-    /// How far away it is at a place (column and row of the layout) after
-    /// `seconds`. None if it does not cover the place.
-    pub(super) fn range_mm(&self, place: [f64; 2], seconds: f64, layout: Geometry) -> Option<f64> {
+    /// How far away it is at a place (column and row of the layout), which the unit ray
+    /// `ray` goes to, after `seconds`. None if it does not cover the place.
+    pub(super) fn range_mm(
+        &self,
+        place: [f64; 2],
+        ray: [f64; 3],
+        seconds: f64,
+        layout: Geometry,
+    ) -> Option<f64> {
         let [column, row] = self.at_start(place, seconds);
         let nearer_mm = match &self.shape {
             Shape::Everywhere => 0.0,
@@ -112,12 +132,17 @@ impl Surface {
                 (from_centre < 1.0).then(|| ball.radius_mm * (1.0 - from_centre.powi(2)).sqrt())?
             }
             Shape::Fan(fan) => fan.covers([column, row], seconds).then_some(0.0)?,
+            Shape::Plane(plane) => return plane.along(ray, self.plane_mm(0.0, seconds, layout)),
         };
         Some(self.plane_mm(column, seconds, layout) - nearer_mm)
     }
 
-    /// The least it can be at any place of the layout after `seconds`.
+    /// The least it can be at any place of the layout after `seconds`; of a plane the
+    /// least it is anywhere.
     pub(super) fn nearest_mm(&self, seconds: f64, layout: Geometry) -> f64 {
+        if let Shape::Plane(plane) = &self.shape {
+            return plane.distance(self.plane_mm(0.0, seconds, layout));
+        }
         let nearer_mm = match &self.shape {
             Shape::Ball(ball) => ball.radius_mm,
             _ => 0.0,
@@ -140,6 +165,23 @@ impl Surface {
         let turned = self.range_right_mm - self.range_mm;
         let last = f64::from(layout.columns.max(2) - 1);
         self.range_mm + turned * column / last + self.velocity_m_per_s * 1000.0 * seconds
+    }
+}
+
+impl Plane {
+    /// How far along a ray it is, if the optical axis meets it at `axis_mm`. None if the
+    /// ray leads away from it.
+    fn along(&self, ray: [f64; 3], axis_mm: f64) -> Option<f64> {
+        let towards: f64 = self.normal.iter().zip(ray).map(|(n, side)| n * side).sum();
+        let range_mm = axis_mm * self.normal[2] / towards;
+        // Farther than that is parallel.
+        (range_mm > 0.0 && range_mm < FARTHEST_MM).then_some(range_mm)
+    }
+
+    /// How far from the lens it is.
+    fn distance(&self, axis_mm: f64) -> f64 {
+        let [x, y, z] = self.normal;
+        axis_mm * z.abs() / x.hypot(y).hypot(z)
     }
 }
 

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "not every test needs all of it")]
 
+pub mod aer;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

@@ -1,0 +1,77 @@
+"""What an export must hold, worked out here from the AER file alone."""
+
+from collections import defaultdict, deque
+from math import floor
+
+import numpy as np
+
+from aer import Depth
+
+MM_PER_PS = 0.149896229
+
+
+def pinhole(header, fov):
+    """x, y and z of the unit ray of each pixel; fov in degrees, or None."""
+    if fov is None:
+        longer = max(header.columns, header.rows)
+        half = np.tan(np.radians(30)) * np.array([header.columns, header.rows]) / longer
+    else:
+        half = np.tan(np.radians(fov) / 2)
+    pixel = np.arange(header.columns * header.rows)
+    column, row = pixel % header.columns, pixel // header.columns
+    x = half[0] * (2 * (column + 0.5) / header.columns - 1)
+    y = half[1] * (2 * (row + 0.5) / header.rows - 1)
+    rays = np.stack([x, y, np.ones(len(pixel))], axis=1)
+    return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+
+def nanoseconds(event, laser_hz):
+    return event.cycle * 10**9 // laser_hz
+
+
+def microseconds(event, laser_hz):
+    return event.cycle * 10**6 // laser_hz
+
+
+def range_mm(header, event):
+    """Within 0.01 mm, as the core works with fixed-point numbers."""
+    return event.position / 256 * header.bin_width_ps * MM_PER_PS + header.offset_mm
+
+
+def records(header, events, laser_hz):
+    """Value, pixel, flags and time of each point."""
+    def value(event):
+        if isinstance(event, Depth):
+            return event.peak_count
+        return event.change / 256 * header.bin_width_ps * MM_PER_PS / 1000
+    return [
+        (value(event), event.pixel, event.flags, nanoseconds(event, laser_hz)) for event in events
+    ]
+
+
+def changes(header, events, laser_hz, threshold_mm, reference):
+    """Time, column, row and polarity of each change of depth, in order of time."""
+    step_mm = header.bin_width_ps * MM_PER_PS / 256
+    threshold = 3 * floor(threshold_mm / step_mm + 0.5)
+    recent = defaultdict(lambda: deque(maxlen=3))
+    compared_with = {}
+    found = []
+    for event in events:
+        if isinstance(event, Depth):
+            last = recent[event.pixel]
+            last.append(event.position)
+            if len(last) < 3:
+                continue
+            mean = sum(last)
+            moved = mean - compared_with.setdefault(event.pixel, mean)
+            changed = abs(moved) > threshold
+            if changed or reference == "previous":
+                compared_with[event.pixel] = mean
+            if not changed:
+                continue
+        else:
+            moved = event.change
+        column, row = event.pixel % header.columns, event.pixel // header.columns
+        found.append((microseconds(event, laser_hz), column, row, int(moved > 0)))
+    # Events of one microsecond stay in the order they came in.
+    return sorted(found, key=lambda change: change[0])

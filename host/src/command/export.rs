@@ -1,0 +1,88 @@
+//! `dtof export`: the events of an AER file in formats that other programs read.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use dtof::aer_file::EventKind;
+use dtof::export::{Format, LaserClock, Optics, Options, export};
+use dtof::geometry::FieldOfView;
+use dtof::summary::grouped;
+
+use super::dynamic_depth;
+
+#[derive(Args)]
+pub struct Export {
+    /// The AER file
+    file: PathBuf,
+    /// What to write; docs/export.md says what is in it
+    #[arg(long, value_enum)]
+    format: Format,
+    /// Where to
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// What the array sees, in degrees from edge to edge [default: 60 across the longer side,
+    /// square pixels]
+    #[arg(
+        long,
+        value_name = "HxV",
+        allow_hyphen_values = true,
+        conflicts_with = "calibration"
+    )]
+    fov: Option<FieldOfView>,
+    /// A direction and a range bias for each pixel, a TOML file; docs/export.md has its keys
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// Laser cycles a second
+    #[arg(long, value_name = "HZ", default_value_t = LaserClock::PAPER_HZ, value_parser = clap::value_parser!(u64).range(1..))]
+    laser_hz: u64,
+    /// Which events of a file that holds both kinds
+    #[arg(long, value_enum)]
+    events: Option<EventKind>,
+    /// MCAP: milliseconds of a point cloud
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    slice_ms: u64,
+    #[command(flatten)]
+    dynamic_depth: dynamic_depth::Options,
+    /// Print nothing but errors
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl Export {
+    pub fn run(&self) -> Result<()> {
+        let optics = match &self.calibration {
+            Some(file) => Optics::Calibration(file.clone()),
+            None => Optics::Pinhole(self.fov),
+        };
+        let options = Options {
+            optics,
+            clock: LaserClock::new(self.laser_hz)?,
+            kind: self.events,
+            slice_ns: self.slice_ms * 1_000_000,
+            dynamic_depth: self.dynamic_depth.dynamic_depth(),
+        };
+        let exported = export(&self.file, &self.out, self.format, &options, self.quiet)?;
+        let out = self.out.display();
+        let written = grouped(exported.written);
+        if exported.late > 0 {
+            writeln!(
+                io::stderr(),
+                "{}: {} events came after more than 65,536 later ones: left out of {out}",
+                self.file.display(),
+                grouped(exported.late)
+            )?;
+        }
+        if let Some(damage) = exported.damage {
+            bail!(
+                "{}: {damage}; {out} holds what came before: {written} events",
+                self.file.display()
+            );
+        }
+        if !self.quiet {
+            writeln!(io::stdout(), "{out}: {written} events")?;
+        }
+        Ok(())
+    }
+}

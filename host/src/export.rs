@@ -1,0 +1,224 @@
+//! Events of an AER file in formats that other programs read. `docs/export.md` says
+//! what is in them.
+//!
+//! The file is read twice: once to count the events up to its end, or to where it is
+//! damaged; once to write them, without ever holding more than a few of them. What is
+//! written is moved to its place when it is whole.
+
+mod clock;
+mod csv;
+mod events;
+mod evt2;
+mod mcap;
+mod pcd;
+mod ply;
+mod points;
+mod projection;
+mod reorder;
+
+use std::fs;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use clap::ValueEnum;
+use dtof_core::RangeScale;
+use tempfile::NamedTempFile;
+
+use crate::aer_file::{Event, EventKind};
+use crate::dynamic_depth::DynamicDepth;
+use crate::geometry::{FieldOfView, Rays};
+use crate::output::{aside, flushed};
+use crate::progress::Progress;
+use crate::source::Geometry;
+
+pub use clock::LaserClock;
+use events::{Events, Survey};
+use projection::Projection;
+
+/// What a file is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// Comma-separated values
+    Csv,
+    /// Points, for PCL
+    Pcd,
+    /// Points, for mesh programs
+    Ply,
+    /// Points slice by slice and statistics, for Foxglove
+    Mcap,
+    /// Changes of depth as an event camera's RAW file (EVT2)
+    Evt2,
+}
+
+/// Where the rays of the pixels come from.
+#[derive(Clone, Debug)]
+pub enum Optics {
+    /// A pinhole camera; [`FieldOfView::of`] the array unless given.
+    Pinhole(Option<FieldOfView>),
+    /// A calibration file.
+    Calibration(PathBuf),
+}
+
+impl Optics {
+    fn rays(&self, array: Geometry) -> Result<Rays> {
+        Ok(match self {
+            Self::Pinhole(view) => {
+                Rays::pinhole(array, view.unwrap_or_else(|| FieldOfView::of(array)))
+            }
+            Self::Calibration(path) => Rays::read(path, array)?,
+        })
+    }
+}
+
+/// How events become points in space and time, or changes of depth.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Where pixels look.
+    pub optics: Optics,
+    /// How long a laser cycle is.
+    pub clock: LaserClock,
+    /// Which events of a file that holds both kinds.
+    pub kind: Option<EventKind>,
+    /// MCAP: nanoseconds of a slice; not 0.
+    pub slice_ns: u64,
+    /// EVT2: what is made of depth events.
+    pub dynamic_depth: DynamicDepth,
+}
+
+impl Default for Options {
+    /// A pinhole camera at the paper's 10 MHz, slices of 10 ms, and the paper's dynamic
+    /// depth: 0.1 m between the means of adjacent events (section III-E).
+    fn default() -> Self {
+        Self {
+            optics: Optics::Pinhole(None),
+            clock: LaserClock::default(),
+            kind: None,
+            slice_ns: 10_000_000,
+            dynamic_depth: DynamicDepth::default(),
+        }
+    }
+}
+
+/// What came of it.
+#[derive(Debug)]
+pub struct Exported {
+    /// Events or points in the file.
+    pub written: u64,
+    /// Events that came too late to be put in order, and are left out.
+    pub late: u64,
+    /// Where the AER file is damaged and how, if it is. What came before is written.
+    pub damage: Option<String>,
+}
+
+/// A file on its way.
+type Out = BufWriter<NamedTempFile>;
+
+/// A file that is whole.
+struct Finished {
+    out: Out,
+    written: u64,
+    late: u64,
+}
+
+/// Takes events, writes a file.
+trait Sink {
+    fn write(&mut self, event: &Event) -> Result<()>;
+    fn finish(self: Box<Self>) -> Result<Finished>;
+}
+
+/// Writes the events of the AER file `input` to `out`.
+///
+/// # Errors
+/// If `input` is not an AER file, holds what the format cannot, or `out` cannot be
+/// written; `out` is what it was then. Damage of `input` is no error: see
+/// [`Exported::damage`].
+pub fn export(
+    input: &Path,
+    out: &Path,
+    format: Format,
+    options: &Options,
+    quiet: bool,
+) -> Result<Exported> {
+    let name = || input.display().to_string();
+    let folder = place_of(out, input)?;
+    let survey = Survey::of(input, quiet).with_context(name)?;
+    let kind = survey.kind(options.kind).with_context(name)?;
+    let held = options.clock.check(format, survey.latest);
+    // A damaged time may be any; the damage is named with it.
+    let held = match &survey.damage {
+        Some(damage) => held.with_context(|| damage.clone()),
+        None => held,
+    };
+    held.with_context(name)?;
+    let header = survey.header;
+    let array = header.geometry;
+    let projection = Projection {
+        rays: options.optics.rays(array)?,
+        scale: RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?,
+        clock: options.clock,
+    };
+    let file = BufWriter::new(aside(&folder)?);
+    let points = survey.events(kind);
+    let to = || out.display().to_string();
+    let sink: Result<Box<dyn Sink>> = match format {
+        Format::Csv => csv::Csv::new(file, projection, kind).map(boxed),
+        Format::Pcd => pcd::begin(file, projection, kind, points).map(boxed),
+        Format::Ply => ply::begin(file, projection, kind, points).map(boxed),
+        Format::Mcap => mcap::Mcap::new(file, projection, array, kind, options.slice_ns).map(boxed),
+        Format::Evt2 => {
+            let config = options.dynamic_depth.config(&projection.scale)?;
+            evt2::Evt2::new(file, array, options.clock, config).map(boxed)
+        }
+    };
+    let mut sink = sink.with_context(to)?;
+
+    let progress = Progress::new(survey.all(), "events", quiet);
+    let mut events = Events::open(input).with_context(name)?;
+    for done in 1..=survey.all() {
+        let event = events.next().with_context(name)?;
+        let event = event.with_context(|| format!("{} changed while it was read", name()))?;
+        if event.kind() == kind {
+            sink.write(&event).with_context(to)?;
+        }
+        if done.is_multiple_of(4096) {
+            progress.at(done);
+        }
+    }
+    progress.finish();
+    let finished = sink.finish().with_context(to)?;
+    let moved = flushed(finished.out).with_context(to)?.persist(out);
+    moved.map_err(|error| error.error).with_context(to)?;
+    Ok(Exported {
+        written: finished.written,
+        late: finished.late,
+        damage: survey.damage,
+    })
+}
+
+fn boxed<S: Sink + 'static>(sink: S) -> Box<dyn Sink> {
+    Box::new(sink)
+}
+
+/// The folder that `out` is to be in. Only a file is ever replaced, and never the one
+/// that is read.
+fn place_of(out: &Path, input: &Path) -> Result<PathBuf> {
+    let name = || out.display().to_string();
+    if let Ok(there) = fs::canonicalize(out) {
+        ensure!(there.is_file(), "{}: is there, and is no file", name());
+        let same = fs::canonicalize(input).is_ok_and(|input| input == there);
+        ensure!(!same, "{}: is the file that is read", name());
+    }
+    let folder = match out.parent() {
+        Some(folder) if folder == Path::new("") => Path::new("."),
+        Some(folder) => folder,
+        None => Path::new("/"),
+    };
+    ensure!(
+        folder.is_dir(),
+        "{}: there is no folder {}",
+        name(),
+        folder.display()
+    );
+    Ok(folder.to_owned())
+}

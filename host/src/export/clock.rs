@@ -1,0 +1,116 @@
+//! From laser cycles to time.
+
+use anyhow::{Result, ensure};
+
+use super::{Format, evt2};
+
+/// How many laser cycles a second has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LaserClock {
+    /// Not 0.
+    hz: u64,
+}
+
+impl Default for LaserClock {
+    fn default() -> Self {
+        Self { hz: Self::PAPER_HZ }
+    }
+}
+
+impl LaserClock {
+    /// The paper's 10 MHz (section III-A).
+    pub const PAPER_HZ: u64 = 10_000_000;
+
+    /// `hz` laser cycles a second.
+    ///
+    /// # Errors
+    /// If `hz` is 0.
+    pub fn new(hz: u64) -> Result<Self> {
+        ensure!(hz > 0, "the laser has 0 cycles a second");
+        Ok(Self { hz })
+    }
+
+    /// Nanoseconds from the start of laser cycle 0 to that of `cycle`, rounded down.
+    #[must_use]
+    pub fn nanoseconds(&self, cycle: u64) -> u128 {
+        u128::from(cycle) * 1_000_000_000 / u128::from(self.hz)
+    }
+
+    /// The same in microseconds.
+    #[must_use]
+    pub fn microseconds(&self, cycle: u64) -> u128 {
+        u128::from(cycle) * 1_000_000 / u128::from(self.hz)
+    }
+
+    /// Whether `format` can hold the time of the latest event.
+    pub(super) fn check(&self, format: Format, latest: u64) -> Result<()> {
+        let Some(end_ns) = format.end_ns() else {
+            return Ok(());
+        };
+        let time = self.nanoseconds(latest);
+        ensure!(
+            time < end_ns,
+            "laser cycle {latest} lies {} s after the start, and {} holds {} s of time (--laser-hz {})",
+            time / 1_000_000_000,
+            format.name(),
+            end_ns / 1_000_000_000,
+            self.hz
+        );
+        Ok(())
+    }
+}
+
+impl Format {
+    /// The nanosecond from which on it does not hold the time of an event.
+    fn end_ns(self) -> Option<u128> {
+        match self {
+            Self::Csv => None,
+            // Whole numbers in a double.
+            Self::Pcd | Self::Ply | Self::Mcap => Some(1 << 53),
+            // Readers differ in what they take time for that has wrapped.
+            Self::Evt2 => Some(1000 << evt2::TIME_BITS),
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Csv => "CSV",
+            Self::Pcd => "PCD",
+            Self::Ply => "PLY",
+            Self::Mcap => "MCAP",
+            Self::Evt2 => "EVT2",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_is_rounded_down_and_never_overflows() {
+        let clock = LaserClock::default();
+        assert_eq!(clock.nanoseconds(3), 300);
+        assert_eq!(clock.microseconds(19), 1);
+        let slow = LaserClock::new(3).unwrap();
+        assert_eq!(slow.microseconds(2), 666_666);
+        let one = LaserClock::new(1).unwrap();
+        assert_eq!(
+            one.nanoseconds(u64::MAX),
+            u128::from(u64::MAX) * 1_000_000_000
+        );
+        assert!(LaserClock::new(0).is_err());
+    }
+
+    #[test]
+    fn times_that_a_double_would_round_are_refused() {
+        let clock = LaserClock::new(1_000_000_000).unwrap();
+        assert!(clock.check(Format::Pcd, (1 << 53) - 1).is_ok());
+        let error = clock.check(Format::Ply, 1 << 53).unwrap_err();
+        assert!(error.to_string().contains("PLY holds 9007199 s"), "{error}");
+        assert!(clock.check(Format::Csv, u64::MAX).is_ok());
+        let clock = LaserClock::new(1_000_000).unwrap();
+        assert!(clock.check(Format::Evt2, (1 << 34) - 1).is_ok());
+        assert!(clock.check(Format::Evt2, 1 << 34).is_err());
+    }
+}

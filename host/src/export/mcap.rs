@@ -1,0 +1,297 @@
+//! MCAP: point clouds as Foxglove knows them, one for each slice of time, and
+//! statistics of the slice.
+
+use std::io::Write;
+
+use ::mcap::records::MessageHeader;
+use anyhow::{Context, Result};
+use dtof_core::Flags;
+use foxglove::Encode;
+use foxglove::messages::packed_element_field::NumericType;
+use foxglove::messages::{PackedElementField, PointCloud, Pose, Quaternion, Timestamp, Vector3};
+use serde::Serialize;
+
+use super::points::{BYTES, Number, fields, record};
+use super::projection::Projection;
+use super::reorder::{Reorder, WAITING};
+use super::{Finished, Out, Sink};
+use crate::aer_file::{Event, EventKind};
+use crate::source::Geometry;
+
+/// Points of a message, at most: a slice with more has more than one message.
+const MOST_POINTS: usize = 1 << 16;
+
+/// The frame that points are in.
+const FRAME: &str = "dtof_optical";
+
+/// What happened in a slice of time.
+#[derive(Clone, Debug, Default, Serialize)]
+struct Statistics {
+    /// When the slice begins.
+    timestamp: Time,
+    /// How long it is, in seconds.
+    duration_s: f64,
+    /// Events.
+    events: u64,
+    /// The same a second.
+    events_per_s: f64,
+    /// Pixels with an event.
+    pixels: u64,
+    /// Events with any flag.
+    flagged: u64,
+    /// Events whose peak counter was full.
+    saturated: u64,
+    /// Events whose depth window was cut by the range gate.
+    clipped: u64,
+    /// Events that had to wait for the link.
+    deferred: u64,
+    /// Events from the start of the file to the end of the slice.
+    events_so_far: u64,
+}
+
+/// As Foxglove has it in JSON.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+struct Time {
+    sec: u32,
+    nsec: u32,
+}
+
+impl Time {
+    /// A time of less than 2^32 s.
+    #[allow(clippy::cast_possible_truncation, reason = "checked by the clock")]
+    fn of(nanoseconds: u64) -> Self {
+        Self {
+            sec: (nanoseconds / 1_000_000_000) as u32,
+            nsec: (nanoseconds % 1_000_000_000) as u32,
+        }
+    }
+}
+
+/// The JSON schema of [`Statistics`].
+fn schema() -> String {
+    let time = serde_json::json!({
+        "type": "object",
+        "title": "time",
+        "properties": { "sec": { "type": "integer" }, "nsec": { "type": "integer" } },
+    });
+    let whole = [
+        "events",
+        "pixels",
+        "flagged",
+        "saturated",
+        "clipped",
+        "deferred",
+        "events_so_far",
+    ];
+    let mut properties = serde_json::Map::new();
+    properties.insert("timestamp".into(), time);
+    for name in ["duration_s", "events_per_s"] {
+        properties.insert(name.into(), serde_json::json!({ "type": "number" }));
+    }
+    for name in whole {
+        properties.insert(name.into(), serde_json::json!({ "type": "integer" }));
+    }
+    serde_json::json!({
+        "title": "dtof.Statistics",
+        "type": "object",
+        "properties": properties,
+    })
+    .to_string()
+}
+
+/// Events put in order, gathered slice by slice.
+pub struct Mcap {
+    writer: ::mcap::Writer<Out>,
+    points_channel: u16,
+    statistics_channel: u16,
+    sequence: u32,
+    kind: EventKind,
+    projection: Projection,
+    order: Reorder<Event>,
+    slice_ns: u64,
+    /// The slice that is being gathered: its number, its points, what happened.
+    slice: Option<u64>,
+    points: Vec<u8>,
+    statistics: Statistics,
+    /// The slice in which each pixel had its last event, counted from 1.
+    last_slice: Vec<u64>,
+    written: u64,
+}
+
+impl Mcap {
+    /// `slice_ns` is not 0.
+    pub fn new(
+        out: Out,
+        projection: Projection,
+        array: Geometry,
+        kind: EventKind,
+        slice_ns: u64,
+    ) -> Result<Self> {
+        let library = concat!("dtof ", env!("CARGO_PKG_VERSION"));
+        let mut writer = ::mcap::WriteOptions::new()
+            .compression(None)
+            .library(library)
+            .create(out)?;
+        let schema_of_points = PointCloud::get_schema().context("a point cloud has a schema")?;
+        let points_schema = writer.add_schema(
+            &schema_of_points.name,
+            &schema_of_points.encoding,
+            &schema_of_points.data,
+        )?;
+        let statistics_schema =
+            writer.add_schema("dtof.Statistics", "jsonschema", schema().as_bytes())?;
+        let none = Default::default();
+        let encoding = PointCloud::get_message_encoding();
+        let points_channel = writer.add_channel(points_schema, "/events", &encoding, &none)?;
+        let statistics_channel =
+            writer.add_channel(statistics_schema, "/statistics", "json", &none)?;
+        Ok(Self {
+            writer,
+            points_channel,
+            statistics_channel,
+            sequence: 0,
+            kind,
+            projection,
+            order: Reorder::new(WAITING),
+            slice_ns,
+            slice: None,
+            points: Vec::new(),
+            statistics: Statistics::default(),
+            last_slice: vec![0; array.addresses()],
+            written: 0,
+        })
+    }
+
+    /// Takes the next event in time.
+    fn gather(&mut self, event: &Event) -> Result<()> {
+        let time = u64::try_from(self.projection.nanoseconds(event))?;
+        let slice = time / self.slice_ns;
+        if self.slice != Some(slice) {
+            self.end_slice()?;
+            self.slice = Some(slice);
+        }
+        self.points.write_all(&record(event, &self.projection)?)?;
+        self.written += 1;
+        let statistics = &mut self.statistics;
+        statistics.events += 1;
+        let last = self.last_slice.get_mut(usize::from(event.pixel().0));
+        let last = last.context("an event of no pixel")?;
+        statistics.pixels += u64::from(*last != slice + 1);
+        *last = slice + 1;
+        let flags = event.flags();
+        for (count, flag) in [
+            (&mut statistics.saturated, Flags::SATURATED),
+            (&mut statistics.clipped, Flags::CLIPPED),
+            (&mut statistics.deferred, Flags::DEFERRED),
+        ] {
+            *count += u64::from(flags.contains(flag));
+        }
+        statistics.flagged += u64::from(flags != Flags::NONE);
+        if self.points.len() >= MOST_POINTS * BYTES {
+            self.write_points(slice * self.slice_ns)?;
+        }
+        Ok(())
+    }
+
+    /// Writes what was gathered.
+    #[allow(clippy::cast_precision_loss, reason = "for people")]
+    fn end_slice(&mut self) -> Result<()> {
+        let Some(slice) = self.slice else {
+            return Ok(());
+        };
+        let begin = slice * self.slice_ns;
+        if !self.points.is_empty() {
+            self.write_points(begin)?;
+        }
+        let duration_s = self.slice_ns as f64 / 1e9;
+        let statistics = Statistics {
+            timestamp: Time::of(begin),
+            duration_s,
+            events_per_s: self.statistics.events as f64 / duration_s,
+            events_so_far: self.written,
+            ..std::mem::take(&mut self.statistics)
+        };
+        let message = serde_json::to_vec(&statistics)?;
+        self.write_message(self.statistics_channel, begin, &message)
+    }
+
+    fn write_points(&mut self, time: u64) -> Result<()> {
+        let data = std::mem::take(&mut self.points);
+        let Time { sec, nsec } = Time::of(time);
+        let mut offset = 0;
+        let mut fields_of_points = Vec::new();
+        for field in fields(self.kind) {
+            fields_of_points.push(PackedElementField {
+                name: field.name.to_owned(),
+                offset,
+                r#type: numeric_type(field.number).into(),
+            });
+            offset += u32::try_from(field.number.bytes())?;
+        }
+        let cloud = PointCloud {
+            timestamp: Timestamp::new_checked(sec, nsec),
+            frame_id: FRAME.to_owned(),
+            pose: Some(Pose {
+                position: Some(Vector3 {
+                    x: 0.0,
+                    y: 0.0,
+                    z: 0.0,
+                }),
+                orientation: Some(Quaternion {
+                    x: 0.0,
+                    y: 0.0,
+                    z: 0.0,
+                    w: 1.0,
+                }),
+            }),
+            point_stride: offset,
+            fields: fields_of_points,
+            data: data.into(),
+        };
+        let mut message = Vec::new();
+        cloud.encode(&mut message)?;
+        self.write_message(self.points_channel, time, &message)
+    }
+
+    fn write_message(&mut self, channel_id: u16, time: u64, data: &[u8]) -> Result<()> {
+        let header = MessageHeader {
+            channel_id,
+            sequence: self.sequence,
+            log_time: time,
+            publish_time: time,
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        Ok(self.writer.write_to_known_channel(&header, data)?)
+    }
+}
+
+impl Sink for Mcap {
+    fn write(&mut self, event: &Event) -> Result<()> {
+        match self.order.push(event.cycle().0, *event) {
+            Some(next) => self.gather(&next),
+            None => Ok(()),
+        }
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<Finished> {
+        while let Some(event) = self.order.pop() {
+            self.gather(&event)?;
+        }
+        self.end_slice()?;
+        self.writer.finish()?;
+        Ok(Finished {
+            out: self.writer.into_inner(),
+            written: self.written,
+            late: self.order.late(),
+        })
+    }
+}
+
+fn numeric_type(number: Number) -> NumericType {
+    match number {
+        Number::U8 => NumericType::Uint8,
+        Number::U16 => NumericType::Uint16,
+        Number::F32 => NumericType::Float32,
+        Number::F64 => NumericType::Float64,
+    }
+}

@@ -1,0 +1,43 @@
+//! PCD: the point clouds of PCL, version 0.7, binary.
+
+use anyhow::Result;
+
+use super::Out;
+use super::points::{Number, Points, fields};
+use super::projection::Projection;
+use crate::aer_file::EventKind;
+
+/// Begins a file of so many points.
+pub fn begin(out: Out, projection: Projection, kind: EventKind, points: u64) -> Result<Points> {
+    Points::new(out, projection, &header(kind, points))
+}
+
+fn header(kind: EventKind, points: u64) -> String {
+    let fields = fields(kind);
+    let names = fields.map(|field| field.name).join(" ");
+    let sizes = fields
+        .map(|field| field.number.bytes().to_string())
+        .join(" ");
+    let types = fields.map(|field| letter(field.number)).join(" ");
+    let counts = fields.map(|_| "1").join(" ");
+    format!(
+        "# .PCD v0.7 - Point Cloud Data file format\n\
+         VERSION 0.7\n\
+         FIELDS {names}\n\
+         SIZE {sizes}\n\
+         TYPE {types}\n\
+         COUNT {counts}\n\
+         WIDTH {points}\n\
+         HEIGHT 1\n\
+         VIEWPOINT 0 0 0 1 0 0 0\n\
+         POINTS {points}\n\
+         DATA binary\n"
+    )
+}
+
+fn letter(number: Number) -> &'static str {
+    match number {
+        Number::U8 | Number::U16 => "U",
+        Number::F32 | Number::F64 => "F",
+    }
+}

@@ -1,0 +1,122 @@
+//! Points as packed records, the same in PCD, PLY and MCAP.
+
+use std::io::Write;
+
+use anyhow::Result;
+
+use super::projection::Projection;
+use super::{Finished, Out, Sink};
+use crate::aer_file::{Event, EventKind};
+
+/// What a field of a record holds, little-endian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Number {
+    U8,
+    U16,
+    F32,
+    F64,
+}
+
+impl Number {
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::U8 => 1,
+            Self::U16 => 2,
+            Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
+/// A field of a record.
+#[derive(Clone, Copy, Debug)]
+pub struct Field {
+    pub name: &'static str,
+    pub number: Number,
+}
+
+const fn field(name: &'static str, number: Number) -> Field {
+    Field { name, number }
+}
+
+/// The fields of the points of an event, in this order, without gaps.
+pub fn fields(kind: EventKind) -> [Field; 7] {
+    let value = match kind {
+        // What viewers look for to give points their brightness: the peak count.
+        EventKind::Depth => "intensity",
+        EventKind::DynamicDepth => "change",
+    };
+    [
+        field("x", Number::F32),
+        field("y", Number::F32),
+        field("z", Number::F32),
+        field(value, Number::F32),
+        field("pixel", Number::U16),
+        field("flags", Number::U8),
+        field("t_ns", Number::F64),
+    ]
+}
+
+/// Bytes of a record.
+pub const BYTES: usize = 4 * 4 + 2 + 1 + 8;
+
+/// The record of an event.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    reason = "a peak count has 24 bits, a time is less than 2^53 ns; a change is rounded"
+)]
+pub fn record(event: &Event, projection: &Projection) -> Result<[u8; BYTES]> {
+    let [x, y, z] = projection.point(event)?;
+    let value = match event {
+        Event::Depth(event) => event.peak_count.raw() as f32,
+        Event::DynamicDepth(event) => {
+            let millimetres: f64 = projection.scale.distance(event.change()).to_num();
+            (millimetres / 1000.0) as f32
+        }
+    };
+    let mut record = [0; BYTES];
+    for (place, number) in record.chunks_exact_mut(4).zip([x, y, z, value]) {
+        place.copy_from_slice(&number.to_le_bytes());
+    }
+    record[16..18].copy_from_slice(&event.pixel().0.to_le_bytes());
+    record[18] = event.flags().bits();
+    let time = projection.nanoseconds(event) as f64;
+    record[19..].copy_from_slice(&time.to_le_bytes());
+    Ok(record)
+}
+
+/// Records, one after the other, below a header that is already there.
+pub struct Points {
+    out: Out,
+    projection: Projection,
+    written: u64,
+}
+
+impl Points {
+    /// Writes `header`.
+    pub fn new(mut out: Out, projection: Projection, header: &str) -> Result<Self> {
+        out.write_all(header.as_bytes())?;
+        Ok(Self {
+            out,
+            projection,
+            written: 0,
+        })
+    }
+}
+
+impl Sink for Points {
+    fn write(&mut self, event: &Event) -> Result<()> {
+        self.out.write_all(&record(event, &self.projection)?)?;
+        self.written += 1;
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<Finished> {
+        Ok(Finished {
+            out: self.out,
+            written: self.written,
+            late: 0,
+        })
+    }
+}

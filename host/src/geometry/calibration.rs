@@ -1,0 +1,84 @@
+//! Calibration files: a direction and a range bias for each pixel.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow, ensure};
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{Ray, unit};
+use crate::simulation::effects::within;
+use crate::source::Geometry;
+
+/// No file of 65,536 pixels is longer.
+const MOST_BYTES: u64 = 1 << 24;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CalibrationFile {
+    columns: Spanned<u32>,
+    rows: u32,
+    /// x, y, z and range bias, row by row.
+    pixels: Vec<Spanned<[f64; 4]>>,
+}
+
+pub fn read(path: &Path, array: Geometry) -> Result<Vec<Ray>> {
+    let name = || path.display().to_string();
+    let length = fs::metadata(path).with_context(name)?.len();
+    ensure!(
+        length <= MOST_BYTES,
+        "{}: {length} bytes: no calibration file is so long",
+        name()
+    );
+    let text = fs::read_to_string(path).with_context(name)?;
+    parse(&text, array).with_context(name)
+}
+
+pub(super) fn parse(text: &str, array: Geometry) -> Result<Vec<Ray>> {
+    let line = |at: usize| {
+        let before = text.get(..at).unwrap_or(text);
+        before.matches('\n').count() + 1
+    };
+    let file: CalibrationFile = toml::from_str(text).map_err(|error| {
+        let at = error.span().map_or(0, |span| span.start);
+        anyhow!("line {}: {}", line(at), error.message())
+    })?;
+    let said = (*file.columns.get_ref(), file.rows);
+    ensure!(
+        said == (array.columns, array.rows),
+        "line {}: is of {}x{} pixels, the events are of {}x{}",
+        line(file.columns.span().start),
+        said.0,
+        said.1,
+        array.columns,
+        array.rows
+    );
+    let wanted = array.addresses();
+    // What is too much, or the last of what is there.
+    let last = file.pixels.get(wanted).or(file.pixels.last());
+    ensure!(
+        file.pixels.len() == wanted,
+        "line {}: {} pixels, should be {wanted}",
+        line(last.map_or(0, |pixel| pixel.span().start)),
+        file.pixels.len()
+    );
+    let rays = file.pixels.iter().map(|pixel| {
+        let line = line(pixel.span().start);
+        ray(*pixel.get_ref()).with_context(|| format!("line {line}"))
+    });
+    rays.collect()
+}
+
+fn ray([x, y, z, bias_mm]: [f64; 4]) -> Result<Ray> {
+    for side in [x, y, z] {
+        within("direction", side, -1e6..=1e6)?;
+    }
+    let longest = x.abs().max(y.abs()).max(z.abs());
+    ensure!(longest >= 1e-6, "the direction has no length");
+    within("range bias", bias_mm, -1e6..=1e6)?;
+    Ok(Ray {
+        direction: unit([x, y, z]),
+        bias_mm,
+    })
+}

@@ -1,0 +1,176 @@
+use proptest::prelude::*;
+
+use super::*;
+
+fn array(columns: u32, rows: u32) -> Geometry {
+    Geometry { columns, rows }
+}
+
+fn length([x, y, z]: [f64; 3]) -> f64 {
+    (x * x + y * y + z * z).sqrt()
+}
+
+/// The angle between two unit rays in degrees.
+fn between(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let cosine: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+    cosine.clamp(-1.0, 1.0).acos().to_degrees()
+}
+
+#[test]
+fn the_edges_of_the_image_are_the_field_of_view_apart() {
+    for degrees in [[60.0, 40.0], [1.0, 179.0], [0.01, 90.0]] {
+        let view = FieldOfView::new(degrees).unwrap();
+        let across = between(view.ray(0.0, 0.5), view.ray(1.0, 0.5));
+        let down = between(view.ray(0.5, 0.0), view.ray(0.5, 1.0));
+        assert!((across - degrees[0]).abs() < 1e-6, "{across}");
+        assert!((down - degrees[1]).abs() < 1e-6, "{down}");
+        assert!(
+            view.degrees()
+                .iter()
+                .zip(degrees)
+                .all(|(is, said)| (is - said).abs() < 1e-9)
+        );
+    }
+}
+
+#[test]
+fn corners_are_exact() {
+    // tan 45° = 1: the corner of the image lies at (±1, ±1, 1).
+    let view = FieldOfView::new([90.0, 90.0]).unwrap();
+    let third = 1.0 / 3f64.sqrt();
+    for (across, down, corner) in [
+        (0.0, 0.0, [-third, -third, third]),
+        (1.0, 0.0, [third, -third, third]),
+        (1.0, 1.0, [third, third, third]),
+    ] {
+        for (is, should) in view.ray(across, down).iter().zip(corner) {
+            assert!((is - should).abs() < 1e-15);
+        }
+    }
+    // The middle of the corner pixel of 4×4 is 3/4 of the way from the middle.
+    let rays = Rays::pinhole(array(4, 4), view);
+    let [x, y, z] = rays.0[0].direction;
+    assert!((x / z + 0.75).abs() < 1e-15 && (y / z + 0.75).abs() < 1e-15);
+}
+
+#[test]
+fn x_is_to_the_right_and_y_down() {
+    let rays = Rays::pinhole(array(4, 2), FieldOfView::of(array(4, 2)));
+    let point = |pixel| rays.point(PixelAddress(pixel), 2000.0).unwrap();
+    let [upper_left, upper_right, lower_left] = [point(0), point(3), point(4)];
+    assert!(upper_left[0] < 0.0 && upper_left[1] < 0.0 && upper_left[2] > 0.0);
+    assert!(upper_right[0] > 0.0 && upper_right[1] < 0.0);
+    assert!(lower_left[0] < 0.0 && lower_left[1] > 0.0);
+    assert!((length(upper_left) - 2.0).abs() < 1e-15); // range along the ray, in metres
+    assert_eq!(rays.point(PixelAddress(8), 1.0), None);
+}
+
+#[test]
+fn an_array_sees_60_degrees_along_its_longer_side_unless_told() {
+    let degrees = FieldOfView::of(array(64, 32)).degrees();
+    assert!((degrees[0] - 60.0).abs() < 1e-9 && (degrees[1] - 32.2).abs() < 0.01);
+    let degrees = FieldOfView::of(array(1, 256)).degrees();
+    assert!((degrees[1] - 60.0).abs() < 1e-9 && degrees[0] < 0.3);
+    let degrees = FieldOfView::of(array(1, 1)).degrees();
+    assert_eq!(degrees[0], degrees[1]);
+}
+
+#[test]
+fn fields_of_view_that_cannot_be_are_refused() {
+    for text in [
+        "", "60", "x", "60x", "60x0", "0x60", "180x60", "-1x5", "nanx5", "infx5", "60x40x2",
+    ] {
+        assert_eq!(text.parse::<FieldOfView>(), Err(FieldOfViewError), "{text}");
+    }
+    assert_eq!("60x40".parse(), FieldOfView::new([60.0, 40.0]));
+}
+
+#[test]
+fn a_calibration_gives_directions_and_takes_the_bias_off() {
+    let text = "columns = 2\nrows = 1\npixels = [\n  [0, 0, 1, 0],\n  [3, 0.0, 4, 12.5],\n]\n";
+    let rays = Rays(calibration::parse(text, array(2, 1)).unwrap());
+    assert_eq!(rays.point(PixelAddress(0), 1500.0), Some([0.0, 0.0, 1.5]));
+    let [x, y, z] = rays.point(PixelAddress(1), 2012.5).unwrap();
+    assert!((x - 1.2).abs() < 1e-12 && y == 0.0 && (z - 1.6).abs() < 1e-12);
+}
+
+#[test]
+fn the_calibration_of_the_documentation_is_one() {
+    let docs = include_str!("../../../docs/export.md");
+    let (_, rest) = docs.split_once("```toml\n").unwrap();
+    let (text, _) = rest.split_once("```").unwrap();
+    let rays = calibration::parse(text, array(2, 1)).unwrap();
+    assert_eq!(rays[1].bias_mm, -12.5);
+}
+
+#[test]
+fn calibrations_that_cannot_be_are_refused_with_the_line() {
+    let pixels = |rows: &str| format!("columns = 2\nrows = 1\npixels = [\n{rows}]\n");
+    for (text, parts) in [
+        (String::new(), &["line 1", "missing field"][..]),
+        ("columns = 2\nrows = \n".into(), &["line 2"]),
+        (pixels("[0, 0, 1]\n"), &["line 4", "array of length 4"]),
+        (
+            pixels("[0, 0, 1, 0],\n[0, 0, 0, 0]\n"),
+            &["line 5", "no length"],
+        ),
+        (
+            pixels("[0, 0, 1, 0],\n[nan, 0, 1, 0]\n"),
+            &["line 5", "direction NaN"],
+        ),
+        (
+            pixels("[0, 0, 1, inf],\n[0, 0, 1, 0]\n"),
+            &["line 4", "range bias inf"],
+        ),
+        (
+            pixels("[0, 0, 1, 0],\n"),
+            &["line 4", "1 pixels, should be 2"],
+        ),
+        (
+            pixels(&"[0, 0, 1, 0],\n".repeat(3)),
+            &["line 6", "3 pixels"],
+        ),
+        (
+            pixels(&"[0, 0, 1, 0],\n".repeat(2)).replace("rows = 1", "rows = 3"),
+            &["line 1", "is of 2x3 pixels, the events are of 2x1"],
+        ),
+        (pixels("") + "bias = 1\n", &["line 5", "unknown field"]),
+    ] {
+        let error = calibration::parse(&text, array(2, 1)).unwrap_err();
+        let message = format!("{error:#}");
+        for part in parts {
+            assert!(message.contains(part), "{message:?} does not say {part:?}");
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn rays_have_length_1_and_mirror_each_other(
+        columns in 1u32..80, rows in 1u32..80, horizontal in 0.01..179.0, vertical in 0.01..179.0,
+    ) {
+        let view = FieldOfView::new([horizontal, vertical]).unwrap();
+        let rays = Rays::pinhole(array(columns, rows), view).0;
+        prop_assert_eq!(rays.len(), (columns * rows) as usize);
+        for (index, ray) in rays.iter().enumerate() {
+            prop_assert!((length(ray.direction) - 1.0).abs() < 1e-15);
+            // Turned by 180 degrees, the last pixel is the first.
+            let [x, y, z] = rays[rays.len() - 1 - index].direction;
+            let opposite = [-x, -y, z];
+            for (a, b) in ray.direction.iter().zip(opposite) {
+                prop_assert!((a - b).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn rays_along_a_row_are_evenly_spaced_at_distance_1(columns in 2u32..80, degrees in 1.0..170.0) {
+        let view = FieldOfView::new([degrees, 10.0]).unwrap();
+        let rays = Rays::pinhole(array(columns, 1), view).0;
+        let step = 2.0 * (f64::from(columns)).recip() * (degrees / 2.0f64).to_radians().tan();
+        for two in rays.windows(2) {
+            let [a, b] = [two[0].direction, two[1].direction];
+            prop_assert!((b[0] / b[2] - a[0] / a[2] - step).abs() < 1e-9 * step.max(1.0));
+        }
+    }
+}

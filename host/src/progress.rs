@@ -1,0 +1,44 @@
+//! How far a long job is.
+
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// A progress bar that is not worth showing for short work.
+pub struct Progress {
+    bar: ProgressBar,
+    since: Instant,
+    quiet: bool,
+}
+
+impl Progress {
+    /// Of `total` things called `unit`. Shows after a second, unless `quiet`, and only
+    /// on a terminal.
+    #[must_use]
+    pub fn new(total: u64, unit: &str, quiet: bool) -> Self {
+        let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
+        let template = format!("{{bar:40}} {{human_pos}} of {{human_len}} {unit}, {{eta}} left");
+        let style = ProgressStyle::with_template(&template);
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Self {
+            bar,
+            since: Instant::now(),
+            quiet,
+        }
+    }
+
+    /// So many are done.
+    pub fn at(&self, done: u64) {
+        let long = self.since.elapsed() > Duration::from_secs(1);
+        if self.bar.is_hidden() && long && !self.quiet {
+            // Stays hidden where standard error is not a terminal.
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+        self.bar.set_position(done);
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}

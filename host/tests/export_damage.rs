@@ -1,0 +1,173 @@
+//! `dtof export` of files that are damaged, or are no AER files.
+
+mod common;
+
+use common::Scratch;
+use common::aer::{HEADER, byte_of, depth, events, exported, file, folder};
+use dtof::aer_file::Event;
+use dtof::export::{Format, Options};
+
+/// How many whole points a file holds, which must be as many as it says.
+fn points(format: Format, bytes: &[u8]) -> u64 {
+    let text = String::from_utf8_lossy(bytes);
+    let said = |key: &str| {
+        let line = text.lines().find_map(|line| line.strip_prefix(key));
+        line.unwrap().parse::<usize>().unwrap()
+    };
+    let records = |end: &str, said: usize| {
+        let header = bytes
+            .windows(end.len())
+            .position(|part| part == end.as_bytes());
+        assert_eq!(bytes.len() - header.unwrap() - end.len(), said * 27);
+        said
+    };
+    let points = match format {
+        Format::Csv => {
+            assert!(text.ends_with('\n'));
+            text.lines().count() - 1
+        }
+        Format::Pcd => records("DATA binary\n", said("POINTS ")),
+        Format::Ply => records("end_header\n", said("element vertex ")),
+        _ => panic!("{format:?} has a test of its own"),
+    };
+    points as u64
+}
+
+const FORMATS: [Format; 3] = [Format::Csv, Format::Pcd, Format::Ply];
+
+#[test]
+fn what_comes_before_the_end_of_a_cut_file_is_exported_whole() {
+    let whole = file(&HEADER, &events());
+    // A time word, eleven events, a time word, an event, the end word.
+    assert_eq!(whole.len(), byte_of(15));
+    for format in FORMATS {
+        for length in 64..whole.len() {
+            let (exported, written) = exported(&whole[..length], format, &Options::default());
+            let words = (length - 64) / 16;
+            let events = words.saturating_sub(1) - usize::from(words >= 13);
+            assert_eq!(exported.written, events as u64, "{length} bytes");
+            assert_eq!(points(format, &written), events as u64);
+            let damage = exported.damage.unwrap();
+            assert!(
+                damage.starts_with(&format!("byte {}: ", byte_of(words))),
+                "{damage}"
+            );
+        }
+    }
+}
+
+#[test]
+fn damage_is_named_with_its_byte_after_the_events_before_it_are_written() {
+    let whole = file(&HEADER, &events());
+    let changed = |at: usize, to: u8| {
+        let mut bytes = whole.clone();
+        bytes[at] = to;
+        bytes
+    };
+    for format in FORMATS {
+        for (bytes, written, parts) in [
+            (
+                changed(byte_of(5) + 7, 0xc0),
+                4,
+                ["byte 144: ", "unknown kind"],
+            ),
+            // Pixel 65,280 of 2,048.
+            (
+                changed(byte_of(5) + 1, 0xff),
+                4,
+                ["byte 144: pixel ", " of 2048"],
+            ),
+            // A photon more, which only the checksum knows.
+            (changed(byte_of(5) + 8, 38), 12, ["byte 288: ", "checksum"]),
+            (
+                [&whole[..], &[0]].concat(),
+                12,
+                ["byte 288: ", "bytes follow"],
+            ),
+        ] {
+            let (exported, out) = exported(&bytes, format, &Options::default());
+            assert_eq!((exported.written, points(format, &out)), (written, written));
+            let damage = exported.damage.unwrap();
+            assert!(parts.iter().all(|part| damage.contains(part)), "{damage}");
+        }
+    }
+}
+
+#[test]
+fn the_program_says_what_is_damaged_and_fails() {
+    let scratch = Scratch::new();
+    scratch.file("cut.aer", &file(&HEADER, &events())[..100]);
+    let output = scratch.dtof(&["export", "cut.aer", "--format", "csv", "--out", "x.csv"]);
+    scratch.refused(
+        &output,
+        &["cut.aer: byte 96: the file ends inside a word; x.csv holds what came before: 1 events"],
+    );
+    assert_eq!(scratch.read("x.csv").lines().count(), 2);
+}
+
+#[test]
+fn what_is_no_aer_file_leaves_the_output_as_it_was() {
+    let scratch = Scratch::new();
+    scratch.file("x.pcd", "kept");
+    let whole = file(&HEADER, &events());
+    let mut other_version = whole.clone();
+    other_version[8] = 9;
+    let mut no_pixels = whole.clone();
+    no_pixels[16] = 0;
+    let mut many_pixels = whole.clone();
+    many_pixels[16..24].fill(0xff);
+    let mut no_bins = whole.clone();
+    no_bins[24..28].fill(0);
+    for (bytes, part) in [
+        (&b""[..], "not an AER file"),
+        (&[0; 200], "not an AER file"),
+        (b"cycle,pixel\n", "not an AER file"),
+        (&other_version, "AER version 9"),
+        (&no_pixels, "0x32 pixels"),
+        (&many_pixels, "4294967295x4294967295 pixels"),
+        (&no_bins, "bin width is zero"),
+    ] {
+        scratch.file("events.aer", bytes);
+        let output = scratch.dtof(&["export", "events.aer", "--format", "pcd", "--out", "x.pcd"]);
+        scratch.refused(&output, &["events.aer: ", part]);
+        assert_eq!(scratch.read("x.pcd"), "kept");
+        assert_eq!(folder(&scratch.path("")).len(), 2);
+    }
+}
+
+#[test]
+fn a_time_that_is_damaged_is_refused_with_the_damage() {
+    let scratch = Scratch::new();
+    let mut bytes = file(&HEADER, &events());
+    bytes[byte_of(0) + 12] = 1; // 2^52 laser cycles
+    scratch.file("events.aer", bytes);
+    let output = scratch.dtof(&["export", "events.aer", "--format", "pcd", "--out", "x.pcd"]);
+    scratch.refused(
+        &output,
+        &[
+            "events.aer: byte 288: the checksum",
+            "laser cycle 4503599627370",
+            "PCD holds",
+        ],
+    );
+    assert!(!scratch.path("x.pcd").exists());
+}
+
+#[test]
+fn an_interrupted_export_leaves_no_output() {
+    let scratch = Scratch::new();
+    let events: Vec<Event> = (0..1_000_000).map(|cycle| depth(7, cycle, 40)).collect();
+    scratch.file("events.aer", file(&HEADER, &events));
+    let mut dtof = std::process::Command::new(env!("CARGO_BIN_EXE_dtof"));
+    dtof.current_dir(scratch.path(""));
+    dtof.args(["export", "events.aer", "--format", "csv", "--out", "x.csv"]);
+    let mut child = dtof.spawn().unwrap();
+    let is_partial = |path: &std::path::PathBuf| path.extension().is_some_and(|is| is == "partial");
+    // Not before it writes.
+    while !folder(&scratch.path("")).iter().any(is_partial) {
+        assert!(child.try_wait().unwrap().is_none(), "ended too early");
+    }
+    child.kill().unwrap();
+    assert!(!child.wait().unwrap().success());
+    assert!(!scratch.path("x.csv").exists());
+}
