@@ -187,12 +187,12 @@ impl DynamicDepthEvent {
 }
 
 /// The last `N` depths of one pixel, and what they are compared with. `N` is 3 in the
-/// paper; takes `4·N + 16` bytes (asserted in `core/tests/dynamic_depth.rs`).
+/// paper; takes `4·N + 8` bytes (asserted in `core/tests/dynamic_depth.rs`).
 #[derive(Clone, Debug, Default)]
 pub struct DynamicDepthPixel<const N: usize> {
     recent: RunningMean<N>,
-    /// `N` times a mean, in 1/256 bins; that of nothing before the first.
-    reference: Option<i32>,
+    /// `N` times a mean, in 1/256 bins; of nothing until `recent` is full.
+    reference: i32,
 }
 
 impl<const N: usize> DynamicDepthPixel<N> {
@@ -201,7 +201,7 @@ impl<const N: usize> DynamicDepthPixel<N> {
     pub const fn new() -> Self {
         Self {
             recent: RunningMean::new(),
-            reference: None,
+            reference: 0,
         }
     }
 
@@ -218,17 +218,18 @@ impl<const N: usize> DynamicDepthPixel<N> {
         config: &DynamicDepthConfig,
         event: &DepthEvent,
     ) -> Option<DynamicDepthEvent> {
+        let is_first = !self.recent.is_full();
         self.recent.push(event.position());
-        if !self.recent.is_full() {
-            return None;
-        }
         // N times as much as the mean, so that nothing is rounded: at most 28 bits.
         let sum = self.recent.sum();
-        let reference = *self.reference.get_or_insert(sum);
-        let moved = sum - reference;
+        if is_first {
+            self.reference = sum;
+            return None;
+        }
+        let moved = sum - self.reference;
         let changed = moved.unsigned_abs() > config.threshold * N as u32;
         if changed || config.reference == Reference::Previous {
-            self.reference = Some(sum);
+            self.reference = sum;
         }
         if !changed {
             return None;

@@ -17,15 +17,13 @@
 
 use crate::units::BinPosition;
 
-/// The positions of the last `N` events, or of as many as there were, and their sum.
-/// `N` is 1 to 255.
+/// The positions of the last `N` events, or of as many as there were. `N` is 1 to 255.
 ///
-/// Takes `4·N + 8` bytes (asserted in `core/tests/running_mean.rs`).
+/// Takes `4·N + 4` bytes (asserted in `core/tests/running_mean.rs`).
 #[derive(Clone, Debug)]
 pub struct RunningMean<const N: usize> {
     /// In 1/256 bins; the oldest is at `next` once all places are taken.
     recent: [i32; N],
-    sum: i32,
     next: u8,
     length: u8,
 }
@@ -37,7 +35,6 @@ impl<const N: usize> RunningMean<N> {
         const { assert!(0 < N && N < 256, "the mean is of 1 to 255 events") };
         Self {
             recent: [0; N],
-            sum: 0,
             next: 0,
             length: 0,
         }
@@ -50,8 +47,6 @@ impl<const N: usize> RunningMean<N> {
         let Some(oldest) = self.recent.get_mut(usize::from(self.next)) else {
             return;
         };
-        // Places not taken yet hold 0. At most 255 times 19 bits.
-        self.sum += position.raw() - *oldest;
         *oldest = position.raw();
         self.next = if usize::from(self.next) + 1 < N {
             self.next + 1
@@ -87,20 +82,21 @@ impl<const N: usize> RunningMean<N> {
     /// The sum of the positions, in 1/256 bins.
     #[inline]
     #[must_use]
-    pub const fn sum(&self) -> i32 {
-        self.sum
+    pub fn sum(&self) -> i32 {
+        // Places not taken yet hold 0. At most 255 times 19 bits.
+        self.recent.iter().sum()
     }
 
     /// Their mean to the nearest 1/256 bin, halves up; `None` of no events.
     #[inline]
     #[must_use]
-    pub const fn mean(&self) -> Option<BinPosition> {
+    pub fn mean(&self) -> Option<BinPosition> {
         if self.is_empty() {
             return None;
         }
         let length = self.length as i32;
         // Up to two bins before bin 0: halves up there as well.
-        BinPosition::new((self.sum + length / 2).div_euclid(length))
+        BinPosition::new((self.sum() + length / 2).div_euclid(length))
     }
 }
 

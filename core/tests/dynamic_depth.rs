@@ -148,8 +148,8 @@ fn the_threshold_is_strict_and_rounded_to_the_nearest_step() {
 
 #[test]
 fn it_takes_the_memory_it_says() {
-    assert_eq!(size_of::<DynamicDepthPixel<3>>(), 4 * 3 + 16);
-    assert_eq!(size_of::<DynamicDepthPixel<10>>(), 4 * 10 + 16);
+    assert_eq!(size_of::<DynamicDepthPixel<3>>(), 4 * 3 + 8);
+    assert_eq!(size_of::<DynamicDepthPixel<10>>(), 4 * 10 + 8);
 }
 
 fn positions() -> impl Strategy<Value = Vec<i32>> {

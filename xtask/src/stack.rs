@@ -22,7 +22,7 @@ const PAINT: [u8; 4] = 0xcccc_cccc_u32.to_le_bytes();
 const SEMIHOSTING: [u8; 2] = 0xbeab_u16.to_le_bytes();
 
 /// Bytes left to the stack, of the 128 KiB of RAM of the real board.
-pub const RESERVE: u64 = 24 * 1024;
+pub const RESERVE: u64 = 19 * 1024;
 /// Bytes an image may need of them; the rest is for the report of a panic.
 pub const MOST: u64 = 12 * 1024;
 
