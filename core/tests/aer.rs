@@ -548,8 +548,8 @@ fn check_any_bytes(bytes: [u8; 16]) {
         }
         (0, _) => assert_eq!(decoded, Err(AerError::UnknownControl)),
         (2, _) => {
-            let position = (number >> 64) as u32 as i32;
-            let change = (number >> 96) as u32 as i32;
+            let position = ((number >> 64) as u32).cast_signed();
+            let change = ((number >> 96) as u32).cast_signed();
             let in_range = (-512..=262_399).contains(&position)
                 && (-262_911..=262_911).contains(&change)
                 && change != 0;

@@ -1,5 +1,7 @@
 //! Dynamic depth against its definition, over whole sequences of events.
 
+#![allow(clippy::cast_possible_wrap, reason = "means of a few events")]
+
 use dtof_core::fixed::types::{I24F8, U16F16, U24F8};
 use dtof_core::{
     BinIndex, BinPosition, Count, DepthEvent, DynamicDepthConfig, DynamicDepthEvent,

@@ -40,6 +40,7 @@ fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES
         l2: 2000,
         x: 4,
         one_hit_tdc: false,
+        frame: None,
         seed: 1,
     };
     let truth = ground_truth(log);

@@ -311,6 +311,7 @@ fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec
         l2: request.l2,
         x: request.x,
         one_hit_tdc: false,
+        frame: None,
         seed: 11,
     };
     let geometry = Geometry {
