@@ -1,5 +1,7 @@
 //! The running mean against sums over all events.
 
+#![allow(clippy::cast_possible_wrap, reason = "means of a few events")]
+
 use dtof_core::{BinPosition, RunningMean};
 use proptest::prelude::*;
 
