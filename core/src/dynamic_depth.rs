@@ -4,9 +4,12 @@
 //! (section III-E of the paper) keeps quiet until the mean depth of the last events has
 //! moved by more than a threshold, and then reports by how much and to which side, as
 //! an event camera does with brightness. The paper compares the three-event means of
-//! two adjacent events and takes 0.1 m: see [`Reference::Previous`]. A target that
-//! moves by less than that between two events is not seen so; [`Reference::Reported`]
-//! sees it.
+//! two adjacent events and takes 0.1 m: see [`Reference::Previous`]. A jump moves the
+//! mean of `N` events by an `N`th of it at each of `N` events, so that one of up to `N`
+//! times the threshold is not seen so, nor is slow motion; [`Reference::Reported`] sees
+//! what is more than the threshold. What is reported on the way of the mean are places
+//! where nothing need stand. A false event moves the mean twice, when it comes and when it
+//! leaves. Means know no time: an event after a long pause is averaged with those before it.
 //!
 //! ```
 //! use dtof_core::fixed::types::{I24F8, U16F16, U24F8};
@@ -47,7 +50,8 @@ use crate::units::{BinPosition, LaserCycle, PixelAddress};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reference {
-    /// The mean at the event before: the paper's. Sees steps.
+    /// The mean at the event before: the paper's. Sees jumps of more than `N` times the
+    /// threshold.
     #[default]
     Previous,
     /// The mean that was reported last, at first the first mean. Sees slow motion, too,
@@ -135,7 +139,7 @@ pub struct DynamicDepthEvent {
     pub cycle: LaserCycle,
     /// The mean of the last events, to the nearest 1/256 bin.
     pub position: BinPosition,
-    /// What is to be said against the last of these events.
+    /// What is to be said against any of these events, or the one that has left the mean.
     pub flags: Flags,
     change: i32,
 }
@@ -187,12 +191,21 @@ impl DynamicDepthEvent {
 }
 
 /// The last `N` depths of one pixel, and what they are compared with. `N` is 3 in the
-/// paper; takes `4·N + 8` bytes (asserted in `core/tests/dynamic_depth.rs`).
-#[derive(Clone, Debug, Default)]
+/// paper; takes `5·N + 8` bytes, rounded up to whole words (asserted in
+/// `core/tests/dynamic_depth.rs`).
+#[derive(Clone, Debug)]
 pub struct DynamicDepthPixel<const N: usize> {
     recent: RunningMean<N>,
     /// `N` times a mean, in 1/256 bins; of nothing until `recent` is full.
     reference: i32,
+    /// Of the same events, the newest first.
+    flags: [Flags; N],
+}
+
+impl<const N: usize> Default for DynamicDepthPixel<N> {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 impl<const N: usize> DynamicDepthPixel<N> {
@@ -202,6 +215,7 @@ impl<const N: usize> DynamicDepthPixel<N> {
         Self {
             recent: RunningMean::new(),
             reference: 0,
+            flags: [Flags::NONE; N],
         }
     }
 
@@ -218,6 +232,13 @@ impl<const N: usize> DynamicDepthPixel<N> {
         config: &DynamicDepthConfig,
         event: &DepthEvent,
     ) -> Option<DynamicDepthEvent> {
+        // Each moves on by one; the last, which leaves, counts once more.
+        let mut flags = event.flags;
+        let mut moving = event.flags;
+        for place in &mut self.flags {
+            flags |= *place;
+            moving = core::mem::replace(place, moving);
+        }
         let is_first = !self.recent.is_full();
         self.recent.push(event.position());
         // N times as much as the mean, so that nothing is rounded: at most 28 bits.
@@ -239,7 +260,7 @@ impl<const N: usize> DynamicDepthPixel<N> {
             event.cycle,
             self.recent.mean()?,
             moved / N as i32,
-            event.flags,
+            flags,
         )
     }
 

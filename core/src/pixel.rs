@@ -137,8 +137,8 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
     /// gate left out included, are more than half its laser cycles.
     ///
     /// At that half, 0.7 photons arrive in a laser cycle, and a Gaussian pulse on its
-    /// own is read 0.2 of its standard deviation too near; false events begin at three
-    /// quarters (`docs/failures.md`). The 5 % that photon counting usually keeps to
+    /// own is read 0.2 of its standard deviation too near; false events begin above four
+    /// fifths (`docs/failures.md`). The 5 % that photon counting usually keeps to
     /// ask for a depth error of a hundredth of the pulse, far below that of an
     /// event's few photons.
     #[must_use]

@@ -75,7 +75,7 @@ impl PaperRule {
         gate: &RangeGate<BINS>,
     ) -> Option<(Peak, Count)> {
         // A quadrant must be of whole blocks.
-        if BINS / 4 < BLOCK || !gate.is_full() {
+        if BINS / 4 < BLOCK || !(BINS / 4).is_multiple_of(BLOCK) || !gate.is_full() {
             return self.detect_gated::<W, BINS>(counts, gate);
         }
         let [first, second, third, fourth] = background::quadrants(counts, &RangeGate::full());

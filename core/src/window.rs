@@ -77,9 +77,9 @@ impl WindowRule {
     ///
     /// [`Self::width_for_pulse`] says which width suits the pulse.
     ///
-    /// Of `B` gated bins; more than `z²·width/(B - width)` photons make a detection even
-    /// without any background. Where the window leaves few bins that is many: with 7 of 8
-    /// and z 4 more than 112.
+    /// Where the window takes half of the `B` gated bins or more, it needs more than
+    /// `z²·width/(B - width)` photons even without any background, which is many where it
+    /// leaves few bins: with 7 of 8 and z 4 more than 112.
     ///
     /// # Errors
     /// [`WindowWidthError`] unless `width` is 1 to [`Self::MAX_WIDTH`].

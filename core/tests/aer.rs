@@ -674,13 +674,28 @@ proptest! {
         for (mut numbers, shift) in numbers {
             numbers[1] >>= 20 + shift % 44; // often the same upper bits
             let event = event(numbers);
-            let (time, word) = encoder.encode(&event);
+            let change = DynamicDepthEvent::new(
+                event.pixel,
+                event.cycle,
+                event.position(),
+                1 + i32::from(event.offset.raw()).abs(),
+                event.flags,
+            );
+            let change = change.filter(|_| shift % 3 == 0);
+            let (time, word) = match &change {
+                None => encoder.encode(&event),
+                Some(change) => encoder.encode_dynamic_depth(change),
+            };
+            let record = match change {
+                None => AerRecord::Event(event),
+                Some(change) => AerRecord::DynamicDepth(change),
+            };
             prop_assert_eq!(time.is_some(), high != Some(event.cycle.0 >> 20));
             high = Some(event.cycle.0 >> 20);
             if let Some(time) = time {
                 decoder.decode(time).unwrap();
             }
-            prop_assert_eq!(decoder.decode(word), Ok(AerRecord::Event(event)));
+            prop_assert_eq!(decoder.decode(word), Ok(record));
         }
     }
 }

@@ -1,10 +1,13 @@
 //! Reflectivity against exact sums.
 
-use dtof_core::fixed::types::I24F8;
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8};
 use dtof_core::{
-    BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, Reflectivity, SubBinOffset,
+    AsyncPixel, BinIndex, Count, DepthEvent, DetectionRule, Flags, LaserCycle, PaperRule,
+    PixelAddress, PixelConfig, RangeGate, Reflectivity, SubBinOffset, WindowRule,
 };
 use proptest::prelude::*;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
 
 fn event(peak: u32, background: u32, exposure: u16) -> DepthEvent {
     DepthEvent {
@@ -60,4 +63,59 @@ proptest! {
         prop_assert_eq!(pixel.of_events(range), limited(events.len() as u128 * square));
         prop_assert_eq!(pixel.of_signal(range).to_bits(), limited(rate * square));
     }
+}
+
+/// Photons of a mean of so many, as Knuth draws them: products of uniform numbers.
+fn photons(rng: &mut Pcg32, mean: f64) -> u32 {
+    let (limit, mut product, mut count) = (libm::exp(-mean), 1.0, 0);
+    loop {
+        product *= f64::from(rng.next_u32()) / 4_294_967_296.0;
+        if product < limit {
+            return count;
+        }
+        count += 1;
+    }
+}
+
+/// The signal read over the signal sent, all of it in one bin.
+fn read<R: DetectionRule>(rule: R, signal: f64) -> f64 {
+    let config = PixelConfig::new(4, 40, 2000, RangeGate::full(), rule).unwrap();
+    let mut rng = Pcg32::seed_from_u64(1);
+    let mut pixel = AsyncPixel::<128>::new(PixelAddress(0));
+    let mut reflectivity = Reflectivity::new();
+    for cycle in 0..1_000_000 {
+        for _ in 0..photons(&mut rng, 128.0 * 0.05) {
+            pixel.count(&config, (rng.next_u32() % 128) as u16);
+        }
+        for _ in 0..photons(&mut rng, signal) {
+            pixel.count(&config, 60);
+        }
+        pixel.end_laser_cycle(&config, LaserCycle(cycle));
+        if let Some(event) = pixel.acknowledge() {
+            reflectivity.add(&event);
+        }
+    }
+    assert!(reflectivity.events() > 200, "{}", reflectivity.events());
+    reflectivity.signal().to_num::<f64>() / signal
+}
+
+#[test]
+fn the_papers_background_makes_dim_pixels_dimmer_and_the_mean_does_not() {
+    let paper = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+    let window = WindowRule::new(3, U4F12::lit("4.5"), Count::saturating(5)).unwrap();
+    for (signal, low, high) in [(0.05, 0.66, 0.76), (0.5, 0.84, 0.9), (2.0, 0.95, 0.99)] {
+        let maximum = read(paper, signal);
+        assert!((low..=high).contains(&maximum), "{signal}: {maximum}");
+        let mean = read(window, signal);
+        assert!((0.97..=1.05).contains(&mean), "{signal}: {mean}");
+    }
+}
+
+#[test]
+fn at_the_limit_the_ratio_stays() {
+    let mut pixel = Reflectivity::new();
+    for _ in 0..1 << 25 {
+        pixel.add(&event(0xff_ffff, 0, 1));
+    }
+    assert_eq!(pixel.signal(), 0xff_ffff);
 }

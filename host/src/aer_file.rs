@@ -7,7 +7,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
-    AER_VERSION, AerDecoder, AerEncoder, AerRecord, AerWord, BinPosition, DepthEvent,
+    AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord, BinPosition, DepthEvent,
     DynamicDepthEvent, Flags, LaserCycle, PixelAddress,
 };
 
@@ -200,6 +200,7 @@ impl<W: Write> Writer<W> {
 /// Reads a file, event by event.
 pub struct Reader<R: Read> {
     input: R,
+    version: u16,
     digest: Digest<'static, u32>,
     decoder: AerDecoder,
     header: Header,
@@ -227,6 +228,7 @@ impl<R: Read> Reader<R> {
             input,
             digest,
             decoder: AerDecoder::new(),
+            version: u16::from_le_bytes([bytes[8], bytes[9]]),
             header: Header::from_bytes(&bytes)?,
             offset: HEADER_BYTES.into(),
             events: 0,
@@ -266,6 +268,7 @@ impl<R: Read> Reader<R> {
         match self.decoder.decode(AerWord::from_le_bytes(bytes))? {
             AerRecord::Event(event) => Ok(Some(self.counted(&bytes, Event::Depth(event)))),
             AerRecord::DynamicDepth(event) => {
+                ensure!(self.version > OLDEST_VERSION, AerError::UnknownKind);
                 Ok(Some(self.counted(&bytes, Event::DynamicDepth(event))))
             }
             AerRecord::Time(_) => {

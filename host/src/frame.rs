@@ -1,5 +1,6 @@
 //! The frame-based sensor events are held against: the same photons and histograms, but
-//! every pixel reads its highest bin at the same time, whatever stands in it.
+//! every pixel reads its highest bin at the same time, if it stands above the background
+//! at all. Pile-up is not flagged.
 
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::U8F8;

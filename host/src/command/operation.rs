@@ -31,7 +31,7 @@ pub struct Operation {
     #[arg(long, value_name = "N", default_value_t = 4)]
     x: u16,
     /// A frame-based sensor instead, to compare with: every pixel reads its highest bin every N
-    /// laser cycles, whatever stands in it
+    /// laser cycles, if that stands above the background at all
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..),
         conflicts_with_all = ["rule", "alpha", "window", "z", "false_one_in", "min_count", "l1", "l2", "x"])]
     frame: Option<u16>,

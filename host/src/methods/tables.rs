@@ -22,7 +22,7 @@ pub(super) fn decision(
          100 to 300 laser cycles. Times are means over a pulse in the middle of its bin and on an edge, with 1 % false\n\
          events in 1000 laser cycles, over those of the likelihood ratio that knows the scene; how sure the latter are, which\n\
          is the same for all rules, is not in the intervals. Photons are those of the pulse until the event. Commands\n\
-         take them as `--rule window --window 3 --z 4.38`.\n\n\
+         take them as `--rule window --window 3 --z 4.4`.\n\n\
          | pulse σ, bins | background a bin and cycle | signal a cycle | rule | α or z | time | photons | instructions | the paper's rule: time |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
@@ -61,7 +61,8 @@ pub(super) fn depth(text: &mut String, counts: &Instructions, part: &Part) -> Re
     text.push_str(
         "\n## Which depth estimator\n\n\
          By the standard deviation of the pulse, the background and the signal photons of an event, with the error over\n\
-         the Cramér-Rao bound. The background is the mean that a window rule gives; the paper's is from its quadrants.\n\
+         the Cramér-Rao bound, in histograms of a fixed exposure. The background is the mean outside a window of 5; the paper's is\n\
+         from its quadrants.\n\
          The rules were tried with three of these pulses.\n\n\
          | estimator | instructions |\n|---|---|\n",
     );

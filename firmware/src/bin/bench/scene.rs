@@ -3,9 +3,9 @@
 
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
-    AerEncoder, AsyncPixel, ConfigError, Count, DepthEstimator, DepthEvent, DynamicDepthConfig,
-    DynamicDepthPixel, Histogram, LaserCycle, PaperRule, PixelAddress, PixelConfig, RangeGate,
-    RangeScale, Reference, Reflectivity, RunningMean, WindowRule,
+    AerEncoder, AnyRule, AsyncPixel, ConfigError, Count, DepthEstimator, DepthEvent,
+    DynamicDepthConfig, DynamicDepthPixel, Histogram, LaserCycle, PaperRule, PixelAddress,
+    PixelConfig, RangeGate, RangeScale, Reference, Reflectivity, RunningMean, WindowRule,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -41,6 +41,8 @@ pub struct State {
     pub window: WindowRule,
     /// Which is measured.
     pub estimator: DepthEstimator,
+    /// Which is measured.
+    pub any_rule: AnyRule,
     pub mean_of_3: RunningMean<3>,
     pub mean_of_10: RunningMean<10>,
     pub changes: DynamicDepthPixel<3>,
@@ -64,6 +66,7 @@ impl State {
             never_fires: Self::config(4, CYCLES, 1023, RangeGate::full()).ok()?,
             window: WindowRule::new(1, U4F12::ZERO, Count::saturating(5)).ok()?,
             estimator: DepthEstimator::default(),
+            any_rule: PaperRule::new(U8F8::ZERO, Count::saturating(5)).into(),
             mean_of_3: RunningMean::new(),
             mean_of_10: RunningMean::new(),
             changes: DynamicDepthPixel::new(),

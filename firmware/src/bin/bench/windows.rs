@@ -1,7 +1,8 @@
-//! Window rules and centred windows, which differ by their width.
+//! Window rules and centred windows, which differ by their width, and rules chosen when the
+//! program runs.
 
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
-use dtof_core::{Count, DepthEstimator, RangeGate, WindowRule, detect};
+use dtof_core::{AnyRule, Count, DepthEstimator, RangeGate, WindowRule, detect};
 
 use crate::counter::Counter;
 use crate::report::Report;
@@ -40,6 +41,28 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
         }
         report.line("decision", variant, total, runs);
     }
+    let Ok(window) = WindowRule::new(3, const { U4F12::lit("4.4") }, Count::saturating(5)) else {
+        return;
+    };
+    let rules = [
+        (
+            AnyRule::from(*state.config.rule()),
+            "any rule: the paper's; no event",
+        ),
+        (AnyRule::from(window), "any rule: window of 3; no event"),
+    ];
+    for (rule, variant) in rules {
+        state.any_rule = rule;
+        let (mut total, mut runs) = (0, 0);
+        for number in 0..EXPOSURES {
+            state.counted(number, false);
+            if decided_by_any(state).is_none() {
+                total += counter.measure(decide_by_any, state, 0);
+                runs += 1;
+            }
+        }
+        report.line("decision", variant, total, runs);
+    }
     for (sigma, variant) in PULSES {
         state.estimator = DepthEstimator::for_pulse(sigma);
         let mut total = 0;
@@ -67,6 +90,22 @@ fn decided(state: &State) -> Option<dtof_core::Detection> {
 
 extern "C" fn decide(state: &mut State, _: u32) -> u32 {
     decided(state).map_or(0, |detection| {
+        detection.depth.offset.raw().unsigned_abs().into()
+    })
+}
+
+#[inline(always)]
+fn decided_by_any(state: &State) -> Option<dtof_core::Detection> {
+    detect(
+        state.pixel.histogram(),
+        &RangeGate::full(),
+        &state.any_rule,
+        &state.estimator,
+    )
+}
+
+extern "C" fn decide_by_any(state: &mut State, _: u32) -> u32 {
+    decided_by_any(state).map_or(0, |detection| {
         detection.depth.offset.raw().unsigned_abs().into()
     })
 }

@@ -45,7 +45,7 @@ const SCENES: [&str; 4] = [
 pub const STUDY: Study = Study {
     name: "dynamic-depth",
     about: "which changes of depth dynamic depth reports, and how many events it takes away",
-    revision: 1,
+    revision: 2,
     few_seeds: 2,
     all_seeds: 20,
     points,
@@ -162,6 +162,9 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         for (&address, watched) in addresses.iter().zip(pixels) {
             let steps = steps(&scene, address, cycles, f64::from(*threshold_mm));
             watched.add_to(&mut tally, &name, &steps, cycles);
+            if self::steps(&scene, address, cycles, 0.0).is_empty() {
+                watched.add_still(&mut tally, &name);
+            }
         }
     }
     Ok(tally)

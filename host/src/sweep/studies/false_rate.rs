@@ -99,22 +99,21 @@ impl Outcome {
         }
     }
 
-    /// The largest factor between a share and `wanted`, up or down. No false event is
-    /// as many as the interval ends with, "at least".
+    /// The largest factor between a share and `wanted`, up or down, with its interval. No
+    /// false event is as many as the interval ends with, "at least".
     fn worst_factor(&self, wanted: f64) -> String {
-        let factor = |(_, share): &(f64, Share)| {
-            let is_limit = share.value == 0.0;
-            let value = if is_limit {
-                share.interval.1.min(wanted)
-            } else {
-                share.value
-            };
-            ((value / wanted).max(wanted / value), is_limit)
+        let factor = |value: f64| (value / wanted).max(wanted / value);
+        let none = self.shares.iter().filter(|(_, share)| share.value == 0.0);
+        let least = none.map(|(_, share)| factor(share.interval.1.min(wanted)));
+        let counted = self.shares.iter().filter(|(_, share)| share.value > 0.0);
+        let worst = counted.max_by(|a, b| factor(a.1.value).total_cmp(&factor(b.1.value)));
+        let Some((_, worst)) = worst else {
+            return format!("at least {:.1}", least.fold(1.0, f64::max));
         };
-        let factors = self.shares.iter().map(factor);
-        let worst = factors.max_by(|a, b| a.0.total_cmp(&b.0));
-        let (factor, is_limit) = worst.unwrap_or((1.0, false));
-        format!("{}{factor:.1}", if is_limit { "at least " } else { "" })
+        let [low, high] = [worst.interval.0, worst.interval.1].map(factor);
+        let (low, high) = (low.min(high), low.max(high));
+        let least = if least.count() > 0 { "at least " } else { "" };
+        format!("{least}{:.1} ({low:.1} to {high:.1})", factor(worst.value))
     }
 }
 

@@ -232,7 +232,7 @@ fn claims(scenes: &[(&str, &PointTally)]) -> Vec<Claim> {
             } else {
                 Verdict::Refuted
             },
-            why: "between two events of 44 laser cycles a car goes less than a millimetre, so that adjacent means never differ by 0.1 m but through noise or an edge; compared with the mean that was reported last they do, and each tenth of a metre is reported: differs if so with 99 % confidence; a delay below 0 is a mean that is ahead by its noise and by what the centre of mass errs",
+            why: "between two events of 44 laser cycles a car goes less than a millimetre, so that adjacent means never differ by 0.1 m but through noise or an edge; compared with the mean that was reported last they do, and each tenth of a metre is reported: differs if so with 99 % confidence; a step is found from half of what it takes before on, and a change is false unless the truth has moved to that side by half the threshold; a delay below 0 is a mean that is ahead by its noise and by what the centre of mass errs",
         },
         Claim {
             claim: "a wall makes no dynamic depth (section III-E)",

@@ -116,6 +116,13 @@ impl Watched {
         self.since = Extent::of(newest());
     }
 
+    /// Adds what was reported of what never moved.
+    pub fn add_still(&self, tally: &mut Tally, name: &str) {
+        add(tally, name, "still pixels", 1);
+        add(tally, name, "still events", self.events);
+        add(tally, name, "still changes", self.changes.len() as u64);
+    }
+
     /// Adds what was reported, beside the true `steps` of a run of `cycles` laser
     /// cycles, to the counts of `name`.
     pub fn add_to(&self, tally: &mut Tally, name: &str, steps: &[(u64, i8)], cycles: u64) {
@@ -123,11 +130,6 @@ impl Watched {
         add(tally, name, "changes", count(self.changes.len()));
         let is_false = self.changes.iter().filter(|change| !change.is_true);
         add(tally, name, "false", count(is_false.count()));
-        if steps.is_empty() {
-            add(tally, name, "still pixels", 1);
-            add(tally, name, "still events", self.events);
-            add(tally, name, "still changes", count(self.changes.len()));
-        }
         for (index, &(at, side)) in steps.iter().enumerate() {
             if at + WITHIN > cycles {
                 break;
@@ -193,6 +195,7 @@ mod tests {
     fn tallied(watched: &Watched, steps: &[(u64, i8)]) -> Tally {
         let mut tally = Tally::new();
         watched.add_to(&mut tally, "a", steps, 100_000);
+        watched.add_still(&mut tally, "a");
         tally
     }
 

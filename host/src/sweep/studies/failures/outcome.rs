@@ -60,9 +60,13 @@ impl Warning {
         }
     }
 
-    /// Of so many wrong events in so many exposures.
-    fn new(wrong: u64, flagged: u64, exposures: u64) -> Self {
-        let are_many = |events| Share::new(events, exposures).interval.0 > 0.01;
+    /// Of so many wrong events of all `events`, in so many exposures. Where few exposures
+    /// bring an event it takes few to be wrong: more than a tenth of them, for sure.
+    fn new(wrong: u64, flagged: u64, events: u64, exposures: u64) -> Self {
+        let are_many = |wrong| {
+            Share::new(wrong, exposures).interval.0 > 0.01
+                || (events > 0 && Share::new(wrong, events).interval.0 > 0.1)
+        };
         if are_many(wrong - flagged) {
             Self::Silent
         } else if are_many(wrong) {
@@ -160,9 +164,9 @@ fn outcome(case: &Case, point: &PointTally, plain: &PointTally, method: Method) 
         _ => Verdict::Fails,
     };
     let warning = if is_far_off {
-        Warning::new(events, flagged, exposures)
+        Warning::new(events, flagged, events, exposures)
     } else {
-        Warning::new(false_events, count("false flagged"), exposures)
+        Warning::new(false_events, count("false flagged"), events, exposures)
     };
     Outcome {
         method,
