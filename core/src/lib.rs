@@ -136,4 +136,4 @@ pub use running_mean::RunningMean;
 pub use threshold::Threshold;
 pub use units::{BinIndex, BinPosition, Count, LaserCycle, PixelAddress, SubBinOffset};
 pub use window::{WindowRule, WindowWidthError};
-pub use window_z::z_for;
+pub use window_z::{HIGHEST_Z, z_for};

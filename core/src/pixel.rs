@@ -279,8 +279,8 @@ pub struct AsyncPixel<const BINS: usize, W: CounterWidth = Count10> {
     histogram: Histogram<BINS, W>,
     slot: EventSlot,
     statistics: Statistics,
-    /// [`Statistics::gated_out`] when the exposure began.
-    gated_out_before: u64,
+    /// [`Statistics::gated_out`] when the exposure began, its lower 32 bits.
+    gated_out_before: u32,
 }
 
 impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
@@ -469,15 +469,23 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         statistics
     }
 
-    /// Photons of the present exposure with a TDC code of a bin.
+    /// Photons of the present exposure with a TDC code of a bin, of which there are fewer
+    /// than 2³² outside the gate.
     fn photons(&self) -> u64 {
-        let gated_out = self.statistics.gated_out - self.gated_out_before;
-        u64::from(self.histogram.total()) + u64::from(self.histogram.saturated()) + gated_out
+        let gated_out = self.gated_out().wrapping_sub(self.gated_out_before);
+        let counted = u64::from(self.histogram.total()) + u64::from(self.histogram.saturated());
+        counted + u64::from(gated_out)
+    }
+
+    /// The lower 32 bits of what the gate has left out.
+    #[allow(clippy::cast_possible_truncation, reason = "what is asked for")]
+    const fn gated_out(&self) -> u32 {
+        self.statistics.gated_out as u32
     }
 
     /// Begins a new exposure.
     fn restart(&mut self) {
-        self.gated_out_before = self.statistics.gated_out;
+        self.gated_out_before = self.gated_out();
         self.statistics.add_photons_of(&self.histogram);
         self.histogram.clear();
         self.exposure = 0;

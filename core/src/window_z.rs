@@ -17,8 +17,9 @@ use crate::gate::RangeGate;
 /// What the first 1, 2, 4, … looks are worth, in 1/16.
 const LOOKS: [u16; 11] = [6, 13, 26, 48, 80, 127, 185, 257, 341, 424, 533];
 
-/// The last of these.
-const HIGHEST: u16 = 26394;
+/// The highest z that [`z_for`] gives, 6.44: for 2³⁴ trials or more, so that more false
+/// events may come than wanted.
+pub const HIGHEST_Z: U4F12 = U4F12::from_bits(26394);
 
 /// z in 1/4096 for 2⁶, 2⁸, … trials.
 const Z: [u16; 15] = [
@@ -34,7 +35,8 @@ const Z: [u16; 15] = [
 /// window and the background; with 1 in 1000 and hundreds of photons a bin it may be a
 /// little more. With 128 bins and 0.4 photons a bin at the first look or more it is at
 /// least 0.4 times as many; with fewer bins or photons, or a window of most of the bins,
-/// fewer still. From 64 to 2³⁴ trials, z 2.15 to 6.44, to which it is limited.
+/// fewer still. From 64 to 2³⁴ trials, z 2.15 to
+/// [`HIGHEST_Z`], to which it is limited.
 ///
 /// ```
 /// use dtof_core::{RangeGate, z_for};
@@ -63,7 +65,7 @@ pub fn z_for<const BINS: usize>(
     let (index, part) = ((above >> 9) as usize, above & 511);
     let z = match Z.get(index..) {
         Some(&[low, high, ..]) => u32::from(low) + ((u32::from(high - low) * part) >> 9),
-        _ => u32::from(HIGHEST),
+        _ => u32::from(HIGHEST_Z.to_bits()),
     };
     U4F12::from_bits(z as u16)
 }

@@ -155,23 +155,27 @@ impl Settings {
             row("range offset", format!("{} mm", self.offset_mm.0)),
             row("range gate", gate),
         ];
-        let [threshold, depth] = self.detection_rows();
-        let decisions = match self.frame {
-            None => {
-                rows.push(threshold);
+        rows.extend(self.detection_rows());
+        if self.frame.is_none() {
+            rows.push(row(
+                "decisions",
                 format!(
                     "every {} laser cycles (X), in exposures longer than {} (L1) and shorter than {} (L2)",
                     self.x, self.l1, self.l2
-                )
-            }
-            Some(length) => format!("the highest bin of each frame of {length} laser cycles"),
-        };
-        rows.extend([
-            depth,
-            row("decisions", decisions),
-            row("seed", self.seed.to_string()),
-        ]);
+                ),
+            ));
+        }
+        rows.push(row("seed", self.seed.to_string()));
         rows
+    }
+
+    /// What the report is of.
+    #[must_use]
+    pub fn title(&self) -> &'static str {
+        match self.frame {
+            None => "Asynchronous depth events",
+            Some(_) => "Frames, as a frame-based sensor reads them",
+        }
     }
 
     /// Laser cycles until the first.
@@ -180,10 +184,17 @@ impl Settings {
         self.frame.map_or((l1 / x + 1) * x, u64::from)
     }
 
-    /// Rule and estimator.
+    /// Rule, or frame, and estimator.
     #[must_use]
     pub fn detection_rows(&self) -> [Row; 2] {
-        [self.rule.row(self.min_count), self.estimator.row()]
+        let decision = match self.frame {
+            None => self.rule.row(self.min_count),
+            Some(length) => (
+                "frames".to_owned(),
+                format!("the highest bin of each {length} laser cycles"),
+            ),
+        };
+        [decision, self.estimator.row()]
     }
 }
 

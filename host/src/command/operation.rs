@@ -2,12 +2,12 @@
 
 use std::str::FromStr;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::settings::{I24F8Number, Settings, U16F16Number};
-use dtof_core::RangeGate;
 use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_core::{HIGHEST_Z, RangeGate};
 
 use super::detection::Detection;
 
@@ -38,6 +38,11 @@ pub struct Operation {
 }
 
 impl Operation {
+    /// Whether frames are wanted, which a device does not read.
+    pub fn reads_frames(&self) -> bool {
+        self.frame.is_some()
+    }
+
     /// With what the options do not say.
     ///
     /// # Errors
@@ -57,7 +62,12 @@ impl Operation {
             let (first, last) = self.gate.unwrap_or((0, last_bin));
             let gate = RangeGate::<1024>::new(first, last)
                 .with_context(|| format!("--gate {first}..{last} with {bins} bins"))?;
-            Ok(dtof_core::z_for(one_in, &gate, self.x, self.l1, self.l2))
+            let z = dtof_core::z_for(one_in, &gate, self.x, self.l1, self.l2);
+            ensure!(
+                z < HIGHEST_Z,
+                "--false-one-in {one_in}: there is no z for so few; --z may be up to 15.9998"
+            );
+            Ok(z)
         };
         Ok(Settings {
             bins,

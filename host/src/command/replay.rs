@@ -90,7 +90,7 @@ impl Replay {
         let input = self.input.display().to_string();
         let lead = format!("Recorded photons of {input}.");
         summary.input = Some(input);
-        output.finish(&summary, "Asynchronous depth events", &lead, &[])?;
+        output.finish(&summary, settings.title(), &lead, &[])?;
         if !self.quiet {
             print_summary(&summary, &[], &self.out)?;
         }

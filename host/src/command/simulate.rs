@@ -111,7 +111,7 @@ impl Simulation<'_> {
             heading: "Surfaces",
             rows: &surfaces,
         }];
-        output.finish(&summary, "Asynchronous depth events", self.lead, &sections)?;
+        output.finish(&summary, self.settings.title(), self.lead, &sections)?;
         if !self.quiet {
             print_summary(&summary, &surfaces, self.out)?;
         }

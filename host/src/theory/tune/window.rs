@@ -5,9 +5,9 @@
 //! has a background that [`z_for`] holds for if there are any. False events are counted
 //! in simulated exposures without a target.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{Count, DepthEstimator, RangeGate, WindowRule, z_for};
+use dtof_core::{Count, DepthEstimator, HIGHEST_Z, RangeGate, WindowRule, z_for};
 
 use super::shortest::{false_events, shortest};
 use super::{Request, candidates, check};
@@ -67,6 +67,10 @@ pub fn tune(request: &Request) -> Result<Tuned> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let one_in = (1.0 / request.wanted.in_an_exposure(looks)).ceil() as u32;
         let z = z_for(one_in, &gate, request.x, l1, request.l2);
+        ensure!(
+            z < HIGHEST_Z,
+            "a false event in {one_in} exposures: there is no z for so few"
+        );
         let decisions = Decisions {
             looks,
             rule: WindowRule::new(window, z, minimum_count)?.into(),
