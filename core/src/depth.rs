@@ -194,7 +194,10 @@ impl RangeScale {
     pub const fn bins_of(&self, distance: U24F8) -> u64 {
         // 32 + 16 bits; the bin is not 0.
         let distance = (distance.to_bits() as u64) << 16;
-        (distance + self.bin as u64 / 2) / self.bin as u64
+        match (distance + self.bin as u64 / 2).checked_div(self.bin as u64) {
+            Some(bins) => bins,
+            None => u64::MAX,
+        }
     }
 
     /// In 1/256 mm, before it is narrowed.
