@@ -97,13 +97,15 @@ impl Output {
     /// # Errors
     /// If the folder cannot be written.
     pub fn finish(
-        self,
+        mut self,
         summary: &Summary,
         title: &str,
         lead: &str,
         sections: &[Section],
     ) -> Result<()> {
         let pictures = pictures(&self.maps, summary.cycles)?;
+        let bytes = pictures.iter().map(|picture| picture.svg.len()).sum();
+        self.sample.limit(report::room_for_events(bytes));
         let figures: Vec<Figure> = pictures
             .iter()
             .map(|picture| Figure {
