@@ -11,6 +11,7 @@ use std::time::Duration;
 use dtof::aer_file::{Event, Header, Reader};
 use dtof::detection::{Estimator, Rule};
 use dtof::device::{Client, Port};
+use dtof::monitor::map::LiveMap;
 use dtof::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::settings::{I24F8Number, Settings, U16F16Number};
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
@@ -66,7 +67,7 @@ enum Moment {
     Stops,
 }
 
-/// A device whose events come from pixel `pixel`, one at each of `moments`. After `lives`
+/// A device whose events come from pixel `pixel`, the last one from pixel 0. After `lives`
 /// events it is gone.
 struct Device {
     endpoint: Endpoint,
@@ -83,7 +84,11 @@ struct Device {
 impl Device {
     fn event(&mut self, moment: Moment) {
         let cycle = self.sent.borrow().len() as u64;
-        let event = event(self.pixel, 100 * cycle + moment as u64);
+        let pixel = match moment {
+            Moment::Stops => 0,
+            Moment::Begins | Moment::Runs => self.pixel,
+        };
+        let event = event(pixel, 100 * cycle + moment as u64);
         let (time, word) = self.encoder.encode(&event);
         let words = time.into_iter().chain([word]);
         let body: Vec<u8> = words.flat_map(|word| word.to_le_bytes()).collect();
@@ -155,6 +160,19 @@ impl Port for Device {
     }
 }
 
+/// A terminal, for all to see.
+#[derive(Clone, Default)]
+struct Screen(Rc<RefCell<Vec<u8>>>);
+
+impl Write for Screen {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.borrow_mut().write(bytes)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 /// Takes so many bytes, then nobody reads any more.
 struct Closing(usize);
 
@@ -175,7 +193,7 @@ impl Write for Closing {
 struct Monitored {
     sent: Vec<DepthEvent>,
     recorded: Vec<Event>,
-    statistics: Vec<u8>,
+    drawn: String,
     error: Option<String>,
 }
 
@@ -202,7 +220,9 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
     }))
     .unwrap();
     let mut recording = Recording::new(&path, &header).unwrap();
-    let mut statistics = Vec::new();
+    let screen = Screen::default();
+    let room = Box::new(|| (24, 80));
+    let mut map = LiveMap::new(Box::new(screen.clone()), room, PIXELS, 2);
     let task = Task {
         settings: &settings(),
         pixels: PIXELS,
@@ -214,8 +234,8 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
         |elapsed| elapsed >= Duration::from_secs(seconds),
         &mut Outputs {
             events: &mut Closing(events),
-            statistics: &mut statistics,
-            map: None,
+            statistics: &mut io::sink(),
+            map: Some(&mut map),
             recording: Some(&mut recording),
         },
     );
@@ -223,7 +243,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
     Monitored {
         sent: sent.take(),
         recorded: recorded(&path),
-        statistics,
+        drawn: String::from_utf8(screen.0.take()).unwrap(),
         error: ended.err().map(|error| format!("{error:#}")),
     }
 }
@@ -245,7 +265,9 @@ fn what_is_sent_is_recorded_also_when_nobody_reads_and_while_the_device_stops() 
         assert!(run.sent.len() >= 3, "at first, after a second, at the end");
         let sent: Vec<_> = run.sent.into_iter().map(Event::Depth).collect();
         assert_eq!(run.recorded, sent);
-        assert!(run.statistics.starts_with(b"events/s "));
+        // The last event, too.
+        let (_, last) = run.drawn.rsplit_once("\r").unwrap();
+        assert!(last.contains("2 of 4 pixels") && last.contains("events/s "));
     }
 }
 
