@@ -1,17 +1,21 @@
 """Reports of `dtof` in a real browser: `cargo xtask check-report`.
 
 Arguments: the browser, the folder for the pictures, the report of a static scene, that of a
-moving one with more events than a report shows. Ends with an error at the first thing that is
+moving one with more events than a report shows, and that of a large array. Ends with an error at the first thing that is
 not as it should be.
 """
 
+import base64
+import json
 import shutil
+import struct
 import sys
 from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
 MOST_BYTES = 5_000_000
+SCRIPTS = Path(__file__).parent.parent / "host/src/report"
 
 
 def check(what, holds):
@@ -124,7 +128,10 @@ def turns(report):
     page.locator("[data-view=reset]").click()
     check("Reset gives back the first picture", report.picture() == first)
     report.changes("the range as third axis", lambda: page.select_option("#third", "range"))
+    label = cloud.get_attribute("aria-label")
+    check("the label names the third axis", "column, row and range," in label)
     page.select_option("#third", "cycle")
+    check("and the other", "row and laser cycle," in cloud.get_attribute("aria-label"))
     report.changes("leaving out what is far", lambda: page.locator("#far").fill("50"))
     page.locator("#far").fill("100")
     check("any range gives back the first picture", report.picture() == first)
@@ -157,6 +164,8 @@ def shows_spikes(report):
     page.locator("#line").fill("3")
     page.keyboard.press("Enter")
     check("a pixel by its place", "column 7, row 3: " in lanes.first.inner_text())
+    said = page.locator("#status").evaluate("e => e.value")
+    check("the text says so", "Spikes of column 7, row 3: " in said)
     page.locator("[data-view=front]").click()
     report.settle()
     box = page.locator("#cloud").bounding_box()
@@ -180,6 +189,8 @@ def is_named(report):
             .map((e) => e.outerHTML)"""
     )
     check(f"everything to use has a name {nameless}", not nameless)
+    role = report.page.locator("#cloud").get_attribute("role")
+    check("keys go to the cloud in browse mode, too", role == "application")
     report.page.locator("#play").focus()
     report.page.keyboard.press("Tab")
     outline = report.run("getComputedStyle(document.activeElement).outlineStyle")
@@ -202,12 +213,42 @@ def is_closed(report):
     report.complaints.clear()
 
 
-def main(chromium, pictures, static, moving):
-    pictures, static, moving = Path(pictures), Path(static), Path(moving)
+def places_are_true(browser):
+    """Ranges beyond the colours, too: the axis is linear over all of them."""
+    ranges = [500, 1000, 2000, 9000]
+    records = b"".join(struct.pack("<IfH", at, mm, 0) for at, mm in enumerate(ranges))
+    data = {"columns": 1, "rows": 1, "cycles": 4, "unit": 1, "oneOf": 1, "low": 1000, "high": 2000}
+    data |= {"colours": "000000" * 256, "records": base64.b64encode(records).decode()}
+    page = browser.new_page()
+    page.set_content(f'<script type="application/json" id="data">{json.dumps(data)}</script>')
+    for script in ["events.js", "projection.js"]:
+        page.add_script_tag(content=(SCRIPTS / script).read_text())
+    found = page.evaluate(
+        """() => {
+            Object.assign(view, VIEWS.side, { third: "range" });
+            showWindow(0, 4);
+            const found = [], sides = axes();
+            eachPlace(sides, camera(sides, 800, 600), (event, x) => found.push(x));
+            return { found, low: sides[2].low, high: sides[2].high };
+        }"""
+    )
+    check("the axis spans all ranges", (found["low"], found["high"]) == (500, 9000))
+    left, *_, right = places = found["found"]
+    expected = [left + (right - left) * (mm - 500) / 8500 for mm in ranges]
+    wrong = max(abs(place - true) for place, true in zip(places, expected))
+    check("every range has its place", abs(right - left) > 100 and wrong < 0.01)
+    page.close()
+
+
+def main(chromium, pictures, static, moving, large):
+    pictures, static, moving, large = map(Path, (pictures, static, moving, large))
     with sync_playwright() as driver:
         # Root, as in a container, has no sandbox.
         browser = driver.chromium.launch(executable_path=shutil.which(chromium), args=["--no-sandbox"])
         print(f"browser {browser.version}")
+
+        print("ranges")
+        places_are_true(browser)
 
         print("static scene")
         check("smaller than 5 MB", static.stat().st_size < MOST_BYTES)
@@ -233,6 +274,13 @@ def main(chromium, pictures, static, moving):
             check("drawn in colours", report.colours() > 50)
             turns(report)
             moves_in_time(report)
+
+        print("large array")
+        check("smaller than 5 MB", large.stat().st_size < MOST_BYTES)
+        with Report(browser, large) as report:
+            text = report.page.locator("#cloud-hint").inner_text()
+            check("says that not all events are shown", " events shown: " in text)
+            check("drawn in colours", report.colours() > 50)
 
         print("dark")
         with Report(browser, static, color_scheme="dark") as report:

@@ -28,7 +28,7 @@ use tempfile::NamedTempFile;
 use crate::aer_file::{Event, EventKind};
 use crate::dynamic_depth::DynamicDepth;
 use crate::geometry::{FieldOfView, Rays};
-use crate::output::{aside, flushed};
+use crate::output::{aside, flushed, place_of};
 use crate::progress::Progress;
 use crate::source::Geometry;
 
@@ -141,7 +141,9 @@ pub fn export(
     quiet: bool,
 ) -> Result<Exported> {
     let name = || input.display().to_string();
-    let folder = place_of(out, input)?;
+    let folder = place_of(out)?;
+    let same = fs::canonicalize(out).is_ok_and(|out| fs::canonicalize(input).ok() == Some(out));
+    ensure!(!same, "{}: is the file that is read", out.display());
     let survey = Survey::of(input, quiet).with_context(name)?;
     let kind = survey.kind(options.kind).with_context(name)?;
     let held = options.clock.check(format, survey.latest);
@@ -158,7 +160,7 @@ pub fn export(
         scale: RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?,
         clock: options.clock,
     };
-    let file = BufWriter::new(aside(&folder)?);
+    let file = BufWriter::new(aside(&folder, ".dtof-export-")?);
     let points = survey.events(kind);
     let to = || out.display().to_string();
     let sink: Result<Box<dyn Sink>> = match format {
@@ -198,27 +200,4 @@ pub fn export(
 
 fn boxed<S: Sink + 'static>(sink: S) -> Box<dyn Sink> {
     Box::new(sink)
-}
-
-/// The folder that `out` is to be in. Only a file is ever replaced, and never the one
-/// that is read.
-fn place_of(out: &Path, input: &Path) -> Result<PathBuf> {
-    let name = || out.display().to_string();
-    if let Ok(there) = fs::canonicalize(out) {
-        ensure!(there.is_file(), "{}: is there, and is no file", name());
-        let same = fs::canonicalize(input).is_ok_and(|input| input == there);
-        ensure!(!same, "{}: is the file that is read", name());
-    }
-    let folder = match out.parent() {
-        Some(folder) if folder == Path::new("") => Path::new("."),
-        Some(folder) => folder,
-        None => Path::new("/"),
-    };
-    ensure!(
-        folder.is_dir(),
-        "{}: there is no folder {}",
-        name(),
-        folder.display()
-    );
-    Ok(folder.to_owned())
 }

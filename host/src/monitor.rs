@@ -18,6 +18,7 @@ use crate::device::{Client, configuration};
 use crate::dynamic_depth::DynamicDepth;
 use crate::events_csv;
 use crate::settings::Settings;
+use crate::source::Geometry;
 use map::LiveMap;
 pub use recording::Recording;
 
@@ -35,6 +36,23 @@ pub struct Task<'a> {
     pub dynamic_depth: Option<DynamicDepth>,
 }
 
+/// The array of so many `pixels`, to draw and to record: in so many `columns`, or else as
+/// high as wide, or the least bit wider.
+#[must_use]
+pub fn array(pixels: u16, columns: Option<u16>) -> Geometry {
+    let pixels = u32::from(pixels);
+    let squarest = || {
+        let rows = (1..=pixels).take_while(|rows| rows * rows <= pixels);
+        let rows = rows.filter(|rows| pixels.is_multiple_of(*rows)).last();
+        pixels / rows.unwrap_or(1)
+    };
+    let columns = columns.map_or_else(squarest, u32::from).max(1);
+    Geometry {
+        columns,
+        rows: pixels.div_ceil(columns),
+    }
+}
+
 /// Where what it does is written.
 pub struct Outputs<'a> {
     /// Its events as CSV, as they come.
@@ -49,36 +67,62 @@ pub struct Outputs<'a> {
 }
 
 impl Outputs<'_> {
-    /// A line of statistics. Says whether somebody still reads them.
-    fn tell(&mut self, line: String) -> io::Result<bool> {
-        match &mut self.map {
-            None => still_open(writeln!(self.statistics, "{line}")),
+    /// A line of statistics.
+    fn tell(&mut self, line: String, readers: &mut Readers) -> Result<()> {
+        if !readers.statistics {
+            return Ok(());
+        }
+        readers.statistics = still_open(match &mut self.map {
+            None => writeln!(self.statistics, "{line}"),
             Some(map) => {
                 map.tell(line);
-                still_open(map.draw())
+                map.draw()
             }
-        }
+        })?;
+        Ok(())
     }
 
-    /// Events. Says whether somebody still reads them.
-    fn write(&mut self, events: &[Event], scale: &RangeScale) -> Result<bool> {
+    /// Events. They are recorded whether or not somebody reads them.
+    fn write(&mut self, events: &[Event], scale: &RangeScale, readers: &mut Readers) -> Result<()> {
         if let Some(recording) = &mut self.recording {
             recording.write(events)?;
         }
-        let open = still_open(write(self.events, events, scale))?;
-        let Some(map) = &mut self.map else {
-            return Ok(open);
-        };
-        map.add(events, scale);
-        Ok(still_open(map.draw_when_due())? && open)
+        if readers.events {
+            readers.events = still_open(write(self.events, events, scale))?;
+        }
+        if let Some(map) = &mut self.map
+            && readers.statistics
+        {
+            map.add(events, scale);
+            readers.statistics = still_open(map.draw_when_due())?;
+        }
+        Ok(())
     }
+
+    /// The picture as it is at the end.
+    fn finish(&mut self, readers: &Readers) -> Result<()> {
+        if let Some(map) = &mut self.map
+            && readers.statistics
+        {
+            still_open(map.draw())?;
+        }
+        Ok(())
+    }
+}
+
+/// Which outputs somebody still reads.
+struct Readers {
+    events: bool,
+    /// Or the map in their place.
+    statistics: bool,
 }
 
 /// Has the device take photons from its sensor, and writes what it does to `outputs`.
 ///
 /// Ends when `done`, asked again and again, says so of the time it has taken, or
-/// when nobody reads the output any more. The device takes no photons from its
-/// sensor then.
+/// when the reader of an output is gone, unless there is a recording: it goes on, and
+/// what is read by nobody ends alone. The device takes no photons from its sensor then.
+/// Every event that has arrived is written, also if the device is gone.
 ///
 /// # Errors
 /// If the device refuses the settings or is gone, or what is written cannot be.
@@ -88,9 +132,27 @@ pub fn monitor(
     done: impl Fn(Duration) -> bool,
     outputs: &mut Outputs,
 ) -> Result<()> {
+    let scale = task.settings.range_scale()?;
+    let mut readers = Readers {
+        events: true,
+        statistics: true,
+    };
+    let watched = watch(client, task, &scale, done, outputs, &mut readers);
+    let written = outputs.write(&client.take_events(), &scale, &mut readers);
+    watched.and(written).and(outputs.finish(&readers))
+}
+
+/// [`monitor`] but for the events that have arrived and are not yet written.
+fn watch(
+    client: &mut Client,
+    task: &Task,
+    scale: &RangeScale,
+    done: impl Fn(Duration) -> bool,
+    outputs: &mut Outputs,
+    readers: &mut Readers,
+) -> Result<()> {
     let configuration =
         |source| configuration(task.settings, task.pixels, source, task.dynamic_depth);
-    let scale = task.settings.range_scale()?;
     client.configure(&configuration(1)?)?;
     let started = Instant::now();
     let mut figures = Figures {
@@ -103,22 +165,24 @@ pub fn monitor(
         None => events_csv::HEADER,
         Some(_) => events_csv::DYNAMIC_DEPTH_HEADER,
     };
-    let mut open = still_open(header(outputs.events, columns))?;
+    readers.events = still_open(header(outputs.events, columns))?;
+    let recorded = outputs.recording.is_some();
+    let goes_on = |readers: &Readers| recorded || (readers.events && readers.statistics);
     let mut asked = false;
-    while open && !done(started.elapsed()) {
+    while goes_on(readers) && !done(started.elapsed()) {
         if !asked && figures.since.elapsed() >= EVERY {
             client.request_report()?;
             asked = true;
         }
         let report = client.poll_report()?;
-        open = outputs.write(&client.take_events(), &scale)?;
+        outputs.write(&client.take_events(), scale, readers)?;
         if let Some(report) = report {
-            open &= outputs.tell(figures.line(client, &report))?;
+            outputs.tell(figures.line(client, &report), readers)?;
             asked = false;
         }
     }
     // The last second, unless it has only just begun.
-    if asked || (open && figures.since.elapsed() >= EVERY / 2) {
+    if asked || (goes_on(readers) && figures.since.elapsed() >= EVERY / 2) {
         if !asked {
             client.request_report()?;
         }
@@ -127,14 +191,10 @@ pub fn monitor(
                 break report;
             }
         };
-        open &= outputs.tell(figures.line(client, &report))?;
+        outputs.tell(figures.line(client, &report), readers)?;
     }
     // After the answer there are no more events.
-    client.configure(&configuration(0)?)?;
-    if open {
-        outputs.write(&client.take_events(), &scale)?;
-    }
-    Ok(())
+    client.configure(&configuration(0)?)
 }
 
 fn header(out: &mut dyn Write, columns: &str) -> io::Result<()> {
@@ -256,5 +316,32 @@ fn since(now: &LinkCounters, first: &LinkCounters) -> LinkCounters {
         out_of_order: now.out_of_order.wrapping_sub(first.out_of_order),
         duplicate: now.duplicate.wrapping_sub(first.duplicate),
         retransmitted: now.retransmitted.wrapping_sub(first.retransmitted),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrays_are_as_high_as_wide_if_they_can_be() {
+        let array = |pixels, columns| {
+            let Geometry { columns, rows } = array(pixels, columns);
+            (columns, rows)
+        };
+        let squarest = [1, 2, 4, 9, 64, 128, 2048, 7, 0].map(|pixels| array(pixels, None));
+        let expected = [
+            (1, 1),
+            (2, 1),
+            (2, 2),
+            (3, 3),
+            (8, 8),
+            (16, 8),
+            (64, 32),
+            (7, 1),
+            (1, 0),
+        ];
+        assert_eq!(squarest, expected);
+        assert_eq!(array(64, Some(10)), (10, 7));
     }
 }

@@ -10,7 +10,7 @@ use std::fs;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use dtof_core::{DepthEvent, RangeScale};
 use tempfile::NamedTempFile;
 
@@ -26,8 +26,10 @@ use pictures::pictures;
 
 /// What makes a folder complete: moved to its place last.
 const SUMMARY: &str = "summary.json";
-/// Names of files that are not complete begin and end so.
-const ASIDE: (&str, &str) = (".dtof-", ".partial");
+/// Names of files of a run that are not complete begin so.
+const OF_A_RUN: &str = ".dtof-run-";
+/// Names of files that are not complete end so.
+const ASIDE: &str = ".partial";
 
 /// Files on their way into the output folder.
 pub struct Output {
@@ -49,7 +51,7 @@ impl Output {
         fs::create_dir_all(folder)
             .with_context(|| format!("{}: cannot be the output folder", folder.display()))?;
         remove_leftovers(folder);
-        let mut csv = BufWriter::new(aside(folder)?);
+        let mut csv = BufWriter::new(aside(folder, OF_A_RUN)?);
         writeln!(csv, "{}", events_csv::HEADER)?;
         let header = aer_file::Header {
             bins: u32::try_from(settings.bins)?,
@@ -57,7 +59,7 @@ impl Output {
             bin_width_ps: settings.bin_width_ps.0,
             offset_mm: settings.offset_mm.0,
         };
-        let aer = aer_file::Writer::new(BufWriter::new(aside(folder)?), &header)?;
+        let aer = aer_file::Writer::new(BufWriter::new(aside(folder, OF_A_RUN)?), &header)?;
         Ok(Self {
             folder: folder.to_owned(),
             csv,
@@ -95,13 +97,15 @@ impl Output {
     /// # Errors
     /// If the folder cannot be written.
     pub fn finish(
-        self,
+        mut self,
         summary: &Summary,
         title: &str,
         lead: &str,
         sections: &[Section],
     ) -> Result<()> {
         let pictures = pictures(&self.maps, summary.cycles)?;
+        let bytes = pictures.iter().map(|picture| picture.svg.len()).sum();
+        self.sample.limit(report::room_for_events(bytes));
         let figures: Vec<Figure> = pictures
             .iter()
             .map(|picture| Figure {
@@ -132,7 +136,7 @@ impl Output {
         let report = report::html(title, lead, &all, &figures, &cloud);
 
         let aside = |text: &str| -> Result<NamedTempFile> {
-            let mut file = aside(&self.folder)?;
+            let mut file = aside(&self.folder, OF_A_RUN)?;
             file.write_all(text.as_bytes())
                 .with_context(|| self.folder.display().to_string())?;
             Ok(file)
@@ -168,21 +172,43 @@ impl Output {
     }
 }
 
-/// What a run that was killed has left. None of it is worth an error.
+/// What a run that was killed has left, and nothing of an export or a recording, which
+/// may be under way. None of it is worth an error.
 fn remove_leftovers(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        if name.starts_with(ASIDE.0) && name.ends_with(ASIDE.1) {
+        if name.starts_with(OF_A_RUN) && name.ends_with(ASIDE) {
             let _ = fs::remove_file(entry.path());
         }
     }
 }
 
-/// A file in `folder` that vanishes unless it is moved to its place.
-pub(crate) fn aside(folder: &Path) -> Result<NamedTempFile> {
+/// The folder that the file `out` is to be in. Only a file is ever replaced.
+pub(crate) fn place_of(out: &Path) -> Result<PathBuf> {
+    let name = || out.display().to_string();
+    if let Ok(there) = fs::canonicalize(out) {
+        ensure!(there.is_file(), "{}: is there, and is no file", name());
+    }
+    let folder = match out.parent() {
+        Some(folder) if folder == Path::new("") => Path::new("."),
+        Some(folder) => folder,
+        None => Path::new("/"),
+    };
+    ensure!(
+        folder.is_dir(),
+        "{}: there is no folder {}",
+        name(),
+        folder.display()
+    );
+    Ok(folder.to_owned())
+}
+
+/// A file in `folder` that vanishes unless it is moved to its place. Its name begins
+/// with `prefix`, which says whose it is.
+pub(crate) fn aside(folder: &Path, prefix: &str) -> Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(ASIDE.0).suffix(ASIDE.1);
+    builder.prefix(prefix).suffix(ASIDE);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;

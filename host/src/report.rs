@@ -11,6 +11,7 @@ use sha2::{Digest, Sha256};
 pub use cloud::Cloud;
 
 use crate::picture::{escape, one_line};
+use crate::sample::Sample;
 
 /// A picture of the report.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +30,22 @@ pub struct Section<'a> {
     pub heading: &'a str,
     /// Names and values.
     pub rows: &'a [(String, String)],
+}
+
+/// Bytes of a page. Larger ones are slow to open, and to send.
+const PAGE: usize = 5_000_000;
+/// Bytes of a page for all but events and figures, at most.
+const ALL_ELSE: usize = 200_000;
+/// There are events even where figures leave no room for any.
+const LEAST_EVENTS: usize = 4096;
+
+/// How many events there is room for beside figures of so many bytes.
+#[must_use]
+pub fn room_for_events(figures: usize) -> usize {
+    let bytes = PAGE.saturating_sub(ALL_ELSE + figures);
+    // Four characters for three bytes.
+    let events = bytes / 4 * 3 / cloud::RECORD;
+    events.clamp(LEAST_EVENTS, Sample::LIMIT)
 }
 
 /// Colours follow the reader's scheme, the columns the width of the window.

@@ -32,7 +32,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Events of a report: 3.5 MB of it, and 6 MB of memory.
+    /// Most events of a report: 3.5 MB of it, and 6 MB of memory.
     pub const LIMIT: usize = 1 << 18;
 
     /// Keeps at most `limit` events.
@@ -56,11 +56,8 @@ impl Sample {
             return;
         }
         if self.kept.len() == self.limit {
-            self.halvings += 1;
-            let halvings = self.halvings;
-            self.kept
-                .retain(|(place, _)| place.leading_zeros() >= halvings);
-            if place.leading_zeros() < halvings || self.kept.len() == self.limit {
+            self.halve();
+            if place.leading_zeros() < self.halvings || self.kept.len() == self.limit {
                 return;
             }
         }
@@ -70,6 +67,21 @@ impl Sample {
             range_mm: range_mm as f32,
         };
         self.kept.push((place, event));
+    }
+
+    fn halve(&mut self) {
+        self.halvings += 1;
+        let halvings = self.halvings;
+        self.kept
+            .retain(|(place, _)| place.leading_zeros() >= halvings);
+    }
+
+    /// Keeps at most `limit` events from now on.
+    pub fn limit(&mut self, limit: usize) {
+        self.limit = self.limit.min(limit);
+        while self.kept.len() > self.limit {
+            self.halve();
+        }
     }
 
     /// k, if one of k events is kept: a power of two.
@@ -125,6 +137,24 @@ mod tests {
         assert_eq!(sample.one_of(), 1);
         assert!(sample.events().map(|event| event.cycle).eq(0..100));
         assert!(sample.events().all(|event| event.range_mm == 1.5));
+    }
+
+    #[test]
+    fn a_lower_limit_keeps_evenly_as_many_as_it_can() {
+        for events in [0, 50, 100, 101, 5000] {
+            for limit in [100, 99, 25] {
+                let mut sample = sampled(200, events);
+                sample.limit(limit);
+                let kept = sample.events().len();
+                assert!(kept <= limit);
+                assert!(events <= limit as u64 && kept as u64 == events || kept * 9 >= limit * 4);
+                let expected = events / sample.one_of();
+                assert!((kept as u64).abs_diff(expected) <= 2, "{kept}");
+                sample.limit(1000);
+                sample.add(&event(events), 1.5);
+                assert!(sample.events().len() <= limit, "it stays");
+            }
+        }
     }
 
     #[test]

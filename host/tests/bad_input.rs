@@ -300,7 +300,14 @@ fn a_folder_that_cannot_be_completed_has_no_summary() {
     scratch.replayed(&first, &[]);
     std::fs::remove_file(scratch.path("out/report.html")).unwrap();
     std::fs::create_dir(scratch.path("out/report.html")).unwrap();
-    scratch.file("out/.dtof-left.partial", "from a run that was killed");
+    scratch.file("out/.dtof-run-left.partial", "from a run that was killed");
+    let of_others = [
+        "out/.dtof-export-a.partial",
+        "out/.dtof-recording-b.partial",
+    ];
+    for name in of_others {
+        scratch.file(name, "of an export or a recording under way");
+    }
     let second = scratch.file("second.csv", format!("{CSV_HEADER}0,0,1\n"));
     let output = scratch.replay(&second, &[]);
     let message = String::from_utf8(output.stderr).unwrap();
@@ -309,7 +316,8 @@ fn a_folder_that_cannot_be_completed_has_no_summary() {
         "{message}"
     );
     assert!(!scratch.path("out/summary.json").exists());
-    assert!(!scratch.path("out/.dtof-left.partial").exists());
+    assert!(!scratch.path("out/.dtof-run-left.partial").exists());
+    assert!(of_others.iter().all(|name| scratch.path(name).exists()));
 }
 
 #[test]

@@ -14,7 +14,7 @@ use crate::tools::CHROMIUM;
 const PICTURE: &str = "docs/figures/report.png";
 const MOST_BYTES: u64 = 300_000;
 
-/// Makes the reports of a static scene and of a moving one and uses them as a reader
+/// Makes the reports of a static scene, of a moving one and of a large array and uses them as a reader
 /// does; the pictures are in `out/check-report`. With `picture` that of the README is
 /// written, too.
 ///
@@ -29,16 +29,20 @@ pub fn check(root: &Path, picture: bool) -> Result<()> {
         &xtask.join("check-report.requirements.txt"),
     )?;
     let folder = root.join("out").join("check-report");
-    let (still, moving) = (folder.join("static"), folder.join("moving"));
+    let [still, moving, large] = ["static", "moving", "large"].map(|name| folder.join(name));
     dtof(root, &["demo", "--quiet", "--out"], &still)?;
     // More events than a report shows.
     let fan = "simulate --quiet --scene scenes/fan.toml --cycles 100000 --alpha 8 --out";
     dtof(root, &fan.split(' ').collect::<Vec<_>>(), &moving)?;
 
+    // Maps that leave room for fewer.
+    let array = "demo --quiet --array 256x256 --cycles 2000 --out";
+    dtof(root, &array.split(' ').collect::<Vec<_>>(), &large)?;
+
     let status = Command::new(python)
         .arg(xtask.join("check-report.py"))
         .args([CHROMIUM.program.as_ref(), folder.as_path()])
-        .args([still.join("report.html"), moving.join("report.html")])
+        .args([still, moving, large].map(|folder| folder.join("report.html")))
         .status()
         .context("the check does not start")?;
     ensure!(

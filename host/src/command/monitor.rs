@@ -12,8 +12,7 @@ use console::Term;
 use dtof::aer_file::Header;
 use dtof::device::{self, Client};
 use dtof::monitor::map::{LiveMap, SHOW_CURSOR};
-use dtof::monitor::{Outputs, Recording, Task, monitor};
-use dtof::source::Geometry;
+use dtof::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_firmware::sensor::About;
 
@@ -52,8 +51,8 @@ pub struct Monitor {
     /// Write the events into an AER file as well, for `dtof decode` and `dtof export`
     #[arg(long, value_name = "FILE.aer")]
     record: Option<PathBuf>,
-    /// Columns of the array that is drawn or recorded, pixel = row × columns + column [default: drawn
-    /// as high as wide, recorded in one row]
+    /// Columns of the array that is drawn or recorded, pixel = row × columns + column [default: as
+    /// high as wide]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     columns: Option<u16>,
     #[command(flatten)]
@@ -99,11 +98,16 @@ impl Monitor {
         let length = self
             .seconds
             .map(|seconds| Duration::from_secs(seconds.into()));
+        let geometry = array(pixels, self.columns);
         let mut map = self.map.then(|| {
             let terminal = Term::stderr();
-            let (lines, columns) = terminal.size();
-            let room = (lines.into(), columns.into());
-            LiveMap::new(Box::new(terminal), room, pixels, self.columns)
+            let asked = terminal.clone();
+            let room = move || {
+                let (lines, columns) = asked.size();
+                (lines.into(), columns.into())
+            };
+            let room = Box::new(room);
+            LiveMap::new(Box::new(terminal), room, pixels, geometry.columns as usize)
         });
         let mut events: Box<dyn Write> = if self.map && io::stdout().is_terminal() {
             Box::new(io::sink())
@@ -113,11 +117,6 @@ impl Monitor {
         let mut recording = match &self.record {
             None => None,
             Some(file) => {
-                let columns = u32::from(self.columns.unwrap_or(pixels)).max(1);
-                let geometry = Geometry {
-                    columns,
-                    rows: u32::from(pixels).div_ceil(columns),
-                };
                 let header = Header {
                     bins: client.bins().into(),
                     geometry,

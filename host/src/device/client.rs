@@ -29,6 +29,8 @@ pub struct Client {
     read: Instant,
     bins: u16,
     pixels: u16,
+    /// Pixels of the configuration in force.
+    configured: u16,
 }
 
 impl Client {
@@ -54,6 +56,7 @@ impl Client {
             read: now,
             bins: 0,
             pixels: 0,
+            configured: 0,
         };
         while !client.endpoint.is_open() {
             client.exchange().context("no device answered")?;
@@ -97,7 +100,10 @@ impl Client {
         self.send(message::CONFIGURE, &configuration.to_le_bytes())?;
         let answer = self.answer()?;
         match answer.kind {
-            message::CONFIGURED => Ok(()),
+            message::CONFIGURED => {
+                self.configured = configuration.pixels;
+                Ok(())
+            }
             message::REFUSED => {
                 let refusal = answer
                     .body
@@ -164,7 +170,11 @@ impl Client {
     /// # Errors
     /// If the device is gone.
     pub fn poll_report(&mut self) -> Result<Option<Report>> {
-        self.exchange()?;
+        if let Err(gone) = self.exchange() {
+            // Events that have arrived before are taken all the same.
+            while let Ok(Some(_)) = self.next() {}
+            return Err(gone);
+        }
         self.next()?.map(|answer| report(&answer)).transpose()
     }
 
@@ -209,14 +219,18 @@ impl Client {
             }
             for word in message.body.chunks(AerWord::BYTES) {
                 let word = word.try_into().context("the device sends half a word")?;
-                match self.decoder.decode(AerWord::from_le_bytes(word))? {
-                    AerRecord::Event(event) => self.events.push(Event::Depth(event)),
-                    AerRecord::DynamicDepth(event) => {
-                        self.events.push(Event::DynamicDepth(event));
-                    }
-                    AerRecord::Time(_) => {}
+                let event = match self.decoder.decode(AerWord::from_le_bytes(word))? {
+                    AerRecord::Event(event) => Event::Depth(event),
+                    AerRecord::DynamicDepth(event) => Event::DynamicDepth(event),
+                    AerRecord::Time(_) => continue,
                     AerRecord::End { .. } => bail!("the device ends a stream it never ends"),
-                }
+                };
+                let (pixel, pixels) = (event.pixel().0, self.configured);
+                ensure!(
+                    pixel < pixels,
+                    "the device sends an event of pixel {pixel}, and has {pixels} pixels"
+                );
+                self.events.push(event);
             }
         }
         Ok(None)

@@ -19,39 +19,39 @@ const HIDE_CURSOR: &str = "\x1b[?25l";
 pub const SHOW_CURSOR: &str = "\x1b[?25h";
 const PLAIN: &str = "\x1b[0m";
 const CLEAR_REST: &str = "\x1b[K";
+/// Everything gone, and the cursor in the first line.
+const CLEAR_ALL: &str = "\x1b[2J\x1b[H";
+
+/// Lines and columns of a terminal, asked for each time: its window may change.
+pub type Room = Box<dyn Fn() -> (usize, usize)>;
 
 /// The picture and where it is drawn. The cursor is hidden as long as it lives.
 pub struct LiveMap {
     out: Box<dyn Write>,
-    /// Lines and columns of the terminal.
-    room: (usize, usize),
+    room: Room,
     columns: usize,
     ranges: Vec<Option<f64>>,
     /// What stands below the picture.
     line: String,
-    /// Lines that are there from the last time.
+    /// Lines that are there from the last time, and the room there was.
     lines: usize,
+    before: (usize, usize),
     drawn: Option<Instant>,
 }
 
 impl LiveMap {
-    /// A picture of so many `pixels` on `out`, a terminal with `room` for so many lines
-    /// and columns. The array has so many `columns`, or is about as high as wide.
+    /// A picture of so many `pixels` on `out`, a terminal with so much `room`. The array has so many `columns`.
     #[must_use]
-    pub fn new(
-        out: Box<dyn Write>,
-        room: (usize, usize),
-        pixels: u16,
-        columns: Option<u16>,
-    ) -> Self {
+    pub fn new(out: Box<dyn Write>, room: Room, pixels: u16, columns: usize) -> Self {
         let pixels = usize::from(pixels);
         Self {
             out,
             room,
-            columns: columns.map_or_else(|| squarest(pixels), usize::from),
+            columns,
             ranges: vec![None; pixels],
             line: String::new(),
             lines: 0,
+            before: (0, 0),
             drawn: None,
         }
     }
@@ -86,25 +86,25 @@ impl LiveMap {
     /// # Errors
     /// Those of the terminal.
     pub fn draw(&mut self) -> io::Result<()> {
-        let (lines, columns) = self.room;
-        // Two lines below the picture, and the one of the cursor.
-        let mut text = picture(&self.ranges, self.columns, lines.saturating_sub(3), columns);
+        let room = (self.room)();
+        // Two lines below the picture, and the one of the cursor. The last column stays free:
+        // a line that fills it would clear it, or go on in the next.
+        let (lines, columns) = (room.0.saturating_sub(3), room.1.saturating_sub(1));
+        let mut text = picture(&self.ranges, self.columns, lines, columns);
         text.push(legend(&self.ranges));
         text.push(self.line.clone());
         let back = match self.lines {
             0 => HIDE_CURSOR.to_owned(),
+            // Lines may be broken in another way now.
+            _ if room != self.before => CLEAR_ALL.to_owned(),
             lines => format!("\r\x1b[{lines}A"),
         };
         self.out.write_all(back.as_bytes())?;
         for line in &text {
-            let visible = if line.contains('\x1b') {
-                line.clone()
-            } else {
-                line.chars().take(columns.saturating_sub(1)).collect()
-            };
-            writeln!(self.out, "{visible}{CLEAR_REST}")?;
+            writeln!(self.out, "{}{CLEAR_REST}", cut(line, columns))?;
         }
         self.lines = text.len();
+        self.before = room;
         self.drawn = Some(Instant::now());
         self.out.flush()
     }
@@ -115,13 +115,6 @@ impl Drop for LiveMap {
         let _ = write!(self.out, "{PLAIN}{SHOW_CURSOR}");
         let _ = self.out.flush();
     }
-}
-
-/// Columns of the array of `pixels` that is as high as wide, or the least bit wider.
-fn squarest(pixels: usize) -> usize {
-    let rows = (1..=pixels).take_while(|rows| rows * rows <= pixels);
-    let rows = rows.filter(|rows| pixels.is_multiple_of(*rows)).last();
-    pixels / rows.unwrap_or(1)
 }
 
 /// `ranges`, `columns` in a row, as lines of text with colours, at most as many and as
@@ -152,6 +145,22 @@ pub fn picture(
         lines.push(line + PLAIN);
     }
     lines
+}
+
+/// The first `columns` characters of `line`, and all of its colours.
+fn cut(line: &str, columns: usize) -> String {
+    let (mut seen, mut in_code) = (0, false);
+    let kept = line.chars().filter(|&character| {
+        let visible = !in_code && character != '\x1b';
+        if visible {
+            seen += 1;
+        } else {
+            // A code ends with its first letter.
+            in_code = !character.is_ascii_alphabetic();
+        }
+        !visible || seen <= columns
+    });
+    kept.collect()
 }
 
 /// A character with the colours of an upper and a lower pixel.

@@ -114,4 +114,4 @@ impl Cloud<'_> {
 }
 
 /// Bytes of an event: laser cycle, range in millimetres, pixel, all little-endian.
-const RECORD: usize = 4 + 4 + 2;
+pub(super) const RECORD: usize = 4 + 4 + 2;

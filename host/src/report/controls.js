@@ -32,14 +32,19 @@ function chooseWindow() {
   redraw();
 }
 
-/** What is shown, and what was clicked. */
-function tell() {
+/** What is shown, what was clicked, and what else there is to say. */
+function tell(news = "") {
   const [first, last] = [number(shown.start), number(shown.end)];
   let count = 0;
   for (let event = shown.first; event < shown.last; event++) {
     if (events.range[event] <= shown.far) count++;
   }
-  status.value = `${number(count)} events from laser cycle ${first} to ${last}. ${pickedText()}`;
+  status.value = `${number(count)} events from laser cycle ${first} to ${last}. ${pickedText()} ${news}`.trim();
+}
+
+/** Adds a pixel's spikes, and says so. */
+function showSpikes(pixel) {
+  return `Spikes of ${addLane(pixel, true)} are shown first.`;
 }
 
 function pickedText() {
@@ -113,8 +118,7 @@ for (const type of ["pointerup", "pointercancel"]) {
     fingers.delete(event.pointerId);
     if (!click) return;
     picked = eventAt(event.offsetX, event.offsetY);
-    if (picked >= 0) addLane(events.pixel[picked], true);
-    tell();
+    tell(picked >= 0 ? showSpikes(events.pixel[picked]) : "");
     redraw();
   });
 }
@@ -161,6 +165,8 @@ function chooseFar() {
 far.addEventListener("input", chooseFar);
 element("third").addEventListener("input", (event) => {
   view.third = event.target.value;
+  const third = view.third === "range" ? "range" : "laser cycle";
+  cloud.setAttribute("aria-label", `Events by column, row and ${third}, coloured by range`);
   redraw();
 });
 
@@ -169,7 +175,7 @@ element("column").max = data.columns - 1;
 element("line").max = data.rows - 1;
 element("add").addEventListener("submit", (event) => {
   event.preventDefault();
-  addLane(Number(element("line").value) * data.columns + Number(element("column").value), true);
+  tell(showSpikes(Number(element("line").value) * data.columns + Number(element("column").value)));
 });
 
 // The first look.

@@ -6,6 +6,9 @@ const events = decode(data.records, data.unit);
 const levels = Uint8Array.from(events.range, (range) =>
   data.high > data.low ? (255 * Math.min(1, Math.max(0, share(range, data.low, data.high)))) + 0.5 : 127,
 );
+// All ranges, beyond the colours too.
+const [nearest, farthest] = events.range.reduce(
+  ([low, high], range) => [Math.min(low, range), Math.max(high, range)], [Infinity, -Infinity]);
 const colours = data.colours.match(/.{6}/g).map((hex) => `#${hex}`);
 
 /**

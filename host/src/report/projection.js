@@ -31,9 +31,10 @@ function axes() {
   ];
 }
 
+/** All ranges: only colours end at percentiles. */
 function spanOfRange() {
-  const room = data.high > data.low ? 0 : 0.5;
-  return { low: data.low - room, high: data.high + room };
+  const room = farthest > nearest ? 0 : 0.5;
+  return { low: nearest - room, high: farthest + room };
 }
 
 /** What turns places in the box, its middle the origin, into places on the screen. */
@@ -78,8 +79,7 @@ function eachPlace(sides, { rows }, visit, first = shown.first, last = shown.las
     const column = pixel - row * data.columns;
     const x = ((column + 0.5) / data.columns - 0.5) * across.length;
     const y = ((row + 0.5) / data.rows - 0.5) * down.length;
-    const place = Math.min(1, Math.max(0, share(third[event], along.low, along.high)));
-    const z = (place - 0.5) * along.length;
+    const z = (share(third[event], along.low, along.high) - 0.5) * along.length;
     visit(
       event,
       toX[0] * x + toX[1] * y + toX[2] * z + toX[3],

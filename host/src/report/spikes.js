@@ -3,7 +3,7 @@
 const lanes = element("lanes");
 const MOST_LANES = 12;
 
-/** Adds a pixel; the oldest one goes if there are too many. */
+/** Adds a pixel, and gives its label; the oldest one goes if there are too many. */
 function addLane(pixel, prepend = false) {
   removeLane(pixel);
   const lane = document.createElement("li");
@@ -33,6 +33,7 @@ function addLane(pixel, prepend = false) {
   const all = [...lanes.querySelectorAll("li:not(.scale)")];
   if (all.length > MOST_LANES) all.at(-1).remove();
   lane.draw();
+  return label.textContent;
 }
 
 function removeLane(pixel) {

@@ -8,7 +8,7 @@ use crate::sample::Sample;
 use crate::source::Geometry;
 
 /// `count` events, one a laser cycle, of four pixels in turn.
-fn sample(limit: usize, count: u16) -> Sample {
+fn sample(limit: usize, count: u32) -> Sample {
     let scale = RangeScale::new(
         dtof_core::fixed::types::U16F16::lit("250"),
         dtof_core::fixed::types::I24F8::ZERO,
@@ -16,11 +16,12 @@ fn sample(limit: usize, count: u16) -> Sample {
     .unwrap();
     let mut sample = Sample::new(limit);
     for cycle in 0..count {
+        let pixel = u16::try_from(cycle % 4).unwrap();
         let event = DepthEvent {
-            pixel: PixelAddress(cycle % 4),
+            pixel: PixelAddress(pixel),
             cycle: LaserCycle(cycle.into()),
             exposure: 40,
-            peak_bin: BinIndex::saturating(10 + cycle % 4),
+            peak_bin: BinIndex::saturating(10 + pixel),
             offset: SubBinOffset::CENTRE,
             peak_count: Count::saturating(9),
             background: Count::saturating(1),
@@ -179,10 +180,25 @@ fn a_page_says_how_many_of_the_events_it_shows() {
 }
 
 #[test]
-fn the_most_events_stay_below_the_documented_size() {
+fn events_and_figures_stay_below_the_documented_size() {
     assert_eq!(Sample::LIMIT, 262_144);
     let base64 = base64::encoded_len(10 * Sample::LIMIT, true).unwrap();
     assert!((3_450_000..3_550_000).contains(&base64)); // 3.5 MB
+    for figures in [0, 1_000_000, 2_000_000, 3_000_000, 4_500_000] {
+        let mut sample = sample(Sample::LIMIT, 1 << 18);
+        sample.limit(room_for_events(figures));
+        let svg = format!("<svg>{}</svg>", "M1 1h1v1h-1z".repeat(figures / 12));
+        let figures = [Figure {
+            svg: &svg,
+            caption: "c",
+        }];
+        let page = page(&sample, 1 << 20, &[], &figures);
+        assert!(page.len() < PAGE, "{}", page.len());
+    }
+    // Beside maps that leave nothing there are some.
+    assert_eq!(room_for_events(PAGE), 4096);
+    let empty = page(&sample(1, 1), 1, &[], &[]).len();
+    assert!(empty < ALL_ELSE / 2, "{empty}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use dtof_core::fixed::types::{I24F8, U16F16};
@@ -50,12 +50,6 @@ fn too_little_room_leaves_pixels_out() {
     }
 }
 
-#[test]
-fn arrays_are_as_high_as_wide_if_they_can_be() {
-    let columns = [1, 2, 4, 9, 64, 128, 2048, 7, 0].map(squarest);
-    assert_eq!(columns, [1, 2, 2, 3, 8, 16, 64, 7, 0]);
-}
-
 /// What was written, for all to see.
 #[derive(Clone, Default)]
 struct Screen(Rc<RefCell<Vec<u8>>>);
@@ -79,7 +73,7 @@ impl Screen {
 #[test]
 fn it_is_drawn_in_place_and_gives_the_cursor_back() {
     let screen = Screen::default();
-    let mut map = LiveMap::new(Box::new(screen.clone()), (24, 30), 4, None);
+    let mut map = LiveMap::new(Box::new(screen.clone()), Box::new(|| (24, 40)), 4, 2);
     map.draw_when_due().unwrap();
     let first = screen.taken();
     assert!(first.starts_with(HIDE_CURSOR));
@@ -102,7 +96,7 @@ fn it_is_drawn_in_place_and_gives_the_cursor_back() {
     };
     let scale = RangeScale::new(U16F16::lit("250"), I24F8::ZERO).unwrap();
     map.add(&[event, foreign].map(Event::Depth), &scale);
-    map.tell("events/s 12, and so much more than fits".to_owned());
+    map.tell("events/s 12, and so much more than fits here".to_owned());
     map.draw_when_due().unwrap();
     assert_eq!(screen.taken(), "", "not so soon");
     map.draw().unwrap();
@@ -112,8 +106,58 @@ fn it_is_drawn_in_place_and_gives_the_cursor_back() {
     assert_eq!(second.matches('\n').count(), 3);
     let second = characters(&second);
     assert!(second.contains(" ▄") && second.contains("1 of 4 pixels"));
-    assert!(second.contains("events/s 12, and so much more") && !second.contains("than fits"));
+    assert!(second.contains("events/s 12, and so much more than fits") && !second.contains("here"));
 
     drop(map);
     assert_eq!(screen.taken(), format!("{PLAIN}{SHOW_CURSOR}"));
+}
+
+#[test]
+fn no_line_is_wider_than_the_terminal_whose_size_may_change() {
+    let screen = Screen::default();
+    let room = Rc::new(Cell::new((24, 100)));
+    let asked = Rc::clone(&room);
+    let mut map = LiveMap::new(
+        Box::new(screen.clone()),
+        Box::new(move || asked.get()),
+        64,
+        8,
+    );
+    map.ranges.fill(Some(123_456.0));
+    map.ranges[0] = Some(1.0);
+    map.tell("events/s 12".repeat(50));
+    for (lines, columns) in [
+        (24, 100),
+        (24, 101),
+        (24, 45),
+        (24, 9),
+        (7, 9),
+        (24, 2),
+        (9, 60),
+    ] {
+        room.set((lines, columns));
+        map.draw().unwrap();
+        let drawn = screen.taken();
+        assert!(drawn.starts_with(HIDE_CURSOR) || drawn.starts_with(CLEAR_ALL));
+        let text: Vec<String> = drawn.lines().map(characters).collect();
+        assert!(text.len() < lines, "{lines} lines");
+        for line in text {
+            let most = columns - 1;
+            assert!(line.chars().count() <= most, "{columns} columns: {line:?}");
+        }
+        assert!(drawn.lines().all(|line| {
+            line.rfind(PLAIN) >= line.rfind("\x1b[38") && line.ends_with(CLEAR_REST)
+        }));
+        // In place as long as it stays so.
+        map.draw().unwrap();
+        assert!(screen.taken().starts_with("\r\x1b["));
+    }
+}
+
+#[test]
+fn cutting_counts_what_is_seen_and_keeps_colours() {
+    let line = "\x1b[38;2;1;2;3m▀\x1b[0m near\x1b[0m";
+    assert_eq!(cut(line, 3), "\x1b[38;2;1;2;3m▀\x1b[0m n\x1b[0m");
+    assert_eq!(cut(line, 99), line);
+    assert_eq!(cut(line, 0), "\x1b[38;2;1;2;3m\x1b[0m\x1b[0m");
 }
