@@ -29,8 +29,8 @@ use core::sync::atomic::AtomicU32;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::peak::ComparatorTree;
 use dtof_core::{
-    AerDecoder, AerEncoder, AerWord, AsyncPixel, BinIndex, BinPosition, CentredWindow, Count,
-    Count10, Count16, Count24, CounterWidth, DepthEstimator, DepthEvent, DetectionRule,
+    AerDecoder, AerEncoder, AerWord, AnyRule, AsyncPixel, BinIndex, BinPosition, CentredWindow,
+    Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DepthEvent, DetectionRule,
     DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, EventSlot, Flags, Histogram,
     LaserCycle, Macropixel, PaperRule, Peak, PixelAddress, PixelConfig, ProcessingElement,
     RangeGate, RangeScale, Reference, Reflectivity, RunningMean, Statistics, SubBinOffset,
@@ -276,6 +276,15 @@ fn pixels<const BINS: usize, W: CounterWidth>() {
             && let Ok(config) = PixelConfig::new(x, l1, l2, gate(), rule)
         {
             pixels_with::<BINS, W, _>(&config.with_estimator(estimator()));
+        }
+        let any = match window_rule() {
+            Some(rule) => AnyRule::from(rule),
+            None => AnyRule::from(rule()),
+        };
+        if let Ok(config) = PixelConfig::new(x, l1, l2, gate(), any) {
+            let config = config.with_one_hit_tdc();
+            keep(config.is_one_hit());
+            pixels_with::<BINS, W, _>(&config);
         }
     }
 }
