@@ -34,7 +34,16 @@ def export(dtof, name, format, options=(), damaged=None):
     return out
 
 
-def check_points(header, events, name, laser_hz, fov, decoded):
+def slice_ns(events, laser_hz, slice_us):
+    """The length of a slice, and where the last one ends, at the latest."""
+    latest = max((event.cycle for event in events), default=0)
+    end = (latest + 1) * 10**9 // laser_hz
+    if slice_us is not None:
+        return slice_us * 1000, end
+    return min(max(-(-end // 100_000) * 1000, 10_000), 10_000_000), end
+
+
+def check_points(header, events, name, laser_hz, fov, decoded, slice_us=None):
     """CSV, PCD, PLY and MCAP against the AER file, the decoder and each other."""
     columns, rows = read.from_csv(f"{name}.csv")
     assert columns[:4] == ["time_us", "x_m", "y_m", "z_m"], columns
@@ -72,10 +81,11 @@ def check_points(header, events, name, laser_hz, fov, decoded):
 
     clouds, statistics = read.from_mcap(f"{name}.mcap")
     in_time = sorted(in_file, key=lambda index: events[index].cycle)
+    length, end = slice_ns(events, laser_hz, slice_us)
     slices = {}
     for index in in_time:
-        slices.setdefault(wanted[index][3] // 10_000_000, []).append(index)
-    assert [time for time, _ in clouds] == [number * 10_000_000 for number in slices]
+        slices.setdefault(wanted[index][3] // length, []).append(index)
+    assert [time for time, _ in clouds] == [number * length for number in slices]
     assert [time for time, _ in statistics] == [time for time, _ in clouds]
     so_far = 0
     for (time, cloud), (_, said), order in zip(clouds, statistics, slices.values()):
@@ -85,16 +95,18 @@ def check_points(header, events, name, laser_hz, fov, decoded):
         compare(read.points_of(cloud), order)
         so_far += len(order)
         flags = [wanted[index][2] for index in order]
+        duration_s = (min(time + length, end) - time) / 1e9
         assert said == {
             "timestamp": {"sec": time // 10**9, "nsec": time % 10**9},
-            "duration_s": 0.01,
+            "duration_s": duration_s,
             "events": len(order),
-            "events_per_s": len(order) / 0.01,
+            "events_per_s": len(order) / duration_s,
             "pixels": len({wanted[index][1] for index in order}),
             "flagged": sum(flag != 0 for flag in flags),
             "saturated": sum(flag & 1 for flag in flags),
             "clipped": sum(flag >> 1 & 1 for flag in flags),
             "deferred": sum(flag >> 2 & 1 for flag in flags),
+            "pile_up": sum(flag >> 3 & 1 for flag in flags),
             "events_so_far": so_far,
         }, said
 
@@ -111,7 +123,8 @@ def check_evt2(header, events, name, laser_hz, threshold_mm=100, reference="prev
 def check(dtof, name, laser_hz=10_000_000, fov=None, evt2=(), damaged=None):
     """All formats of NAME.aer."""
     header, events = aer.read(f"{name}.aer")
-    options = ["--laser-hz", str(laser_hz)]
+    clock = ["--laser-hz", str(laser_hz)]
+    options = clock.copy()
     if fov is not None:
         options += ["--fov", "x".join(map(str, fov))]
     decoded = subprocess.run([dtof, "decode", f"{name}.aer"], capture_output=True, text=True)
@@ -123,9 +136,38 @@ def check(dtof, name, laser_hz=10_000_000, fov=None, evt2=(), damaged=None):
     changes = 0
     for threshold_mm, reference in evt2 or [(100, "previous")]:
         more = ["--threshold-mm", str(threshold_mm), "--reference", reference]
-        export(dtof, name, "evt2", options + more, damaged)
+        export(dtof, name, "evt2", clock + more, damaged)
         changes += check_evt2(header, events, name, laser_hz, threshold_mm, reference)
     print(f"{name}: {len(events)} events, {changes} changes of depth: all readers agree")
+
+
+def check_rate(dtof):
+    """A steady rate is the same in every slice, also in the last, which the run does not fill."""
+    array = aer.Header(bins=128, columns=64, rows=32, bin_width_ps=250.0, offset_mm=0.0)
+    # An event every 2 µs for 25 ms, each at the end of them.
+    events = [aer.Depth(20 * number + 19, number % 2048, 40 * 256) for number in range(12_500)]
+    aer.write("rate.aer", array, events)
+    for slice_us, slices in ((None, 100), (10_000, 3)):
+        more = [] if slice_us is None else ["--slice-us", str(slice_us)]
+        for format in ("csv", "pcd", "ply", "mcap"):
+            export(dtof, "rate", format, more if format == "mcap" else [])
+        header, events = aer.read("rate.aer")
+        check_points(header, events, "rate", 10_000_000, None, None, slice_us)
+        _, statistics = read.from_mcap("rate.mcap")
+        assert len(statistics) == slices
+        assert all(said["events_per_s"] == 500_000 for _, said in statistics), statistics
+
+
+def check_empty(dtof):
+    """Files without events, but for expelliarmus, which reads none."""
+    array = aer.Header(bins=128, columns=64, rows=32, bin_width_ps=250.0, offset_mm=0.0)
+    aer.write("empty.aer", array, [])
+    for format in FORMATS:
+        export(dtof, "empty", format)
+    check_points(array, [], "empty", 10_000_000, None, None)
+    for reader in read.EVT2_READERS:
+        if reader is not read.evt2_with_expelliarmus:
+            assert reader("empty.raw", (64, 32)) == [], reader.__name__
 
 
 def check_calibration(dtof, name):
@@ -160,10 +202,10 @@ def late_events(dynamic):
         position = rng.randrange(10 * 256, 118 * 256)
         if dynamic:
             change = rng.choice([-1, 1]) * rng.randrange(1, 50 * 256)
-            events.append(aer.Dynamic(cycle, pixel, position, change, rng.randrange(8)))
+            events.append(aer.Dynamic(cycle, pixel, position, change, rng.randrange(16)))
         else:
             peak = rng.choice([5, 1023, 2**24 - 1])
-            events.append(aer.Depth(cycle, pixel, position, peak, rng.randrange(8)))
+            events.append(aer.Depth(cycle, pixel, position, peak, rng.randrange(16)))
     return events
 
 
@@ -184,6 +226,8 @@ def main():
     snippets(docs)
     check(dtof, "events", laser_hz=33_333_333, fov=(45.0, 24.5), evt2=[(20, "previous")])
     check_calibration(dtof, "events")
+    check_rate(dtof)
+    check_empty(dtof)
     # Cut inside a word.
     words = (len(data) - 64) // 16 * 2 // 3
     Path("cut.aer").write_bytes(data[: 64 + 16 * words + 5])

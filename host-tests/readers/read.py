@@ -48,7 +48,7 @@ def from_mcap(path):
 
 def points_of(cloud):
     """The points of one cloud of an MCAP file."""
-    types = {1: "<u1", 3: "<u2", 7: "<f4", 8: "<f8"}
+    types = {1: "<u1", 5: "<u4", 7: "<f4", 8: "<f8"}
     dtype = np.dtype({
         "names": [field.name for field in cloud.fields],
         "formats": [types[field.type] for field in cloud.fields],

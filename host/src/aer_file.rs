@@ -129,16 +129,44 @@ impl Header {
             u16_at(10) == HEADER_BYTES && bytes[32..].iter().all(|&byte| byte == 0),
             "the header is damaged"
         );
+        let geometry = Geometry {
+            columns: u32_at(16),
+            rows: u32_at(20),
+        };
+        ensure!(
+            (1..=1 << 16).contains(&addresses(geometry)),
+            "the header says {}x{} pixels: must be 1 to 65,536",
+            geometry.columns,
+            geometry.rows
+        );
         Ok(Self {
             bins: u32_at(12),
-            geometry: Geometry {
-                columns: u32_at(16),
-                rows: u32_at(20),
-            },
+            geometry,
             bin_width_ps: U16F16::from_le_bytes(four_at(24)),
             offset_mm: I24F8::from_le_bytes(four_at(28)),
         })
     }
+
+    /// Can an array with this header have sent the event?
+    fn check(&self, event: &Event) -> Result<()> {
+        let (pixel, pixels) = (event.pixel().0, addresses(self.geometry));
+        ensure!(u64::from(pixel) < pixels, "pixel {pixel} of {pixels}");
+        let (bin, beyond) = match event {
+            Event::Depth(event) => (event.peak_bin.raw().into(), self.bins.into()),
+            // A position lies up to one bin beyond that of the peak.
+            Event::DynamicDepth(event) => (
+                i64::from(event.position.raw() >> BinPosition::FRACTIONAL_BITS),
+                i64::from(self.bins) + 1,
+            ),
+        };
+        ensure!(bin < beyond, "bin {bin} of {}", self.bins);
+        Ok(())
+    }
+}
+
+/// Pixels of an array of any size.
+fn addresses(array: Geometry) -> u64 {
+    u64::from(array.columns) * u64::from(array.rows)
 }
 
 /// Writes a file; it is complete once [`Writer::finish`] has returned.
@@ -252,8 +280,9 @@ impl<R: Read> Reader<R> {
     /// What is wrong and at which byte of the file.
     pub fn next_event(&mut self) -> Result<Option<Event>> {
         while !self.ended {
-            let offset = self.offset;
-            if let Some(event) = self.next_word().with_context(|| format!("byte {offset}"))? {
+            let word = self.next_word();
+            // Nothing that is wrong has been passed.
+            if let Some(event) = word.with_context(|| format!("byte {}", self.offset))? {
                 return Ok(Some(event));
             }
         }
@@ -266,10 +295,10 @@ impl<R: Read> Reader<R> {
             bail!("the file ends without an end word");
         };
         match self.decoder.decode(AerWord::from_le_bytes(bytes))? {
-            AerRecord::Event(event) => Ok(Some(self.counted(&bytes, Event::Depth(event)))),
+            AerRecord::Event(event) => self.counted(&bytes, Event::Depth(event)).map(Some),
             AerRecord::DynamicDepth(event) => {
                 ensure!(self.version > OLDEST_VERSION, AerError::UnknownKind);
-                Ok(Some(self.counted(&bytes, Event::DynamicDepth(event))))
+                self.counted(&bytes, Event::DynamicDepth(event)).map(Some)
             }
             AerRecord::Time(_) => {
                 self.accept(&bytes);
@@ -286,6 +315,7 @@ impl<R: Read> Reader<R> {
                     checksum == self.digest.clone().finalize(),
                     "the checksum does not match: a word before this one is damaged"
                 );
+                self.offset += AerWord::BYTES as u64;
                 ensure!(self.input.read(&mut [0])? == 0, "bytes follow the end word");
                 Ok(None)
             }
@@ -307,10 +337,11 @@ impl<R: Read> Reader<R> {
             .map_err(|_| anyhow!("the file ends inside a word"))
     }
 
-    fn counted(&mut self, bytes: &[u8; AerWord::BYTES], event: Event) -> Event {
+    fn counted(&mut self, bytes: &[u8; AerWord::BYTES], event: Event) -> Result<Event> {
+        self.header.check(&event)?;
         self.accept(bytes);
         self.events += 1;
-        event
+        Ok(event)
     }
 
     fn accept(&mut self, bytes: &[u8; AerWord::BYTES]) {

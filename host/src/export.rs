@@ -16,6 +16,7 @@ mod points;
 mod projection;
 mod reorder;
 
+use std::fmt::Write;
 use std::fs;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
@@ -33,7 +34,7 @@ use crate::progress::Progress;
 use crate::source::Geometry;
 
 pub use clock::LaserClock;
-use events::{Events, Survey};
+use events::Survey;
 use projection::Projection;
 
 /// What a file is written as.
@@ -41,9 +42,9 @@ use projection::Projection;
 pub enum Format {
     /// Comma-separated values
     Csv,
-    /// Points, for PCL
+    /// Points, in the format of PCL
     Pcd,
-    /// Points, for mesh programs
+    /// Points, as vertices of a mesh
     Ply,
     /// Points slice by slice and statistics, for Foxglove
     Mcap,
@@ -61,12 +62,14 @@ pub enum Optics {
 }
 
 impl Optics {
-    fn rays(&self, array: Geometry) -> Result<Rays> {
+    /// The rays, and what they are for people.
+    fn rays(&self, array: Geometry) -> Result<(Rays, String)> {
         Ok(match self {
             Self::Pinhole(view) => {
-                Rays::pinhole(array, view.unwrap_or_else(|| FieldOfView::of(array)))
+                let view = view.unwrap_or_else(|| FieldOfView::of(array));
+                (Rays::pinhole(array, view), format!("{view} degrees, "))
             }
-            Self::Calibration(path) => Rays::read(path, array)?,
+            Self::Calibration(path) => (Rays::read(path, array)?, format!("{}, ", path.display())),
         })
     }
 }
@@ -80,21 +83,21 @@ pub struct Options {
     pub clock: LaserClock,
     /// Which events of a file that holds both kinds.
     pub kind: Option<EventKind>,
-    /// MCAP: nanoseconds of a slice; not 0.
-    pub slice_ns: u64,
+    /// MCAP: nanoseconds of a slice, not 0; 1/100 of the run unless given, see docs/export.md.
+    pub slice_ns: Option<u64>,
     /// EVT2: what is made of depth events.
     pub dynamic_depth: DynamicDepth,
 }
 
 impl Default for Options {
-    /// A pinhole camera at the paper's 10 MHz, slices of 10 ms, and the paper's dynamic
-    /// depth: 0.1 m between the means of adjacent events (section III-E).
+    /// A pinhole camera at the paper's 10 MHz, and the paper's dynamic depth: 0.1 m
+    /// between the means of adjacent events (section III-E).
     fn default() -> Self {
         Self {
             optics: Optics::Pinhole(None),
             clock: LaserClock::default(),
             kind: None,
-            slice_ns: 10_000_000,
+            slice_ns: None,
             dynamic_depth: DynamicDepth::default(),
         }
     }
@@ -109,6 +112,8 @@ pub struct Exported {
     pub late: u64,
     /// Where the AER file is damaged and how, if it is. What came before is written.
     pub damage: Option<String>,
+    /// What points and times rest on, for people: "60x32.2 degrees, 10 MHz".
+    pub assumed: String,
 }
 
 /// A file on its way.
@@ -141,33 +146,36 @@ pub fn export(
     quiet: bool,
 ) -> Result<Exported> {
     let name = || input.display().to_string();
-    let folder = place_of(out)?;
-    let same = fs::canonicalize(out).is_ok_and(|out| fs::canonicalize(input).ok() == Some(out));
+    let place = place_of(out)?;
+    let same = fs::canonicalize(input).is_ok_and(|input| input == place.file);
     ensure!(!same, "{}: is the file that is read", out.display());
-    let survey = Survey::of(input, quiet).with_context(name)?;
+    let survey = Survey::of(input, format, options.clock, quiet).with_context(name)?;
     let kind = survey.kind(options.kind).with_context(name)?;
-    let held = options.clock.check(format, survey.latest);
-    // A damaged time may be any; the damage is named with it.
-    let held = match &survey.damage {
-        Some(damage) => held.with_context(|| damage.clone()),
-        None => held,
-    };
-    held.with_context(name)?;
     let header = survey.header;
     let array = header.geometry;
+    let (rays, mut assumed) = options.optics.rays(array)?;
     let projection = Projection {
-        rays: options.optics.rays(array)?,
+        rays,
         scale: RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?,
         clock: options.clock,
     };
-    let file = BufWriter::new(aside(&folder, ".dtof-export-")?);
+    if format == Format::Evt2 {
+        assumed.clear();
+    }
+    assumed += &options.clock.to_string();
+    let end_ns = options.clock.end_ns(survey.latest);
+    let slice_ns = options.slice_ns.unwrap_or_else(|| mcap::slice_of(end_ns));
+    let file = BufWriter::new(aside(&place.folder, ".dtof-export-")?);
     let points = survey.events(kind);
     let to = || out.display().to_string();
     let sink: Result<Box<dyn Sink>> = match format {
         Format::Csv => csv::Csv::new(file, projection, kind).map(boxed),
         Format::Pcd => pcd::begin(file, projection, kind, points).map(boxed),
         Format::Ply => ply::begin(file, projection, kind, points).map(boxed),
-        Format::Mcap => mcap::Mcap::new(file, projection, array, kind, options.slice_ns).map(boxed),
+        Format::Mcap => {
+            let _ = write!(assumed, ", clouds every {} µs", slice_ns as f64 / 1000.0);
+            mcap::Mcap::new(file, projection, array, kind, [slice_ns, end_ns]).map(boxed)
+        }
         Format::Evt2 => {
             let config = options.dynamic_depth.config(&projection.scale)?;
             evt2::Evt2::new(file, array, options.clock, config).map(boxed)
@@ -176,9 +184,9 @@ pub fn export(
     let mut sink = sink.with_context(to)?;
 
     let progress = Progress::new(survey.all(), "events", quiet);
-    let mut events = Events::open(input).with_context(name)?;
+    let mut events = events::open(input).with_context(name)?;
     for done in 1..=survey.all() {
-        let event = events.next().with_context(name)?;
+        let event = events.next_event().with_context(name)?;
         let event = event.with_context(|| format!("{} changed while it was read", name()))?;
         if event.kind() == kind {
             sink.write(&event).with_context(to)?;
@@ -189,12 +197,13 @@ pub fn export(
     }
     progress.finish();
     let finished = sink.finish().with_context(to)?;
-    let moved = flushed(finished.out).with_context(to)?.persist(out);
+    let moved = flushed(finished.out).with_context(to)?.persist(&place.file);
     moved.map_err(|error| error.error).with_context(to)?;
     Ok(Exported {
         written: finished.written,
         late: finished.late,
         damage: survey.damage,
+        assumed,
     })
 }
 

@@ -85,6 +85,19 @@ impl FieldOfView {
     }
 }
 
+/// As `--fov` takes it, rounded to two decimals or as many as the format says.
+impl fmt::Display for FieldOfView {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let decimals = f.precision().unwrap_or(2);
+        let [horizontal, vertical] = self.degrees().map(|angle| {
+            let text = format!("{angle:.decimals$}");
+            let short = text.trim_end_matches('0').trim_end_matches('.');
+            if text.contains('.') { short } else { &text }.to_owned()
+        });
+        write!(f, "{horizontal}x{vertical}")
+    }
+}
+
 impl FromStr for FieldOfView {
     type Err = FieldOfViewError;
 

@@ -184,13 +184,32 @@ fn remove_leftovers(folder: &Path) {
     }
 }
 
-/// The folder that the file `out` is to be in. Only a file is ever replaced.
-pub(crate) fn place_of(out: &Path) -> Result<PathBuf> {
+/// Where a file is to be.
+pub(crate) struct Place {
+    /// The folder it is written in.
+    pub folder: PathBuf,
+    /// The file.
+    pub file: PathBuf,
+}
+
+/// Where `out` is: what it leads to, if it is a link. Only a file is ever replaced.
+///
+/// # Errors
+/// If something else is there, or there is no folder for it.
+pub(crate) fn place_of(out: &Path) -> Result<Place> {
     let name = || out.display().to_string();
+    let mut file = out.to_owned();
     if let Ok(there) = fs::canonicalize(out) {
         ensure!(there.is_file(), "{}: is there, and is no file", name());
+        file = there;
+    } else {
+        ensure!(
+            !out.is_symlink(),
+            "{}: is a link to what is not there",
+            name()
+        );
     }
-    let folder = match out.parent() {
+    let folder = match file.parent() {
         Some(folder) if folder == Path::new("") => Path::new("."),
         Some(folder) => folder,
         None => Path::new("/"),
@@ -201,7 +220,8 @@ pub(crate) fn place_of(out: &Path) -> Result<PathBuf> {
         name(),
         folder.display()
     );
-    Ok(folder.to_owned())
+    let folder = folder.to_owned();
+    Ok(Place { folder, file })
 }
 
 /// A file in `folder` that vanishes unless it is moved to its place. Its name begins

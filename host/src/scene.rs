@@ -38,7 +38,7 @@ pub struct Scene {
     pub geometry: Geometry,
     /// The array that the places in `surfaces` are given in.
     pub layout: Geometry,
-    /// What the array sees; [`FieldOfView::of`] the array unless given. Planes need it.
+    /// What the array sees; [`FieldOfView::of`] the layout unless given. Planes need it.
     pub field_of_view: Option<FieldOfView>,
     /// Laser cycles.
     pub cycles: u64,
@@ -146,6 +146,17 @@ impl Scene {
         self.bin_width_ps * MM_PER_PS
     }
 
+    /// Laser cycles a second, rounded.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the file is checked: more than 0 MHz, and the histogram fits"
+    )]
+    #[must_use]
+    pub fn laser_hz(&self) -> u64 {
+        (self.laser_rate_mhz * 1e6).round() as u64
+    }
+
     /// Picoseconds as bins.
     fn timing(&self) -> Timing {
         Timing {
@@ -171,10 +182,16 @@ impl Scene {
         [column * across, row * down]
     }
 
+    /// What the array sees, whichever it is.
+    #[must_use]
+    pub fn view(&self) -> FieldOfView {
+        let view = self.field_of_view;
+        view.unwrap_or_else(|| FieldOfView::of(self.layout))
+    }
+
     /// The unit ray through the middle of a pixel, as `dtof export` has it.
     fn ray(&self, pixel: PixelAddress) -> [f64; 3] {
-        let view = self.field_of_view;
-        let view = view.unwrap_or_else(|| FieldOfView::of(self.geometry));
+        let view = self.view();
         let Geometry { columns, rows } = self.geometry;
         let [column, row] = self.column_and_row(pixel);
         view.ray(

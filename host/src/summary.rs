@@ -12,6 +12,12 @@ use crate::source::PhotonSource;
 pub struct Summary {
     /// The recording or the scene, if it was a file.
     pub input: Option<String>,
+    /// Laser cycles a second of a simulated scene.
+    pub laser_hz: Option<u64>,
+    /// What the array sees of a simulated scene: horizontal and vertical angle.
+    pub field_of_view_degrees: Option<[f64; 2]>,
+    /// The options that `dtof export` needs for the scene, if any.
+    pub export_with: Option<String>,
     /// Laser cycles that recorded histograms were taken to have lasted: the
     /// shortest and the longest capture.
     pub recorded_cycles: Option<(u64, u64)>,
@@ -68,6 +74,9 @@ impl Summary {
         } = *statistics;
         Self {
             input: None,
+            laser_hz: None,
+            field_of_view_degrees: None,
+            export_with: None,
             recorded_cycles: source.recorded_cycles(),
             cycles: source.cycles(),
             photons: statistics.photons(),
@@ -135,6 +144,9 @@ impl Summary {
                 .filter(|loss| loss.1 > 0)
                 .map(|&(name, value)| row(name, value)),
         );
+        if let Some(options) = &self.export_with {
+            rows.push(("export with".to_owned(), options.clone()));
+        }
         rows
     }
 }

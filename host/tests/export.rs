@@ -1,4 +1,4 @@
-//! `dtof export`: points, kinds of event, options that cannot be.
+//! `dtof export`: points, kinds of event, the result line, links.
 
 mod common;
 
@@ -8,13 +8,13 @@ use dtof::aer_file::EventKind;
 use dtof::export::{Format, Options};
 
 /// A record: x, y, z, value, pixel, flags, time.
-fn record(bytes: &[u8]) -> ([f32; 4], u16, u8, f64) {
+fn record(bytes: &[u8]) -> ([f32; 4], u32, u8, f64) {
     let four = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
     (
         [four(0), four(4), four(8), four(12)],
-        u16::from_le_bytes(bytes[16..18].try_into().unwrap()),
-        bytes[18],
-        f64::from_le_bytes(bytes[19..27].try_into().unwrap()),
+        u32::from_le_bytes(bytes[16..20].try_into().unwrap()),
+        bytes[20],
+        f64::from_le_bytes(bytes[21..29].try_into().unwrap()),
     )
 }
 
@@ -31,7 +31,10 @@ fn csv_has_time_and_point_before_the_columns_of_decode() {
         "points.csv",
     ]);
     assert!(output.status.success());
-    assert_eq!(output.stdout, b"points.csv: 12 events\n");
+    assert_eq!(
+        output.stdout,
+        b"points.csv: 12 events (60x32.2 degrees, 10 MHz)\n"
+    );
     let decoded = String::from_utf8(scratch.dtof(&["decode", "events.aer"]).stdout).unwrap();
     let text = scratch.read("points.csv");
     let cut = |line: &str| line.splitn(5, ',').nth(4).unwrap().to_owned();
@@ -75,7 +78,7 @@ fn pcd_and_ply_hold_the_same_records() {
 # .PCD v0.7 - Point Cloud Data file format
 VERSION 0.7
 FIELDS x y z intensity pixel flags t_ns
-SIZE 4 4 4 4 2 1 8
+SIZE 4 4 4 4 4 1 8
 TYPE F F F F U U F
 COUNT 1 1 1 1 1 1 1
 WIDTH 12
@@ -93,7 +96,7 @@ property float x
 property float y
 property float z
 property float intensity
-property ushort pixel
+property uint pixel
 property uchar flags
 property double t_ns
 end_header
@@ -101,14 +104,14 @@ end_header
     let pcd = pcd.strip_prefix(pcd_header.as_bytes()).unwrap();
     let ply = ply.strip_prefix(ply_header.as_bytes()).unwrap();
     assert_eq!(pcd, ply);
-    assert_eq!(pcd.len(), 12 * 27);
+    assert_eq!(pcd.len(), 12 * 29);
     let csv = String::from_utf8(csv).unwrap();
-    for ((bytes, event), line) in pcd.chunks(27).zip(events()).zip(csv.lines().skip(1)) {
+    for ((bytes, event), line) in pcd.chunks(29).zip(events()).zip(csv.lines().skip(1)) {
         let ([x, y, z, intensity], pixel, flags, time) = record(bytes);
         let columns: Vec<&str> = line.split(',').collect();
         let point = [1, 2, 3].map(|index| columns[index].parse::<f32>().unwrap());
         assert_eq!([x, y, z], point);
-        assert_eq!((intensity, pixel, flags), (37.0, event.pixel().0, 4));
+        assert_eq!((intensity, pixel, flags), (37.0, event.pixel().0.into(), 4));
         assert_eq!(time, event.cycle().0 as f64 * 100.0);
     }
 }
@@ -123,7 +126,7 @@ fn changes_of_depth_are_points_at_the_mean() {
         header.contains("FIELDS x y z change pixel flags t_ns"),
         "{header}"
     );
-    let ([x, y, z, change], pixel, ..) = record(&pcd[pcd.len() - 54..]);
+    let ([x, y, z, change], pixel, ..) = record(&pcd[pcd.len() - 58..]);
     let metres = (40.0 * 250.0 * 0.149_896_229 - 12.5) / 1000.0;
     assert!((f64::from(x.hypot(y).hypot(z)) - metres).abs() < 1e-5);
     assert!((change + 0.112_422).abs() < 1e-5 && pixel == 5, "{change}");
@@ -165,6 +168,89 @@ fn a_file_of_both_kinds_needs_to_be_told_which() {
 }
 
 #[test]
+fn the_result_line_says_what_points_and_times_rest_on() {
+    let scratch = Scratch::new();
+    scratch.file("events.aer", file(&HEADER, &events()));
+    scratch.file("none.aer", file(&HEADER, &[]));
+    let rays = "[0, 0, 1, 0],\n".repeat(2048);
+    let calibration = format!("columns = 64\nrows = 32\npixels = [\n{rays}]\n");
+    scratch.file("rays.toml", calibration);
+    let khz = ["--laser-hz", "12500"];
+    for (name, format, more, said) in [
+        (
+            "events",
+            "ply",
+            &["--fov", "45x24.5"][..],
+            "12 events (45x24.5 degrees, 10 MHz)",
+        ),
+        (
+            "events",
+            "pcd",
+            &["--calibration", "rays.toml"],
+            "12 events (rays.toml, 10 MHz)",
+        ),
+        ("events", "evt2", &khz, "0 events (0.0125 MHz)"),
+        // The run lasts 105 ms, or no time.
+        (
+            "events",
+            "mcap",
+            &[],
+            "12 events (60x32.2 degrees, 10 MHz, clouds every 1049 µs)",
+        ),
+        ("events", "mcap", &["--slice-us", "5"], "clouds every 5 µs)"),
+        (
+            "none",
+            "mcap",
+            &["--events", "depth"],
+            "0 events (60x32.2 degrees, 10 MHz, clouds every 10 µs)",
+        ),
+    ] {
+        let name = format!("{name}.aer");
+        let arguments = ["export", &name, "--format", format, "--out", "x"];
+        let output = scratch.dtof(&[&arguments, more].concat());
+        let line = String::from_utf8(output.stdout).unwrap();
+        assert!(output.status.success() && line.starts_with("x: "), "{line}");
+        assert!(line.ends_with(&format!("{said}\n")), "{line}");
+        let output = scratch.dtof(&[&arguments, more, &["--quiet"]].concat());
+        assert!(output.status.success() && output.stdout.is_empty());
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_stays_and_what_it_leads_to_is_replaced() {
+    use std::os::unix::fs::symlink;
+
+    let scratch = Scratch::new();
+    scratch.file("events.aer", file(&HEADER, &events()));
+    std::fs::create_dir(scratch.path("folder")).unwrap();
+    scratch.file("folder/points.csv", "old");
+    symlink("folder/points.csv", scratch.path("link.csv")).unwrap();
+    symlink("folder/none.csv", scratch.path("lost.csv")).unwrap();
+    let output = scratch.dtof(&[
+        "export",
+        "events.aer",
+        "--format",
+        "csv",
+        "--out",
+        "link.csv",
+    ]);
+    assert!(output.status.success());
+    assert!(scratch.path("link.csv").is_symlink());
+    assert_eq!(scratch.read("folder/points.csv").lines().count(), 13);
+    let output = scratch.dtof(&[
+        "export",
+        "events.aer",
+        "--format",
+        "csv",
+        "--out",
+        "lost.csv",
+    ]);
+    scratch.refused(&output, &["lost.csv: is a link to what is not there"]);
+    assert!(scratch.path("lost.csv").is_symlink());
+}
+
+#[test]
 fn the_commands_of_the_readme_run() {
     let scratch = Scratch::new();
     std::fs::create_dir_all(scratch.path("out/demo")).unwrap();
@@ -181,115 +267,4 @@ fn the_commands_of_the_readme_run() {
         commands += 1;
     }
     assert_eq!(commands, 5);
-}
-
-#[test]
-fn options_that_cannot_be_are_refused_in_one_line() {
-    let scratch = Scratch::new();
-    scratch.file("events.aer", file(&HEADER, &events()));
-    scratch.file(
-        "calibration.toml",
-        "columns = 64\nrows = 32\npixels = [\n]\n",
-    );
-    scratch.file("late.aer", file(&HEADER, &[depth(0, 1 << 60, 5)]));
-    std::fs::create_dir(scratch.path("folder")).unwrap();
-    for (arguments, part) in [
-        (&["events.aer", "--format", "csv"][..], "--out"),
-        (&["events.aer", "--out", "x"], "--format"),
-        (&["events.aer", "--format", "las", "--out", "x"], "las"),
-        (
-            &["none.aer", "--format", "csv", "--out", "x"],
-            "none.aer: No such file",
-        ),
-        (
-            &["folder", "--format", "csv", "--out", "x"],
-            "folder: not a file",
-        ),
-        (
-            &["events.aer", "--format", "csv", "--out", "folder"],
-            "folder: is there, and is no file",
-        ),
-        (
-            &["events.aer", "--format", "csv", "--out", "/dev/null"],
-            "is no file",
-        ),
-        (
-            &["events.aer", "--format", "csv", "--out", "./events.aer"],
-            "is the file that is read",
-        ),
-        (
-            &["events.aer", "--format", "csv", "--out", "x", "--fov", "60"],
-            "HORIZONTALxVERTICAL",
-        ),
-        (
-            &[
-                "events.aer",
-                "--format",
-                "csv",
-                "--out",
-                "x",
-                "--fov",
-                "0x10",
-            ],
-            "HORIZONTALxVERTICAL",
-        ),
-        (
-            &[
-                "events.aer",
-                "--format",
-                "csv",
-                "--out",
-                "x",
-                "--laser-hz",
-                "0",
-            ],
-            "--laser-hz",
-        ),
-        (
-            &["late.aer", "--format", "ply", "--out", "x"],
-            "PLY holds 9007199 s of time",
-        ),
-        (
-            &[
-                "events.aer",
-                "--format",
-                "csv",
-                "--out",
-                "x",
-                "--calibration",
-                "none.toml",
-            ],
-            "none.toml: No such file",
-        ),
-        (
-            &[
-                "events.aer",
-                "--format",
-                "csv",
-                "--out",
-                "x",
-                "--calibration",
-                "calibration.toml",
-            ],
-            "calibration.toml: line 1: 0 pixels, should be 2048",
-        ),
-        (
-            &[
-                "events.aer",
-                "--format",
-                "csv",
-                "--out",
-                "x",
-                "--calibration",
-                "calibration.toml",
-                "--fov",
-                "60x40",
-            ],
-            "cannot be used with",
-        ),
-    ] {
-        let output = scratch.dtof(&[&["export"], arguments].concat());
-        scratch.refused(&output, &[part]);
-        assert!(!scratch.path("x").exists());
-    }
 }

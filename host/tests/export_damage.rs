@@ -3,9 +3,10 @@
 mod common;
 
 use common::Scratch;
-use common::aer::{HEADER, byte_of, depth, events, exported, file, folder};
-use dtof::aer_file::Event;
+use common::aer::{HEADER, byte_of, depth, dynamic, events, exported, file, folder};
+use dtof::aer_file::{Event, Header};
 use dtof::export::{Format, Options};
+use dtof::source::Geometry;
 
 /// How many whole points a file holds, which must be as many as it says.
 fn points(format: Format, bytes: &[u8]) -> u64 {
@@ -18,7 +19,7 @@ fn points(format: Format, bytes: &[u8]) -> u64 {
         let header = bytes
             .windows(end.len())
             .position(|part| part == end.as_bytes());
-        assert_eq!(bytes.len() - header.unwrap() - end.len(), said * 27);
+        assert_eq!(bytes.len() - header.unwrap() - end.len(), said * 29);
         said
     };
     let points = match format {
@@ -82,7 +83,13 @@ fn damage_is_named_with_its_byte_after_the_events_before_it_are_written() {
             (
                 [&whole[..], &[0]].concat(),
                 12,
-                ["byte 288: ", "bytes follow"],
+                ["byte 304: ", "bytes follow"],
+            ),
+            // Bin 152 of 128: the peak bin has bits 52-61.
+            (
+                changed(byte_of(5) + 7, 0x49),
+                4,
+                ["byte 144: bin 152", " of 128"],
             ),
         ] {
             let (exported, out) = exported(&bytes, format, &Options::default());
@@ -136,21 +143,84 @@ fn what_is_no_aer_file_leaves_the_output_as_it_was() {
 }
 
 #[test]
-fn a_time_that_is_damaged_is_refused_with_the_damage() {
+fn what_comes_before_a_time_that_is_damaged_is_exported_whole() {
+    let mut events: Vec<Event> = (0..1000).map(|cycle| dynamic(7, cycle, 40, 1)).collect();
+    events.push(dynamic(7, 1 << 20, 40, 1));
+    events.push(dynamic(7, 1 << 21, 40, 1));
+    let mut bytes = file(&HEADER, &events);
+    // A time word, 1,000 events, a time word: 2^60 laser cycles.
+    bytes[byte_of(1001) + 13] = 1;
+    for (format, name) in [
+        (Format::Pcd, "PCD"),
+        (Format::Ply, "PLY"),
+        (Format::Mcap, "MCAP"),
+        (Format::Evt2, "EVT2"),
+    ] {
+        // The rest may be there, or not.
+        for bytes in [&bytes[..], &bytes[..byte_of(1003)]] {
+            let (exported, _) = exported(bytes, format, &Options::default());
+            assert_eq!(exported.written, 1000);
+            let damage = exported.damage.unwrap();
+            let parts = [
+                "byte 16080: laser cycle 1152921504607895552 lies beyond",
+                name,
+            ];
+            assert!(parts.iter().all(|part| damage.contains(part)), "{damage}");
+        }
+    }
+    // CSV holds any time: only the checksum knows.
+    let (exported, _) = exported(&bytes, Format::Csv, &Options::default());
+    assert_eq!(exported.written, 1002);
+    assert!(exported.damage.unwrap().contains("checksum"));
+}
+
+#[test]
+fn a_whole_file_of_times_that_the_format_cannot_hold_is_refused() {
     let scratch = Scratch::new();
-    let mut bytes = file(&HEADER, &events());
-    bytes[byte_of(0) + 12] = 1; // 2^52 laser cycles
-    scratch.file("events.aer", bytes);
-    let output = scratch.dtof(&["export", "events.aer", "--format", "pcd", "--out", "x.pcd"]);
+    scratch.file(
+        "late.aer",
+        file(&HEADER, &[depth(0, 5, 5), depth(0, 1 << 60, 5)]),
+    );
+    let output = scratch.dtof(&["export", "late.aer", "--format", "pcd", "--out", "x.pcd"]);
     scratch.refused(
         &output,
-        &[
-            "events.aer: byte 288: the checksum",
-            "laser cycle 4503599627370",
-            "PCD holds",
-        ],
+        &["late.aer: laser cycle 1152921504606846976 lies beyond"],
     );
     assert!(!scratch.path("x.pcd").exists());
+}
+
+#[test]
+fn what_export_takes_for_damage_decode_does_too() {
+    let beyond = Header { bins: 32, ..HEADER };
+    let narrow = Header {
+        geometry: Geometry {
+            columns: 8,
+            rows: 2,
+        },
+        ..HEADER
+    };
+    let scratch = Scratch::new();
+    for (header, event, part) in [
+        (beyond, depth(0, 2, 32), "bin 32 of 32"),
+        (beyond, dynamic(0, 2, 33, 1), "bin 33 of 32"),
+        (narrow, depth(16, 2, 5), "pixel 16 of 16"),
+        (narrow, dynamic(16, 2, 5, 1), "pixel 16 of 16"),
+    ] {
+        let first = match event {
+            Event::Depth(_) => depth(15, 1, 31),
+            // The mean of positions that lie in the bin after the peak.
+            Event::DynamicDepth(_) => dynamic(15, 1, 32, 1),
+        };
+        scratch.file("events.aer", file(&header, &[first, event]));
+        for arguments in [
+            &["export", "events.aer", "--format", "csv", "--out", "x.csv"][..],
+            &["decode", "events.aer"],
+        ] {
+            let output = scratch.dtof(arguments);
+            scratch.refused(&output, &[&format!("events.aer: byte 96: {part}")]);
+        }
+        assert_eq!(scratch.read("x.csv").lines().count(), 2);
+    }
 }
 
 #[test]

@@ -9,8 +9,8 @@ use dtof::aer_file::{Event, Header};
 use dtof::dynamic_depth::DynamicDepth;
 use dtof::export::{Format, LaserClock, Options};
 use dtof::source::Geometry;
-use dtof_core::Reference;
 use dtof_core::fixed::types::U24F8;
+use dtof_core::{DepthEvent, Flags, Reference};
 
 /// Time, column, row and whether it is ON, of each event.
 fn evt2(bytes: &[u8]) -> Vec<(u64, u32, u32, bool)> {
@@ -52,6 +52,22 @@ fn mcap(bytes: &[u8]) -> (u64, usize, usize) {
         json["events_so_far"].as_u64().unwrap()
     });
     (last, clouds.len(), statistics.len())
+}
+
+/// The log times of the messages of a topic.
+fn times(bytes: &[u8], topic: &str) -> Vec<u64> {
+    let all = mcap::MessageStream::new(bytes).unwrap().map(Result::unwrap);
+    all.filter(|message| message.channel.topic == topic)
+        .map(|message| message.log_time)
+        .collect()
+}
+
+/// The messages of statistics.
+fn statistics(bytes: &[u8]) -> Vec<serde_json::Value> {
+    let all = mcap::MessageStream::new(bytes).unwrap().map(Result::unwrap);
+    all.filter(|message| message.channel.topic == "/statistics")
+        .map(|message| serde_json::from_slice(&message.data).unwrap())
+        .collect()
 }
 
 /// Ten changes, one of them in the laser cycle of another time word.
@@ -181,7 +197,7 @@ fn what_evt2_cannot_hold_is_refused() {
         (
             "late.aer",
             &[],
-            "late.aer: laser cycle 171798691840 lies 17179 s after the start, and EVT2 holds",
+            "late.aer: laser cycle 171798691840 lies beyond, 17179 s after the start: EVT2 holds",
         ),
         (
             "last.aer",
@@ -190,7 +206,6 @@ fn what_evt2_cannot_hold_is_refused() {
         ),
         ("last.aer", &["--threshold-mm", "-1"], "--threshold-mm"),
         ("last.aer", &["--reference", "next"], "--reference"),
-        ("last.aer", &["--slice-ms", "0"], "--slice-ms"),
     ] {
         scratch.refused(&evt2_of(name, more), &[part]);
         assert!(!scratch.path("x.raw").exists());
@@ -203,23 +218,78 @@ fn what_evt2_cannot_hold_is_refused() {
 #[test]
 fn slices_have_a_cloud_and_statistics_each() {
     let bytes = file(&HEADER, &changes());
-    for (slice_ns, messages) in [(10_000_000, 6), (5_000_000, 10), (1_000_000_000, 1)] {
+    // The run lasts 105 ms.
+    for (slice_ns, messages) in [
+        (Some(10_000_000), 6),
+        (Some(5_000_000), 10),
+        (Some(1_000_000_000), 1),
+        (None, 10),
+    ] {
         let options = Options {
             slice_ns,
             ..Options::default()
         };
         let (exported, out) = exported(&bytes, Format::Mcap, &options);
         assert_eq!(exported.written, 10);
-        assert_eq!(mcap(&out), (10, messages, messages), "{slice_ns}");
+        assert_eq!(mcap(&out), (10, messages, messages), "{slice_ns:?}");
     }
     // A message holds 65,536 points at most.
     let events: Vec<Event> = (0..70_000).map(|index| depth(7, index, 40)).collect();
     let options = Options {
         clock: LaserClock::new(1_000_000_000).unwrap(),
+        slice_ns: Some(10_000_000),
         ..Options::default()
     };
     let (_, out) = exported(&file(&HEADER, &events), Format::Mcap, &options);
     assert_eq!(mcap(&out), (70_000, 2, 1));
+    // Each has a time of its own: the beginning of the slice, its first point.
+    assert_eq!(times(&out, "/events"), [0, 65_536]);
+    assert_eq!(times(&out, "/statistics"), [0]);
+}
+
+#[test]
+fn the_last_slice_ends_with_the_last_event() {
+    // One event every 2 µs for 15 ms.
+    let events: Vec<Event> = (0..7500)
+        .map(|index| depth(7, index * 20 + 19, 40))
+        .collect();
+    let options = Options {
+        slice_ns: Some(10_000_000),
+        ..Options::default()
+    };
+    let (_, out) = exported(&file(&HEADER, &events), Format::Mcap, &options);
+    for statistics in statistics(&out) {
+        assert_eq!(statistics["events_per_s"], 500_000.0);
+    }
+    let lengths: Vec<_> = statistics(&out)
+        .iter()
+        .map(|said| said["duration_s"].as_f64())
+        .collect();
+    assert_eq!(lengths, [Some(0.01), Some(0.005)]);
+    // A slice is 1/100 of that by default.
+    let (_, out) = exported(&file(&HEADER, &events), Format::Mcap, &Options::default());
+    assert_eq!(
+        times(&out, "/events"),
+        (0..100).map(|slice| slice * 150_000).collect::<Vec<_>>()
+    );
+}
+
+#[test]
+fn flags_are_counted_each() {
+    let events = (0..16u8).map(|bits| match depth(bits.into(), bits.into(), 40) {
+        Event::Depth(event) => Event::Depth(DepthEvent {
+            flags: Flags::from_bits(bits).unwrap(),
+            ..event
+        }),
+        event => event,
+    });
+    let events: Vec<Event> = events.collect();
+    let (_, out) = exported(&file(&HEADER, &events), Format::Mcap, &Options::default());
+    let said = &statistics(&out)[0];
+    for name in ["saturated", "clipped", "deferred", "pile_up"] {
+        assert_eq!(said[name], 8, "{name}");
+    }
+    assert_eq!(said["flagged"], 15);
 }
 
 #[test]

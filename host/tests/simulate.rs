@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 
 use common::Scratch;
 use dtof::scene::Scene;
+use dtof::source::Geometry;
+use dtof_core::PixelAddress;
 
 fn repository(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
@@ -284,5 +286,83 @@ fn frames_read_all_pixels_at_once() {
         assert!(!refused.status.success());
         let lines = refused.stderr.iter().filter(|&&byte| byte == b'\n');
         assert_eq!(lines.count(), 1);
+    }
+}
+
+/// `dtof export` has to be told what is not its default, and `simulate` says what.
+#[test]
+fn the_options_that_export_needs_are_said() {
+    let scratch = Scratch::new();
+    let wall = "[[surface]]\nrange_mm = 1000\nsignal = 1\n";
+    let keys = "columns = 8\nrows = 4\nbins = 128\ncycles = 200\n";
+    let slow = "laser_rate_mhz = 1.25\nfield_of_view_degrees = [60, 32]\n";
+    let natural = [60.0, 2.0 * (0.5 / 3f64.sqrt()).atan().to_degrees()];
+    for (more, array, hz, degrees, options) in [
+        ("", "8x4", 10_000_000, natural, None),
+        ("", "16x8", 10_000_000, natural, None),
+        // The scene stays as wide as it is.
+        ("", "4x4", 10_000_000, natural, Some("--fov 60x32.204228")),
+        (
+            slow,
+            "8x4",
+            1_250_000,
+            [60.0, 32.0],
+            Some("--laser-hz 1250000 --fov 60x32"),
+        ),
+    ] {
+        let scene = scratch.file("scene.toml", format!("{keys}{more}{wall}"));
+        let output = scratch.simulate(&scene, &["--array", array]);
+        assert!(output.status.success());
+        let printed = String::from_utf8(output.stdout).unwrap();
+        let row = printed.lines().find(|line| line.contains("export with"));
+        let summary: serde_json::Value =
+            serde_json::from_str(&scratch.read("out/summary.json")).unwrap();
+        assert_eq!(summary["laser_hz"], hz);
+        for (is, said) in degrees.iter().enumerate() {
+            let there = summary["field_of_view_degrees"][is].as_f64().unwrap();
+            assert!((there - said).abs() < 1e-9, "{there}");
+        }
+        assert_eq!(summary["export_with"].as_str(), options);
+        assert_eq!(row.is_some(), options.is_some(), "{printed}");
+        let Some(options) = options else { continue };
+        assert!(row.unwrap().ends_with(options), "{printed}");
+        let export = ["export", "out/events.aer", "--format", "csv", "--out", "x"];
+        let options: Vec<&str> = options.split(' ').collect();
+        assert!(
+            scratch
+                .dtof(&[&export[..], &options].concat())
+                .status
+                .success()
+        );
+    }
+}
+
+/// Another array before a scene sees the same plane under the same angles.
+#[test]
+fn another_array_sees_as_much_of_a_plane() {
+    let text = "columns = 64\nrows = 32\n[[surface]]\nrange_mm = 2000\nsignal = 1\n\
+                plane = { normal = [0.5, 0.3, 1] }\n";
+    let scene = Scene::parse(text).unwrap();
+    let square = Scene {
+        geometry: Geometry {
+            columns: 8,
+            rows: 8,
+        },
+        ..scene.clone()
+    };
+    let range = |scene: &Scene, column: u16, row: u16| {
+        let columns = u16::try_from(scene.geometry.columns).unwrap();
+        let pixel = PixelAddress(row * columns + column);
+        scene.truth(pixel, 0).unwrap().range_mm
+    };
+    // A pixel of 8x8 is eight columns and four rows of 64x32; its middle is a corner of the
+    // four pixels in the middle of them, and an inverse range is linear but for the length of
+    // the ray.
+    for (column, row) in [(0, 0), (7, 0), (3, 5), (7, 7)] {
+        let four = [(3, 1), (4, 1), (3, 2), (4, 2)];
+        let around = four.map(|(right, down)| range(&scene, 8 * column + right, 4 * row + down));
+        let mean = around.iter().sum::<f64>() / 4.0;
+        let here = range(&square, column, row);
+        assert!((here / mean - 1.0).abs() < 1e-3, "{here} and {mean}");
     }
 }

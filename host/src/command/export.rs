@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use clap::Args;
 use dtof::aer_file::EventKind;
 use dtof::export::{Format, LaserClock, Optics, Options, export};
@@ -40,9 +40,9 @@ pub struct Export {
     /// Which events of a file that holds both kinds
     #[arg(long, value_enum)]
     events: Option<EventKind>,
-    /// MCAP: milliseconds of a point cloud
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
-    slice_ms: u64,
+    /// MCAP: microseconds of a point cloud [default: 1/100 of the run, 10 to 10,000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    slice_us: Option<u64>,
     #[command(flatten)]
     dynamic_depth: dynamic_depth::Options,
     /// Print nothing but errors
@@ -52,6 +52,7 @@ pub struct Export {
 
 impl Export {
     pub fn run(&self) -> Result<()> {
+        self.check()?;
         let optics = match &self.calibration {
             Some(file) => Optics::Calibration(file.clone()),
             None => Optics::Pinhole(self.fov),
@@ -60,7 +61,7 @@ impl Export {
             optics,
             clock: LaserClock::new(self.laser_hz)?,
             kind: self.events,
-            slice_ns: self.slice_ms * 1_000_000,
+            slice_ns: self.slice_us.map(|us| us * 1000),
             dynamic_depth: self.dynamic_depth.dynamic_depth(),
         };
         let exported = export(&self.file, &self.out, self.format, &options, self.quiet)?;
@@ -81,7 +82,41 @@ impl Export {
             );
         }
         if !self.quiet {
-            writeln!(io::stdout(), "{out}: {written} events")?;
+            writeln!(
+                io::stdout(),
+                "{out}: {written} events ({})",
+                exported.assumed
+            )?;
+        }
+        Ok(())
+    }
+
+    /// No option is left unused.
+    fn check(&self) -> Result<()> {
+        let evt2 = self.format == Format::Evt2;
+        let mcap = self.format == Format::Mcap;
+        for (given, has_use, option, of) in [
+            (self.slice_us.is_some(), mcap, "--slice-us", "mcap"),
+            (
+                self.dynamic_depth.are_given(),
+                evt2,
+                "--threshold-mm and --reference",
+                "evt2",
+            ),
+            (
+                self.fov.is_some(),
+                !evt2,
+                "--fov",
+                "points, which evt2 has not",
+            ),
+            (
+                self.calibration.is_some(),
+                !evt2,
+                "--calibration",
+                "points, which evt2 has not",
+            ),
+        ] {
+            ensure!(!given || has_use, "{option}: only for {of}");
         }
         Ok(())
     }

@@ -6,6 +6,8 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::{Engine, host_engine};
+use dtof::export::LaserClock;
+use dtof::geometry::FieldOfView;
 use dtof::output::Output;
 use dtof::report::Section;
 use dtof::run::run;
@@ -106,6 +108,9 @@ impl Simulation<'_> {
             self.quiet,
         )?;
         summary.input = self.file;
+        summary.laser_hz = Some(self.scene.laser_hz());
+        summary.field_of_view_degrees = Some(self.scene.view().degrees());
+        summary.export_with = export_with(self.scene);
         let surfaces = self.scene.against_truth(output.maps(), self.cycles);
         let sections = [Section {
             heading: "Surfaces",
@@ -117,6 +122,20 @@ impl Simulation<'_> {
         }
         Ok(())
     }
+}
+
+/// The options without which `dtof export` takes the scene for another, if any.
+fn export_with(scene: &Scene) -> Option<String> {
+    let mut options = Vec::new();
+    let hz = scene.laser_hz();
+    if hz != LaserClock::PAPER_HZ {
+        options.push(format!("--laser-hz {hz}"));
+    }
+    let view = format!("{:.6}", scene.view());
+    if view != format!("{:.6}", FieldOfView::of(scene.geometry)) {
+        options.push(format!("--fov {view}"));
+    }
+    (!options.is_empty()).then(|| options.join(" "))
 }
 
 /// The engine of this computer, or that of a device.

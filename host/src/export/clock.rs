@@ -1,5 +1,7 @@
 //! From laser cycles to time.
 
+use std::fmt;
+
 use anyhow::{Result, ensure};
 
 use super::{Format, evt2};
@@ -42,21 +44,35 @@ impl LaserClock {
         u128::from(cycle) * 1_000_000 / u128::from(self.hz)
     }
 
-    /// Whether `format` can hold the time of the latest event.
-    pub(super) fn check(&self, format: Format, latest: u64) -> Result<()> {
+    /// The nanosecond in which laser cycle `cycle` ends, as far as 64 bits go; not 0.
+    pub(super) fn end_ns(&self, cycle: u64) -> u64 {
+        let end = self.nanoseconds(cycle.saturating_add(1)).max(1);
+        u64::try_from(end).unwrap_or(u64::MAX)
+    }
+
+    /// Whether `format` can hold the time of an event in laser cycle `cycle`.
+    pub(super) fn check(&self, format: Format, cycle: u64) -> Result<()> {
         let Some(end_ns) = format.end_ns() else {
             return Ok(());
         };
-        let time = self.nanoseconds(latest);
+        let time = self.nanoseconds(cycle);
         ensure!(
             time < end_ns,
-            "laser cycle {latest} lies {} s after the start, and {} holds {} s of time (--laser-hz {})",
+            "laser cycle {cycle} lies beyond, {} s after the start: {} holds {} s of time (--laser-hz {})",
             time / 1_000_000_000,
             format.name(),
             end_ns / 1_000_000_000,
             self.hz
         );
         Ok(())
+    }
+}
+
+/// "10 MHz".
+impl fmt::Display for LaserClock {
+    #[allow(clippy::cast_precision_loss, reason = "for people")]
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} MHz", self.hz as f64 / 1e6)
     }
 }
 
@@ -100,6 +116,9 @@ mod tests {
             u128::from(u64::MAX) * 1_000_000_000
         );
         assert!(LaserClock::new(0).is_err());
+        assert_eq!((clock.end_ns(0), one.end_ns(u64::MAX)), (100, u64::MAX));
+        assert_eq!(LaserClock::new(u64::MAX).unwrap().end_ns(0), 1);
+        assert_eq!(clock.to_string(), "10 MHz");
     }
 
     #[test]

@@ -6,45 +6,13 @@ use std::path::Path;
 
 use anyhow::{Result, bail, ensure};
 
-use crate::aer_file::{Event, EventKind, Header, Reader};
+use super::{Format, LaserClock};
+use crate::aer_file::{EventKind, Header, Reader};
 use crate::progress::Progress;
 
-/// Reads events, and takes those of pixels that are not there for damage.
-pub struct Events {
-    reader: Reader<BufReader<File>>,
-    addresses: u64,
-}
-
-impl Events {
-    pub fn open(path: &Path) -> Result<Self> {
-        let reader = Reader::new(BufReader::new(File::open(path)?))?;
-        let array = reader.header().geometry;
-        let addresses = u64::from(array.columns) * u64::from(array.rows);
-        ensure!(
-            (1..=1 << 16).contains(&addresses),
-            "the header says {}x{} pixels: must be 1 to 65,536",
-            array.columns,
-            array.rows
-        );
-        Ok(Self { reader, addresses })
-    }
-
-    /// The next event, or `None` at the end. What is wrong begins with the byte.
-    pub fn next(&mut self) -> Result<Option<Event>> {
-        let event = self.reader.next_event()?;
-        if let Some(event) = event
-            && u64::from(event.pixel().0) >= self.addresses
-        {
-            // The word before the one that comes next.
-            let byte = self.reader.offset() - 16;
-            bail!(
-                "byte {byte}: pixel {} of {}",
-                event.pixel().0,
-                self.addresses
-            );
-        }
-        Ok(event)
-    }
+/// The events of a file.
+pub fn open(path: &Path) -> Result<Reader<BufReader<File>>> {
+    Reader::new(BufReader::new(File::open(path)?))
 }
 
 /// What a file holds.
@@ -59,35 +27,55 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// Reads all of a file.
-    pub fn of(path: &Path, quiet: bool) -> Result<Self> {
+    /// Reads all of a file. In a damaged file, an event at a time that `format` cannot hold
+    /// is where the damage begins.
+    ///
+    /// # Errors
+    /// Of a file that is not damaged, such an event is an error.
+    pub fn of(path: &Path, format: Format, clock: LaserClock, quiet: bool) -> Result<Self> {
         let file = path.metadata()?;
         ensure!(file.is_file(), "not a file that can be read twice");
-        let mut events = Events::open(path)?;
+        let mut reader = open(path)?;
         let mut survey = Self {
-            header: *events.reader.header(),
+            header: *reader.header(),
             depth: 0,
             dynamic_depth: 0,
             latest: 0,
             damage: None,
         };
         let progress = Progress::new(file.len(), "bytes counted", quiet);
+        let mut beyond = None;
         loop {
-            let event = match events.next() {
+            let begin = reader.offset();
+            let event = match reader.next_event() {
                 Ok(Some(event)) => event,
-                Ok(None) => break,
+                Ok(None) => match beyond {
+                    None => break,
+                    Some((_, time)) => return Err(time),
+                },
                 Err(error) => {
-                    survey.damage = Some(format!("{error:#}"));
+                    survey.damage = Some(match beyond {
+                        None => format!("{error:#}"),
+                        Some((byte, time)) => format!("byte {byte}: {time}"),
+                    });
                     break;
                 }
             };
+            if beyond.is_some() {
+                continue;
+            }
+            if let Err(time) = clock.check(format, event.cycle().0) {
+                // The byte of the time word, if there is one before the event.
+                beyond = Some((begin, time));
+                continue;
+            }
             *match event.kind() {
                 EventKind::Depth => &mut survey.depth,
                 EventKind::DynamicDepth => &mut survey.dynamic_depth,
             } += 1;
             survey.latest = survey.latest.max(event.cycle().0);
             if survey.all().is_multiple_of(4096) {
-                progress.at(events.reader.offset());
+                progress.at(reader.offset());
             }
         }
         progress.finish();
@@ -109,6 +97,15 @@ impl Survey {
     /// The one kind there is, unless one is wanted.
     pub fn kind(&self, wanted: Option<EventKind>) -> Result<EventKind> {
         if let Some(wanted) = wanted {
+            let (name, there) = match wanted {
+                EventKind::Depth => ("", self.depth),
+                EventKind::DynamicDepth => ("dynamic ", self.dynamic_depth),
+            };
+            ensure!(
+                there > 0 || self.all() == 0 || self.damage.is_some(),
+                "{} events, none of them a {name}depth event",
+                self.all()
+            );
             return Ok(wanted);
         }
         match (self.depth, self.dynamic_depth) {

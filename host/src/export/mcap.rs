@@ -29,7 +29,7 @@ const FRAME: &str = "dtof_optical";
 struct Statistics {
     /// When the slice begins.
     timestamp: Time,
-    /// How long it is, in seconds.
+    /// How long it is, in seconds. The last one ends with the last event.
     duration_s: f64,
     /// Events.
     events: u64,
@@ -41,10 +41,13 @@ struct Statistics {
     flagged: u64,
     /// Events whose peak counter was full.
     saturated: u64,
-    /// Events whose depth window was cut by the range gate.
+    /// Events whose depth window was cut by the range gate, or whose position was held two
+    /// bins from the peak.
     clipped: u64,
     /// Events that had to wait for the link.
     deferred: u64,
+    /// Events of exposures with so many photons that the TDC missed some.
+    pile_up: u64,
     /// Events from the start of the file to the end of the slice.
     events_so_far: u64,
 }
@@ -81,6 +84,7 @@ fn schema() -> String {
         "saturated",
         "clipped",
         "deferred",
+        "pile_up",
         "events_so_far",
     ];
     let mut properties = serde_json::Map::new();
@@ -109,23 +113,33 @@ pub struct Mcap {
     projection: Projection,
     order: Reorder<Event>,
     slice_ns: u64,
-    /// The slice that is being gathered: its number, its points, what happened.
+    /// Where the last slice ends, at the latest.
+    end_ns: u64,
+    /// The slice that is being gathered: its number, its points that are not written and
+    /// their time, what happened.
     slice: Option<u64>,
     points: Vec<u8>,
+    points_ns: u64,
     statistics: Statistics,
     /// The slice in which each pixel had its last event, counted from 1.
     last_slice: Vec<u64>,
     written: u64,
 }
 
+/// Slices of a run that ends at `end_ns`: 1/100 of it in whole microseconds, rounded up,
+/// from 10 µs to 10 ms.
+pub fn slice_of(end_ns: u64) -> u64 {
+    (end_ns.div_ceil(100_000) * 1000).clamp(10_000, 10_000_000)
+}
+
 impl Mcap {
-    /// `slice_ns` is not 0.
+    /// Length of a slice, and where the last one ends: neither is 0.
     pub fn new(
         out: Out,
         projection: Projection,
         array: Geometry,
         kind: EventKind,
-        slice_ns: u64,
+        [slice_ns, end_ns]: [u64; 2],
     ) -> Result<Self> {
         let library = concat!("dtof ", env!("CARGO_PKG_VERSION"));
         let mut writer = ::mcap::WriteOptions::new()
@@ -154,8 +168,10 @@ impl Mcap {
             projection,
             order: Reorder::new(WAITING),
             slice_ns,
+            end_ns,
             slice: None,
             points: Vec::new(),
+            points_ns: 0,
             statistics: Statistics::default(),
             last_slice: vec![0; array.addresses()],
             written: 0,
@@ -169,6 +185,10 @@ impl Mcap {
         if self.slice != Some(slice) {
             self.end_slice()?;
             self.slice = Some(slice);
+            self.points_ns = slice * self.slice_ns;
+        } else if self.points.is_empty() {
+            // The slice has a message already. Of two of one time viewers show the last.
+            self.points_ns = time;
         }
         self.points.write_all(&record(event, &self.projection)?)?;
         self.written += 1;
@@ -183,12 +203,13 @@ impl Mcap {
             (&mut statistics.saturated, Flags::SATURATED),
             (&mut statistics.clipped, Flags::CLIPPED),
             (&mut statistics.deferred, Flags::DEFERRED),
+            (&mut statistics.pile_up, Flags::PILE_UP),
         ] {
             *count += u64::from(flags.contains(flag));
         }
         statistics.flagged += u64::from(flags != Flags::NONE);
         if self.points.len() >= MOST_POINTS * BYTES {
-            self.write_points(slice * self.slice_ns)?;
+            self.write_points()?;
         }
         Ok(())
     }
@@ -201,9 +222,11 @@ impl Mcap {
         };
         let begin = slice * self.slice_ns;
         if !self.points.is_empty() {
-            self.write_points(begin)?;
+            self.write_points()?;
         }
-        let duration_s = self.slice_ns as f64 / 1e9;
+        let end = begin.saturating_add(self.slice_ns).min(self.end_ns);
+        let end = end.max(begin + 1);
+        let duration_s = (end - begin) as f64 / 1e9;
         let statistics = Statistics {
             timestamp: Time::of(begin),
             duration_s,
@@ -215,7 +238,8 @@ impl Mcap {
         self.write_message(self.statistics_channel, begin, &message)
     }
 
-    fn write_points(&mut self, time: u64) -> Result<()> {
+    fn write_points(&mut self) -> Result<()> {
+        let time = self.points_ns;
         let data = std::mem::take(&mut self.points);
         let Time { sec, nsec } = Time::of(time);
         let mut offset = 0;
@@ -290,7 +314,7 @@ impl Sink for Mcap {
 fn numeric_type(number: Number) -> NumericType {
     match number {
         Number::U8 => NumericType::Uint8,
-        Number::U16 => NumericType::Uint16,
+        Number::U32 => NumericType::Uint32,
         Number::F32 => NumericType::Float32,
         Number::F64 => NumericType::Float64,
     }

@@ -37,7 +37,7 @@ fn header(kind: EventKind, points: u64) -> String {
 
 fn letter(number: Number) -> &'static str {
     match number {
-        Number::U8 | Number::U16 => "U",
+        Number::U8 | Number::U32 => "U",
         Number::F32 | Number::F64 => "F",
     }
 }

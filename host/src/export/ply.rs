@@ -31,7 +31,7 @@ fn header(kind: EventKind, points: u64) -> String {
 fn name(number: Number) -> &'static str {
     match number {
         Number::U8 => "uchar",
-        Number::U16 => "ushort",
+        Number::U32 => "uint",
         Number::F32 => "float",
         Number::F64 => "double",
     }

@@ -12,7 +12,7 @@ use crate::aer_file::{Event, EventKind};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Number {
     U8,
-    U16,
+    U32,
     F32,
     F64,
 }
@@ -21,8 +21,7 @@ impl Number {
     pub fn bytes(self) -> usize {
         match self {
             Self::U8 => 1,
-            Self::U16 => 2,
-            Self::F32 => 4,
+            Self::U32 | Self::F32 => 4,
             Self::F64 => 8,
         }
     }
@@ -51,14 +50,15 @@ pub fn fields(kind: EventKind) -> [Field; 7] {
         field("y", Number::F32),
         field("z", Number::F32),
         field(value, Number::F32),
-        field("pixel", Number::U16),
+        // More than an address needs: Open3D leaves out 16 bits of a PLY file.
+        field("pixel", Number::U32),
         field("flags", Number::U8),
         field("t_ns", Number::F64),
     ]
 }
 
 /// Bytes of a record.
-pub const BYTES: usize = 4 * 4 + 2 + 1 + 8;
+pub const BYTES: usize = 5 * 4 + 1 + 8;
 
 /// The record of an event.
 #[allow(
@@ -79,10 +79,10 @@ pub fn record(event: &Event, projection: &Projection) -> Result<[u8; BYTES]> {
     for (place, number) in record.chunks_exact_mut(4).zip([x, y, z, value]) {
         place.copy_from_slice(&number.to_le_bytes());
     }
-    record[16..18].copy_from_slice(&event.pixel().0.to_le_bytes());
-    record[18] = event.flags().bits();
+    record[16..20].copy_from_slice(&u32::from(event.pixel().0).to_le_bytes());
+    record[20] = event.flags().bits();
     let time = projection.nanoseconds(event) as f64;
-    record[19..].copy_from_slice(&time.to_le_bytes());
+    record[21..].copy_from_slice(&time.to_le_bytes());
     Ok(record)
 }
 

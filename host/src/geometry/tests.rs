@@ -86,6 +86,18 @@ fn fields_of_view_that_cannot_be_are_refused() {
 }
 
 #[test]
+fn a_field_of_view_is_printed_as_it_is_read() {
+    for text in ["60x40", "0.01x179", "100x32.2", "45.25x90"] {
+        assert_eq!(text.parse::<FieldOfView>().unwrap().to_string(), text);
+    }
+    let wide = FieldOfView::of(array(64, 32));
+    assert_eq!(
+        format!("{wide} {wide:.6} {wide:.0}"),
+        "60x32.2 60x32.204228 60x32"
+    );
+}
+
+#[test]
 fn a_calibration_gives_directions_and_takes_the_bias_off() {
     let text = "columns = 2\nrows = 1\npixels = [\n  [0, 0, 1, 0],\n  [3, 0.0, 4, 12.5],\n]\n";
     let rays = Rays(calibration::parse(text, array(2, 1)).unwrap());
@@ -101,6 +113,20 @@ fn the_calibration_of_the_documentation_is_one() {
     let (text, _) = rest.split_once("```").unwrap();
     let rays = calibration::parse(text, array(2, 1)).unwrap();
     assert_eq!(rays[1].bias_mm, -12.5);
+}
+
+#[test]
+fn the_largest_calibration_is_read_in_linear_time() {
+    let pixels: String = (0..65_536)
+        .map(|pixel| format!("[0, 0, 1, {pixel}],\n"))
+        .collect();
+    let text = format!("columns = 256\nrows = 256\npixels = [\n{pixels}]\n");
+    let begin = std::time::Instant::now();
+    let rays = calibration::parse(&text, array(256, 256)).unwrap();
+    assert_eq!(rays[65_535].bias_mm, 65_535.0);
+    // Counting the lines before each pixel would take minutes.
+    let seconds = begin.elapsed().as_secs();
+    assert!(seconds < 30, "{seconds} s");
 }
 
 #[test]

@@ -23,14 +23,14 @@ impl Recording {
     /// # Errors
     /// If nothing can be written in its folder, or what is at `path` is no file.
     pub fn new(path: &Path, header: &Header) -> Result<Self> {
-        let folder = place_of(path)?;
+        let place = place_of(path)?;
         let name = || path.display().to_string();
-        let mut file = aside(&folder, ".dtof-recording-").with_context(name)?;
+        let mut file = aside(&place.folder, ".dtof-recording-").with_context(name)?;
         file.disable_cleanup(true);
         Ok(Self {
             aside: file.path().to_owned(),
             aer: Writer::new(BufWriter::new(file), header).with_context(name)?,
-            path: path.to_owned(),
+            path: place.file,
         })
     }
 
