@@ -1,8 +1,8 @@
 // Ibex: two-stage pipeline, RV32IMC, its configuration "small" (multiplication
 // in three cycles, no instruction cache) with the register file for FPGAs.
 //
-// A load or a store takes two cycles in all: RAM answers the cycle after it is
-// asked. Instructions are fetched ahead, one word a cycle.
+// A load or a store takes 2 cycles: RAM answers the cycle after it is asked.
+// Instructions are fetched ahead, one word a cycle, so an addition takes 1.
 //
 // It starts at 0x80, an offset from its boot address that is fixed.
 module processor (
@@ -20,7 +20,6 @@ module processor (
     input         data_ready,
     input         data_error,
     input  [31:0] data_read,
-    output        no_csr,
     output        retired,
     output        stopped
 );
@@ -76,6 +75,5 @@ module processor (
     );
 
     assign retired = cpu.u_ibex_core.perf_instr_ret_wb;
-    assign no_csr = 0;
     assign stopped = 0;
 endmodule

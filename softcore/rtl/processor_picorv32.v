@@ -3,10 +3,11 @@
 // no barrel shifter, multiplication bit by bit.
 //
 // Its look-ahead port tells an address one cycle early, so RAM answers without
-// a wait: an instruction fetch costs one cycle, a load or a store 5 in all.
+// a wait: an addition takes 3 cycles with its fetch, a load or a store 5.
 //
-// It has no trap handler of the RISC-V kind: an illegal instruction, one of control
-// and status registers among them, or an access where nothing is mapped stops it.
+// It has no trap handler of the RISC-V kind: an illegal instruction, or an access
+// where nothing is mapped, stops it. Nor has it control and status registers; so that
+// a program may set a trap handler, a write to one does nothing and a read gives 0.
 module processor (
     input         clk,
     input         reset,
@@ -22,7 +23,6 @@ module processor (
     input         data_ready,
     input         data_error,
     input  [31:0] data_read,
-    output        no_csr,
     output        retired,
     output        stopped
 );
@@ -35,16 +35,21 @@ module processor (
     // The instruction port is not used: everything goes through the data port.
     assign fetch_valid = 0;
     assign fetch_address = 0;
-    wire unused = &{1'b0, fetch_ready, fetch_error, fetch_data};
+    wire unused = &{1'b0, fetch_ready, fetch_error, fetch_data, instruction};
 
     wire look_read, look_write, trap;
     wire [3:0] look_strobe;
     assign data_valid = look_read || look_write;
     assign data_strobe = look_write ? look_strobe : 4'h0;
 
+    wire coprocessor_valid;
+    wire [31:0] instruction;
+    wire csr = coprocessor_valid && instruction[6:0] == 7'h73 && instruction[14:12] != 0;
+
     picorv32 #(
         .ENABLE_MUL(MULTIPLY),
-        .ENABLE_DIV(MULTIPLY)
+        .ENABLE_DIV(MULTIPLY),
+        .ENABLE_PCPI(1'b1)
     ) cpu (
         .clk(clk),
         .resetn(!reset),
@@ -61,14 +66,14 @@ module processor (
         .mem_la_addr(data_address),
         .mem_la_wdata(data_write),
         .mem_la_wstrb(look_strobe),
-        .pcpi_valid(),
-        .pcpi_insn(),
+        .pcpi_valid(coprocessor_valid),
+        .pcpi_insn(instruction),
         .pcpi_rs1(),
         .pcpi_rs2(),
-        .pcpi_wr(1'b0),
+        .pcpi_wr(csr),
         .pcpi_rd(32'h0),
         .pcpi_wait(1'b0),
-        .pcpi_ready(1'b0),
+        .pcpi_ready(csr),
         .irq(32'h0),
         .eoi(),
         .trace_valid(),
@@ -79,6 +84,5 @@ module processor (
     reg count;
     always @(posedge clk) count <= cpu.count_instr[0];
     assign retired = count != cpu.count_instr[0];
-    assign no_csr = 1;
     assign stopped = trap || data_error;
 endmodule

@@ -1,9 +1,10 @@
 // VexRiscv: five-stage pipeline, 4 KiB of instruction cache, data cache
 // (the file VexRiscv.v of its package: RV32IM, no debug). Two Wishbone buses.
 //
-// A line of a cache is 8 words. It is filled by one burst, a word each cycle
-// after the first: 9 cycles. A store goes through to RAM in 2 cycles, behind the
-// pipeline. Addresses with the top bit set are not cached.
+// A load that the cache has takes 1 cycle, and its result 2 more to arrive at the
+// next instruction. One that it has not takes 14: a line of 8 words is filled by one
+// burst, a word each cycle after the first. Stores go through to RAM, one every 2
+// cycles. Addresses with the top bit set are not cached: a read takes 4 cycles.
 module processor (
     input         clk,
     input         reset,
@@ -19,7 +20,6 @@ module processor (
     input         data_ready,
     input         data_error,
     input  [31:0] data_read,
-    output        no_csr,
     output        retired,
     output        stopped
 );
@@ -69,6 +69,5 @@ module processor (
     );
 
     assign retired = cpu.lastStageIsFiring;
-    assign no_csr = 0;
     assign stopped = 0;
 endmodule

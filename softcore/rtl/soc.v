@@ -26,8 +26,6 @@
 //                              falls and ACK with it.
 //                              read: bit 0 ACK, high from the cycle after the
 //                              link took the word until the next write here
-//   0xF000_0020  PROCESSOR     read: bit 0 the processor has no control and status
-//                              registers and stops at a trap
 // Other writes do nothing, other reads give 0.
 // Input and output registers take whole words only.
 module soc #(
@@ -69,7 +67,6 @@ module soc #(
     wire [31:0] fetch_address;
     reg         fetch_ready, fetch_error;
     reg  [31:0] fetch_data;
-    wire        no_csr;
 
     // Data port. `data_strobe` names the bytes to write; 0 is a read.
     wire        data_valid;
@@ -93,7 +90,6 @@ module soc #(
         .data_ready(data_ready),
         .data_error(data_error),
         .data_read(data_read),
-        .no_csr(no_csr),
         .retired(retired),
         .stopped(stopped)
     );
@@ -101,8 +97,8 @@ module soc #(
     // Address decoding. Bits 1..0 do not matter: accesses are whole words.
     wire fetch_ram = fetch_address[31:RAM_BITS+2] == 0;
     wire data_ram = data_address[31:RAM_BITS+2] == 0;
-    wire data_io = data_address[31:6] == 26'h3c0_0000;
-    wire [3:0] register = data_address[5:2];
+    wire data_io = data_address[31:5] == 27'h780_0000;
+    wire [2:0] register = data_address[4:2];
     wire unused = &{1'b0, fetch_address[1:0], data_address[1:0]};
 
     // RAM. The loader borrows the data port.
@@ -128,7 +124,7 @@ module soc #(
 
     // Input and output.
     localparam PRINT = 0, MARK = 1, EXIT = 2, PHOTON_STATUS = 4, PHOTON = 5,
-               EVENT_DATA = 6, EVENT_REQ = 7, PROCESSOR = 8;
+               EVENT_DATA = 6, EVENT_REQ = 7;
 
     wire io = data_valid && data_io && !reset;
     wire io_read = io && data_strobe == 0;
@@ -164,7 +160,6 @@ module soc #(
             PHOTON_STATUS: io_data <= {16'(photon_fill), 14'd0, photon_lost_since || photon_lost, photon_fill != 0};
             PHOTON: io_data <= photon_head;
             EVENT_REQ: io_data <= {31'd0, event_ack};
-            PROCESSOR: io_data <= {31'd0, no_csr};
             default: io_data <= 0;
         endcase
 
