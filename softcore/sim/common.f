@@ -3,7 +3,7 @@
 -Wall --cc --exe --build --prefix Vsoc --top-module soc
 -O3 --x-assign 0 --x-initial 0 --noassert
 --timescale 1ns/1ps
--CFLAGS -O2 -CFLAGS -std=c++17
+-MAKEFLAGS OPT_FAST=-O2 -CFLAGS -std=c++17
 $SOFTCORE/sim/lint.vlt
 $SOFTCORE/rtl/photon_fifo.v
 $SOFTCORE/rtl/soc.v
