@@ -11,7 +11,7 @@
 // oldest of them; when none waits it is 0xffff_ffff, or 0xffff_fffe with
 // `finished`: none will come. `take` on an empty FIFO does nothing.
 module photon_fifo #(
-    parameter DEPTH_LOG2 = 6
+    parameter DEPTH_LOG2 = 9
 ) (
     input                       clk,
     input                       reset,
