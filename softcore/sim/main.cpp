@@ -2,17 +2,18 @@
 //
 // Standard output: what the program prints and a line `event HEX` an event word.
 // Standard error: marks, the end of the run, what became of the photons.
-// Status: low 8 bits of what the program wrote to EXIT (1 if those are 0 and the
-// rest is not); 2 at the limit of cycles; 250 when the processor stopped by itself;
-// 3 for bad arguments or files.
+// Status: what the program wrote to EXIT, 250 if that is 256 or more, as after a
+// trap; 250 when the processor stopped by itself; 2 at the limit of cycles; 3 for bad
+// arguments or files.
 
 #include <algorithm>
+#include <cerrno>
 #include <cinttypes>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <deque>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -24,6 +25,8 @@
 namespace {
 
 constexpr size_t RAM_BYTES = 256 * 1024;
+constexpr int TRAP = 250;
+constexpr int LIMIT = 2;
 constexpr uint32_t END_OF_CYCLE = 0x80000001; // one laser cycle
 
 [[noreturn]] void fail(const std::string &message) {
@@ -45,8 +48,9 @@ struct Photon {
 
 uint64_t number(const char *name, const char *text) {
     char *end;
+    errno = 0;
     uint64_t value = std::strtoull(text, &end, 10);
-    if (*text < '0' || *text > '9' || *end) fail(std::string(name) + ": not a number: " + text);
+    if (*text < '0' || *text > '9' || *end || errno) fail(std::string(name) + ": not a number: " + text);
     return value;
 }
 
@@ -72,10 +76,16 @@ Options parse(int argc, char **argv) {
     return options;
 }
 
-std::vector<uint8_t> read_image(const std::string &path) {
+std::ifstream open(const std::string &path) {
     std::ifstream file(path, std::ios::binary);
+    if (!file || std::filesystem::is_directory(path)) fail(path + ": cannot read");
+    return file;
+}
+
+std::vector<uint8_t> read_image(const std::string &path) {
+    std::ifstream file = open(path);
     std::vector<uint8_t> bytes((std::istreambuf_iterator<char>(file)), {});
-    if (!file || bytes.empty()) fail(path + ": cannot read, or empty");
+    if (bytes.empty()) fail(path + ": empty");
     if (bytes.size() > RAM_BYTES) fail(path + ": larger than RAM");
     bytes.resize((bytes.size() + 3) / 4 * 4);
     return bytes;
@@ -84,8 +94,7 @@ std::vector<uint8_t> read_image(const std::string &path) {
 // Lines `cycle pixel code`: laser cycle (not decreasing), pixel 0..255, TDC code.
 std::vector<Photon> read_stream(const std::string &path) {
     std::vector<Photon> photons;
-    std::ifstream file(path);
-    if (!file) fail(path + ": cannot read");
+    std::ifstream file = open(path);
     std::string line;
     for (size_t n = 1; std::getline(file, line); n++) {
         if (line.empty() || line[0] == '#') continue;
@@ -187,8 +196,6 @@ void load(Vsoc &soc, const std::vector<uint8_t> &image) {
     soc.reset = 0;
 }
 
-int status(uint32_t code) { return code == 0 ? 0 : code & 0xff ? code & 0xff : 1; }
-
 int run(Vsoc &soc, const Options &options, Laser &laser) {
     Link link(options.acknowledge_after);
     uint64_t instructions = 0;
@@ -200,17 +207,17 @@ int run(Vsoc &soc, const Options &options, Laser &laser) {
             std::fprintf(stderr, "mark %u cycle %" PRIu64 " instructions %" PRIu64 "\n", soc.written, cycle, instructions);
         if (soc.exit_valid) {
             std::fprintf(stderr, "exit 0x%x cycle %" PRIu64 " instructions %" PRIu64 "\n", soc.written, cycle, instructions);
-            return status(soc.written);
+            return soc.written < 256 ? soc.written : TRAP;
         }
         if (soc.stopped) {
             std::fprintf(stderr, "trap cycle %" PRIu64 " instructions %" PRIu64 "\n", cycle, instructions);
-            return 250;
+            return TRAP;
         }
         link.clock(soc);
         laser.clock(soc);
     }
     std::fprintf(stderr, "cycle limit\n");
-    return 2;
+    return LIMIT;
 }
 
 } // namespace
