@@ -30,7 +30,7 @@
 // Input and output registers take whole words only.
 module soc #(
     parameter RAM_BITS = 16,        // log2 of the words of RAM
-    parameter FIFO_DEPTH_LOG2 = 9  // of words: 512
+    parameter FIFO_DEPTH_LOG2 = 9   // log2 of the words of the photon FIFO
 ) (
     input               clk,
     input               reset,
