@@ -5,6 +5,9 @@
 // next instruction. One that it has not takes 14: a line of 8 words is filled by one
 // burst, a word each cycle after the first. Stores go through to RAM, one every 2
 // cycles. Addresses with the top bit set are not cached: a read takes 4 cycles.
+//
+// It takes no notice of bus errors: a load or store where nothing is mapped stops the
+// run; what is fetched there is 0, an illegal instruction.
 module processor (
     input         clk,
     input         reset,
@@ -49,7 +52,7 @@ module processor (
         .iBusWishbone_ACK(fetch_ready),
         .iBusWishbone_WE(),
         .iBusWishbone_ADR(fetch_word),
-        .iBusWishbone_DAT_MISO(fetch_data),
+        .iBusWishbone_DAT_MISO(fetch_error ? 32'h0 : fetch_data),
         .iBusWishbone_DAT_MOSI(),
         .iBusWishbone_SEL(),
         .iBusWishbone_ERR(fetch_error),
@@ -69,5 +72,5 @@ module processor (
     );
 
     assign retired = cpu.lastStageIsFiring;
-    assign stopped = 0;
+    assign stopped = data_error;
 endmodule
