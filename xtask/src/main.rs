@@ -15,6 +15,7 @@ mod readers;
 mod report;
 mod self_test;
 mod sizes;
+mod softcore;
 mod source;
 mod stack;
 mod stack_bound;
@@ -63,7 +64,12 @@ cargo xtask <command>
   self-test     the core works out the same on the target; --bless writes down
                 what it works out here
   bench         instructions the core's operations take on the target; writes
-                docs/bench/instructions.csv, or with --check compares with it";
+                docs/bench/instructions.csv, or with --check compares with it
+  softcore [--qemu-only] [--core NAME]... [--check]
+                the core on RV32 processors: golden vectors in QEMU and on the
+                Verilog of VexRiscv, PicoRV32, SERV and Ibex, cycles and photon rates
+                there; writes docs/bench/softcore.csv and softcore-photons.csv if all
+                cores run, or with --check compares with them";
 
 fn main() -> ExitCode {
     match run() {
@@ -99,6 +105,7 @@ fn run() -> Result<()> {
         ["self-test", "--bless"] => self_test::bless(root()?),
         ["bench"] => bench::run(root()?),
         ["bench", "--check"] => bench::check(root()?),
+        ["softcore", ref rest @ ..] => softcore::run(root()?, rest),
         ["help" | "--help" | "-h"] => {
             println!("{HELP}");
             Ok(())

@@ -11,7 +11,7 @@ use crate::firmware::Board;
 use crate::qemu::{self, Emulator, End};
 use crate::stack;
 
-const EXPECTED: &str = "firmware/self-test.out";
+pub const EXPECTED: &str = "firmware/self-test.out";
 
 /// Runs the image of each board in QEMU and compares.
 pub fn run(root: &Path) -> Result<()> {
@@ -61,7 +61,7 @@ pub fn bless(root: &Path) -> Result<()> {
 }
 
 /// Lines that differ, each as it should be and as it is.
-fn differences(expected: &str, found: &str) -> Vec<String> {
+pub fn differences(expected: &str, found: &str) -> Vec<String> {
     let (mut expected_lines, mut found_lines) = (expected.lines(), found.lines());
     let mut differences = Vec::new();
     for number in 1.. {

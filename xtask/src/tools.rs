@@ -21,6 +21,20 @@ pub const QEMU: Tool = Tool {
     install: "sudo apt-get install --yes qemu-system-arm",
 };
 
+/// For `softcore`.
+pub const QEMU_RISCV: Tool = Tool {
+    program: "qemu-system-riscv32",
+    ask: VERSION,
+    install: "sudo apt-get install --yes qemu-system-misc",
+};
+
+/// For `softcore`, with what it calls.
+pub const VERILATOR: Tool = Tool {
+    program: "verilator",
+    ask: VERSION,
+    install: "sudo apt-get install --yes verilator g++ make",
+};
+
 pub const DEFMT_PRINT: Tool = Tool {
     program: "defmt-print",
     ask: VERSION,
@@ -92,6 +106,7 @@ impl Tool {
 /// says so itself, so that this never fails.
 pub fn set_up() {
     install(&QEMU, || debian_package("qemu-system-arm"));
+    set_up_softcore();
     install(&PARALLEL, || debian_package("parallel"));
     install(&CHROMIUM, || debian_package("chromium"));
     install(&PYTHON, || debian_package("python3-venv python3-dev"));
@@ -100,6 +115,12 @@ pub fn set_up() {
         cargo.args(["install", "--locked", "--quiet", "defmt-print"]);
         Some(cargo)
     });
+}
+
+/// The same for what `softcore` needs.
+pub fn set_up_softcore() {
+    install(&QEMU_RISCV, || debian_package("qemu-system-misc"));
+    install(&VERILATOR, || debian_package("verilator g++ make"));
 }
 
 /// How root installs packages on Debian.

@@ -1,0 +1,2 @@
++define+RV32I
+-f $SOFTCORE/sim/picorv32.f

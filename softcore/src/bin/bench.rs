@@ -1,0 +1,335 @@
+//! The operations of `firmware/src/bin/bench` between marks, on the same photons: the
+//! testbench counts the cycles.
+
+#![no_std]
+#![no_main]
+
+#[cfg(not(target_arch = "riscv32"))]
+compile_error!("an image for a soft-core: cargo xtask softcore");
+
+#[path = "../../../firmware/src/bin/bench/scene.rs"]
+#[allow(dead_code, reason = "not every operation is measured here")]
+mod scene;
+
+use core::arch::asm;
+use core::hint::black_box;
+
+use dtof_core::{AsyncPixel, Count10, LaserCycle, Look, PixelAddress, detect, isqrt};
+use dtof_softcore::{io, println, program};
+
+use scene::{CYCLES, PHOTONS, PHOTONS_A_CYCLE, State};
+
+/// Exposures of each kind: fewer than an emulator would do, as the bit-serial
+/// processor takes a second for each.
+const EXPOSURES: u32 = 8;
+
+/// Loads or stores, one after the other.
+const ACCESSES: u32 = 32;
+
+type Operation = extern "C" fn(&mut State, u32) -> u32;
+
+/// Brings the state, whose photons are those of the exposure, to where the operation
+/// begins.
+type Prepare = fn(&mut State);
+
+/// One operation.
+struct Row {
+    name: &'static str,
+    /// Whether on exposures with a target, without, or both.
+    target: bool,
+    prepare: Prepare,
+    way: Operation,
+    /// How many photons, say, are in one call.
+    each: u32,
+}
+
+const fn row(name: &'static str, target: bool, prepare: Prepare, way: Operation, each: u32) -> Row {
+    Row {
+        name,
+        target,
+        prepare,
+        way,
+        each,
+    }
+}
+
+/// The first is taken off all others.
+const ROWS: [Row; 19] = [
+    row("call", true, empty, call, 1),
+    row("photon: AsyncPixel::count", true, empty, count, PHOTONS),
+    row(
+        "photon: AsyncPixel::count_batch",
+        true,
+        empty,
+        count_batch,
+        PHOTONS,
+    ),
+    row(
+        "photon: Histogram::add_batch",
+        true,
+        empty,
+        add_batch,
+        PHOTONS,
+    ),
+    row("decision: kept peak; no event", false, counted, kept, 1),
+    row(
+        "decision: kept peak; event and depth",
+        true,
+        counted,
+        kept,
+        1,
+    ),
+    row(
+        "decision: kept peak; no event; again",
+        false,
+        kept_before,
+        kept,
+        1,
+    ),
+    row(
+        "decision: kept peak; event and depth; again",
+        true,
+        kept_before,
+        kept,
+        1,
+    ),
+    row("decision: look; no event", false, counted, look, 1),
+    row(
+        "decision: whole histogram; no event",
+        false,
+        counted,
+        whole,
+        1,
+    ),
+    row("decision: whole histogram; event", true, counted, whole, 1),
+    row(
+        "decision: whole histogram; no event; again",
+        false,
+        whole_before,
+        whole,
+        1,
+    ),
+    row("event: look to packed word", true, counted, event, 1),
+    row("pack: encode and to_le_bytes", true, at_event, pack, 1),
+    row("clear: Histogram::clear", true, counted, clear, 1),
+    row("exposure: count_batch", true, empty, exposure, 1),
+    row("root: isqrt::<5>", true, empty, root, 1),
+    row("access: load", true, loaded, load, ACCESSES),
+    row("access: store", true, stored, store, ACCESSES),
+];
+
+fn run() -> bool {
+    let Some(mut state) = State::new() else {
+        println!("the configuration is refused");
+        return false;
+    };
+    let mut times = [0; ROWS.len()];
+    for number in 0..EXPOSURES {
+        for target in [false, true] {
+            // Of photons of 64-bit arithmetic there are few.
+            state.empty(number, target);
+            counted(&mut state);
+            let fires = fires(&state);
+            for (index, (row, times)) in ROWS.iter().zip(&mut times).enumerate() {
+                let is_decision = row.name.starts_with("decision") || row.name.starts_with("event");
+                // Noise may fire, if seldom.
+                if row.target != target || is_decision && fires != target {
+                    continue;
+                }
+                (row.prepare)(&mut state);
+                measure(index, row.way, &mut state, CYCLES.into());
+                *times += row.each;
+            }
+        }
+    }
+    for (index, (row, times)) in ROWS.iter().zip(times).enumerate() {
+        println!("operation {index} {times} {}", row.name);
+    }
+    true
+}
+
+program!(run);
+
+/// Marks 2 k + 1 and 2 k + 2 are about operation k.
+#[inline(never)]
+fn measure(number: usize, operation: Operation, state: &mut State, argument: u32) {
+    let Ok(number) = u32::try_from(number) else {
+        return;
+    };
+    let after = 2 * number + 2;
+    io::mark(after - 1);
+    black_box(operation(state, argument));
+    io::mark(after);
+}
+
+fn fires(state: &State) -> bool {
+    kept_event(state).is_some()
+}
+
+fn empty(state: &mut State) {
+    state.pixel = AsyncPixel::new(PixelAddress(7));
+    state.histogram.clear();
+    state.event = None;
+}
+
+/// Counts all photons, up to where the last laser cycle ends.
+fn counted(state: &mut State) {
+    empty(state);
+    state.pixel.count_batch(&state.config, &state.codes);
+    state.histogram.add_batch(&state.codes);
+    state.foreign = *state.histogram.counts();
+    state.wait_for_last_look();
+}
+
+/// What was done just before is in the processor's caches, if it has any.
+fn kept_before(state: &mut State) {
+    counted(state);
+    black_box(kept(state, 0));
+}
+
+/// The same.
+fn whole_before(state: &mut State) {
+    counted(state);
+    black_box(whole(state, 0));
+}
+
+fn at_event(state: &mut State) {
+    counted(state);
+    let cycle = LaserCycle(u64::from(CYCLES) - 1);
+    let _ = state.pixel.end_laser_cycle(&state.config, cycle);
+    state.event = state.pixel.acknowledge();
+}
+
+extern "C" fn call(_: &mut State, _: u32) -> u32 {
+    0
+}
+
+extern "C" fn count(state: &mut State, _: u32) -> u32 {
+    // Each as if it came alone, not as a batch.
+    for &code in &state.codes {
+        one(&mut state.pixel, &state.config, code);
+    }
+    0
+}
+
+#[inline(never)]
+fn one(
+    pixel: &mut AsyncPixel<{ scene::BINS }>,
+    config: &dtof_core::PixelConfig<{ scene::BINS }>,
+    code: u16,
+) {
+    pixel.count(config, code);
+}
+
+extern "C" fn count_batch(state: &mut State, _: u32) -> u32 {
+    state.pixel.count_batch(&state.config, &state.codes);
+    0
+}
+
+extern "C" fn add_batch(state: &mut State, _: u32) -> u32 {
+    state.histogram.add_batch(&state.codes);
+    0
+}
+
+#[inline(always)]
+fn kept_event(state: &State) -> Option<dtof_core::Detection> {
+    let config = &state.config;
+    detect(
+        state.pixel.histogram(),
+        config.gate(),
+        config.rule(),
+        config.estimator(),
+    )
+}
+
+extern "C" fn kept(state: &mut State, _: u32) -> u32 {
+    match kept_event(state) {
+        Some(detection) => detection.depth.offset.raw().unsigned_abs().into(),
+        None => 0,
+    }
+}
+
+extern "C" fn look(state: &mut State, cycle: u32) -> u32 {
+    let cycle = LaserCycle(cycle.into());
+    state.pixel.end_laser_cycle(&state.config, cycle) as u32
+}
+
+extern "C" fn whole(state: &mut State, _: u32) -> u32 {
+    let config = &state.config;
+    let detected = config
+        .rule()
+        .detect_whole::<Count10, _>(&state.foreign, config.gate());
+    detected.map_or(0, |(peak, background)| {
+        u32::from(peak.bin.raw()) + background.raw()
+    })
+}
+
+extern "C" fn event(state: &mut State, cycle: u32) -> u32 {
+    let cycle = LaserCycle(cycle.into());
+    if state.pixel.end_laser_cycle(&state.config, cycle) == Look::Event {
+        state.event = state.pixel.acknowledge();
+    }
+    pack(state, 0)
+}
+
+extern "C" fn pack(state: &mut State, _: u32) -> u32 {
+    let Some(event) = &state.event else {
+        return 0;
+    };
+    let (_, word) = state.encoder.encode(event);
+    black_box(word.to_le_bytes());
+    1
+}
+
+extern "C" fn clear(state: &mut State, _: u32) -> u32 {
+    state.histogram.clear();
+    0
+}
+
+extern "C" fn exposure(state: &mut State, _: u32) -> u32 {
+    let mut photons = state.codes.chunks(PHOTONS_A_CYCLE);
+    for cycle in 0..CYCLES {
+        let photons = photons.next().unwrap_or_default();
+        state.pixel.count_batch(&state.config, photons);
+        let cycle = LaserCycle(cycle.into());
+        if state.pixel.end_laser_cycle(&state.config, cycle) == Look::Event {
+            state.event = state.pixel.acknowledge();
+        }
+    }
+    pack(state, 0)
+}
+
+extern "C" fn root(_: &mut State, value: u32) -> u32 {
+    isqrt::<5>(value)
+}
+
+/// What was done just before is in the processor's caches.
+fn loaded(state: &mut State) {
+    load(state, 0);
+}
+
+/// The same.
+fn stored(state: &mut State) {
+    store(state, 0);
+}
+
+#[allow(unsafe_code, reason = "so many instructions of one kind")]
+extern "C" fn load(state: &mut State, _: u32) -> u32 {
+    // SAFETY: reads the first word of what a reference reaches, which is aligned to 8.
+    unsafe {
+        asm!(".rept {n}", "lw {t}, 0({p})", ".endr", n = const ACCESSES, t = out(reg) _,
+            p = in(reg) &raw const *state, options(nostack, readonly));
+    }
+    0
+}
+
+#[allow(unsafe_code, reason = "so many instructions of one kind")]
+extern "C" fn store(_: &mut State, value: u32) -> u32 {
+    let mut word = value;
+    // SAFETY: writes a variable of its own.
+    unsafe {
+        asm!(".rept {n}", "sw {v}, 0({p})", ".endr", n = const ACCESSES, v = in(reg) value,
+            p = in(reg) &raw mut word, options(nostack));
+    }
+    word
+}

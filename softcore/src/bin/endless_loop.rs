@@ -1,0 +1,17 @@
+//! A loop without end: the run must fail.
+
+#![no_std]
+#![no_main]
+
+#[cfg(not(target_arch = "riscv32"))]
+compile_error!("an image for a soft-core: cargo xtask softcore");
+
+use dtof_softcore::{println, program};
+
+fn run() -> bool {
+    println!("an endless loop follows");
+    #[allow(clippy::empty_loop, reason = "what this program is for")]
+    loop {}
+}
+
+program!(run);

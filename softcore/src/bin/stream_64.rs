@@ -1,0 +1,9 @@
+//! 64 macropixels, photons from the FIFO, events to the link.
+
+#![no_std]
+#![no_main]
+
+#[cfg(not(target_arch = "riscv32"))]
+compile_error!("an image for a soft-core: cargo xtask softcore");
+
+dtof_softcore::stream_program!(64);

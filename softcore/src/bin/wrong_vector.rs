@@ -1,0 +1,23 @@
+//! The golden vectors with one wrong bit among them: the run must fail.
+
+#![no_std]
+#![no_main]
+
+#[cfg(not(target_arch = "riscv32"))]
+compile_error!("an image for a soft-core: cargo xtask softcore");
+
+use dtof_softcore::{golden, io::Printer, program};
+
+/// A digit of the first word of the first stream is wrong.
+const WRONG: [u8; golden::EXPECTED.len()] = {
+    let mut wrong = [0; golden::EXPECTED.len()];
+    wrong.copy_from_slice(golden::EXPECTED);
+    wrong[165] ^= 1;
+    wrong
+};
+
+fn run() -> bool {
+    golden::run(&WRONG, &mut Printer) == Ok(true)
+}
+
+program!(run);

@@ -1,0 +1,43 @@
+//! What bare programs on an RV32 soft-core need: the start, the trap handler, the
+//! registers of the testbench or of QEMU's `virt`, and the programs' parts.
+//!
+//! The programs are in `src/bin`; `cargo xtask softcore` builds and runs them, and
+//! `docs/softcore.md` says what to take from here for a design of one's own.
+
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod golden;
+#[cfg_attr(feature = "virt", path = "io_virt.rs")]
+pub mod io;
+#[cfg(target_arch = "riscv32")]
+#[allow(unsafe_code, reason = "nothing is there yet that could be safe")]
+mod start;
+pub mod stream;
+
+/// Makes a function without arguments, which returns whether it succeeded, what the
+/// image runs.
+#[macro_export]
+macro_rules! program {
+    ($run:path) => {
+        #[allow(unsafe_code, reason = "the start calls it by this name")]
+        #[unsafe(no_mangle)]
+        extern "C" fn softcore_program() -> bool {
+            $run()
+        }
+    };
+}
+
+/// Prints one line.
+#[macro_export]
+macro_rules! println {
+    ($($part:tt)*) => {{
+        // Printing cannot fail.
+        let _ = ::core::fmt::Write::write_fmt(
+            &mut $crate::io::Printer,
+            ::core::format_args!("{}\n", ::core::format_args!($($part)*)),
+        );
+    }};
+}

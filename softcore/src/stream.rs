@@ -1,0 +1,257 @@
+//! Macropixels that share a processor, their photons from a FIFO, their events to a
+//! link.
+//!
+//! Photons come first: while the FIFO has them, they are counted. When a laser cycle has
+//! ended and no more than [`FEW`] words wait, the next macropixel in turn is looked at, provided X laser cycles have passed since
+//! its last look. That is the mini-frame of [`AsyncPixel::end_laser_cycles`]: a processor
+//! that cannot look at every macropixel every X laser cycles looks as often as it can,
+//! and no photon is assigned to a wrong exposure.
+
+use core::fmt::{self, Write};
+
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{
+    AerEncoder, AerWord, AsyncPixel, ConfigError, Count, LaserCycle, PaperRule, PixelAddress,
+    PixelConfig, RangeGate,
+};
+
+use crate::io;
+
+/// Bins of a macropixel.
+pub const BINS: usize = 128;
+/// Laser cycles between looks, unless the processor needs more.
+const X: u16 = 4;
+/// The exposure an event must exceed.
+const L1: u16 = 40;
+/// The exposure at which a histogram is cleared without an event.
+const L2: u16 = 2000;
+
+/// Words that may wait during a look: the next end of a laser cycle most often does.
+const FEW: u32 = 1;
+
+/// A word of the photon FIFO.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Word {
+    /// A photon of a macropixel, with its TDC code.
+    Photon(u8, u16),
+    /// So many laser cycles end, one or more.
+    CyclesEnd(u16),
+    /// None waits.
+    Empty,
+    /// None will come: the testbench's photons are used up.
+    End,
+}
+
+impl Word {
+    const EMPTY: u32 = u32::MAX;
+    const END: u32 = u32::MAX - 1;
+    const CYCLES_END: u32 = 1 << 31;
+
+    /// The word as it is read from the register.
+    #[allow(clippy::cast_possible_truncation, reason = "fields of 16 and 8 bits")]
+    #[inline(always)]
+    #[must_use]
+    pub const fn from_raw(raw: u32) -> Self {
+        if raw & Self::CYCLES_END == 0 {
+            Self::Photon((raw >> 16) as u8, raw as u16)
+        } else if raw == Self::EMPTY {
+            Self::Empty
+        } else if raw == Self::END {
+            Self::End
+        } else {
+            Self::CyclesEnd(raw as u16)
+        }
+    }
+}
+
+/// `N` macropixels of one processor.
+pub struct Pixels<const N: usize> {
+    config: PixelConfig<BINS>,
+    pixels: [AsyncPixel<BINS>; N],
+    /// The laser cycle of each macropixel's last look.
+    looked: [u32; N],
+    /// Laser cycles that have ended; about 7 minutes at 10 MHz. More than that a
+    /// longer counter takes.
+    now: u32,
+    turn: usize,
+    looks: u32,
+    /// How often the FIFO had lost photons when it was asked.
+    losses: u32,
+    encoder: AerEncoder,
+    /// Whether the link has not yet answered.
+    is_requesting: bool,
+    /// The word of the event whose time word went before.
+    next: Option<AerWord>,
+}
+
+impl<const N: usize> Pixels<N> {
+    /// Empty macropixels.
+    ///
+    /// # Errors
+    /// None: the configuration is valid.
+    pub const fn new() -> Result<Self, ConfigError> {
+        let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+        let config = match PixelConfig::new(X, L1, L2, RangeGate::full(), rule) {
+            Ok(config) => config,
+            Err(error) => return Err(error),
+        };
+        let mut pixels = [const { AsyncPixel::new(PixelAddress(0)) }; N];
+        let mut index = 0;
+        while index < N {
+            #[allow(clippy::cast_possible_truncation, reason = "there are 2¹⁶ addresses")]
+            let address = PixelAddress(index as u16);
+            pixels[index] = AsyncPixel::new(address);
+            index += 1;
+        }
+        Ok(Self {
+            config,
+            pixels,
+            looked: [0; N],
+            now: 0,
+            turn: 0,
+            looks: 0,
+            losses: 0,
+            encoder: AerEncoder::new(),
+            is_requesting: false,
+            next: None,
+        })
+    }
+
+    /// Takes words from the FIFO until there will be none, and hands events to the
+    /// link.
+    pub fn run(&mut self) {
+        loop {
+            match io::take() {
+                Word::Photon(pixel, code) => {
+                    if let Some(pixel) = self.pixels.get_mut(usize::from(pixel)) {
+                        pixel.count(&self.config, code);
+                    }
+                }
+                Word::CyclesEnd(cycles) => {
+                    self.now += u32::from(cycles.max(1));
+                    let (waiting, is_lossy) = io::photon_status();
+                    self.losses += u32::from(is_lossy);
+                    if waiting <= FEW {
+                        self.look();
+                    }
+                }
+                Word::Empty => {}
+                Word::End => break,
+            }
+        }
+        self.finish();
+    }
+
+    /// Looks at the next macropixel in turn, if it is time.
+    fn look(&mut self) {
+        let index = self.turn;
+        let (Some(pixel), Some(looked)) = (self.pixels.get_mut(index), self.looked.get_mut(index))
+        else {
+            return;
+        };
+        let passed = self.now - *looked;
+        if passed < u32::from(X) {
+            return;
+        }
+        *looked = self.now;
+        self.turn = if index + 1 < N { index + 1 } else { 0 };
+        self.looks += 1;
+        let passed = u16::try_from(passed).unwrap_or(u16::MAX);
+        let last = LaserCycle(u64::from(self.now) - 1);
+        let _ = pixel.end_laser_cycles(&self.config, last, passed);
+        self.link(index);
+    }
+
+    /// Hands the event that a macropixel holds to the link, if that is free. If not, the
+    /// macropixel keeps it, counts on, and counts what it puts off.
+    fn link(&mut self, index: usize) {
+        if self.is_requesting && io::is_acknowledged() {
+            self.is_requesting = false;
+        }
+        if self.is_requesting {
+            return;
+        }
+        // What follows a time word comes before all others.
+        let word = self.next.take().or_else(|| {
+            let event = self.pixels.get_mut(index)?.acknowledge()?;
+            let (time, word) = self.encoder.encode(&event);
+            self.next = time.and(Some(word));
+            Some(time.unwrap_or(word))
+        });
+        if let Some(word) = word {
+            io::request(word);
+            self.is_requesting = true;
+        }
+    }
+
+    /// Hands the events that are left to the link.
+    fn finish(&mut self) {
+        for index in 0..N {
+            while self.is_requesting || self.next.is_some() || self.holds_event(index) {
+                self.link(index);
+            }
+        }
+    }
+
+    fn holds_event(&self, index: usize) -> bool {
+        self.pixels.get(index).is_some_and(AsyncPixel::request)
+    }
+
+    /// Writes what was done: laser cycles, looks, losses, photons and events of all.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn report(&self, out: &mut impl Write) -> fmt::Result {
+        let (mut photons, mut events, mut deferred) = (0, 0, 0);
+        for pixel in &self.pixels {
+            let statistics = pixel.statistics();
+            photons += statistics.photons();
+            events += statistics.events;
+            deferred += statistics.deferred;
+        }
+        writeln!(
+            out,
+            "cycles {} looks {} losses {} photons {photons} events {events} deferred {deferred}",
+            self.now, self.looks, self.losses
+        )
+    }
+}
+
+/// Defines the program that runs so many macropixels.
+#[macro_export]
+macro_rules! stream_program {
+    ($pixels:literal) => {
+        /// The program: true once every photon was taken.
+        #[allow(
+            unsafe_code,
+            reason = "the pixels are memory of the image's, not stack"
+        )]
+        fn run() -> bool {
+            static mut PIXELS: $crate::stream::Pixels<$pixels> = match $crate::stream::Pixels::new()
+            {
+                Ok(pixels) => pixels,
+                Err(_) => panic!("the configuration is refused"),
+            };
+            // SAFETY: the program is called once, and nothing else knows the name.
+            let pixels = unsafe { &mut *&raw mut PIXELS };
+            pixels.run();
+            pixels.report(&mut $crate::io::Printer).is_ok()
+        }
+
+        $crate::program!(run);
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reads_the_words_of_the_fifo() {
+        assert_eq!(Word::from_raw(0x0003_007f), Word::Photon(3, 127));
+        assert_eq!(Word::from_raw(0x8000_0001), Word::CyclesEnd(1));
+        assert_eq!(Word::from_raw(0x8000_ffff), Word::CyclesEnd(0xffff));
+        assert_eq!(Word::from_raw(0xffff_fffe), Word::End);
+        assert_eq!(Word::from_raw(0xffff_ffff), Word::Empty);
+    }
+}

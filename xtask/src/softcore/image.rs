@@ -1,0 +1,132 @@
+//! The images of `softcore/`: built, and made what a testbench loads.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, ensure};
+use object::elf::{SHF_ALLOC, SHF_WRITE, SHT_NOBITS};
+use object::read::elf::{ElfFile32, SectionHeader};
+use object::{Object, ObjectSegment};
+
+use crate::python::succeed;
+use crate::{target_folder, toolchain};
+
+const PROFILE: &str = "firmware";
+
+/// Every program.
+const PROGRAMS: [&str; 8] = [
+    "self-test",
+    "bench",
+    "stream-1",
+    "stream-4",
+    "stream-64",
+    "wrong-vector",
+    "illegal-instruction",
+    "endless-loop",
+];
+
+/// The images of one instruction set.
+pub struct Images {
+    folder: PathBuf,
+}
+
+impl Images {
+    /// Builds them for `isa` (`rv32i`, say), for QEMU's `virt` or for the testbench.
+    pub fn build(root: &Path, isa: &str, virt: bool) -> Result<Self> {
+        let letters = isa.strip_prefix("rv").context("no RISC-V")?;
+        let target = format!("riscv{letters}-unknown-none-elf");
+        toolchain::ensure_target(&target)?;
+        let target_folder = target_folder(root);
+        let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+        cargo.current_dir(root);
+        cargo.args(["build", "--locked", "--quiet", "--package", "dtof-softcore"]);
+        cargo.args(["--bins", "--target", &target, "--profile", PROFILE]);
+        cargo.args(["--features", if virt { "image,virt" } else { "image" }]);
+        cargo.arg("--target-dir").arg(&target_folder);
+        succeed(&mut cargo, "cargo build")?;
+
+        // The other machine's images would take their place.
+        let machine = if virt { "virt" } else { "testbench" };
+        let folder = target_folder
+            .join("softcore/images")
+            .join(machine)
+            .join(isa);
+        fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+        for program in PROGRAMS {
+            let built = target_folder.join(&target).join(PROFILE).join(program);
+            let bytes = fs::read(&built).with_context(|| built.display().to_string())?;
+            fs::write(folder.join(program), &bytes)?;
+            if !virt {
+                let flat = flat(&bytes).with_context(|| built.display().to_string())?;
+                fs::write(folder.join(format!("{program}.bin")), flat)?;
+            }
+        }
+        Ok(Self { folder })
+    }
+
+    /// The ELF file of a program.
+    pub fn elf(&self, program: &str) -> PathBuf {
+        self.folder.join(program)
+    }
+
+    /// The memory from address 0 on that a program is.
+    pub fn flat(&self, program: &str) -> PathBuf {
+        self.folder.join(format!("{program}.bin"))
+    }
+
+    /// Bytes a program takes.
+    pub fn sizes(&self, program: &str) -> Result<Sizes> {
+        let path = self.elf(program);
+        Sizes::of(&fs::read(&path)?).with_context(|| path.display().to_string())
+    }
+}
+
+/// Memory from address 0 on, as long as there is content.
+fn flat(elf: &[u8]) -> Result<Vec<u8>> {
+    let file = object::File::parse(elf)?;
+    let mut memory = Vec::new();
+    for segment in file.segments() {
+        let content = segment.data()?;
+        let start = usize::try_from(segment.address())?;
+        ensure!(start <= 1 << 20, "content at {start:#x}");
+        let end = start + content.len();
+        if memory.len() < end {
+            memory.resize(end, 0);
+        }
+        memory[start..end].copy_from_slice(content);
+    }
+    ensure!(!memory.is_empty(), "an empty image");
+    Ok(memory)
+}
+
+/// Bytes of an image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sizes {
+    /// Instructions and constants.
+    pub code: u64,
+    /// What changes, the stack apart.
+    pub data: u64,
+}
+
+impl Sizes {
+    fn of(elf: &[u8]) -> Result<Self> {
+        let file = ElfFile32::<object::Endianness>::parse(elf)?;
+        let endian = file.endian();
+        let mut sizes = Self::default();
+        for section in file.elf_section_table().iter() {
+            let flags = section.sh_flags(endian);
+            let size = u64::from(section.sh_size(endian));
+            if flags & SHF_ALLOC == 0 {
+                continue;
+            }
+            if flags & SHF_WRITE != 0 || section.sh_type(endian) == SHT_NOBITS {
+                sizes.data += size;
+            } else {
+                sizes.code += size;
+            }
+        }
+        Ok(sizes)
+    }
+}
