@@ -166,7 +166,9 @@ fn outcome(case: &Case, point: &PointTally, plain: &PointTally, method: Method) 
     let warning = if is_far_off {
         Warning::new(events, flagged, events, exposures)
     } else {
-        Warning::new(false_events, count("false flagged"), events, exposures)
+        // Without a target every event is false, and how many there are is asked alone.
+        let of_events = if has_target { events } else { 0 };
+        Warning::new(false_events, count("false flagged"), of_events, exposures)
     };
     Outcome {
         method,
