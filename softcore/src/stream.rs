@@ -2,7 +2,7 @@
 //! link.
 //!
 //! Photons come first: while the FIFO has them, they are counted. When a laser cycle has
-//! ended and no more than [`FEW`] words wait, the next macropixel in turn is looked at, provided X laser cycles have passed since
+//! ended and no more than `FEW` words wait, the next macropixel in turn is looked at, provided X laser cycles have passed since
 //! its last look. That is the mini-frame of [`AsyncPixel::end_laser_cycles`]: a processor
 //! that cannot look at every macropixel every X laser cycles looks as often as it can,
 //! and no photon is assigned to a wrong exposure.
