@@ -10,13 +10,13 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use dtof::detection::{Estimator, Rule};
+use dtof::detection::Rule;
 use dtof::device::{self, Client};
 use dtof::dynamic_depth::DynamicDepth;
 use dtof::events_csv;
 use dtof::monitor::{Outputs, Task, losses, monitor};
-use dtof::settings::{I24F8Number, Settings, U16F16Number};
-use dtof_core::fixed::types::{I24F8, U0F32, U8F8, U8F24, U16F16, U24F8};
+use dtof::settings::Settings;
+use dtof_core::fixed::types::{U0F32, U8F8, U8F24, U16F16, U24F8};
 use dtof_core::{
     AnyRule, AsyncPixel, DepthEvent, DynamicDepthPixel, LaserCycle, PixelAddress, PixelConfig,
     Reference,
@@ -33,19 +33,10 @@ const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
 
 fn settings() -> Settings {
     Settings {
-        bins: 128,
-        bin_width_ps: U16F16Number(U16F16::lit("250")),
-        offset_mm: I24F8Number(I24F8::ZERO),
-        gate: None,
         rule: Rule::paper(U8F8::lit("4")),
-        estimator: Estimator::default(),
-        min_count: 5,
         l1: 40,
-        l2: 2000,
         x: 4,
-        one_hit_tdc: false,
-        frame: None,
-        seed: 0,
+        ..dtof::scene::settings(0)
     }
 }
 

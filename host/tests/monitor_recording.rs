@@ -9,11 +9,12 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use dtof::aer_file::{Event, Header, Reader};
-use dtof::detection::{Estimator, Rule};
+use dtof::detection::Rule;
 use dtof::device::{Client, Port};
 use dtof::monitor::map::LiveMap;
 use dtof::monitor::{Outputs, Recording, Task, array, monitor};
-use dtof::settings::{I24F8Number, Settings, U16F16Number};
+use dtof::scene;
+use dtof::settings::Settings;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
     AerEncoder, BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, SubBinOffset,
@@ -27,19 +28,10 @@ const PIXELS: u16 = 4;
 
 fn settings() -> Settings {
     Settings {
-        bins: 128,
-        bin_width_ps: U16F16Number(U16F16::lit("250")),
-        offset_mm: I24F8Number(I24F8::ZERO),
-        gate: None,
         rule: Rule::paper(U8F8::lit("4")),
-        estimator: Estimator::default(),
-        min_count: 5,
         l1: 40,
-        l2: 2000,
         x: 4,
-        one_hit_tdc: false,
-        frame: None,
-        seed: 0,
+        ..scene::settings(0)
     }
 }
 
