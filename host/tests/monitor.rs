@@ -539,13 +539,14 @@ fn a_map_needs_a_terminal() {
     );
 }
 
-/// `script` of util-linux gives the command a terminal.
+/// `script` of util-linux gives the command a terminal. Its shell is replaced by the
+/// command: some, interrupted with it, say so whatever the command returns.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_map_is_drawn_on_a_terminal_and_ctrl_c_gives_the_cursor_back() {
     let name = device(true, Duration::from_secs(60));
     let dtof = env!("CARGO_BIN_EXE_dtof");
-    let command = format!("'{dtof}' monitor --pixels 4 --map --device {name}");
+    let command = format!("exec '{dtof}' monitor --pixels 4 --map --device {name}");
     let mut terminal = Command::new("script")
         .args(["--quiet", "--return", "--flush", "--command"])
         .args([&command, "/dev/null"])
@@ -562,7 +563,8 @@ fn a_map_is_drawn_on_a_terminal_and_ctrl_c_gives_the_cursor_back() {
     // Ctrl-C.
     terminal.stdin.as_mut().unwrap().write_all(b"\x03").unwrap();
     screen.read_to_string(&mut drawn).unwrap();
-    assert!(terminal.wait().unwrap().success(), "{drawn}");
+    let status = terminal.wait().unwrap();
+    assert!(status.success(), "{status}: {drawn}");
 
     assert!(drawn.contains("4 of 4 pixels"), "{drawn}");
     assert!(drawn.contains("\x1b[3A"), "drawn in place: {drawn}");
