@@ -10,6 +10,9 @@
 // that found no room. `fill` is the number of words that wait. `head` is the
 // oldest of them; when none waits it is 0xffff_ffff, or 0xffff_fffe with
 // `finished`: none will come. `take` on an empty FIFO does nothing.
+//
+// The newest word waits in a register, where its number can grow; the older ones
+// are in a memory with one port to write and one, clocked, to read: block RAM.
 module photon_fifo #(
     parameter DEPTH_LOG2 = 9
 ) (
@@ -25,31 +28,49 @@ module photon_fifo #(
 );
     localparam DEPTH = 1 << DEPTH_LOG2;
 
-    reg [31:0] words [0:DEPTH - 1];
-    reg [DEPTH_LOG2-1:0] first;
+    reg [31:0] older [0:DEPTH - 1];
+    reg [31:0] newest;
+    // Where the oldest of the older words is, and where the next one goes.
+    reg [DEPTH_LOG2-1:0] first, last;
 
     wire empty = fill == 0;
+    wire one = fill == 1;
     wire taken = take && !empty;
-    wire [DEPTH_LOG2-1:0] next = first + fill[DEPTH_LOG2-1:0];
-    wire [DEPTH_LOG2-1:0] newest = next - 1'b1;
+    wire newest_stays = !empty && !(taken && one);
 
     wire is_end = word[31];
-    wire stays = !empty && !(taken && fill == 1);
-    wire joins = is_end && stays && words[newest][31] && words[newest][15:0] != 16'hffff;
-    wire room = !fill[DEPTH_LOG2] && (is_end || next + 1'b1 != first);
+    wire joins = is_end && newest_stays && newest[31] && newest[15:0] != 16'hffff;
+    wire full_for_photons = fill[DEPTH_LOG2] || &fill[DEPTH_LOG2-1:0];
+    wire room = !fill[DEPTH_LOG2] && (is_end || !full_for_photons);
     wire stored = put && !joins && room;
 
-    assign head = !empty ? words[first] : {31'h7fff_ffff, !finished};
+    // The oldest word is read one clock cycle ahead. If it is written in that same
+    // cycle, what is read is not it.
+    wire moves = stored && newest_stays;
+    wire [DEPTH_LOG2-1:0] next_first = taken && !one ? first + 1'b1 : first;
+    reg [31:0] oldest, moved;
+    reg is_moved;
 
     always @(posedge clk) begin
-        if (stored) words[next] <= word;
-        if (put && joins) words[newest][15:0] <= words[newest][15:0] + 1'b1;
+        if (moves) older[last] <= newest;
+        oldest <= older[next_first];
+    end
+
+    assign head = empty ? {31'h7fff_ffff, !finished} : one ? newest : is_moved ? moved : oldest;
+
+    always @(posedge clk) begin
+        moved <= newest;
+        is_moved <= moves && last == next_first;
+        if (stored) newest <= word;
+        else if (put && joins) newest[15:0] <= newest[15:0] + 1'b1;
         lost <= put && !joins && !room && !reset;
         if (reset) begin
             first <= 0;
+            last <= 0;
             fill <= 0;
         end else begin
-            if (taken) first <= first + 1'b1;
+            first <= next_first;
+            if (moves) last <= last + 1'b1;
             if (stored && !taken) fill <= fill + 1'b1;
             if (taken && !stored) fill <= fill - 1'b1;
         end

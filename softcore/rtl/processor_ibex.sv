@@ -21,6 +21,8 @@ module processor (
     input         data_error,
     input  [31:0] data_read,
     output        retired,
+    output        fetch_filled,
+    output        data_filled,
     output        stopped
 );
     wire data_we;
@@ -75,5 +77,7 @@ module processor (
     );
 
     assign retired = cpu.u_ibex_core.perf_instr_ret_wb;
+    assign fetch_filled = 1'b0;
+    assign data_filled = 1'b0;
     assign stopped = 0;
 endmodule

@@ -24,6 +24,8 @@ module processor (
     input         data_error,
     input  [31:0] data_read,
     output        retired,
+    output        fetch_filled,
+    output        data_filled,
     output        stopped
 );
 `ifdef RV32I
@@ -84,5 +86,7 @@ module processor (
     reg count;
     always @(posedge clk) count <= cpu.count_instr[0];
     assign retired = count != cpu.count_instr[0];
+    assign fetch_filled = 1'b0;
+    assign data_filled = 1'b0;
     assign stopped = trap || data_error;
 endmodule

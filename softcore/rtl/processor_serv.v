@@ -20,6 +20,8 @@ module processor (
     input         data_error,
     input  [31:0] data_read,
     output        retired,
+    output        fetch_filled,
+    output        data_filled,
     output        stopped
 );
     wire fetch_cyc, data_cyc, data_we;
@@ -53,5 +55,7 @@ module processor (
 
     // It fetches nothing that it does not execute.
     assign retired = fetch_ready;
+    assign fetch_filled = 1'b0;
+    assign data_filled = 1'b0;
     assign stopped = fetch_error || data_error;
 endmodule

@@ -24,6 +24,8 @@ module processor (
     input         data_error,
     input  [31:0] data_read,
     output        retired,
+    output        fetch_filled,
+    output        data_filled,
     output        stopped
 );
     localparam BURST = 3'b010; // Wishbone cycle type: another word follows
@@ -35,9 +37,9 @@ module processor (
 
     // While one word of a burst is answered the next is asked for.
     assign fetch_valid = fetch_stb && (!fetch_ready || fetch_type == BURST);
-    assign fetch_address = {fetch_word + 30'(fetch_ready), 2'b00};
+    assign fetch_address = {fetch_word + {29'd0, fetch_ready}, 2'b00};
     assign data_valid = data_stb && (!data_ready || data_type == BURST);
-    assign data_address = {data_word + 30'(data_ready), 2'b00};
+    assign data_address = {data_word + {29'd0, data_ready}, 2'b00};
     assign data_strobe = data_we ? data_bytes : 4'h0;
 
     VexRiscv cpu (
@@ -72,5 +74,8 @@ module processor (
     );
 
     assign retired = cpu.lastStageIsFiring;
+    // The first word of a line has come.
+    assign fetch_filled = fetch_stb && fetch_ready && fetch_type == BURST && fetch_word[2:0] == 0;
+    assign data_filled = data_stb && data_ready && data_type == BURST && data_word[2:0] == 0;
     assign stopped = data_error;
 endmodule

@@ -1,6 +1,6 @@
 // One processor, its RAM and its input and output, for simulation.
 //
-// The processor is the module `processor` of the file processor_NAME.v that is
+// The processor is the module `processor` of the file processor_NAME that is
 // compiled with this one. All have the same two ports here, one for
 // instructions and one for data. `valid` high at a clock edge is one access,
 // answered in the next cycle with `ready` high and the data read, or with
@@ -22,10 +22,10 @@
 //                              waits, 0xffff_fffe when none will come
 //   0xF000_0018  EVENT_DATA    write: 32 bits of a 128-bit event word, least
 //                              significant first; the last four are kept
-//   0xF000_001C  EVENT_REQ     write 1: REQ, with the event word. write 0: REQ
-//                              falls and ACK with it.
+//   0xF000_001C  EVENT_REQ     write 1: REQ rises, with the event word. write 0:
+//                              REQ falls, and ACK with it.
 //                              read: bit 0 ACK, high from the cycle after the
-//                              link took the word until the next write here
+//                              link took the word until REQ falls
 // Other writes do nothing, other reads give 0.
 // Input and output registers take whole words only.
 module soc #(
@@ -54,12 +54,16 @@ module soc #(
     output reg          exit_valid,
     output reg [31:0]   written,
 
-    // The link that takes events: `event_taken` is high for one cycle.
+    // The link takes an event word while REQ is high and ACK is not: `event_taken`
+    // is high for one cycle, and ACK from then on.
     output reg          event_req,
+    output reg          event_ack,
     output reg [127:0]  event_word,
     input               event_taken,
 
     output              retired,        // an instruction was completed
+    output              fetch_filled,   // the instruction cache began to fill a line
+    output              data_filled,    // the data cache did
     output              stopped         // the processor cannot go on
 );
     // Instruction port.
@@ -91,6 +95,8 @@ module soc #(
         .data_error(data_error),
         .data_read(data_read),
         .retired(retired),
+        .fetch_filled(fetch_filled),
+        .data_filled(data_filled),
         .stopped(stopped)
     );
 
@@ -130,8 +136,8 @@ module soc #(
     wire io_read = io && data_strobe == 0;
     wire io_write = io && data_strobe != 0;
     wire [31:0] photon_head;
+    wire [15:0] photon_waiting = {{15 - FIFO_DEPTH_LOG2{1'b0}}, photon_fill};
     reg photon_lost_since;
-    reg event_ack;
     reg read_is_io;
     reg [31:0] io_data;
 
@@ -157,7 +163,7 @@ module soc #(
 
         read_is_io <= io;
         case (register)
-            PHOTON_STATUS: io_data <= {16'(photon_fill), 14'd0, photon_lost_since || photon_lost, photon_fill != 0};
+            PHOTON_STATUS: io_data <= {photon_waiting, 14'd0, photon_lost_since || photon_lost, photon_fill != 0};
             PHOTON: io_data <= photon_head;
             EVENT_REQ: io_data <= {31'd0, event_ack};
             default: io_data <= 0;
@@ -170,11 +176,8 @@ module soc #(
         if (io_write && register == EVENT_DATA) event_word <= {data_write, event_word[127:32]};
         if (io_write && register == EVENT_REQ) begin
             event_req <= data_write[0];
-            event_ack <= 0;
-        end else if (event_req && event_taken) begin
-            event_req <= 0;
-            event_ack <= 1;
-        end
+            if (!data_write[0]) event_ack <= 0;
+        end else if (event_req && event_taken) event_ack <= 1;
 
         if (reset) begin
             photon_lost_since <= 0;

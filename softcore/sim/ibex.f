@@ -15,4 +15,4 @@ $DATA/vendor/lowrisc_ip/ip/prim/rtl/prim_mubi_pkg.sv
 -y $DATA/vendor/lowrisc_ip/ip/prim_generic/rtl
 -y $DATA/rtl
 $DATA/rtl/ibex_top.sv
-$SOFTCORE/rtl/processor_ibex.v
+$SOFTCORE/rtl/processor_ibex.sv

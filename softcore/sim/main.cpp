@@ -1,7 +1,9 @@
 // Runs an image on one processor in simulation.
 //
-// Standard output: what the program prints and a line `event HEX` an event word.
-// Standard error: marks, the end of the run, what became of the photons.
+// Standard output: what the program prints and a line `event HEX` an event word, its
+// most significant digit first.
+// Standard error: marks (with the cycles, the instructions and the lines that the two
+// caches have filled until then), the end of the run, what became of the photons.
 // Status: what the program wrote to EXIT, 250 if that is 256 or more, as after a
 // trap; 250 when the processor stopped by itself; 2 at the limit of cycles; 3 for bad
 // arguments or files.
@@ -28,6 +30,7 @@ constexpr size_t RAM_BYTES = 256 * 1024;
 constexpr int TRAP = 250;
 constexpr int LIMIT = 2;
 constexpr uint32_t END_OF_CYCLE = 0x80000001; // one laser cycle
+constexpr size_t PARTS = 10;                  // of a stream, to tell of each how full the FIFO was
 
 [[noreturn]] void fail(const std::string &message) {
     std::fprintf(stderr, "%s\n", message.c_str());
@@ -116,12 +119,18 @@ std::vector<Photon> read_stream(const std::string &path) {
 // off.
 class Laser {
 public:
-    Laser(std::vector<Photon> photons, uint64_t clocks) : photons_(std::move(photons)), clocks_(clocks) {}
+    Laser(std::vector<Photon> photons, uint64_t clocks) : photons_(std::move(photons)), clocks_(clocks) {
+        std::fill(std::begin(lowest_), std::end(lowest_), UINT64_MAX);
+    }
 
     // To be called once a clock cycle, after the rising edge.
     void clock(Vsoc &soc) {
         if (soc.photon_lost) (put_ == END_OF_CYCLE ? ends_lost_ : lost_)++;
         if (soc.photon_fill > highest_) highest_ = soc.photon_fill;
+        if (soc.photon_read && next_ < photons_.size()) {
+            uint64_t &lowest = lowest_[PARTS * cycle_ / (photons_.back().cycle + 1)];
+            if (soc.photon_fill < lowest) lowest = soc.photon_fill;
+        }
         if (soc.photon_read && next_ < photons_.size() && ++phase_ == clocks_) end_of_cycle();
         soc.photon_valid = !waiting_.empty();
         soc.photon_finished = waiting_.empty() && next_ == photons_.size();
@@ -134,6 +143,9 @@ public:
     void report() const {
         std::fprintf(stderr, "fifo: %zu photons, %" PRIu64 " lost, highest fill %" PRIu64 "\n", sent_, lost_, highest_);
         std::fprintf(stderr, "fifo: %" PRIu64 " laser cycles, %" PRIu64 " lost\n", cycle_, ends_lost_);
+        std::fprintf(stderr, "fifo: lowest fill of each tenth");
+        for (uint64_t lowest : lowest_) std::fprintf(stderr, " %" PRIu64, lowest);
+        std::fprintf(stderr, "\n");
     }
 
 private:
@@ -153,19 +165,20 @@ private:
     std::deque<uint32_t> waiting_;
     uint64_t clocks_, phase_ = 0, cycle_ = 0, lost_ = 0, ends_lost_ = 0, highest_ = 0;
     size_t next_ = 0, sent_ = 0;
+    uint64_t lowest_[PARTS];
     uint32_t put_ = 0; // the last word put into the FIFO
 };
 
-// The link: takes an event word a number of cycles after REQ rose.
+// The link: takes an event word a number of cycles after REQ rose, and answers with ACK.
 class Link {
 public:
     explicit Link(uint64_t after) : after_(after) {}
 
     void clock(Vsoc &soc) {
-        soc.event_taken = soc.event_req && !soc.event_taken && waited_++ >= after_;
-        if (!soc.event_req) waited_ = 0;
+        bool asked = soc.event_req && !soc.event_ack;
+        soc.event_taken = asked && waited_ == after_;
+        waited_ = asked && !soc.event_taken ? waited_ + 1 : 0;
         if (!soc.event_taken) return;
-        waited_ = 0;
         std::printf("event %08x%08x%08x%08x\n", soc.event_word[3], soc.event_word[2], soc.event_word[1], soc.event_word[0]);
     }
 
@@ -198,13 +211,16 @@ void load(Vsoc &soc, const std::vector<uint8_t> &image) {
 
 int run(Vsoc &soc, const Options &options, Laser &laser) {
     Link link(options.acknowledge_after);
-    uint64_t instructions = 0;
+    uint64_t instructions = 0, code = 0, data = 0;
     for (uint64_t cycle = 1; cycle <= options.cycles; cycle++) {
         clock(soc);
         instructions += soc.retired;
+        code += soc.fetch_filled;
+        data += soc.data_filled;
         if (soc.print_valid) std::putchar(soc.written & 0xff);
         if (soc.mark_valid)
-            std::fprintf(stderr, "mark %u cycle %" PRIu64 " instructions %" PRIu64 "\n", soc.written, cycle, instructions);
+            std::fprintf(stderr, "mark %u cycle %" PRIu64 " instructions %" PRIu64 " code %" PRIu64 " data %" PRIu64 "\n",
+                         soc.written, cycle, instructions, code, data);
         if (soc.exit_valid) {
             std::fprintf(stderr, "exit 0x%x cycle %" PRIu64 " instructions %" PRIu64 "\n", soc.written, cycle, instructions);
             return soc.written < 256 ? soc.written : TRAP;
@@ -225,6 +241,9 @@ int run(Vsoc &soc, const Options &options, Laser &laser) {
 int main(int argc, char **argv) {
     Options options = parse(argc, argv);
     Verilated::commandArgs(argc, argv);
+    // What nothing has written, memory included, holds anything; the same every time.
+    Verilated::randReset(2);
+    Verilated::randSeed(1);
     std::vector<uint8_t> image = read_image(options.image);
     Laser laser(options.stream.empty() ? std::vector<Photon>() : read_stream(options.stream), options.clocks_per_laser_cycle);
     Vsoc soc;

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "Vphoton_fifo.h"
+#include "verilated.h"
 
 namespace {
 
@@ -40,6 +41,8 @@ private:
 } // namespace
 
 int main() {
+    Verilated::randReset(2);
+    Verilated::randSeed(1);
     Vphoton_fifo fifo;
     Model model;
     std::mt19937 random(1);

@@ -9,6 +9,9 @@
 #[cfg(test)]
 extern crate std;
 
+#[cfg(target_arch = "riscv32")]
+#[allow(unsafe_code, reason = "caches are behind the language's back")]
+pub mod cache;
 pub mod golden;
 #[cfg_attr(feature = "virt", path = "io_virt.rs")]
 pub mod io;

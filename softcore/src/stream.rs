@@ -2,17 +2,18 @@
 //! link.
 //!
 //! Photons come first: while the FIFO has them, they are counted. When a laser cycle has
-//! ended and no more than `FEW` words wait, the next macropixel in turn is looked at, provided X laser cycles have passed since
-//! its last look. That is the mini-frame of [`AsyncPixel::end_laser_cycles`]: a processor
-//! that cannot look at every macropixel every X laser cycles looks as often as it can,
-//! and no photon is assigned to a wrong exposure.
+//! ended and no more than [`FEW`] words wait, the next macropixel in turn is looked at,
+//! provided X laser cycles have passed since its last look. That is the mini-frame of
+//! [`AsyncPixel::end_laser_cycles`]: a processor that cannot look at every macropixel
+//! every X laser cycles looks as often as it can, and no photon is assigned to a wrong
+//! exposure.
 
 use core::fmt::{self, Write};
 
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AerEncoder, AerWord, AsyncPixel, ConfigError, Count, LaserCycle, PaperRule, PixelAddress,
-    PixelConfig, RangeGate,
+    PixelConfig, RangeGate, Statistics,
 };
 
 use crate::io;
@@ -27,7 +28,16 @@ const L1: u16 = 40;
 const L2: u16 = 2000;
 
 /// Words that may wait during a look: the next end of a laser cycle most often does.
-const FEW: u32 = 1;
+pub const FEW: u32 = 1;
+
+/// X = 4, L1 = 40, L2 = 2000, α = 4, at least 5 photons.
+///
+/// # Errors
+/// None: the configuration is valid.
+pub const fn config() -> Result<PixelConfig<BINS>, ConfigError> {
+    let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+    PixelConfig::new(X, L1, L2, RangeGate::full(), rule)
+}
 
 /// A word of the photon FIFO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,15 +78,16 @@ impl Word {
 pub struct Pixels<const N: usize> {
     config: PixelConfig<BINS>,
     pixels: [AsyncPixel<BINS>; N],
-    /// The laser cycle of each macropixel's last look.
-    looked: [u32; N],
-    /// Laser cycles that have ended; about 7 minutes at 10 MHz. More than that a
-    /// longer counter takes.
-    now: u32,
+    /// Laser cycles that had ended at each macropixel's last look.
+    looked: [u64; N],
+    /// Laser cycles that have ended.
+    now: u64,
     turn: usize,
     looks: u32,
     /// How often the FIFO had lost photons when it was asked.
     losses: u32,
+    /// Photons of macropixels that there are not.
+    strays: u32,
     encoder: AerEncoder,
     /// Whether the link has not yet answered.
     is_requesting: bool,
@@ -90,8 +101,7 @@ impl<const N: usize> Pixels<N> {
     /// # Errors
     /// None: the configuration is valid.
     pub const fn new() -> Result<Self, ConfigError> {
-        let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
-        let config = match PixelConfig::new(X, L1, L2, RangeGate::full(), rule) {
+        let config = match config() {
             Ok(config) => config,
             Err(error) => return Err(error),
         };
@@ -111,6 +121,7 @@ impl<const N: usize> Pixels<N> {
             turn: 0,
             looks: 0,
             losses: 0,
+            strays: 0,
             encoder: AerEncoder::new(),
             is_requesting: false,
             next: None,
@@ -122,19 +133,20 @@ impl<const N: usize> Pixels<N> {
     pub fn run(&mut self) {
         loop {
             match io::take() {
-                Word::Photon(pixel, code) => {
-                    if let Some(pixel) = self.pixels.get_mut(usize::from(pixel)) {
-                        pixel.count(&self.config, code);
-                    }
-                }
+                Word::Photon(pixel, code) => match self.pixels.get_mut(usize::from(pixel)) {
+                    Some(pixel) => pixel.count(&self.config, code),
+                    None => self.strays = self.strays.saturating_add(1),
+                },
                 Word::CyclesEnd(cycles) => {
-                    self.now += u32::from(cycles.max(1));
+                    self.now += u64::from(cycles.max(1));
                     let (waiting, is_lossy) = io::photon_status();
                     self.losses += u32::from(is_lossy);
                     if waiting <= FEW {
                         self.look();
                     }
                 }
+                // A time word has the event's behind it.
+                Word::Empty if self.next.is_some() => self.link(self.turn),
                 Word::Empty => {}
                 Word::End => break,
             }
@@ -150,14 +162,14 @@ impl<const N: usize> Pixels<N> {
             return;
         };
         let passed = self.now - *looked;
-        if passed < u32::from(X) {
+        if passed < u64::from(X) {
             return;
         }
         *looked = self.now;
         self.turn = if index + 1 < N { index + 1 } else { 0 };
         self.looks += 1;
         let passed = u16::try_from(passed).unwrap_or(u16::MAX);
-        let last = LaserCycle(u64::from(self.now) - 1);
+        let last = LaserCycle(self.now - 1);
         let _ = pixel.end_laser_cycles(&self.config, last, passed);
         self.link(index);
     }
@@ -197,22 +209,27 @@ impl<const N: usize> Pixels<N> {
         self.pixels.get(index).is_some_and(AsyncPixel::request)
     }
 
-    /// Writes what was done: laser cycles, looks, losses, photons and events of all.
+    /// Writes what was done: laser cycles, looks, losses, strays, and of all macropixels
+    /// photons, events, exposures without one and decisions put off.
     ///
     /// # Errors
     /// Those of `out`.
     pub fn report(&self, out: &mut impl Write) -> fmt::Result {
-        let (mut photons, mut events, mut deferred) = (0, 0, 0);
+        let mut all = Statistics::default();
         for pixel in &self.pixels {
-            let statistics = pixel.statistics();
-            photons += statistics.photons();
-            events += statistics.events;
-            deferred += statistics.deferred;
+            all += pixel.statistics();
         }
         writeln!(
             out,
-            "cycles {} looks {} losses {} photons {photons} events {events} deferred {deferred}",
-            self.now, self.looks, self.losses
+            "cycles {} looks {} losses {} strays {} photons {} events {} expired {} deferred {}",
+            self.now,
+            self.looks,
+            self.losses,
+            self.strays,
+            all.photons(),
+            all.events,
+            all.expired,
+            all.deferred
         )
     }
 }

@@ -35,6 +35,13 @@ pub const VERILATOR: Tool = Tool {
     install: "sudo apt-get install --yes verilator g++ make",
 };
 
+/// For `softcore`: whether a memory becomes block RAM.
+pub const YOSYS: Tool = Tool {
+    program: "yosys",
+    ask: &["-V"],
+    install: "sudo apt-get install --yes yosys",
+};
+
 pub const DEFMT_PRINT: Tool = Tool {
     program: "defmt-print",
     ask: VERSION,
@@ -121,6 +128,7 @@ pub fn set_up() {
 pub fn set_up_softcore() {
     install(&QEMU_RISCV, || debian_package("qemu-system-misc"));
     install(&VERILATOR, || debian_package("verilator g++ make"));
+    install(&YOSYS, || debian_package("yosys"));
 }
 
 /// How root installs packages on Debian.

@@ -1,5 +1,6 @@
 //! The operations of `firmware/src/bin/bench` between marks, on the same photons: the
-//! testbench counts the cycles.
+//! testbench counts the cycles. Each is done cold, when a cache holds nothing of it, and
+//! then warm, on the same state and with the code and the counts of the time before.
 
 #![no_std]
 #![no_main]
@@ -14,8 +15,11 @@ mod scene;
 use core::arch::asm;
 use core::hint::black_box;
 
-use dtof_core::{AsyncPixel, Count10, LaserCycle, Look, PixelAddress, detect, isqrt};
-use dtof_softcore::{io, println, program};
+use dtof_core::{
+    AerEncoder, AsyncPixel, Count10, DepthEvent, Histogram, LaserCycle, Look, PixelAddress, detect,
+    isqrt,
+};
+use dtof_softcore::{cache, io, println, program};
 
 use scene::{CYCLES, PHOTONS, PHOTONS_A_CYCLE, State};
 
@@ -54,7 +58,7 @@ const fn row(name: &'static str, target: bool, prepare: Prepare, way: Operation,
 }
 
 /// The first is taken off all others.
-const ROWS: [Row; 19] = [
+const ROWS: [Row; 16] = [
     row("call", true, empty, call, 1),
     row("photon: AsyncPixel::count", true, empty, count, PHOTONS),
     row(
@@ -79,20 +83,6 @@ const ROWS: [Row; 19] = [
         kept,
         1,
     ),
-    row(
-        "decision: kept peak; no event; again",
-        false,
-        kept_before,
-        kept,
-        1,
-    ),
-    row(
-        "decision: kept peak; event and depth; again",
-        true,
-        kept_before,
-        kept,
-        1,
-    ),
     row("decision: look; no event", false, counted, look, 1),
     row(
         "decision: whole histogram; no event",
@@ -102,20 +92,13 @@ const ROWS: [Row; 19] = [
         1,
     ),
     row("decision: whole histogram; event", true, counted, whole, 1),
-    row(
-        "decision: whole histogram; no event; again",
-        false,
-        whole_before,
-        whole,
-        1,
-    ),
     row("event: look to packed word", true, counted, event, 1),
     row("pack: encode and to_le_bytes", true, at_event, pack, 1),
     row("clear: Histogram::clear", true, counted, clear, 1),
     row("exposure: count_batch", true, empty, exposure, 1),
     row("root: isqrt::<5>", true, empty, root, 1),
-    row("access: load", true, loaded, load, ACCESSES),
-    row("access: store", true, stored, store, ACCESSES),
+    row("access: load", true, empty, load, ACCESSES),
+    row("access: store", true, empty, store, ACCESSES),
 ];
 
 fn run() -> bool {
@@ -126,7 +109,6 @@ fn run() -> bool {
     let mut times = [0; ROWS.len()];
     for number in 0..EXPOSURES {
         for target in [false, true] {
-            // Of photons of 64-bit arithmetic there are few.
             state.empty(number, target);
             counted(&mut state);
             let fires = fires(&state);
@@ -137,18 +119,50 @@ fn run() -> bool {
                     continue;
                 }
                 (row.prepare)(&mut state);
-                measure(index, row.way, &mut state, CYCLES.into());
+                let before = Changed::of(&state);
+                cache::evict();
+                measure(2 * index, row.way, &mut state, CYCLES.into());
+                before.restore(&mut state);
+                cache::read(&state);
+                measure(2 * index + 1, row.way, &mut state, CYCLES.into());
                 *times += row.each;
             }
         }
     }
     for (index, (row, times)) in ROWS.iter().zip(times).enumerate() {
-        println!("operation {index} {times} {}", row.name);
+        println!("operation {} {times} {}; cold", 2 * index, row.name);
+        println!("operation {} {times} {}; warm", 2 * index + 1, row.name);
     }
     true
 }
 
 program!(run);
+
+/// What operations change of the state.
+struct Changed {
+    pixel: AsyncPixel<{ scene::BINS }>,
+    histogram: Histogram<{ scene::BINS }>,
+    encoder: AerEncoder,
+    event: Option<DepthEvent>,
+}
+
+impl Changed {
+    fn of(state: &State) -> Self {
+        Self {
+            pixel: state.pixel.clone(),
+            histogram: state.histogram.clone(),
+            encoder: state.encoder.clone(),
+            event: state.event,
+        }
+    }
+
+    fn restore(self, state: &mut State) {
+        state.pixel = self.pixel;
+        state.histogram = self.histogram;
+        state.encoder = self.encoder;
+        state.event = self.event;
+    }
+}
 
 /// Marks 2 k + 1 and 2 k + 2 are about operation k.
 #[inline(never)]
@@ -179,18 +193,6 @@ fn counted(state: &mut State) {
     state.histogram.add_batch(&state.codes);
     state.foreign = *state.histogram.counts();
     state.wait_for_last_look();
-}
-
-/// What was done just before is in the processor's caches, if it has any.
-fn kept_before(state: &mut State) {
-    counted(state);
-    black_box(kept(state, 0));
-}
-
-/// The same.
-fn whole_before(state: &mut State) {
-    counted(state);
-    black_box(whole(state, 0));
 }
 
 fn at_event(state: &mut State) {
@@ -301,16 +303,6 @@ extern "C" fn exposure(state: &mut State, _: u32) -> u32 {
 
 extern "C" fn root(_: &mut State, value: u32) -> u32 {
     isqrt::<5>(value)
-}
-
-/// What was done just before is in the processor's caches.
-fn loaded(state: &mut State) {
-    load(state, 0);
-}
-
-/// The same.
-fn stored(state: &mut State) {
-    store(state, 0);
 }
 
 #[allow(unsafe_code, reason = "so many instructions of one kind")]

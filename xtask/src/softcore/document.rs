@@ -1,10 +1,11 @@
-//! `docs/bench/softcore.md`: the figures as tables.
+//! `docs/bench/softcore.md`: the figures of the files as tables.
 
 use std::fmt::Write as _;
 
 use super::image::Sizes;
+use super::memory::Memory;
 use super::photons::Sustained;
-use super::table::Row;
+use super::table::{COLD, Row};
 
 const START: &str = "\
 # Figures of the soft-cores
@@ -12,65 +13,135 @@ const START: &str = "\
 Made by `cargo xtask softcore`; do not edit. What they are figures of is in [softcore.md](../softcore.md).
 ";
 
-/// Bytes of the program for so many macropixels of an instruction set.
-pub struct Memory {
-    pub isa: &'static str,
-    pub macropixels: u32,
-    pub sizes: Sizes,
-    pub stack: u64,
-}
+/// What 2.4 µs are at 100 MHz.
+const CYCLES: u64 = 240;
+/// Operations from a look to what comes of it.
+const AGAINST: [&str; 3] = [
+    "decision: kept peak; no event",
+    "decision: look; no event",
+    "event: look to packed word",
+];
 
 /// The whole file.
-pub fn text(rows: &[Row], photons: &[(String, Sustained)], memory: &[Memory]) -> String {
-    format!("{START}{}{}{}", cycles(rows), rates(photons), bytes(memory))
+pub fn text(rows: &[Row], photons: &[Sustained], memory: &[Memory]) -> String {
+    format!(
+        "{START}{}{}{}{}",
+        cycles(rows),
+        against(rows),
+        rates(photons),
+        bytes(memory)
+    )
+}
+
+/// The processors, each once.
+fn cores(rows: &[Row]) -> Vec<&str> {
+    let mut cores: Vec<&str> = rows.iter().map(|row| &*row.core).collect();
+    cores.dedup();
+    cores
+}
+
+/// An operation as a processor does it warm, and cold if that is not the same.
+fn find<'a>(rows: &'a [Row], core: &str, operation: &str) -> (Option<&'a Row>, Option<&'a Row>) {
+    let of_core = || rows.iter().filter(|row| row.core == core);
+    let cold = format!("{operation}{COLD}");
+    (
+        of_core().find(|row| row.operation == operation),
+        of_core().find(|row| row.operation == cold),
+    )
 }
 
 /// Operations downwards, processors beside each other.
 fn cycles(rows: &[Row]) -> String {
-    let mut cores: Vec<&str> = rows.iter().map(|row| &*row.core).collect();
-    cores.dedup();
-    let mut text = "\n## Cycles, and instructions in brackets\n\n| operation |".to_owned();
-    for core in &cores {
-        let _ = write!(text, " {} |", core.replace(',', ", "));
+    let cores = cores(rows);
+    let has_cold = |core: &str| {
+        let mut of_core = rows.iter().filter(|row| row.core == core);
+        of_core.any(|row| row.operation.ends_with(COLD))
+    };
+    let mut text = "\n## Cycles, and instructions in brackets\n\n\
+        Lines filled are those of code and of data.\n\n| operation |"
+        .to_owned();
+    let mut columns = 1;
+    for &core in &cores {
+        let name = core.replace(',', ", ");
+        if has_cold(core) {
+            let _ = write!(text, " {name}, warm | lines filled | cold | lines filled |");
+            columns += 4;
+        } else {
+            let _ = write!(text, " {name} |");
+            columns += 1;
+        }
     }
-    let _ = writeln!(text, "\n|---|{}", "---|".repeat(cores.len()));
+    let _ = writeln!(text, "\n|{}", "---|".repeat(columns));
     let Some(first) = cores.first() else {
         return text;
     };
-    for Row { operation, .. } in rows.iter().filter(|row| row.core == *first) {
+    let warm = rows
+        .iter()
+        .filter(|row| row.core == *first && !row.operation.ends_with(COLD));
+    for Row { operation, .. } in warm {
         let _ = write!(text, "| {operation} |");
-        for core in &cores {
-            let same = |row: &&Row| row.core == *core && row.operation == *operation;
-            let cell = rows.iter().find(same).map(Row::cell).unwrap_or_default();
-            let _ = write!(text, " {cell} |");
+        for &core in &cores {
+            let (warm, cold) = find(rows, core, operation);
+            let cell = |row: &Row| format!("{} ({})", row.cycles(), row.instructions());
+            let _ = write!(text, " {} |", warm.map(cell).unwrap_or_default());
+            if let Some(cold) = cold {
+                let warm = warm.map(Row::lines).unwrap_or_default();
+                let _ = write!(text, " {warm} | {} | {} |", cold.cycles(), cold.lines());
+            }
         }
         text.push('\n');
     }
     text
 }
 
-/// Two lines a processor: the highest rate, and half of it.
-fn rates(photons: &[(String, Sustained)]) -> String {
+/// What is within [`CYCLES`], in bold.
+fn against(rows: &[Row]) -> String {
+    let mut text =
+        format!("\n## Against {CYCLES} cycles\n\nWhat is within them is bold.\n\n| core |");
+    for operation in AGAINST {
+        let _ = write!(text, " {operation} | cold |");
+    }
+    let _ = writeln!(text, "\n|---|{}", "---|".repeat(2 * AGAINST.len()));
+    for core in cores(rows) {
+        let _ = write!(text, "| {} |", core.replace(',', ", "));
+        for operation in AGAINST {
+            let (warm, cold) = find(rows, core, operation);
+            for row in [warm, cold.or(warm)] {
+                let cell = row.map(|row| match row.cycles() {
+                    cycles if row.cycles <= CYCLES * 100 => format!("**{cycles}**"),
+                    cycles => cycles,
+                });
+                let _ = write!(text, " {} |", cell.unwrap_or_default());
+            }
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Some lines a processor: the highest rate, and parts of it.
+fn rates(photons: &[Sustained]) -> String {
     let mut text = "
 ## Photons sustained
 
 Of four macropixels together, at 100 MHz and a laser of 10 MHz.
 
-| core | photons a laser cycle | photons a second | laser cycles between looks | photons | events | most words in the FIFO |
-|---|---|---|---|---|---|---|
+| core | photons a laser cycle | photons a second | laser cycles between looks | photons | events | exposures without an event | most words in the FIFO |
+|---|---|---|---|---|---|---|---|
 "
     .to_owned();
-    for (core, sustained) in photons {
+    for sustained in photons {
         let _ = writeln!(
             text,
-            "| {} | {:.4} | {:.0} thousand | {:.1} | {} | {} | {} |",
-            core.replace(',', ", "),
+            "| {} | {:.5} | {:.1} thousand | {} | {} | {} | {} | {} |",
+            sustained.core.replace(',', ", "),
             sustained.rate(),
             // Ten million laser cycles a second.
             sustained.rate() * 1e4,
             sustained.between_looks(),
             sustained.photons,
             sustained.events,
+            sustained.expired,
             sustained.fill,
         );
     }
@@ -92,10 +163,96 @@ fn bytes(memory: &[Memory]) -> String {
         stack,
     } in memory
     {
+        let stack = stack.map(|stack| stack.to_string()).unwrap_or_default();
         let _ = writeln!(
             text,
             "| {isa} | {macropixels} | {code} | {data} | {stack} |"
         );
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::Path;
+
+    use super::super::files::{DOCUMENT, Files};
+    use super::*;
+
+    #[test]
+    fn the_document_says_what_the_files_say() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let files = Files::read(&root).unwrap();
+        let written = fs::read_to_string(root.join(DOCUMENT)).unwrap();
+        assert_eq!(text(&files.rows, &files.photons, &files.memory), written);
+    }
+
+    #[test]
+    fn what_the_page_says_of_240_cycles_holds() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let rows = Files::read(&root).unwrap().rows;
+        let mut within = Vec::new();
+        for core in cores(&rows) {
+            for operation in AGAINST {
+                let (warm, cold) = find(&rows, core, operation);
+                let warm = warm.unwrap();
+                let both = [warm, cold.unwrap_or(warm)];
+                within.push(both.map(|row| row.cycles <= CYCLES * 100));
+            }
+        }
+        // A decision, a look, an event; warm and cold.
+        let (vexriscv, ibex) = (
+            [[true, false], [false; 2], [false; 2]],
+            [[true; 2], [true; 2], [false; 2]],
+        );
+        assert_eq!(within[..6], [vexriscv, ibex].concat());
+        assert!(within[6..].iter().all(|within| *within == [false; 2]));
+        // What is more cold is lines of some ten cycles, most of them code.
+        let (warm, cold) = find(&rows, cores(&rows)[0], AGAINST[0]);
+        let (warm, cold) = (warm.unwrap(), cold.unwrap());
+        let more = (cold.code_lines + cold.data_lines - warm.code_lines - warm.data_lines) * 10;
+        assert!((cold.cycles - warm.cycles).abs_diff(more) < more / 5);
+        assert!(cold.code_lines > 2 * cold.data_lines);
+    }
+
+    #[test]
+    fn the_rates_are_a_highest_one_and_parts_of_it() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let photons = Files::read(&root).unwrap().photons;
+        for of_core in photons.chunks(3) {
+            assert!(of_core.iter().all(|one| one.core == of_core[0].core));
+            assert_eq!(of_core[1].rate, of_core[0].rate / 2);
+            // X = 4 is held at no rate.
+            assert!(of_core.iter().all(|one| one.between_looks > 10 * 4));
+        }
+        assert_eq!(photons.len(), 3 * 5);
+    }
+
+    #[test]
+    fn a_core_with_caches_has_columns_of_its_own() {
+        let row = |core: &str, operation: &str, cycles, lines| Row {
+            core: core.to_owned(),
+            operation: operation.to_owned(),
+            cycles,
+            instructions: 100,
+            code_lines: lines,
+            data_lines: 100,
+        };
+        let rows = [
+            row("a,x", "decision: look; no event; cold", 30_000, 200),
+            row("a,x", "decision: look; no event", 24_000, 0),
+            row("b,y", "decision: look; no event", 24_001, 0),
+        ];
+        let table = cycles(&rows);
+        assert!(table.contains(
+            "| operation | a, x, warm | lines filled | cold | lines filled | b, y |\n|---|---|---|---|---|---|\n"
+        ));
+        assert!(table.contains(
+            "| decision: look; no event | 240.0 (1.0) | 0 + 1 | 300.0 | 2 + 1 | 240.0 (1.0) |\n"
+        ));
+        let table = against(&rows);
+        assert!(table.contains("| a, x |  |  | **240.0** | 300.0 |  |  |\n"));
+        assert!(table.contains("| b, y |  |  | 240.0 | 240.0 |  |  |\n"));
+    }
 }

@@ -2,7 +2,10 @@
 //! own Verilog in simulation, cycle by cycle.
 
 mod document;
+mod events;
+mod files;
 mod image;
+mod memory;
 mod photons;
 mod program;
 mod rtl;
@@ -15,16 +18,12 @@ use std::path::Path;
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::{self_test, target_folder, tools};
-use document::Memory;
+use files::Files;
 use image::Images;
-use photons::Sustained;
+use memory::{Memory, Stacks};
+use photons::{Found, Trials};
 use program::Ran;
 use rtl::{CORES, Core, Simulator};
-use table::Row;
-
-const FILE: &str = "docs/bench/softcore.csv";
-const DOCUMENT: &str = "docs/bench/softcore.md";
-const PHOTONS_FILE: &str = "docs/bench/softcore-photons.csv";
 
 /// The instruction sets with an image, the least first.
 const ISAS: [&str; 3] = ["rv32i", "rv32im", "rv32imc"];
@@ -34,17 +33,27 @@ const MOST_CYCLES: u64 = 2_000_000_000;
 /// What ends a loop without end, which would take the others' limit.
 const ENDLESS_CYCLES: u64 = 1_000_000;
 
-/// What must fail, and with what message.
+/// What must fail, and what it says before that.
 const MUST_FAIL: [(&str, &str); 3] = [
     ("wrong-vector", "vector 5 WRONG"),
-    ("illegal-instruction", "trap"),
-    ("endless-loop", "cycle limit"),
+    ("illegal-instruction", "an illegal instruction follows"),
+    ("endless-loop", "an endless loop follows"),
 ];
 
-/// The bit-serial processor carries an illegal instruction out as some other, which the
-/// program tells.
-const DOES_NOT_TRAP: (&str, &str) = ("serv", "illegal-instruction");
-const CARRIED_OUT: &str = "the illegal instruction was carried out";
+/// What is said last of what must fail in simulation.
+fn last_words(core: Core, program: &str) -> &'static str {
+    match (core.name, program) {
+        ("picorv32" | "picorv32-rv32i", "illegal-instruction") => "trap cycle",
+        // The bit-serial processor carries it out as some other, which the program tells.
+        ("serv", "illegal-instruction") => "the illegal instruction was carried out",
+        (_, "illegal-instruction") => ILLEGAL,
+        (_, "endless-loop") => "cycle limit",
+        _ => "golden WRONG",
+    }
+}
+
+/// What the trap handler says.
+const ILLEGAL: &str = "trap: illegal instruction";
 
 /// What is asked for.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -101,40 +110,26 @@ pub fn run(root: &Path, arguments: &[&str]) -> Result<()> {
     }
 
     rtl::check_fifo(root)?;
-    let (mut rows, mut photons) = (Vec::new(), Vec::new());
+    let (mut measured, mut stacks) = (Files::default(), Stacks::new());
     for core in CORES.into_iter().filter(|&core| options.wants(core)) {
-        let on_rtl = on_rtl(root, core, &expected).with_context(|| core.name)?;
-        rows.extend(on_rtl.rows);
-        photons.extend(on_rtl.sustained.map(|sustained| (name(core), sustained)));
+        let (files, stack) = on_rtl(root, core, &expected).with_context(|| core.name)?;
+        measured.rows.extend(files.rows);
+        measured.photons.extend(files.photons);
+        stacks.extend(stack);
     }
-    let stack = photons.iter().map(|(_, sustained)| sustained.stack).max();
-    let memory = memory(root, stack.unwrap_or_default())?;
-    let document = document::text(&rows, &photons, &memory);
-    println!("\n{document}");
-
-    let photons = photons.iter().map(|(core, sustained)| sustained.csv(core));
-    let photons: Vec<String> = photons.collect();
-    let files = [
-        (FILE, table::HEADER, table::csv(&rows)),
-        (PHOTONS_FILE, Sustained::HEADER, photons),
-    ];
-    let is_whole = options.cores.is_empty();
+    measured.memory = Memory::of_all(root, &stacks)?;
+    println!(
+        "\n{}",
+        document::text(&measured.rows, &measured.photons, &measured.memory)
+    );
     if options.check {
-        for (file, header, lines) in &files {
-            check(root, file, header, lines, &options)?;
-        }
-        let committed = fs::read_to_string(root.join(DOCUMENT)).context(DOCUMENT)?;
-        ensure!(
-            !is_whole || committed == document,
-            "not what {DOCUMENT} says; `cargo xtask softcore` writes it"
-        );
-    } else if is_whole {
-        for (file, header, lines) in &files {
-            let text = format!("{header}\n{}\n", lines.join("\n"));
-            fs::write(root.join(file), text).with_context(|| (*file).to_owned())?;
-        }
-        fs::write(root.join(DOCUMENT), document).context(DOCUMENT)?;
-        println!("{FILE}, {PHOTONS_FILE} and {DOCUMENT}: written");
+        let wanted = |of: &str| {
+            let core = CORES.into_iter().find(|&core| name(core) == of);
+            core.is_none_or(|core| options.wants(core))
+        };
+        Files::read(root)?.only(wanted).check(&measured)?;
+    } else if options.cores.is_empty() {
+        measured.write(root)?;
     }
     Ok(())
 }
@@ -147,17 +142,23 @@ fn name(core: Core) -> String {
 /// The golden vectors and what must fail, in the emulator.
 fn in_qemu(root: &Path, isa: &str, expected: &str) -> Result<()> {
     let images = Images::build(root, isa, true)?;
-    let stack = golden(&virt::run(&images.elf("self-test"), isa)?, expected)?;
-    let bench = virt::run(&images.elf("bench"), isa)?;
+    let run = |program, limit| virt::run(&images.elf(program), isa, limit);
+    let stack = golden(&run("self-test", virt::PATIENCE)?, expected)?;
+    let bench = run("bench", virt::PATIENCE)?;
     ensure!(bench.code == Some(0), "bench: {}", bench.output);
     for (program, message) in MUST_FAIL {
-        let ran = virt::run(&images.elf(program), isa)?;
         // QEMU has no limit of its own.
-        let (code, message) = match program {
-            "endless-loop" => (ran.code.is_none(), "an endless loop follows"),
-            _ => (ran.code.is_some_and(|code| code != 0), message),
+        let (limit, last) = match program {
+            "endless-loop" => (virt::A_MOMENT, message),
+            "illegal-instruction" => (virt::PATIENCE, ILLEGAL),
+            _ => (virt::PATIENCE, "golden WRONG"),
         };
-        must_fail(program, &ran, code, message)?;
+        let ran = run(program, limit)?;
+        let failed = match program {
+            "endless-loop" => ran.code.is_none(),
+            _ => ran.code.is_some_and(|code| code != 0),
+        };
+        must_fail(program, &ran, failed, [message, last])?;
     }
     println!(
         "QEMU, {isa}: {} lines as in {}, {stack} bytes of stack; what must fail fails",
@@ -167,18 +168,11 @@ fn in_qemu(root: &Path, isa: &str, expected: &str) -> Result<()> {
     Ok(())
 }
 
-/// What a processor came to.
-struct OnRtl {
-    rows: Vec<Row>,
-    /// The highest rate, and half of it.
-    sustained: [Sustained; 2],
-}
-
 /// Everything on one processor.
-fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<OnRtl> {
+fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<(Files, Stacks)> {
     let images = Images::build(root, core.isa, false)?;
     let simulator = Simulator::build(root, core)?;
-    let run = |program, cycles| simulator.run(&images.flat(program), cycles, None);
+    let run = |program, cycles| simulator.run(&images.flat(program), cycles);
     let stack = golden(&run("self-test", MOST_CYCLES)?, expected)?;
     println!(
         "{}, {}: {} lines as in {}, {stack} bytes of stack",
@@ -193,19 +187,11 @@ fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<OnRtl> {
             _ => ENDLESS_CYCLES,
         };
         let ran = run(program, limit)?;
-        let message = if (core.name, program) == DOES_NOT_TRAP {
-            CARRIED_OUT
-        } else {
-            message
-        };
-        must_fail(
-            program,
-            &ran,
-            ran.code.is_some_and(|code| code != 0),
-            message,
-        )?;
-        let last = ran.errors.lines().last().unwrap_or_default();
-        println!("{}: {program} fails: {message} ({last})", core.name);
+        let last = last_words(core, program);
+        let failed = ran.code.is_some_and(|code| code != 0);
+        must_fail(program, &ran, failed, [message, last])?;
+        let end = ran.errors.lines().last().unwrap_or_default();
+        println!("{}: {program} fails: {last} ({end})", core.name);
     }
     let bench = run("bench", MOST_CYCLES)?;
     ensure!(
@@ -214,10 +200,32 @@ fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<OnRtl> {
         bench.output,
         bench.errors
     );
-    let rows = table::rows(&name(core), &bench)?;
-    let folder = target_folder(root).join("softcore");
-    let sustained = photons::sustained(&simulator, &images.flat("stream-4"), &folder)?;
-    Ok(OnRtl { rows, sustained })
+    let rows = table::rows(&name(core), core.caches, &bench)?;
+    let trials = Trials {
+        simulator: &simulator,
+        image: &|pixels| images.flat(&format!("stream-{pixels}")),
+        folder: &target_folder(root).join("softcore"),
+        core: &name(core),
+    };
+    let Found {
+        sustained: photons,
+        stack,
+        slow: (events, deferred),
+    } = trials.run()?;
+    println!(
+        "{}: every event word over REQ and ACK is what the host decides from the photons; over a slow link {events}, \
+         {deferred} decisions put off",
+        core.name
+    );
+    let stacks = stack
+        .into_iter()
+        .map(|(pixels, stack)| (core.isa, pixels, stack));
+    let files = Files {
+        rows,
+        photons,
+        memory: Vec::new(),
+    };
+    Ok((files, stacks.collect()))
 }
 
 /// Whether a run printed the golden vectors; the bytes of stack it used.
@@ -238,58 +246,16 @@ fn golden(ran: &Ran, expected: &str) -> Result<u64> {
     Ok(stack.trim().parse()?)
 }
 
-/// Whether a run failed as it should, with its message.
-fn must_fail(program: &str, ran: &Ran, failed: bool, message: &str) -> Result<()> {
+/// Whether a run failed as it should, and said so.
+fn must_fail(program: &str, ran: &Ran, failed: bool, messages: [&str; 2]) -> Result<()> {
     let said = format!("{}{}", ran.output, ran.errors);
     ensure!(failed, "{program} does not fail: {:?}\n{said}", ran.code);
-    ensure!(
-        said.contains(message),
-        "{program} does not say `{message}`\n{said}"
-    );
-    Ok(())
-}
-
-/// What the programs for one, four and 64 macropixels take.
-fn memory(root: &Path, stack: u64) -> Result<Vec<Memory>> {
-    let mut memory = Vec::new();
-    for isa in ISAS {
-        let images = Images::build(root, isa, false)?;
-        for macropixels in [1, 4, 64] {
-            let sizes = images.sizes(&format!("stream-{macropixels}"))?;
-            memory.push(Memory {
-                isa,
-                macropixels,
-                sizes,
-                stack,
-            });
-        }
+    for message in messages {
+        ensure!(
+            said.contains(message),
+            "{program} does not say `{message}`\n{said}"
+        );
     }
-    Ok(memory)
-}
-
-/// Compares with the file, as far as was measured. The simulation gives the same cycle
-/// for cycle, so that nothing may differ.
-fn check(root: &Path, file: &str, header: &str, lines: &[String], options: &Options) -> Result<()> {
-    let text = fs::read_to_string(root.join(file)).with_context(|| file.to_owned())?;
-    let committed = text.strip_prefix(&format!("{header}\n"));
-    let committed = committed.with_context(|| format!("{file}: the header is not {header}"))?;
-    let measured = |line: &&str| {
-        let of = |core: &Core| line.starts_with(&format!("{},", name(*core)));
-        CORES
-            .iter()
-            .find(|core| of(core))
-            .is_none_or(|core| options.wants(*core))
-    };
-    let wanted: Vec<&str> = committed.lines().filter(measured).collect();
-    let differences = self_test::differences(&wanted.join("\n"), &lines.join("\n"));
-    for line in &differences {
-        println!("{line}");
-    }
-    ensure!(
-        differences.is_empty(),
-        "not what {file} says, see above; `cargo xtask softcore` writes it"
-    );
-    println!("{file}: {} lines as measured", lines.len());
     Ok(())
 }
 

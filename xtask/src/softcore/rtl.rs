@@ -7,9 +7,8 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 
-use super::photons::CLOCKS;
 use super::program::{self, Ran};
-use crate::tools::VERILATOR;
+use crate::tools::{VERILATOR, YOSYS};
 use crate::{python, target_folder};
 
 /// A processor as it is configured in `softcore/rtl`.
@@ -20,6 +19,8 @@ pub struct Core {
     pub isa: &'static str,
     /// The Python package with its Verilog.
     package: &'static str,
+    /// Whether it has a cache.
+    pub caches: bool,
 }
 
 /// All of them.
@@ -28,26 +29,31 @@ pub const CORES: [Core; 5] = [
         name: "vexriscv",
         isa: "rv32im",
         package: "pythondata_cpu_vexriscv",
+        caches: true,
     },
     Core {
         name: "ibex",
         isa: "rv32imc",
         package: "pythondata_cpu_ibex",
+        caches: false,
     },
     Core {
         name: "picorv32",
         isa: "rv32im",
         package: "pythondata_cpu_picorv32",
+        caches: false,
     },
     Core {
         name: "picorv32-rv32i",
         isa: "rv32i",
         package: "pythondata_cpu_picorv32",
+        caches: false,
     },
     Core {
         name: "serv",
         isa: "rv32i",
         package: "pythondata_cpu_serv",
+        caches: false,
     },
 ];
 
@@ -71,23 +77,76 @@ impl Simulator {
     }
 
     /// Runs an image for so many cycles at most.
-    pub fn run(&self, image: &Path, cycles: u64, stream: Option<&Path>) -> Result<Ran> {
-        let mut command = Command::new(&self.0);
-        command.arg(image).args(["--cycles", &cycles.to_string()]);
-        if let Some(stream) = stream {
-            command.arg("--stream").arg(stream);
-            command.args(["--clocks-per-laser-cycle", &CLOCKS.to_string()]);
+    pub fn run(&self, image: &Path, cycles: u64) -> Result<Ran> {
+        program::run(&mut self.command(image, cycles), PATIENCE)
+    }
+
+    /// The same with photons.
+    pub fn stream(&self, image: &Path, cycles: u64, laser: &Laser) -> Result<Ran> {
+        let mut command = self.command(image, cycles);
+        command.arg("--stream").arg(laser.photons);
+        for (option, number) in [
+            ("--clocks-per-laser-cycle", Laser::CLOCKS),
+            ("--acknowledge-after", laser.wait),
+        ] {
+            command.args([option, &number.to_string()]);
         }
         program::run(&mut command, PATIENCE)
     }
+
+    fn command(&self, image: &Path, cycles: u64) -> Command {
+        let mut command = Command::new(&self.0);
+        command.arg(image).args(["--cycles", &cycles.to_string()]);
+        command
+    }
 }
 
-/// Whether the FIFO does with random words what a model of it does.
+/// What sends photons, and what takes events.
+pub struct Laser<'a> {
+    /// Lines `laser cycle, macropixel, TDC code`.
+    pub photons: &'a Path,
+    /// Clock cycles until the link answers.
+    pub wait: u64,
+}
+
+impl Laser<'_> {
+    /// Clock cycles of a laser cycle: a laser of 10 MHz, a processor of 100 MHz.
+    pub const CLOCKS: u64 = 10;
+}
+
+/// Whether the FIFO does with random words what a model of it does, and its memory is
+/// block RAM and nothing else: of an iCE40, whose blocks have 4096 bits, that is four for
+/// its 512 words of 32.
 pub fn check_fifo(root: &Path) -> Result<()> {
     let test = verilate(root, "photon_fifo", "")?;
     let ran = program::run(&mut Command::new(test), PATIENCE)?;
     ensure!(ran.code == Some(0), "{}{}", ran.output, ran.errors);
-    println!("photon FIFO: as the model");
+    print!("{}", ran.output);
+
+    YOSYS.require()?;
+    let mut yosys = Command::new(YOSYS.program);
+    yosys.current_dir(root.join("softcore/rtl"));
+    yosys.args(["-q", "-p"]).arg(
+        "read_verilog photon_fifo.v; synth_ice40 -top photon_fifo; \
+         select -assert-count 4 t:SB_RAM40_4K; tee -o /dev/stdout stat",
+    );
+    let ran = program::run(&mut yosys, PATIENCE)?;
+    ensure!(
+        ran.code == Some(0),
+        "photon FIFO: not four block RAMs of an iCE40\n{}{}",
+        ran.output,
+        ran.errors
+    );
+    let cells = |name| {
+        let mut lines = ran.output.lines();
+        let line = lines.find(|line| line.trim_start().starts_with(name));
+        line.and_then(|line| line.split_whitespace().last()?.parse::<u32>().ok())
+    };
+    println!(
+        "photon FIFO: on an iCE40, block RAM: {}, lookup tables: {}",
+        cells("SB_RAM40").context("no count of block RAM")?,
+        cells("SB_LUT4").context("no count of lookup tables")?
+    );
     Ok(())
 }
 

@@ -10,29 +10,42 @@ use super::program::Ran;
 /// others.
 const CALL: &str = "call";
 
+/// What ends the name of an operation that a cache holds nothing of.
+pub const COLD: &str = "; cold";
+/// What ends the name of one that was done just before.
+const WARM: &str = "; warm";
+
 /// One figure of one processor.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Row {
     /// Core and instruction set, with a comma between.
     pub core: String,
+    /// Warm, if the name does not end with [`COLD`].
     pub operation: String,
     /// In hundredths.
     pub cycles: u64,
     /// In hundredths.
     pub instructions: u64,
+    /// Lines that the instruction cache filled, in hundredths.
+    pub code_lines: u64,
+    /// Lines that the data cache filled, in hundredths.
+    pub data_lines: u64,
 }
 
-pub const HEADER: &str = "core,isa,operation,cycles,instructions";
+pub const HEADER: &str = "core,isa,operation,cycles,instructions,code lines,data lines";
 
 /// A count of the testbench at a mark.
 #[derive(Clone, Copy, Debug, Default)]
 struct Count {
     cycle: u64,
     instructions: u64,
+    code: u64,
+    data: u64,
 }
 
-/// The operations of a run of the bench.
-pub fn rows(core: &str, ran: &Ran) -> Result<Vec<Row>> {
+/// The operations of a run of the bench: cold ones of a processor that has `caches`
+/// only; where there is none, both must be the same.
+pub fn rows(core: &str, caches: bool, ran: &Ran) -> Result<Vec<Row>> {
     let totals = totals(&ran.errors)?;
     let mut operations = Vec::new();
     for line in ran.output.lines() {
@@ -46,29 +59,54 @@ pub fn rows(core: &str, ran: &Ran) -> Result<Vec<Row>> {
             operations.push((index, times, name));
         }
     }
-    let &(first, times, CALL) = operations.first().context("no operations")? else {
-        anyhow::bail!("the first operation is not `{CALL}`");
-    };
-    let (call, calls) = totals.get(&first).context("no marks of the first")?;
-    ensure!(times == *calls, "{calls} marks for {times} calls");
-
+    let mut pairs = operations.chunks_exact(2);
+    let mut calls = [(Count::default(), 0); 2];
     let mut rows = Vec::new();
-    for &(index, times, name) in &operations[1..] {
-        let &(total, measured) = totals
-            .get(&index)
-            .with_context(|| format!("{name}: no marks"))?;
-        // A call of nothing takes the same every time but for the first, if at all.
-        let less = |total: u64, call: u64| {
-            let call = call * measured / calls;
-            (total.saturating_sub(call) * 100 + times / 2) / times.max(1)
+    for (number, pair) in pairs.by_ref().enumerate() {
+        let mut both = Vec::new();
+        for ((end, call), &(index, times, name)) in [COLD, WARM].iter().zip(&mut calls).zip(pair) {
+            let name = name.strip_suffix(end);
+            let name = name.with_context(|| format!("operation {index} is not{end}"))?;
+            let marks = totals.get(&index);
+            let &(total, measured) = marks.with_context(|| format!("{name}: no marks"))?;
+            if number == 0 {
+                ensure!(name == CALL, "the first operation is not `{CALL}`");
+                ensure!(times == measured, "{measured} marks for {times} calls");
+                *call = (total, measured);
+                continue;
+            }
+            let less = |of: fn(Count) -> u64| {
+                // In parts of a call of nothing, of which there may be more or fewer.
+                let parts = call.1.max(1);
+                let rest = (of(total) * parts).saturating_sub(of(call.0) * measured);
+                let times = times.max(1) * parts;
+                (rest * 100 + times / 2) / times
+            };
+            both.push(Row {
+                core: core.to_owned(),
+                operation: name.to_owned(),
+                cycles: less(|count| count.cycle),
+                instructions: less(|count| count.instructions),
+                code_lines: less(|count| count.code),
+                data_lines: less(|count| count.data),
+            });
+        }
+        let [cold, warm] = &mut both[..] else {
+            continue;
         };
-        rows.push(Row {
-            core: core.to_owned(),
-            operation: name.to_owned(),
-            cycles: less(total.cycle, call.cycle),
-            instructions: less(total.instructions, call.instructions),
-        });
+        if caches {
+            cold.operation += COLD;
+        } else {
+            ensure!(cold == warm, "without a cache: {cold:?}, {warm:?}");
+            both.remove(0);
+        }
+        rows.extend(both);
     }
+    ensure!(
+        pairs.remainder().is_empty() && !rows.is_empty(),
+        "{} operations, each of which is two",
+        operations.len()
+    );
     Ok(rows)
 }
 
@@ -91,6 +129,8 @@ fn totals(lines: &str) -> Result<BTreeMap<u64, (Count, u64)>> {
                 let (total, times) = totals.entry(before / 2).or_default();
                 total.cycle += count.cycle - start.cycle;
                 total.instructions += count.instructions - start.instructions;
+                total.code += count.code - start.code;
+                total.data += count.data - start.data;
                 *times += 1;
             }
         }
@@ -99,38 +139,98 @@ fn totals(lines: &str) -> Result<BTreeMap<u64, (Count, u64)>> {
     Ok(totals)
 }
 
-/// The rest of `mark N cycle C instructions I`.
+/// The rest of `mark N cycle C instructions I code C data D`.
 fn mark(rest: &str) -> Option<(u64, Count)> {
     let words: Vec<&str> = rest.split(' ').collect();
-    let [number, "cycle", cycle, "instructions", instructions] = words[..] else {
+    let [
+        number,
+        "cycle",
+        cycle,
+        "instructions",
+        instructions,
+        "code",
+        code,
+        "data",
+        data,
+    ] = words[..]
+    else {
         return None;
     };
     let count = Count {
         cycle: cycle.parse().ok()?,
         instructions: instructions.parse().ok()?,
+        code: code.parse().ok()?,
+        data: data.parse().ok()?,
     };
     Some((number.parse().ok()?, count))
 }
 
-/// The lines of the file.
-pub fn csv(rows: &[Row]) -> Vec<String> {
-    let line = |row: &Row| {
-        let (cycles, instructions) = (decimal(row.cycles), decimal(row.instructions));
-        format!("{},{},{cycles},{instructions}", row.core, row.operation)
-    };
-    rows.iter().map(line).collect()
+impl Row {
+    /// Its line of the file.
+    pub fn csv(&self) -> String {
+        let figures = [
+            self.cycles,
+            self.instructions,
+            self.code_lines,
+            self.data_lines,
+        ];
+        let figures = figures.map(decimal).join(",");
+        format!("{},{},{figures}", self.core, self.operation)
+    }
+
+    /// What a line of the file says.
+    pub fn parse(line: &str) -> Option<Self> {
+        let words: Vec<&str> = line.split(',').collect();
+        let [
+            core,
+            isa,
+            operation,
+            cycles,
+            instructions,
+            code_lines,
+            data_lines,
+        ] = words[..]
+        else {
+            return None;
+        };
+        Some(Self {
+            core: format!("{core},{isa}"),
+            operation: operation.to_owned(),
+            cycles: of_decimal(cycles)?,
+            instructions: of_decimal(instructions)?,
+            code_lines: of_decimal(code_lines)?,
+            data_lines: of_decimal(data_lines)?,
+        })
+    }
+
+    /// Cycles to be looked at.
+    pub fn cycles(&self) -> String {
+        format!("{:.1}", hundredths(self.cycles))
+    }
+
+    /// Instructions to be looked at.
+    pub fn instructions(&self) -> String {
+        format!("{:.1}", hundredths(self.instructions))
+    }
+
+    /// Lines of code and of data filled, to be looked at.
+    pub fn lines(&self) -> String {
+        format!(
+            "{:.0} + {:.0}",
+            hundredths(self.code_lines),
+            hundredths(self.data_lines)
+        )
+    }
 }
 
 fn decimal(hundredths: u64) -> String {
     format!("{}.{:02}", hundredths / 100, hundredths % 100)
 }
 
-impl Row {
-    /// Cycles, and in brackets instructions, to be looked at.
-    pub fn cell(&self) -> String {
-        let (cycles, instructions) = (hundredths(self.cycles), hundredths(self.instructions));
-        format!("{cycles:.1} ({instructions:.1})")
-    }
+fn of_decimal(text: &str) -> Option<u64> {
+    let (whole, part) = text.split_once('.')?;
+    let part = (part.len() == 2).then(|| part.parse::<u64>().ok())??;
+    Some(whole.parse::<u64>().ok()? * 100 + part)
 }
 
 #[allow(clippy::cast_precision_loss, reason = "to be looked at")]
@@ -150,32 +250,84 @@ mod tests {
         }
     }
 
-    const OUTPUT: &str = "operation 0 2 call\noperation 1 8 a: b\nstack 4\n";
+    const OUTPUT: &str = "\
+operation 0 1 call; cold
+operation 1 2 call; warm
+operation 2 4 a: b; cold
+operation 3 4 a: b; warm
+stack 4
+";
     const MARKS: &str = "\
-mark 1 cycle 10 instructions 1
-mark 2 cycle 15 instructions 3
-mark 3 cycle 20 instructions 4
-mark 4 cycle 70 instructions 30
-exit 0x0 cycle 80 instructions 40
-mark 1 cycle 90 instructions 50
-mark 2 cycle 95 instructions 52
+mark 1 cycle 10 instructions 1 code 0 data 0
+mark 2 cycle 40 instructions 3 code 2 data 4
+mark 3 cycle 50 instructions 4 code 2 data 4
+mark 4 cycle 55 instructions 6 code 2 data 4
+mark 3 cycle 60 instructions 7 code 2 data 4
+mark 4 cycle 65 instructions 9 code 2 data 4
+mark 5 cycle 70 instructions 9 code 2 data 4
+mark 6 cycle 150 instructions 31 code 6 data 12
+mark 7 cycle 160 instructions 31 code 6 data 12
+mark 8 cycle 201 instructions 53 code 6 data 12
+exit 0x0 cycle 250 instructions 60
 ";
 
     #[test]
-    fn takes_the_call_off_and_divides_by_the_times() {
-        let rows = rows("serv,rv32i", &ran(OUTPUT, MARKS)).unwrap();
-        assert_eq!(csv(&rows), ["serv,rv32i,a: b,5.63,3.00"]);
-        assert_eq!(rows[0].cell(), "5.6 (3.0)");
+    fn takes_a_call_of_the_same_kind_off_and_divides_by_the_times() {
+        let rows = rows("vexriscv,rv32im", true, &ran(OUTPUT, MARKS)).unwrap();
+        let lines: Vec<String> = rows.iter().map(Row::csv).collect();
+        assert_eq!(
+            lines,
+            [
+                "vexriscv,rv32im,a: b; cold,12.50,5.00,0.50,1.00",
+                "vexriscv,rv32im,a: b,9.00,5.00,0.00,0.00"
+            ]
+        );
+        for (row, line) in rows.iter().zip(&lines) {
+            assert_eq!(Row::parse(line).as_ref(), Some(row));
+        }
+        assert_eq!((&*rows[0].cycles(), &*rows[0].lines()), ("12.5", "0 + 1"));
+        for wrong in [
+            "",
+            "a,b,c,1,2,3",
+            "a,b,c,1.0,2.00,3.00",
+            "a,b,1.00,2.00,3.00",
+        ] {
+            assert_eq!(Row::parse(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_processor_without_a_cache_has_nothing_cold() {
+        let error = rows("serv,rv32i", false, &ran(OUTPUT, MARKS)).unwrap_err();
+        assert!(error.to_string().starts_with("without a cache"));
+        let same = "\
+mark 1 cycle 1 instructions 1 code 0 data 0
+mark 2 cycle 2 instructions 2 code 0 data 0
+mark 3 cycle 3 instructions 3 code 0 data 0
+mark 4 cycle 4 instructions 4 code 0 data 0
+mark 5 cycle 5 instructions 5 code 0 data 0
+mark 6 cycle 8 instructions 8 code 0 data 0
+mark 7 cycle 9 instructions 9 code 0 data 0
+mark 8 cycle 12 instructions 12 code 0 data 0
+";
+        let output = OUTPUT.replace("1 2 call", "1 1 call");
+        let rows = rows("serv,rv32i", false, &ran(&output, same)).unwrap();
+        let lines: Vec<String> = rows.iter().map(Row::csv).collect();
+        assert_eq!(lines, ["serv,rv32i,a: b,0.50,0.50,0.00,0.00"]);
     }
 
     #[test]
     fn marks_out_of_order_and_operations_without_marks_fail() {
-        let swapped = MARKS.replace("mark 3", "mark 2");
-        assert!(rows("", &ran(OUTPUT, &swapped)).is_err());
-        let unended = format!("{MARKS}mark 1 cycle 99 instructions 60\n");
-        assert!(rows("", &ran(OUTPUT, &unended)).is_err());
-        let more = format!("{OUTPUT}operation 2 1 c\n");
-        assert!(rows("", &ran(&more, MARKS)).is_err());
-        assert!(rows("", &ran("", MARKS)).is_err());
+        let rows = |output: &str, marks: &str| rows("", true, &ran(output, marks));
+        assert!(rows(OUTPUT, MARKS).is_ok());
+        assert!(rows(OUTPUT, &MARKS.replacen("mark 3", "mark 2", 1)).is_err());
+        let unended = format!("{MARKS}mark 1 cycle 999 instructions 60 code 6 data 12\n");
+        assert!(rows(OUTPUT, &unended).is_err());
+        let more = format!("{OUTPUT}operation 4 1 c; cold\noperation 5 1 c; warm\n");
+        assert!(rows(&more, MARKS).is_err());
+        let odd = OUTPUT.replace("operation 3 4 a: b; warm\n", "");
+        assert!(rows(&odd, MARKS).is_err());
+        assert!(rows(&OUTPUT.replace("call", "c"), MARKS).is_err());
+        assert!(rows("", MARKS).is_err());
     }
 }

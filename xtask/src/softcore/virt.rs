@@ -10,10 +10,12 @@ use super::program::{self, Ran};
 use crate::tools::QEMU_RISCV;
 
 /// Whatever ends, ends in a fraction of this.
-const PATIENCE: Duration = Duration::from_secs(5);
+pub const PATIENCE: Duration = Duration::from_secs(60);
+/// Time enough to print a line.
+pub const A_MOMENT: Duration = Duration::from_secs(5);
 
-/// Runs an image. What the instruction set has not is an illegal instruction.
-pub fn run(image: &Path, isa: &str) -> Result<Ran> {
+/// Runs an image, for so long. What the instruction set has not is an illegal instruction.
+pub fn run(image: &Path, isa: &str, limit: Duration) -> Result<Ran> {
     QEMU_RISCV.require()?;
     let letters = isa.trim_start_matches("rv32");
     let mut processor = "rv32,a=false,f=false,d=false".to_owned();
@@ -26,5 +28,5 @@ pub fn run(image: &Path, isa: &str) -> Result<Ran> {
     qemu.args(["-machine", "virt", "-cpu", &processor, "-bios", "none"]);
     qemu.args(["-display", "none", "-monitor", "none", "-serial", "stdio"]);
     qemu.arg("-kernel").arg(image);
-    program::run(&mut qemu, PATIENCE)
+    program::run(&mut qemu, limit)
 }

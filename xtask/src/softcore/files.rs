@@ -1,0 +1,207 @@
+//! The files with the figures, and how what is measured is compared with them.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+
+use super::document;
+use super::memory::Memory;
+use super::photons::Sustained;
+use super::table::{self, Row};
+
+const ROWS: &str = "docs/bench/softcore.csv";
+const PHOTONS: &str = "docs/bench/softcore-photons.csv";
+const MEMORY: &str = "docs/bench/softcore-bytes.csv";
+pub const DOCUMENT: &str = "docs/bench/softcore.md";
+
+/// Percent by which a figure may differ, more or less: a simulation gives the same cycle
+/// for cycle, but a change elsewhere may move code by a word.
+const PERCENT: f64 = 2.0;
+
+/// All figures.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Files {
+    pub rows: Vec<Row>,
+    pub photons: Vec<Sustained>,
+    pub memory: Vec<Memory>,
+}
+
+impl Files {
+    /// What the files say.
+    pub fn read(root: &Path) -> Result<Self> {
+        Ok(Self {
+            rows: lines(root, ROWS, table::HEADER, Row::parse)?,
+            photons: lines(root, PHOTONS, Sustained::HEADER, Sustained::parse)?,
+            memory: lines(root, MEMORY, Memory::HEADER, Memory::parse)?,
+        })
+    }
+
+    /// Writes the files and the document.
+    pub fn write(&self, root: &Path) -> Result<()> {
+        let document = document::text(&self.rows, &self.photons, &self.memory);
+        let [rows, photons, memory] = self.texts();
+        for (file, text) in [
+            (ROWS, rows),
+            (PHOTONS, photons),
+            (MEMORY, memory),
+            (DOCUMENT, document),
+        ] {
+            fs::write(root.join(file), text).context(file)?;
+            println!("{file}: written");
+        }
+        Ok(())
+    }
+
+    fn texts(&self) -> [String; 3] {
+        let text = |header: &str, lines: Vec<String>| format!("{header}\n{}\n", lines.join("\n"));
+        [
+            text(table::HEADER, self.rows.iter().map(Row::csv).collect()),
+            text(
+                Sustained::HEADER,
+                self.photons.iter().map(Sustained::csv).collect(),
+            ),
+            text(
+                Memory::HEADER,
+                self.memory.iter().map(Memory::csv).collect(),
+            ),
+        ]
+    }
+
+    /// Those of the processors that `wants` wants.
+    pub fn only(mut self, wants: impl Fn(&str) -> bool) -> Self {
+        self.rows.retain(|row| wants(&row.core));
+        self.photons.retain(|sustained| wants(&sustained.core));
+        self
+    }
+
+    /// What of `measured` is not as here. A stack that was not measured differs from none.
+    pub fn differences(&self, measured: &Self) -> Vec<String> {
+        let mut expected = self.clone();
+        for (expected, measured) in expected.memory.iter_mut().zip(&measured.memory) {
+            expected.stack = expected.stack.filter(|_| measured.stack.is_some());
+        }
+        let mut differences = Vec::new();
+        for (expected, measured) in expected.texts().iter().zip(&measured.texts()) {
+            let (mut expected, mut measured) = (expected.lines(), measured.lines());
+            loop {
+                match (expected.next(), measured.next()) {
+                    (None, None) => break,
+                    (Some(expected), Some(measured)) if is_near(expected, measured) => {}
+                    (expected, measured) => differences.push(format!(
+                        "- {}\n+ {}",
+                        expected.unwrap_or_default(),
+                        measured.unwrap_or_default()
+                    )),
+                }
+            }
+        }
+        differences
+    }
+
+    /// Compares `measured` with the files.
+    pub fn check(&self, measured: &Self) -> Result<()> {
+        let differences = self.differences(measured);
+        for difference in &differences {
+            println!("{difference}");
+        }
+        ensure!(
+            differences.is_empty(),
+            "not what {ROWS}, {PHOTONS} and {MEMORY} say, see above; `cargo xtask softcore` writes them"
+        );
+        println!(
+            "{ROWS}, {PHOTONS}, {MEMORY}: {} lines as measured, to {PERCENT} %",
+            measured.rows.len() + measured.photons.len() + measured.memory.len()
+        );
+        Ok(())
+    }
+}
+
+/// The lines of a file but for its header.
+fn lines<T>(root: &Path, file: &str, header: &str, parse: fn(&str) -> Option<T>) -> Result<Vec<T>> {
+    let text = fs::read_to_string(root.join(file)).context(file.to_owned())?;
+    let mut lines = text.lines();
+    ensure!(lines.next() == Some(header), "{file}: not headed {header}");
+    let parse = |line| parse(line).with_context(|| format!("{file}: what is `{line}`?"));
+    lines.map(parse).collect()
+}
+
+/// Whether two lines have the same words, and numbers that differ by little.
+fn is_near(a: &str, b: &str) -> bool {
+    let (a, b): (Vec<&str>, Vec<&str>) = (a.split(',').collect(), b.split(',').collect());
+    let is_near = |(a, b): (&&str, &&str)| match (a.parse::<f64>(), b.parse::<f64>()) {
+        (Ok(a), Ok(b)) => (a - b).abs() <= a.abs() * PERCENT / 100.0,
+        _ => a == b,
+    };
+    a.len() == b.len() && a.iter().zip(&b).all(is_near)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::image::Sizes;
+    use super::*;
+
+    #[test]
+    fn figures_may_differ_by_little() {
+        for (a, b, near) in [
+            ("a,100", "a,102", true),
+            ("a,100", "a,98", true),
+            ("a,100", "a,103", false),
+            ("a,100", "b,100", false),
+            ("a,100", "a,100,1", false),
+            ("a,0", "a,1", false),
+            ("a,", "a,", true),
+            ("a,", "a,1", false),
+        ] {
+            assert_eq!(is_near(a, b), near, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn what_was_not_measured_is_not_compared_and_all_else_is() {
+        let row = |core: &str, cycles| Row {
+            core: core.to_owned(),
+            operation: "o".to_owned(),
+            cycles,
+            instructions: 1,
+            code_lines: 0,
+            data_lines: 0,
+        };
+        let memory = |stack| Memory {
+            isa: "rv32i".to_owned(),
+            macropixels: 1,
+            sizes: Sizes { code: 9, data: 1 },
+            stack,
+        };
+        let files = Files {
+            rows: vec![row("a,x", 1000), row("b,x", 2000)],
+            photons: Vec::new(),
+            memory: vec![memory(Some(4))],
+        };
+        let of_a = files.clone().only(|core| core == "a,x");
+        let mut measured = Files {
+            rows: vec![row("a,x", 1010)],
+            photons: Vec::new(),
+            memory: vec![memory(None)],
+        };
+        assert!(of_a.check(&measured).is_ok());
+        assert_eq!(files.differences(&measured).len(), 1);
+        measured.rows[0].cycles = 1021;
+        assert!(of_a.check(&measured).is_err());
+        measured.rows[0].cycles = 1000;
+        measured.memory[0].stack = Some(5);
+        assert_eq!(of_a.differences(&measured).len(), 1);
+        measured.memory.clear();
+        assert_eq!(of_a.differences(&measured).len(), 1);
+    }
+
+    #[test]
+    fn the_files_are_read_as_they_are_written() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let files = Files::read(&root).unwrap();
+        let [rows, photons, memory] = files.texts();
+        for (file, text) in [(ROWS, rows), (PHOTONS, photons), (MEMORY, memory)] {
+            assert_eq!(fs::read_to_string(root.join(file)).unwrap(), text, "{file}");
+        }
+    }
+}

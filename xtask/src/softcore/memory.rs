@@ -1,0 +1,95 @@
+//! Bytes of the programs that take photons from the FIFO.
+
+use std::path::Path;
+
+use anyhow::Result;
+
+use super::ISAS;
+use super::image::{Images, Sizes};
+
+/// Macropixels of the programs.
+pub const MACROPIXELS: [u8; 3] = [1, 4, 64];
+
+/// Of the program for so many macropixels of an instruction set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Memory {
+    pub isa: String,
+    pub macropixels: u8,
+    pub sizes: Sizes,
+    /// If a processor of that instruction set was run.
+    pub stack: Option<u64>,
+}
+
+/// What the stack was, by instruction set and macropixels.
+pub type Stacks = Vec<(&'static str, u8, u64)>;
+
+impl Memory {
+    pub const HEADER: &str = "isa,macropixels,code and constants,data,stack";
+
+    /// Of all of them.
+    pub fn of_all(root: &Path, stacks: &Stacks) -> Result<Vec<Self>> {
+        let mut all = Vec::new();
+        for isa in ISAS {
+            let images = Images::build(root, isa, false)?;
+            for macropixels in MACROPIXELS {
+                let stacks = stacks
+                    .iter()
+                    .filter(|&&(of, pixels, _)| (of, pixels) == (isa, macropixels));
+                all.push(Self {
+                    isa: isa.to_owned(),
+                    macropixels,
+                    sizes: images.sizes(&format!("stream-{macropixels}"))?,
+                    stack: stacks.map(|&(.., stack)| stack).max(),
+                });
+            }
+        }
+        Ok(all)
+    }
+
+    /// Its line of the file.
+    pub fn csv(&self) -> String {
+        let Self {
+            isa,
+            macropixels,
+            sizes: Sizes { code, data },
+            stack,
+        } = self;
+        let stack = stack.map(|stack| stack.to_string()).unwrap_or_default();
+        format!("{isa},{macropixels},{code},{data},{stack}")
+    }
+
+    /// What a line of the file says.
+    pub fn parse(line: &str) -> Option<Self> {
+        let words: Vec<&str> = line.split(',').collect();
+        let [isa, macropixels, code, data, stack] = words[..] else {
+            return None;
+        };
+        Some(Self {
+            isa: isa.to_owned(),
+            macropixels: macropixels.parse().ok()?,
+            sizes: Sizes {
+                code: code.parse().ok()?,
+                data: data.parse().ok()?,
+            },
+            stack: match stack {
+                "" => None,
+                stack => Some(stack.parse().ok()?),
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_the_file_is_read_as_it_is_written() {
+        for line in ["rv32i,64,100,20,7", "rv32im,1,100,20,"] {
+            assert_eq!(Memory::parse(line).unwrap().csv(), line);
+        }
+        for wrong in ["rv32i,64,100,20", "rv32i,64,100,x,7", "rv32i,64,100,20,x"] {
+            assert_eq!(Memory::parse(wrong), None);
+        }
+    }
+}
