@@ -496,6 +496,23 @@ fn what_is_recorded_is_what_is_printed_also_when_the_device_is_gone() {
 }
 
 #[test]
+fn a_device_that_refuses_leaves_an_older_recording_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("events.aer");
+    std::fs::write(&file, b"older").unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_dtof"))
+        .args(["monitor", "--device"])
+        .arg(device(false, Duration::from_secs(60)))
+        .arg("--record")
+        .arg(&file)
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    assert_eq!(std::fs::read(&file).unwrap(), b"older");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
 fn the_command_prints_rows_and_says_when_the_device_is_gone() {
     let run = |lives, seconds| {
         let name = device(true, Duration::from_millis(lives));

@@ -152,8 +152,12 @@ impl Monitor {
             },
         )
         .with_context(name);
-        // What came before a device was gone is kept.
-        let recorded = recording.map_or(Ok(()), Recording::finish);
+        let finish = if monitored.is_ok() {
+            Recording::finish
+        } else {
+            Recording::finish_after_failure
+        };
+        let recorded = recording.map_or(Ok(()), finish);
         monitored.and(recorded)
     }
 }

@@ -1,5 +1,6 @@
 //! The events of a device as an AER file.
 
+use std::fs;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
@@ -15,6 +16,7 @@ pub struct Recording {
     aer: Writer<BufWriter<NamedTempFile>>,
     path: PathBuf,
     aside: PathBuf,
+    is_empty: bool,
 }
 
 impl Recording {
@@ -31,6 +33,7 @@ impl Recording {
             aside: file.path().to_owned(),
             aer: Writer::new(BufWriter::new(file), header).with_context(name)?,
             path: place.file,
+            is_empty: true,
         })
     }
 
@@ -42,8 +45,22 @@ impl Recording {
         for event in events {
             let written = self.aer.write(event);
             written.with_context(|| self.path.display().to_string())?;
+            self.is_empty = false;
         }
         Ok(())
+    }
+
+    /// Ends the file after a failure: what came before is kept, and if nothing came, so is
+    /// what was at its place.
+    ///
+    /// # Errors
+    /// Those of [`Recording::finish`], or if the file cannot be removed.
+    pub fn finish_after_failure(self) -> Result<()> {
+        if !self.is_empty {
+            return self.finish();
+        }
+        drop(self.aer);
+        fs::remove_file(&self.aside).with_context(|| self.aside.display().to_string())
     }
 
     /// Ends the file and moves it to its place.
@@ -51,7 +68,9 @@ impl Recording {
     /// # Errors
     /// If the disk does not take it; says where the events are then.
     pub fn finish(self) -> Result<()> {
-        let Self { aer, path, aside } = self;
+        let Self {
+            aer, path, aside, ..
+        } = self;
         let moved = || -> Result<()> {
             let file = flushed(aer.finish()?)?;
             file.persist(&path).map_err(|error| error.error)?;
@@ -66,8 +85,6 @@ impl Recording {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
     use dtof_core::fixed::types::{I24F8, U16F16};
 
     use super::*;
