@@ -1,10 +1,10 @@
 //! Pixels that watch the same photons until each has had its event.
 
 use anyhow::{Result, ensure};
-use dtof_core::fixed::types::U8F8;
+use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
 use dtof_core::{
-    AnyRule, BinPosition, Count, DepthEstimator, Histogram, PaperRule, RangeGate, WindowRule,
-    detect, z_for,
+    AnyRule, BinPosition, Count, DepthEstimator, DetectionRule, Histogram, PaperRule, Peak,
+    RangeGate, WindowRule, detect, z_for,
 };
 use rand_pcg::Pcg64;
 
@@ -80,8 +80,17 @@ pub struct Event {
     pub signal: u64,
     /// The highest bin.
     pub peak: u16,
-    /// Where the pulse lies, in 1/256 bin from the start of bin 0, by each estimator.
-    pub positions: [i32; 2],
+    /// Where the pulse lies, in 1/256 bin from the start of bin 0, by each estimator of
+    /// [`ESTIMATORS`](super::ESTIMATORS).
+    pub positions: [i32; 3],
+}
+
+/// A bin's, outside a window of five.
+fn mean_background(histogram: &Histogram<BINS>, peak: Peak) -> U24F8 {
+    // Any excess is a detection: only the background is wanted.
+    let rule = WindowRule::new(5, U4F12::ZERO, Count::default());
+    let background = rule.map(|rule| rule.detect(histogram, &RangeGate::full(), peak));
+    background.ok().flatten().unwrap_or_default()
 }
 
 /// One exposure of the same photons for all `pixels`, with the events of those that have
@@ -133,12 +142,18 @@ pub fn exposure(
             let [Some(mass), Some(centred)] = estimators.each_ref().map(detect) else {
                 continue;
             };
+            let background = mean_background(&histogram, mass.peak);
+            let with_mean = estimators[1].estimate(&histogram, &gate, mass.peak, background);
             let position = |offset| BinPosition::of(mass.peak.bin, offset).raw();
             *event = Some(Event {
                 cycles,
                 signal,
                 peak: mass.peak.bin.raw(),
-                positions: [mass, centred].map(|found| position(found.depth.offset)),
+                positions: [
+                    position(mass.depth.offset),
+                    position(centred.depth.offset),
+                    position(with_mean.offset),
+                ],
             });
         }
         events.iter().all(Option::is_some)
