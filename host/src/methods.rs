@@ -11,7 +11,6 @@ use anyhow::{Context, Result};
 
 pub use self::recorded::RECORDED;
 use self::recorded::recorded;
-
 use crate::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
 use crate::sweep::mean::Measured;
 use crate::sweep::studies::depth_error::{self, Method as Estimator};

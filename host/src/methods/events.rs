@@ -20,8 +20,7 @@ fn better<'a>(outcomes: impl Iterator<Item = &'a Outcome>, number: usize) -> usi
     those.count()
 }
 
-/// From the least to the largest mean square root error of the second estimator over the
-/// first's.
+/// From the least to the largest error of the estimator of this number over the first's.
 fn range<'a>(outcomes: impl Iterator<Item = &'a Outcome>, number: usize) -> (f64, f64) {
     let ratios = outcomes.map(|outcome| {
         let [first, second] = [0, number].map(|number| outcome.placed[number].error.value);
@@ -56,6 +55,14 @@ pub(super) fn section(text: &mut String, part: &Part) -> Result<()> {
         )
     });
     let (low, high) = range(of(&outcomes, true), 2);
+    let bounds = |is_paper, number: usize| {
+        let all =
+            of(&outcomes, is_paper).map(move |outcome| outcome.placed[number].over_bound.value);
+        let (least, most) = all.fold((f64::INFINITY, 0.0f64), |(least, most), of| {
+            (of.min(least), of.max(most))
+        });
+        format!("{least:.2} to {most:.2}")
+    };
     write!(
         text,
         "\n## Which estimator for events as they come\n\n\
@@ -67,18 +74,21 @@ pub(super) fn section(text: &mut String, part: &Part) -> Result<()> {
          in 100 exposures: counts are whole, so that no α gives exactly that. False events are of exposures without a\n\
          target, {:.1} to {:.1} %. Errors are of events whose peak is within 2 σ + 1 bins, {:.1} % of them or more; cycles and signal\n\
          photons are their means. The bound is that of a fixed exposure with these mean counts, averaged over positions in a\n\
-         bin: events are chosen by what they hold and may lie below it, the least at {bound:.2}. The better estimator is so\n\
+         bin: events are chosen by what they hold and may lie below it; the least is at {bound:.2}. The better estimator is so\n\
          for sure, event by event; where either may be, none is named.\n\n\
          Centred window with the paper's rule: {paper}.\n\
          With the window rule: {window}.\n\n\
          What spoils the window with the paper's rule is the background, not the choice of events: that rule's is the highest bin of\n\
          a quadrant, counts above the mean. The window takes it from all its bins, so that too few photons are left to divide\n\
          by, and its steps go too far. With the mean outside a window of 5, which no option chooses, its error on the same events\n\
-         is {low:.2} to {high:.2} times that of the centre of mass (last column).\n\n\
+         is {low:.2} to {high:.2} times that of the centre of mass (last column), and {} times the bound. The window rule's\n\
+         background is such a mean: with it the centred window is at {} times the bound.\n\n\
          ![Depth error of events](figures/event-depth.svg)\n",
         100.0 * least(&mut false_shares.clone()),
         100.0 * most_false,
         100.0 * in_pulse,
+        bounds(true, 2),
+        bounds(false, 1),
     )?;
     for first in FIRST_LOOKS {
         let those = outcomes
@@ -96,7 +106,7 @@ fn table<'a>(
 ) -> Result<()> {
     write!(
         text,
-        "\nFirst look after {first_look} laser cycles; errors in bins:\n\n\
+        "\nFirst look after {first_look} laser cycles; root mean square errors in bins:\n\n\
          | pulse σ, bins | background a bin and cycle | rule | α or z | false events, % | exposures with an event, % | cycles | photons | centre of mass of 3 | over the bound | centred window | over the bound | better | centred, mean background |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n"
     )?;
