@@ -14,7 +14,9 @@ use std::time::Duration;
 use anyhow::{Context, Result, ensure};
 
 use crate::sweep::results::Results;
-use crate::sweep::studies::{depth_error, failures::STUDY as FAILURES, time_to_detect};
+use crate::sweep::studies::{
+    depth_error, event_depth, failures::STUDY as FAILURES, time_to_detect,
+};
 use crate::sweep::{self, Part, SeedRange, Study, studies};
 use crate::{failures, methods};
 
@@ -80,13 +82,19 @@ pub fn documents(
         }
     }
     let part = |study: Study| parts.get(study.name).context(study.name);
-    let [time, depth] = [time_to_detect::STUDY, depth_error::STUDY].map(part);
+    let used = [
+        time_to_detect::STUDY,
+        depth_error::STUDY,
+        event_depth::STUDY,
+    ];
+    let [time, depth, events] = used.map(part);
     let read = |path| {
         let path = docs.join(path);
         fs::read_to_string(&path).with_context(|| path.display().to_string())
     };
     let (counts, recorded) = (read(methods::INSTRUCTIONS)?, read(methods::RECORDED)?);
-    documents.extend(methods::documents(&counts, &recorded, time?, depth?)?);
+    let methods = methods::documents(&counts, &recorded, time?, depth?, events?)?;
+    documents.extend(methods);
     let failures = failures::document(part(FAILURES)?)?;
     documents.push(("failures.md".into(), failures));
     documents.push(("figures/README.md".into(), captions(&all)?));

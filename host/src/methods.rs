@@ -1,6 +1,7 @@
 //! Which method for which scene: what the studies of time and error found, against
 //! the instructions it takes.
 
+mod events;
 mod recorded;
 mod tables;
 
@@ -10,7 +11,6 @@ use anyhow::{Context, Result};
 
 pub use self::recorded::RECORDED;
 use self::recorded::recorded;
-
 use crate::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
 use crate::sweep::mean::Measured;
 use crate::sweep::studies::depth_error::{self, Method as Estimator};
@@ -236,6 +236,7 @@ pub fn documents(
     recorded_rules: &str,
     time: &Part,
     depth: &Part,
+    events: &Part,
 ) -> Result<Vec<(PathBuf, String)>> {
     let counts = Instructions(instructions);
     let outcomes = time_to_detect::outcomes(time)?;
@@ -263,7 +264,7 @@ pub fn documents(
         ["sigma", "signal", "background"].map(|name| worst.parameter(name));
     let mut text = format!(
         "# Which method for which scene\n\n\
-         Made by `cargo xtask figures` from the studies `time-to-detect` and `depth-error` and from the\n\
+         Made by `cargo xtask figures` from the studies `time-to-detect`, `depth-error` and `event-depth` and from the\n\
          [instruction counts](bench/README.md); do not edit. The tables name the cheapest method whose 99 % interval\n\
          ends no more than {:.0} % above the best one's figure, or the best.\n\n\
          ## What it costs\n\n\
@@ -283,6 +284,7 @@ pub fn documents(
     );
     tables::decision(&mut text, &counts, &outcomes)?;
     tables::depth(&mut text, &counts, depth)?;
+    events::section(&mut text, events)?;
     Ok(vec![
         ("figures/cost-time-to-detect.svg".into(), decision_svg),
         ("figures/cost-depth-error.svg".into(), depth_svg),

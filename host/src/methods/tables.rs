@@ -62,7 +62,8 @@ pub(super) fn depth(text: &mut String, counts: &Instructions, part: &Part) -> Re
     text.push_str(
         "\n## Which depth estimator\n\n\
          By the standard deviation of the pulse, the background and the signal photons of an event, with the error over\n\
-         the Cramér-Rao bound, in histograms of a fixed exposure. The background is the mean outside a window of 5; the paper's is\n\
+         the Cramér-Rao bound, in histograms of a fixed exposure; [below](#which-estimator-for-events-as-they-come) are the events\n\
+         that a rule has chosen. The background is the mean outside a window of 5; the paper's is\n\
          from its quadrants. `--sigma-bins` with the σ of the estimator takes a centred window, and leaving it out the centre\n\
          of mass of 3, its background that of the rule. A background a bin is that of a bin and cycle times the event's\n\
          exposure.\n\

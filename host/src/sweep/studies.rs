@@ -3,6 +3,7 @@
 pub mod depth_error;
 pub mod depth_step;
 pub mod dynamic_depth;
+pub mod event_depth;
 pub mod failures;
 pub mod false_events;
 pub mod false_rate;
@@ -41,6 +42,7 @@ pub const ALL: &[Study] = &[
     false_rate::STUDY,
     time_to_detect::STUDY,
     depth_error::STUDY,
+    event_depth::STUDY,
     failures::STUDY,
 ];
 

@@ -21,7 +21,7 @@ pub const LOOKS: Looks = Looks {
     last: 249,
 };
 /// The fewest photons of an event, in the peak or in the window.
-const MINIMUM_COUNT: u32 = 5;
+pub const MINIMUM_COUNT: u32 = 5;
 
 /// What decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
