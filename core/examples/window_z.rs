@@ -57,7 +57,7 @@ fn simulate(seed: u64, exposures: usize) -> Vec<[[f64; WIDTHS.len()]; POWERS]> {
                     total += photons;
                 }
                 for (highest, width) in highest.iter_mut().zip(WIDTHS) {
-                    *highest = z_reached(&counts, total, width).max(*highest);
+                    *highest = z_reached(&counts, total, width, *highest);
                 }
                 looks += 1;
             }
@@ -79,21 +79,30 @@ fn poisson_of_one(rng: &mut Pcg64Mcg) -> u32 {
     count
 }
 
-/// The z at which the window rule just fires.
-fn z_reached(counts: &[u32; BINS], total: u32, width: usize) -> f64 {
+/// The z at which the window rule just fires, or `reached` if that is higher.
+fn z_reached(counts: &[u32; BINS], total: u32, width: usize, reached: f64) -> f64 {
     let peak = (0..BINS).max_by_key(|&bin| (counts[bin], BINS - bin));
     let peak = peak.unwrap_or(0);
     let starts = (peak + 1).saturating_sub(width)..=peak.min(BINS - width);
     let sums = starts.map(|start| counts[start..start + width].iter().sum::<u32>());
-    let inside = sums.max().unwrap_or(0);
-    let [bins, w, inside, total] = [BINS as f64, width as f64, inside.into(), total.into()];
-    let outside_bins = bins - w;
-    let above = bins * inside - w * total;
-    let variance = outside_bins * w * total;
-    let skew = (outside_bins - w) / 6.0;
-    // above = z·√variance + z²·skew
-    let discriminant = (variance + 4.0 * skew * above.max(0.0)).sqrt();
-    (discriminant - variance.sqrt()) / (2.0 * skew)
+    let inside = f64::from(sums.max().unwrap_or(0));
+    let share = width as f64 / BINS as f64;
+    let mean = f64::from(total) * share;
+    let variance = mean * (1.0 - share);
+    let fires = |z: f64| {
+        let skew = z * z / 6.0 * (1.0 - 2.0 * share);
+        inside > mean + z * variance / (variance + z * z / 36.0).sqrt() + skew
+    };
+    let (mut low, mut high) = (reached, 16.0);
+    while fires(low) && high - low > 1e-6 {
+        let middle = f64::midpoint(low, high);
+        if fires(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
 }
 
 /// The share of a normal distribution above `z`.

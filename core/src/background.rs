@@ -18,9 +18,20 @@
 //! assert_eq!(level.raw(), 4);
 //! ```
 
+use fixed::types::U24F8;
+
 use crate::gate::RangeGate;
 use crate::photon_count::PhotonCount;
 use crate::units::{BinIndex, Count};
+
+/// The mean of `photons` in so many `bins`, in 1/256 rounded down; `None` of no bins.
+#[inline(always)]
+pub(crate) fn mean(photons: u32, bins: u32) -> Option<U24F8> {
+    let whole = photons.checked_div(bins)?;
+    // Less than 2¹⁰ bins, so that the rest fits.
+    let rest = (photons.wrapping_sub(whole.wrapping_mul(bins)) << 8).checked_div(bins)?;
+    Some(U24F8::from_bits((whole << 8) + rest))
+}
 
 /// The paper's quadrant estimate over the gated bins.
 ///

@@ -27,7 +27,8 @@ impl DepthEstimator {
         Self::CentredWindow(CentredWindow::for_pulse(sigma))
     }
 
-    /// The depth of `peak`, less the `background` a bin.
+    /// The depth of `peak`, less the `background` a bin, which is that of the rule. A
+    /// [`CentredWindow`] has its own, if the gate leaves a bin for it.
     #[inline(always)]
     #[must_use]
     pub fn estimate<const BINS: usize, W: CounterWidth>(
@@ -39,7 +40,10 @@ impl DepthEstimator {
     ) -> Depth {
         match self {
             Self::CentreOfMass3 => centre_of_mass(histogram, gate, peak, background),
-            Self::CentredWindow(window) => window.estimate(histogram, gate, peak, background),
+            Self::CentredWindow(window) => {
+                let outside = window.background_outside(histogram, gate, peak);
+                window.estimate(histogram, gate, peak, outside.unwrap_or(background))
+            }
         }
     }
 }

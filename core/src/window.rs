@@ -4,11 +4,14 @@
 //! hold the peak bin the one with most, the peak is a detection if
 //!
 //! ```text
-//! S > Tp + z·√(Tp·(1 - p)) + z²/6·(1 - 2p)     p = w/B
+//! S > Tp + z·V/√(V + z²/36) + z²/6·(1 - 2p)     p = w/B     V = Tp·(1 - p)
 //! ```
 //!
 //! the last term at least 0. That is the binomial distribution of `T` photons that fall
-//! into every bin alike: mean, standard deviation and the skew of small counts. What the
+//! into every bin alike: its mean, `z` standard deviations `√V`, and two corrections for
+//! small counts, whose distribution is skew. They are those of Cornish and Fisher, `z²/6` and
+//! `-z³/(72·√V)`; the second stands in the form that fits below one photon as well, where the
+//! series does not. What the
 //! background is need not be known, so that one `z` gives the same rate of false events
 //! from fractions of a count a bin to hundreds, for every width and from 8 bins on, where
 //! the α of the paper's rule has to follow the background. The total of the histogram is
@@ -17,10 +20,11 @@
 //! With `n = B - w` bins outside, multiplied by `B` and squared, this is
 //!
 //! ```text
-//! (B·S - w·T - z²/6·(n - w))² > z²·n·w·T      if what is squared is positive
+//! (B·S - w·T - z²/6·(n - w))² > z²·N²/(N + c)     N = n·w·T     c = z²/36·B²
 //! ```
 //!
-//! without a division or a root.
+//! if what is squared is positive, without a root. As the right side is at least `z²·(N - c)`, its
+//! division is only done where that is exceeded.
 //!
 //! ```
 //! use dtof_core::fixed::types::U4F12;
@@ -40,6 +44,7 @@ use core::fmt;
 
 use fixed::types::{U4F12, U8F8, U24F8};
 
+use crate::background;
 use crate::gate::RangeGate;
 use crate::histogram::{CounterWidth, Histogram};
 use crate::peak::Peak;
@@ -78,8 +83,8 @@ impl WindowRule {
     /// [`Self::width_for_pulse`] says which width suits the pulse.
     ///
     /// Where the window takes half of the `B` gated bins or more, it needs more than
-    /// `z²·width/(B - width)` photons even without any background, which is many where it
-    /// leaves few bins: with 7 of 8 and z 4 more than 112.
+    /// `z²·(width/(B - width) - B²/(36·width·(B - width)))` photons even without any
+    /// background, which is many where it leaves few bins: with 7 of 8 and z 4 more than 107.
     ///
     /// # Errors
     /// [`WindowWidthError`] unless `width` is 1 to [`Self::MAX_WIDTH`].
@@ -187,16 +192,26 @@ impl DetectionRule for WindowRule {
             // Its square is then above any variance.
             u32::try_from(above).unwrap_or(u32::MAX)
         };
-        // At most 8 + 3 + 32 + 16 bits, or 10 + 3 + 26 + 16.
-        let variance = u64::from(bins_outside * width)
-            * u64::from(histogram.total())
-            * u64::from(z_squared >> 16);
-        if above == 0 || u64::from(above) * u64::from(above) <= variance {
+        // At most 8 + 3 + 32 bits, or 10 + 3 + 26; with z² 16 more.
+        let spread = u64::from(bins_outside * width) * u64::from(histogram.total());
+        let exceeds =
+            |spread: u64| u64::from(above) * u64::from(above) > spread * u64::from(z_squared >> 16);
+        // 20 + 12 bits, and after the division 23.
+        let most = bins * bins * (z_squared >> 20) / (36 << 4);
+        if above == 0 || !exceeds(spread.saturating_sub(most.into())) {
+            return None;
+        }
+        // N/(N + c) of the upper 16 bits, in 1/2¹⁶.
+        let sum = spread + u64::from(most);
+        let shift = u64::BITS - (sum >> 16).leading_zeros();
+        #[allow(clippy::cast_possible_truncation, reason = "16 bits")]
+        let [sum, part] = [sum >> shift, spread >> shift].map(|value| value as u32);
+        let part = (part << 16).checked_div(sum)?;
+        // 43 + 16 bits, or 39 + 17.
+        if !exceeds((spread * u64::from(part)) >> 16) {
             return None;
         }
         let outside = histogram.total().wrapping_sub(inside);
-        let whole = outside.checked_div(bins_outside)?;
-        let rest = ((outside - whole * bins_outside) << 8).checked_div(bins_outside)?;
-        Some(U24F8::from_bits((whole << 8) + rest))
+        background::mean(outside, bins_outside)
     }
 }

@@ -248,3 +248,32 @@ proptest! {
         prop_assert_eq!(wide.offset, narrow.offset);
     }
 }
+
+/// Of every peak and gate, and widths from the least to the largest.
+#[test]
+fn the_background_outside_is_the_mean_of_the_bins_not_reached() {
+    let counts: [u32; BINS] = std::array::from_fn(|bin| (bin as u32 * 7919) % 101);
+    for (first, last) in [(0, 31), (0, 7), (5, 13), (24, 31), (3, 30)] {
+        let gate = RangeGate::<BINS>::new(first, last).unwrap();
+        let mut histogram = Histogram::<BINS>::new();
+        histogram.add_frame(&counts, &gate);
+        for half_width in [256, 257, 512, 640, 1024] {
+            for bin in 0..BINS {
+                let window = window(half_width);
+                let found = window.background_outside(&histogram, &gate, peak(&counts, bin));
+                let reach = usize::from(half_width.div_ceil(256));
+                let gated = usize::from(first)..=usize::from(last);
+                let outside = gated.clone().filter(|other| other.abs_diff(bin) > reach);
+                let (mut sum, mut bins) = (0, 0);
+                for other in outside {
+                    sum += counts[other];
+                    bins += 1;
+                }
+                let mean = (sum << 8).checked_div(bins).map(U24F8::from_bits);
+                if gated.contains(&bin) {
+                    assert_eq!(found, mean, "{first} to {last}, {half_width}, {bin}");
+                }
+            }
+        }
+    }
+}

@@ -41,9 +41,10 @@ fn as_written<const BINS: usize, W: CounterWidth>(
 ) -> Option<U24F8> {
     let width = rule.width();
     let (inside, outside, bins) = window(histogram, gate, width.into());
-    // 1/4096 squared; z²/6 in 1/16 and z² in 1/256, rounded down.
+    // 1/4096 squared; z²/6 and z²/36·B² from 1/16, and z² in 1/256, rounded down.
     let z_squared = i128::from(rule.z().to_bits()).pow(2);
-    let (skew, z_squared) = ((z_squared / 6) >> 20, z_squared >> 16);
+    let (skew, sixteenths) = ((z_squared / 6) >> 20, z_squared >> 20);
+    let z_squared = z_squared >> 16;
     let (s, r, n, w) = (
         i128::from(inside),
         i128::from(outside),
@@ -51,22 +52,44 @@ fn as_written<const BINS: usize, W: CounterWidth>(
         i128::from(width),
     );
     let above = 16 * (n * s - w * r) - (n - w).max(0) * skew;
-    let clear = above > 0 && above.pow(2) > z_squared * n * w * (s + r);
+    // N/(N + c) of the upper 16 bits, in 1/2¹⁶ and rounded down.
+    let spread = n * w * (s + r);
+    let sum = spread + (n + w).pow(2) * sixteenths / (36 * 16);
+    let shift = (0..).find(|&shift| sum >> shift < 1 << 16).unwrap();
+    let part = ((spread >> shift) << 16).checked_div(sum >> shift);
+    let less = (spread * part.unwrap_or(0)) >> 16;
+    let clear = above > 0 && above.pow(2) > z_squared * less;
 
     #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
     let (inside_real, total) = (inside as f64, (inside + outside) as f64);
     #[allow(clippy::cast_precision_loss, reason = "at most 1024")]
     let share = f64::from(width) / (bins + u64::from(width)) as f64;
-    let deviation = (total * share * (1.0 - share)).sqrt();
+    let variance = total * share * (1.0 - share);
     let z = rule.z().to_num::<f64>();
-    let level = total * share + z * deviation + (1.0 - 2.0 * share).max(0.0) * z * z / 6.0;
-    // Two roundings: the skew's, and that of z².
-    let tolerance = 0.0626 + deviation * (z - (z * z - 1.0 / 256.0).max(0.0).sqrt());
-    if inside_real > level + 1e-6 * level {
-        assert!(clear, "{inside_real} {level}");
+    let skew = (1.0 - 2.0 * share).max(0.0) * z * z / 6.0;
+    let level = |z: f64, spread: f64| total * share + skew + z * spread.max(0.0).sqrt();
+    let spread = |c: f64| {
+        let sum = variance + c;
+        if sum > 0.0 {
+            variance * variance / sum
+        } else {
+            0.0
+        }
+    };
+    // z² and its sixth, 1/36 and N²/(N + c) are rounded down, the last by 1 and, as the upper
+    // bits alone are divided, by variance/2¹⁵.
+    let c = z * z / 36.0;
+    let exact = level(z, spread(c));
+    let z_low = (z * z - 1.0 / 256.0).max(0.0).sqrt();
+    let unit = 1.0 / ((bins + u64::from(width)) as f64).powi(2);
+    let low = level(z_low, spread(c) - variance / 32_768.0 - unit) - 0.0626;
+    let c_low = (c - 1.0 / (36.0 * 16.0) - unit).max(0.0);
+    let high = level(z, spread(c_low) + variance / 32_768.0);
+    if inside_real > high + 1e-6 * high {
+        assert!(clear, "{inside_real} {exact}");
     }
-    if inside_real < level - tolerance - 1e-6 * level {
-        assert!(!clear, "{inside_real} {level}");
+    if inside_real < low - 1e-6 * low {
+        assert!(!clear, "{inside_real} {exact}");
     }
     let fires = clear && inside >= u64::from(rule.minimum_count().raw());
     fires.then(|| U24F8::from_bits(((outside << 8) / bins) as u32))
@@ -174,7 +197,7 @@ fn an_empty_histogram_is_no_detection() {
 #[test]
 fn a_window_of_most_bins_needs_many_photons() {
     let rule = WindowRule::new(7, U4F12::lit("4"), Count::default()).unwrap();
-    for (photons, expected) in [(112, false), (113, true)] {
+    for (photons, expected) in [(107, false), (108, true)] {
         let mut histogram = Histogram::<8>::new();
         histogram.add_batch(&vec![3; photons]);
         let gate = RangeGate::full();

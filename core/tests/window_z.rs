@@ -91,8 +91,8 @@ const LOOKS: Looks = Looks {
 #[test]
 fn from_half_a_photon_a_bin_to_two_hundred() {
     for background in [0.01, 0.03, 0.1, 0.2] {
-        for width in [2, 3, 5] {
-            check::<128>(LOOKS, 100, width, background, 3000, 0.4);
+        for width in [1, 2, 3, 5, 7] {
+            check::<128>(LOOKS, 100, width, background, 3000, 0.6);
         }
     }
 }

@@ -78,16 +78,16 @@ pub(super) fn section(text: &mut String, part: &Part) -> Result<()> {
          for sure, event by event; where either may be, none is named.\n\n\
          Centred window with the paper's rule: {paper}.\n\
          With the window rule: {window}.\n\n\
-         What spoils the window with the paper's rule is the background, not the choice of events: that rule's is the highest bin of\n\
-         a quadrant, counts above the mean. The window takes it from all its bins, so that too few photons are left to divide\n\
-         by, and its steps go too far. With the mean outside a window of 5, which no option chooses, its error on the same events\n\
-         is {low:.2} to {high:.2} times that of the centre of mass (last column), and {} times the bound. The window rule's\n\
-         background is such a mean: with it the centred window is at {} times the bound.\n\n\
+         The window takes its background from the bins it does not reach, whatever the rule. With that of the paper's rule, the\n\
+         highest bin of a quadrant and so counts above the mean, too few photons are left to divide by and its steps go too far:\n\
+         its error on the same events would be {low:.2} to {high:.2} times that of the centre of mass (last column), and {} times the\n\
+         bound. With its own it is at {} times the bound with the paper's rule and {} with the window rule.\n\n\
          ![Depth error of events](figures/event-depth.svg)\n",
         100.0 * least(&mut false_shares.clone()),
         100.0 * most_false,
         100.0 * in_pulse,
         bounds(true, 2),
+        bounds(true, 1),
         bounds(false, 1),
     )?;
     for first in FIRST_LOOKS {
@@ -107,11 +107,11 @@ fn table<'a>(
     write!(
         text,
         "\nFirst look after {first_look} laser cycles; root mean square errors in bins:\n\n\
-         | pulse σ, bins | background a bin and cycle | rule | α or z | false events, % | exposures with an event, % | cycles | photons | centre of mass of 3 | over the bound | centred window | over the bound | better | centred, mean background |\n\
+         | pulse σ, bins | background a bin and cycle | rule | α or z | false events, % | exposures with an event, % | cycles | photons | centre of mass of 3 | over the bound | centred window | over the bound | better | centred, the rule's background |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n"
     )?;
     for outcome in outcomes {
-        let [mass, centred, mean] = outcome.placed;
+        let [mass, centred, rules] = outcome.placed;
         let better = outcome.better().map(|number| ESTIMATORS.get(number));
         let better = match better {
             None => "either",
@@ -132,7 +132,7 @@ fn table<'a>(
             mass.over_bound.value,
             centred.error.text(3),
             centred.over_bound.value,
-            mean.error.value
+            rules.error.value
         )?;
     }
     Ok(())

@@ -63,10 +63,10 @@ pub(super) fn depth(text: &mut String, counts: &Instructions, part: &Part) -> Re
         "\n## Which depth estimator\n\n\
          By the standard deviation of the pulse, the background and the signal photons of an event, with the error over\n\
          the Cramér-Rao bound, in histograms of a fixed exposure; [below](#which-estimator-for-events-as-they-come) are the events\n\
-         that a rule has chosen. The background is the mean outside a window of 5; the paper's is\n\
-         from its quadrants. `--sigma-bins` with the σ of the estimator takes a centred window, and leaving it out the centre\n\
-         of mass of 3, its background that of the rule. A background a bin is that of a bin and cycle times the event's\n\
-         exposure.\n\
+         that a rule has chosen. A mean background is that outside a window of 5, the paper's is from its quadrants, and the\n\
+         centred window's is the mean of the bins it does not reach. `--sigma-bins` with the σ of the estimator takes a centred\n\
+         window, and leaving it out the centre of mass of 3, its background that of the rule. A background a bin is that of a\n\
+         bin and cycle times the event's exposure.\n\
          The rules were tried with three of these pulses.\n\n\
          | estimator | instructions |\n|---|---|\n",
     );

@@ -30,12 +30,12 @@ pub use crate::sweep::studies::time_to_detect::{BACKGROUNDS, SIGMAS};
 /// The first looks, in laser cycles: when there may be few photons, and when most pulses
 /// have photons to spare. L1 is one less.
 pub const FIRST_LOOKS: [u32; 2] = [40, 400];
-/// The estimators, as tallies, tables and figures call them. The first two have the rule's
-/// background, as a pixel's do; the third, which none has, tells what that is to blame for.
+/// The estimators, as tallies, tables and figures call them. The first two are a pixel's; the
+/// third, which none has, tells what the window has a background of its own for.
 pub const ESTIMATORS: [(&str, &str); 3] = [
     ("mass3", "centre of mass of 3"),
     ("centred", "centred window"),
-    ("centred-mean", "centred window, mean background"),
+    ("centred-rules", "centred window, the rule's background"),
 ];
 /// Exposures of a trial, the pulse in as many places, evenly over a bin.
 const EXPOSURES: u32 = 64;
@@ -44,7 +44,7 @@ const EXPOSURES: u32 = 64;
 pub const STUDY: Study = Study {
     name: "event-depth",
     about: "depth error of the events of a rule as they come, by pulse, background and estimator",
-    revision: 1,
+    revision: 2,
     few_seeds: 30,
     all_seeds: 300,
     points,
@@ -164,7 +164,7 @@ fn results(part: &Part) -> Result<Results> {
                 "Root mean square depth error of the events whose peak is in the pulse, within 2 σ + 1 bins, over their mean laser \
                  cycles, with about 1 % false events an exposure and the first look after {} laser cycles; signal as in \
                  `time-to-detect`, the pulse anywhere in its bin. Joined are the backgrounds of a pulse, 0.01 to 0.2 a bin and laser \
-                 cycle. No pixel has the mean background with the paper's rule: it tells what is to blame. \
+                 cycle. No pixel's window has the background of the paper's rule: it tells what its own is for. \
                  With this first look or one after {} laser cycles, {half} cases a rule, the centred window for the pulse's σ is \
                  surely better than the centre of mass of 3 in {} of them with the paper's rule and surely worse in {}; with the \
                  window rule that suits the pulse better in {}, worse in {} ({} exposures a scene)",
@@ -192,7 +192,7 @@ fn series(outcomes: &[Outcome]) -> Vec<Series> {
     let rules = [(true, "paper's rule"), (false, "window rule")];
     let mut colour = 0;
     for (is_paper, rule) in rules {
-        // A window's background is a mean.
+        // A window rule's background is a mean as well.
         let count = if is_paper { 3 } else { 2 };
         for (index, (_, estimator)) in ESTIMATORS.into_iter().take(count).enumerate() {
             let mut name = Some(format!("{rule}, {estimator}"));

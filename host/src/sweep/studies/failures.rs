@@ -40,7 +40,7 @@ const FALSE: i64 = 3 * PER_BIN;
 pub const STUDY: Study = Study {
     name: "failures",
     about: "false, missing and wrong events in scenes that are not plain, and their flags",
-    revision: 2,
+    revision: 3,
     few_seeds: 30,
     all_seeds: 200,
     points,

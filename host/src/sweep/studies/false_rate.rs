@@ -28,9 +28,9 @@ const TESTED: u64 = 50;
 pub const STUDY: Study = Study {
     name: "false-rate",
     about: "false events with one threshold from 0.4 to 200 background counts a bin",
-    revision: 2,
+    revision: 3,
     few_seeds: 40,
-    all_seeds: 400,
+    all_seeds: 4000,
     points,
     trial,
     results,

@@ -36,7 +36,7 @@ const EXPOSURES: u64 = 50;
 pub const STUDY: Study = Study {
     name: "time-to-detect",
     about: "laser cycles to an event against the likelihood ratio, by pulse and background",
-    revision: 2,
+    revision: 3,
     few_seeds: 20,
     all_seeds: 200,
     points,

@@ -1,10 +1,10 @@
 //! Pixels that watch the same photons until each has had its event.
 
 use anyhow::{Result, ensure};
-use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
+use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AnyRule, BinPosition, Count, DepthEstimator, DetectionRule, Histogram, PaperRule, Peak,
-    RangeGate, WindowRule, detect, z_for,
+    AnyRule, BinPosition, Count, DepthEstimator, DetectionRule, Histogram, PaperRule, RangeGate,
+    WindowRule, detect, z_for,
 };
 use rand_pcg::Pcg64;
 
@@ -85,14 +85,6 @@ pub struct Event {
     pub positions: [i32; 3],
 }
 
-/// A bin's, outside a window of five.
-fn mean_background(histogram: &Histogram<BINS>, peak: Peak) -> U24F8 {
-    // Any excess is a detection: only the background is wanted.
-    let rule = WindowRule::new(5, U4F12::ZERO, Count::default());
-    let background = rule.map(|rule| rule.detect(histogram, &RangeGate::full(), peak));
-    background.ok().flatten().unwrap_or_default()
-}
-
 /// One exposure of the same photons for all `pixels`, with the events of those that have
 /// one. `estimators` find the depth on the histogram of the event.
 ///
@@ -142,8 +134,15 @@ pub fn exposure(
             let [Some(mass), Some(centred)] = estimators.each_ref().map(detect) else {
                 continue;
             };
-            let background = mean_background(&histogram, mass.peak);
-            let with_mean = estimators[1].estimate(&histogram, &gate, mass.peak, background);
+            let with_rules = match (
+                estimators[1],
+                pixel.rule.detect(&histogram, &gate, mass.peak),
+            ) {
+                (DepthEstimator::CentredWindow(window), Some(background)) => {
+                    window.estimate(&histogram, &gate, mass.peak, background)
+                }
+                _ => centred.depth,
+            };
             let position = |offset| BinPosition::of(mass.peak.bin, offset).raw();
             *event = Some(Event {
                 cycles,
@@ -152,7 +151,7 @@ pub fn exposure(
                 positions: [
                     position(mass.depth.offset),
                     position(centred.depth.offset),
-                    position(with_mean.offset),
+                    position(with_rules.offset),
                 ],
             });
         }
