@@ -104,7 +104,7 @@ impl CentredWindow {
 
     /// The mean of the gated bins farther from the peak bin than half the width, in 1/256
     /// rounded down; `None` if there are none, or the peak is not in the gate.
-    #[inline(always)]
+    #[inline(never)]
     #[must_use]
     pub fn background_outside<const BINS: usize, W: CounterWidth>(
         &self,
