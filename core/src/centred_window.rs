@@ -17,8 +17,8 @@
 //! that where the window comes to rest does not depend on the background, only
 //! how far each step goes. For that a mean is needed: with the paper's background, which is
 //! the highest bin of a quadrant, too little is left to divide by, and the steps go too far. So
-//! [`CentredWindow::background_outside`] takes the mean of the bins that the window does
-//! not reach.
+//! [`CentredWindow::background_outside`] takes the mean of the bins that are farther from the
+//! peak bin than half the width.
 //!
 //! With `h` = 2σ + 1/2 bins for a pulse of standard deviation σ the error is within 1.2 of
 //! the Cramér–Rao bound, on average within 1.1: `core/tests/depth_error.rs` prints
@@ -113,6 +113,9 @@ impl CentredWindow {
         peak: Peak,
     ) -> Option<U24F8> {
         let (bin, reach) = (peak.bin.raw(), self.half_width.to_bits().div_ceil(256));
+        if !gate.contains(bin) {
+            return None;
+        }
         let first = bin.saturating_sub(reach).max(gate.first());
         let last = bin.saturating_add(reach).min(gate.last());
         let inside = histogram.counts().get(first.into()..=last.into())?;

@@ -190,15 +190,16 @@ impl DetectionRule for WindowRule {
             let level = u64::from(total_times) * u64::from(histogram.total()) + u64::from(skew);
             let above = (u64::from(inside_times) * u64::from(inside)).checked_sub(level)?;
             // Its square is then above any variance.
-            u32::try_from(above).unwrap_or(u32::MAX)
+            u32::try_from(above).unwrap_or(u32::MAX).min((1 << 30) - 1)
         };
-        // At most 8 + 3 + 32 bits, or 10 + 3 + 26; with z² 16 more.
+        // At most 8 + 3 + 32 bits, or 10 + 3 + 26; in 1/16, and with z², 20 more.
         let spread = u64::from(bins_outside * width) * u64::from(histogram.total());
-        let exceeds =
-            |spread: u64| u64::from(above) * u64::from(above) > spread * u64::from(z_squared >> 16);
+        let exceeds = |sixteenths: u64| {
+            (u64::from(above) * u64::from(above)) << 4 > sixteenths * u64::from(z_squared >> 16)
+        };
         // 20 + 12 bits, and after the division 23.
         let most = bins * bins * (z_squared >> 20) / (36 << 4);
-        if above == 0 || !exceeds(spread.saturating_sub(most.into())) {
+        if above == 0 || !exceeds(spread.saturating_sub(most.into()) << 4) {
             return None;
         }
         // N/(N + c) of the upper 16 bits, in 1/2¹⁶.
@@ -208,7 +209,7 @@ impl DetectionRule for WindowRule {
         let [sum, part] = [sum >> shift, spread >> shift].map(|value| value as u32);
         let part = (part << 16).checked_div(sum)?;
         // 43 + 16 bits, or 39 + 17.
-        if !exceeds((spread * u64::from(part)) >> 16) {
+        if !exceeds((spread * u64::from(part)) >> 12) {
             return None;
         }
         let outside = histogram.total().wrapping_sub(inside);

@@ -30,11 +30,12 @@ const Z: [u16; 15] = [
 /// The z of a [`WindowRule`](crate::WindowRule) with which one in `one_in` exposures
 /// without a target brings a false event: 100 for 1 %, 1000 for 0.1 %.
 ///
-/// `gate`, `x`, `l1` and `l2` are those of the [`PixelConfig`](crate::PixelConfig). At most
-/// 1.5 times as many come as wanted, whatever the gate, the width of the window and the
-/// background. With 128 bins and 0.4 photons a bin at the first look or more it is at
-/// least 0.6 times as many; with fewer bins or photons, or a window of most of the bins,
-/// fewer still. From 64 to 2³⁴ trials, z 2.15 to
+/// `gate`, `x`, `l1` and `l2` are those of the [`PixelConfig`](crate::PixelConfig). With 8 to
+/// 128 bins, 1 in 100 or 1000 and many looks an exposure, at most 1.5 times as many come as
+/// wanted, whatever the width of the window and the background; with a single look, 512
+/// bins or more, or 1 in a million, up to 2.5 times. With 128 bins and 0.4 photons a bin at
+/// the first look or more it is at least 0.5 times as many; with fewer bins or photons,
+/// or a window of most of the bins, fewer still. From 64 to 2³⁴ trials, z 2.15 to
 /// [`HIGHEST_Z`], to which it is limited.
 ///
 /// ```

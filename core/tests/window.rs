@@ -57,8 +57,8 @@ fn as_written<const BINS: usize, W: CounterWidth>(
     let sum = spread + (n + w).pow(2) * sixteenths / (36 * 16);
     let shift = (0..).find(|&shift| sum >> shift < 1 << 16).unwrap();
     let part = ((spread >> shift) << 16).checked_div(sum >> shift);
-    let less = (spread * part.unwrap_or(0)) >> 16;
-    let clear = above > 0 && above.pow(2) > z_squared * less;
+    let sixteenths = (spread * part.unwrap_or(0)) >> 12;
+    let clear = above > 0 && 16 * above.pow(2) > z_squared * sixteenths;
 
     #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
     let (inside_real, total) = (inside as f64, (inside + outside) as f64);
@@ -76,13 +76,13 @@ fn as_written<const BINS: usize, W: CounterWidth>(
             0.0
         }
     };
-    // z² and its sixth, 1/36 and N²/(N + c) are rounded down, the last by 1 and, as the upper
+    // z² and its sixth, 1/36 and N²/(N + c) are rounded down, the last by 1/16 and, as the upper
     // bits alone are divided, by variance/2¹⁵.
     let c = z * z / 36.0;
     let exact = level(z, spread(c));
     let z_low = (z * z - 1.0 / 256.0).max(0.0).sqrt();
     let unit = 1.0 / ((bins + u64::from(width)) as f64).powi(2);
-    let low = level(z_low, spread(c) - variance / 32_768.0 - unit) - 0.0626;
+    let low = level(z_low, spread(c) - variance / 32_768.0 - unit / 16.0) - 0.0626;
     let c_low = (c - 1.0 / (36.0 * 16.0) - unit).max(0.0);
     let high = level(z, spread(c_low) + variance / 32_768.0);
     if inside_real > high + 1e-6 * high {
@@ -220,5 +220,30 @@ fn the_width_suits_the_pulse() {
     ] {
         let sigma: U8F8 = sigma.parse().unwrap();
         assert_eq!(WindowRule::width_for_pulse(sigma), width, "{sigma}");
+    }
+}
+
+/// What fires does so with any lower z, and with one more photon; a photon alone never does,
+/// unless z is less than 2.5.
+#[test]
+fn more_photons_and_a_lower_z_never_undo_a_detection() {
+    for last in 7..16 {
+        let gate = RangeGate::<16>::new(0, last).unwrap();
+        for width in 1..=7 {
+            let mut before = [false; 256];
+            for photons in 1..=150 {
+                let mut histogram = Histogram::<16>::new();
+                histogram.add_batch(&vec![3; photons]);
+                let fires: [bool; 256] = std::array::from_fn(|z| {
+                    let z = U4F12::from_bits((z as u16) << 8);
+                    let rule = WindowRule::new(width, z, Count::default()).unwrap();
+                    rule.detect(&histogram, &gate, histogram.peak()).is_some()
+                });
+                assert!(fires.is_sorted_by(|lower, higher| lower >= higher));
+                assert!(before.iter().zip(&fires).all(|(before, now)| before <= now));
+                assert!(photons > 1 || !fires[40..].contains(&true));
+                before = fires;
+            }
+        }
     }
 }

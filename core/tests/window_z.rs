@@ -92,7 +92,7 @@ const LOOKS: Looks = Looks {
 fn from_half_a_photon_a_bin_to_two_hundred() {
     for background in [0.01, 0.03, 0.1, 0.2] {
         for width in [1, 2, 3, 5, 7] {
-            check::<128>(LOOKS, 100, width, background, 3000, 0.6);
+            check::<128>(LOOKS, 100, width, background, 3000, 0.5);
         }
     }
 }

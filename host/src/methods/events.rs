@@ -78,7 +78,7 @@ pub(super) fn section(text: &mut String, part: &Part) -> Result<()> {
          for sure, event by event; where either may be, none is named.\n\n\
          Centred window with the paper's rule: {paper}.\n\
          With the window rule: {window}.\n\n\
-         The window takes its background from the bins it does not reach, whatever the rule. With that of the paper's rule, the\n\
+         The window takes its background from the bins farther from the peak than half its width, whatever the rule. With that of the paper's rule, the\n\
          highest bin of a quadrant and so counts above the mean, too few photons are left to divide by and its steps go too far:\n\
          its error on the same events would be {low:.2} to {high:.2} times that of the centre of mass (last column), and {} times the\n\
          bound. With its own it is at {} times the bound with the paper's rule and {} with the window rule.\n\n\

@@ -22,7 +22,7 @@ pub(super) fn decision(
          100 to 300 laser cycles. Times are means over a pulse in the middle of its bin and on an edge, with 1 % false\n\
          events in 1000 laser cycles, over those of the likelihood ratio that knows the scene; how sure the latter are, which\n\
          is the same for all rules, is not in the intervals. Photons are those of the pulse until the event. Commands\n\
-         take them as `--rule window --window 3 --z 4.4 --l2 1000`; with another L2, leave z to `--false-one-in 100`.\n\
+         take them as `--rule window --window 3 --z 4.45 --l2 1000`; with another L2, leave z to `--false-one-in 100`.\n\
          `--sigma-bins` takes the best of these widths, whatever it costs.\n\n\
          | pulse σ, bins | background a bin and cycle | signal a cycle | rule | α or z | time | photons | instructions | the paper's rule: time |\n\
          |---|---|---|---|---|---|---|---|---|\n",
@@ -64,7 +64,7 @@ pub(super) fn depth(text: &mut String, counts: &Instructions, part: &Part) -> Re
          By the standard deviation of the pulse, the background and the signal photons of an event, with the error over\n\
          the Cramér-Rao bound, in histograms of a fixed exposure; [below](#which-estimator-for-events-as-they-come) are the events\n\
          that a rule has chosen. A mean background is that outside a window of 5, the paper's is from its quadrants, and the\n\
-         centred window's is the mean of the bins it does not reach. `--sigma-bins` with the σ of the estimator takes a centred\n\
+         centred window's is the mean of the bins farther from the peak than half its width. `--sigma-bins` with the σ of the estimator takes a centred\n\
          window, and leaving it out the centre of mass of 3, its background that of the rule. A background a bin is that of a\n\
          bin and cycle times the event's exposure.\n\
          The rules were tried with three of these pulses.\n\n\

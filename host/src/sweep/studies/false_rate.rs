@@ -99,21 +99,34 @@ impl Outcome {
         }
     }
 
-    /// The largest factor between a share and `wanted`, up or down, with its interval. No
-    /// false event is as many as the interval ends with, "at least".
+    /// The largest factor between a share and `wanted`, up or down, with the interval of
+    /// that share. Where there is no false event, at least as many as the intervals leave.
     fn worst_factor(&self, wanted: f64) -> String {
         let factor = |value: f64| (value / wanted).max(wanted / value);
-        let none = self.shares.iter().filter(|(_, share)| share.value == 0.0);
-        let least = none.map(|(_, share)| factor(share.interval.1.min(wanted)));
-        let counted = self.shares.iter().filter(|(_, share)| share.value > 0.0);
-        let worst = counted.max_by(|a, b| factor(a.1.value).total_cmp(&factor(b.1.value)));
-        let Some((_, worst)) = worst else {
-            return format!("at least {:.1}", least.fold(1.0, f64::max));
+        // Of an interval with `wanted` in it the least is 1.
+        let least = |(low, high): (f64, f64)| {
+            if low <= wanted && wanted <= high {
+                1.0
+            } else {
+                factor(low).min(factor(high))
+            }
         };
-        let [low, high] = [worst.interval.0, worst.interval.1].map(factor);
-        let (low, high) = (low.min(high), low.max(high));
-        let least = if least.count() > 0 { "at least " } else { "" };
-        format!("{least}{:.1} ({low:.1} to {high:.1})", factor(worst.value))
+        let worst = self.shares.iter().filter(|(_, share)| share.value > 0.0);
+        let worst = worst.max_by(|a, b| factor(a.1.value).total_cmp(&factor(b.1.value)));
+        if self.shares.iter().any(|(_, share)| share.value == 0.0) {
+            let least = self.shares.iter().map(|(_, share)| least(share.interval));
+            return format!("at least {:.1}", least.fold(1.0, f64::max));
+        }
+        let Some((_, worst)) = worst else {
+            return "unknown".to_owned();
+        };
+        let (low, high) = worst.interval;
+        let most = factor(low).max(factor(high));
+        format!(
+            "{:.2} ({:.2} to {most:.2})",
+            factor(worst.value),
+            least(worst.interval)
+        )
     }
 }
 
@@ -195,7 +208,7 @@ fn results(part: &Part) -> Result<Results> {
             caption: format!(
                 "False events of a 1000-cycle exposure with one threshold for all backgrounds, set to {percent} % on \
                  average over the backgrounds in {} exposures of each (in steps of 1/16, α 1/8), counted in {} others a dot; an open dot is an \
-                 upper limit where there was none. Largest factor off, up or down: {}",
+                 upper limit where there was none. Largest factor off, up or down, with the interval of that dot: {}",
                 exposures(0.0),
                 exposures(1.0),
                 factors.join(", ")
