@@ -1,15 +1,18 @@
 // Photon FIFO: at most one word in and one word out a clock cycle.
 //
-// A word is a photon, or with bit 31 set the end of laser cycles, their number in
-// bits 15..0. An end that follows an end takes no place of its own: the number of
-// the newest word grows by one. One place is kept for an end, so a laser cycle is
-// never lost, only photons (up to 65535 laser cycles after the last photon).
+// What is put is a photon, or with bit 31 set the end of one laser cycle, whatever
+// the other bits. What is taken is a photon, bit 31 clear, or with bit 31 set the
+// end of as many laser cycles as bits 15..0 say: an end that follows an end takes no
+// place of its own, the number of the newest word grows by one. One place is kept
+// for an end, so a laser cycle is never lost, only photons (up to 65535 laser cycles
+// after the last photon).
 //
 // Whether there is room is known at the clock edge: a place that falls free in
 // that same cycle does not count. `lost` is high for one cycle after each word
 // that found no room. `fill` is the number of words that wait. `head` is the
 // oldest of them; when none waits it is 0xffff_ffff, or 0xffff_fffe with
-// `finished`: none will come. `take` on an empty FIFO does nothing.
+// `finished`: none will come. `take` goes with the `head` of the same clock cycle, and
+// takes one word in every cycle that it is high; on an empty FIFO it does nothing.
 //
 // The newest word waits in a register, where its number can grow; the older ones
 // are in a memory with one port to write and one, clocked, to read: block RAM.
@@ -39,6 +42,7 @@ module photon_fifo #(
     wire newest_stays = !empty && !(taken && one);
 
     wire is_end = word[31];
+    wire [31:0] stored_word = is_end ? 32'h8000_0001 : word;
     wire joins = is_end && newest_stays && newest[31] && newest[15:0] != 16'hffff;
     wire full_for_photons = fill[DEPTH_LOG2] || &fill[DEPTH_LOG2-1:0];
     wire room = !fill[DEPTH_LOG2] && (is_end || !full_for_photons);
@@ -61,7 +65,7 @@ module photon_fifo #(
     always @(posedge clk) begin
         moved <= newest;
         is_moved <= moves && last == next_first;
-        if (stored) newest <= word;
+        if (stored) newest <= stored_word;
         else if (put && joins) newest[15:0] <= newest[15:0] + 1'b1;
         lost <= put && !joins && !room && !reset;
         if (reset) begin

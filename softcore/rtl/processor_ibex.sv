@@ -23,7 +23,8 @@ module processor (
     output        retired,
     output        fetch_filled,
     output        data_filled,
-    output        stopped
+    output        stopped,
+    output        unmapped
 );
     wire data_we;
     wire [3:0] data_bytes;
@@ -79,5 +80,6 @@ module processor (
     assign retired = cpu.u_ibex_core.perf_instr_ret_wb;
     assign fetch_filled = 1'b0;
     assign data_filled = 1'b0;
-    assign stopped = 0;
+    assign stopped = 1'b0;
+    assign unmapped = 1'b0;
 endmodule

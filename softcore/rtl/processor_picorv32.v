@@ -26,7 +26,8 @@ module processor (
     output        retired,
     output        fetch_filled,
     output        data_filled,
-    output        stopped
+    output        stopped,
+    output        unmapped
 );
 `ifdef RV32I
     localparam MULTIPLY = 1'b0;
@@ -88,5 +89,6 @@ module processor (
     assign retired = count != cpu.count_instr[0];
     assign fetch_filled = 1'b0;
     assign data_filled = 1'b0;
-    assign stopped = trap || data_error;
+    assign stopped = trap;
+    assign unmapped = data_error;
 endmodule

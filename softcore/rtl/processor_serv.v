@@ -22,7 +22,8 @@ module processor (
     output        retired,
     output        fetch_filled,
     output        data_filled,
-    output        stopped
+    output        stopped,
+    output        unmapped
 );
     wire fetch_cyc, data_cyc, data_we;
     wire [3:0] data_bytes;
@@ -57,5 +58,6 @@ module processor (
     assign retired = fetch_ready;
     assign fetch_filled = 1'b0;
     assign data_filled = 1'b0;
-    assign stopped = fetch_error || data_error;
+    assign stopped = 1'b0;
+    assign unmapped = fetch_error || data_error;
 endmodule

@@ -26,7 +26,8 @@ module processor (
     output        retired,
     output        fetch_filled,
     output        data_filled,
-    output        stopped
+    output        stopped,
+    output        unmapped
 );
     localparam BURST = 3'b010; // Wishbone cycle type: another word follows
 
@@ -77,5 +78,6 @@ module processor (
     // The first word of a line has come.
     assign fetch_filled = fetch_stb && fetch_ready && fetch_type == BURST && fetch_word[2:0] == 0;
     assign data_filled = data_stb && data_ready && data_type == BURST && data_word[2:0] == 0;
-    assign stopped = data_error;
+    assign stopped = 1'b0;
+    assign unmapped = data_error;
 endmodule

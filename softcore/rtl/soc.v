@@ -21,7 +21,8 @@
 //                              end as bits 15..0 say; 0xffff_ffff when none
 //                              waits, 0xffff_fffe when none will come
 //   0xF000_0018  EVENT_DATA    write: 32 bits of a 128-bit event word, least
-//                              significant first; the last four are kept
+//                              significant first; the last four are kept. Not to
+//                              be written while REQ is high
 //   0xF000_001C  EVENT_REQ     write 1: REQ rises, with the event word. write 0:
 //                              REQ falls, and ACK with it.
 //                              read: bit 0 ACK, high from the cycle after the
@@ -64,7 +65,8 @@ module soc #(
     output              retired,        // an instruction was completed
     output              fetch_filled,   // the instruction cache began to fill a line
     output              data_filled,    // the data cache did
-    output              stopped         // the processor cannot go on
+    output              stopped,        // the processor cannot go on
+    output              unmapped        // nor can it say that nothing is mapped there
 );
     // Instruction port.
     wire        fetch_valid;
@@ -97,7 +99,8 @@ module soc #(
         .retired(retired),
         .fetch_filled(fetch_filled),
         .data_filled(data_filled),
-        .stopped(stopped)
+        .stopped(stopped),
+        .unmapped(unmapped)
     );
 
     // Address decoding. Bits 1..0 do not matter: accesses are whole words.
@@ -174,10 +177,11 @@ module soc #(
         if (io_read && (register == PHOTON_STATUS || register == PHOTON)) photon_read <= 1;
 
         if (io_write && register == EVENT_DATA) event_word <= {data_write, event_word[127:32]};
+        if (event_req && event_taken) event_ack <= 1;
         if (io_write && register == EVENT_REQ) begin
             event_req <= data_write[0];
             if (!data_write[0]) event_ack <= 0;
-        end else if (event_req && event_taken) event_ack <= 1;
+        end
 
         if (reset) begin
             photon_lost_since <= 0;

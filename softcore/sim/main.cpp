@@ -109,6 +109,7 @@ std::vector<Photon> read_stream(const std::string &path) {
             fail(path + ": line " + std::to_string(n) + ": not `cycle pixel code`, or out of order");
         photons.push_back({uint64_t(cycle), uint32_t(pixel << 16 | code)});
     }
+    if (photons.empty()) fail(path + ": no photons");
     return photons;
 }
 
@@ -225,8 +226,9 @@ int run(Vsoc &soc, const Options &options, Laser &laser) {
             std::fprintf(stderr, "exit 0x%x cycle %" PRIu64 " instructions %" PRIu64 "\n", soc.written, cycle, instructions);
             return soc.written < 256 ? soc.written : TRAP;
         }
-        if (soc.stopped) {
-            std::fprintf(stderr, "trap cycle %" PRIu64 " instructions %" PRIu64 "\n", cycle, instructions);
+        if (soc.stopped || soc.unmapped) {
+            std::fprintf(stderr, "%s cycle %" PRIu64 " instructions %" PRIu64 "\n",
+                         soc.unmapped ? "no memory at that address" : "the processor stops", cycle, instructions);
             return TRAP;
         }
         link.clock(soc);

@@ -2,11 +2,14 @@
 //! link.
 //!
 //! Photons come first: while the FIFO has them, they are counted. When a laser cycle has
-//! ended and no more than [`FEW`] words wait, the next macropixel in turn is looked at,
-//! provided X laser cycles have passed since its last look. That is the mini-frame of
+//! ended and no more than [`FEW`] words wait, or half of L2 has passed since the last look at it, the next
+//! macropixel in turn is looked at, provided X laser cycles have passed. That is the mini-frame of
 //! [`AsyncPixel::end_laser_cycles`]: a processor that cannot look at every macropixel
-//! every X laser cycles looks as often as it can, and no photon is assigned to a wrong
-//! exposure.
+//! every X laser cycles looks as often as it can, no photon is assigned to a wrong
+//! exposure, and with more photons than it can count it still decides.
+//!
+//! Each look and each event that leaves its pixel is marked, so that a testbench can tell
+//! what the events must be.
 
 use core::fmt::{self, Write};
 
@@ -26,6 +29,9 @@ const X: u16 = 4;
 const L1: u16 = 40;
 /// The exposure at which a histogram is cleared without an event.
 const L2: u16 = 2000;
+
+/// Laser cycles after which a macropixel is looked at though photons wait.
+const LATE: u64 = L2 as u64 / 2;
 
 /// Words that may wait during a look: the next end of a laser cycle most often does.
 pub const FEW: u32 = 1;
@@ -70,6 +76,45 @@ impl Word {
             Self::End
         } else {
             Self::CyclesEnd(raw as u16)
+        }
+    }
+}
+
+/// What is marked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mark {
+    /// The next macropixel in turn is looked at, when so many laser cycles have ended, of
+    /// which 31 bits are marked.
+    Look(u64),
+    /// The event of a macropixel leaves it.
+    Taken(PixelAddress),
+}
+
+impl Mark {
+    const TAKEN: u32 = 1 << 31;
+
+    /// The number of the mark.
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "as much as there is room for"
+    )]
+    #[inline(always)]
+    #[must_use]
+    pub const fn to_raw(self) -> u32 {
+        match self {
+            Self::Look(cycles) => cycles as u32 & !Self::TAKEN,
+            Self::Taken(pixel) => pixel.0 as u32 | Self::TAKEN,
+        }
+    }
+
+    /// What is marked with a number, if less than 2³¹ laser cycles have ended.
+    #[allow(clippy::cast_possible_truncation, reason = "16 bits were marked")]
+    #[must_use]
+    pub const fn from_raw(raw: u32) -> Self {
+        if raw & Self::TAKEN == 0 {
+            Self::Look(raw as u64)
+        } else {
+            Self::Taken(PixelAddress(raw as u16))
         }
     }
 }
@@ -141,9 +186,7 @@ impl<const N: usize> Pixels<N> {
                     self.now += u64::from(cycles.max(1));
                     let (waiting, is_lossy) = io::photon_status();
                     self.losses += u32::from(is_lossy);
-                    if waiting <= FEW {
-                        self.look();
-                    }
+                    self.look(waiting <= FEW);
                 }
                 // A time word has the event's behind it.
                 Word::Empty if self.next.is_some() => self.link(self.turn),
@@ -154,15 +197,15 @@ impl<const N: usize> Pixels<N> {
         self.finish();
     }
 
-    /// Looks at the next macropixel in turn, if it is time.
-    fn look(&mut self) {
+    /// Looks at the next macropixel in turn, if it is time, or high time.
+    fn look(&mut self, is_free: bool) {
         let index = self.turn;
         let (Some(pixel), Some(looked)) = (self.pixels.get_mut(index), self.looked.get_mut(index))
         else {
             return;
         };
         let passed = self.now - *looked;
-        if passed < u64::from(X) {
+        if passed < u64::from(X) || !is_free && passed < LATE {
             return;
         }
         *looked = self.now;
@@ -170,6 +213,7 @@ impl<const N: usize> Pixels<N> {
         self.looks += 1;
         let passed = u16::try_from(passed).unwrap_or(u16::MAX);
         let last = LaserCycle(self.now - 1);
+        io::mark(Mark::Look(self.now).to_raw());
         let _ = pixel.end_laser_cycles(&self.config, last, passed);
         self.link(index);
     }
@@ -186,6 +230,7 @@ impl<const N: usize> Pixels<N> {
         // What follows a time word comes before all others.
         let word = self.next.take().or_else(|| {
             let event = self.pixels.get_mut(index)?.acknowledge()?;
+            io::mark(Mark::Taken(event.pixel).to_raw());
             let (time, word) = self.encoder.encode(&event);
             self.next = time.and(Some(word));
             Some(time.unwrap_or(word))
@@ -270,5 +315,16 @@ mod tests {
         assert_eq!(Word::from_raw(0x8000_ffff), Word::CyclesEnd(0xffff));
         assert_eq!(Word::from_raw(0xffff_fffe), Word::End);
         assert_eq!(Word::from_raw(0xffff_ffff), Word::Empty);
+    }
+
+    #[test]
+    fn marks_are_read_as_they_are_made() {
+        for mark in [
+            Mark::Look(0),
+            Mark::Look((1 << 31) - 1),
+            Mark::Taken(PixelAddress(u16::MAX)),
+        ] {
+            assert_eq!(Mark::from_raw(mark.to_raw()), mark);
+        }
     }
 }

@@ -68,8 +68,8 @@ cargo xtask <command>
   softcore [--qemu-only] [--core NAME]... [--check]
                 the core on RV32 processors: golden vectors in QEMU and on the
                 Verilog of VexRiscv, PicoRV32, SERV and Ibex, cycles and photon rates
-                there; writes docs/bench/softcore.csv and softcore-photons.csv if all
-                cores run, or with --check compares with them";
+                there; writes docs/bench/softcore*.csv and softcore.md if all cores
+                run, or with --check compares with them";
 
 fn main() -> ExitCode {
     match run() {

@@ -124,9 +124,14 @@ pub fn set_up() {
     });
 }
 
-/// The same for what `softcore` needs.
-pub fn set_up_softcore() {
+/// The same for what `softcore` needs in QEMU.
+pub fn set_up_riscv_emulator() {
     install(&QEMU_RISCV, || debian_package("qemu-system-misc"));
+}
+
+/// The same for all that `softcore` needs.
+pub fn set_up_softcore() {
+    set_up_riscv_emulator();
     install(&VERILATOR, || debian_package("verilator g++ make"));
     install(&YOSYS, || debian_package("yosys"));
 }

@@ -16,9 +16,11 @@ Made by `cargo xtask softcore`; do not edit. What they are figures of is in [sof
 /// What 2.4 µs are at 100 MHz.
 const CYCLES: u64 = 240;
 /// Operations from a look to what comes of it.
-const AGAINST: [&str; 3] = [
+const AGAINST: [&str; 5] = [
     "decision: kept peak; no event",
     "decision: look; no event",
+    "decision: whole histogram; no event",
+    "decision: kept peak; event and depth",
     "event: look to packed word",
 ];
 
@@ -126,14 +128,14 @@ fn rates(photons: &[Sustained]) -> String {
 
 Of four macropixels together, at 100 MHz and a laser of 10 MHz.
 
-| core | photons a laser cycle | photons a second | laser cycles between looks | photons | events | exposures without an event | most words in the FIFO |
-|---|---|---|---|---|---|---|---|
+| core | photons a laser cycle | photons a second | laser cycles between looks | photons | events | exposures without an event | events a second | most words in the FIFO |
+|---|---|---|---|---|---|---|---|---|
 "
     .to_owned();
     for sustained in photons {
         let _ = writeln!(
             text,
-            "| {} | {:.5} | {:.1} thousand | {} | {} | {} | {} | {} |",
+            "| {} | {:.5} | {:.1} thousand | {} | {} | {} | {} | {:.0} | {} |",
             sustained.core.replace(',', ", "),
             sustained.rate(),
             // Ten million laser cycles a second.
@@ -142,6 +144,7 @@ Of four macropixels together, at 100 MHz and a laser of 10 MHz.
             sustained.photons,
             sustained.events,
             sustained.expired,
+            sustained.events_a_second(),
             sustained.fill,
         );
     }
@@ -188,31 +191,75 @@ mod tests {
         assert_eq!(text(&files.rows, &files.photons, &files.memory), written);
     }
 
+    /// What the README says of the figures.
+    fn readme(files: &Files) -> String {
+        let whole = |row: Option<&Row>| row.map_or(0, |row| (row.cycles + 50) / 100);
+        let warm = |core, operation| whole(find(&files.rows, core, operation).0);
+        let cold = |core, operation| whole(find(&files.rows, core, operation).1);
+        let [decision, .., event] = AGAINST;
+        let [vexriscv, ibex, picorv32, serv] = [
+            "vexriscv,rv32im",
+            "ibex,rv32imc",
+            "picorv32,rv32im",
+            "serv,rv32i",
+        ];
+        let rate = |core: &str| {
+            let highest = files.photons.iter().find(|photons| photons.core == core);
+            highest.map_or(0.0, Sustained::rate) * 1e4
+        };
+        format!(
+            "A decision on a kept peak, without an event, takes {} cycles on VexRiscv with its code in the cache ({} \
+             without), {} on Ibex, {} on PicoRV32 and {} on SERV; an event takes {}, {}, {} and {} from the look to the packed \
+             word. Four macropixels that share a processor of 100 MHz and a laser of 10 MHz take in {:.0}, {:.0}, {:.0} and \
+             {:.0} thousand photons a second from a FIFO.",
+            warm(vexriscv, decision),
+            cold(vexriscv, decision),
+            warm(ibex, decision),
+            warm(picorv32, decision),
+            warm(serv, decision),
+            warm(vexriscv, event),
+            warm(ibex, event),
+            warm(picorv32, event),
+            warm(serv, event),
+            rate(vexriscv),
+            rate(ibex),
+            rate(picorv32),
+            rate(serv),
+        )
+    }
+
+    #[test]
+    fn the_readme_says_what_the_files_say() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let text = fs::read_to_string(root.join("README.md")).unwrap();
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let expected = readme(&Files::read(&root).unwrap());
+        assert!(words.join(" ").contains(&expected), "not there: {expected}");
+    }
+
     #[test]
     fn what_the_page_says_of_240_cycles_holds() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let rows = Files::read(&root).unwrap().rows;
-        let mut within = Vec::new();
+        let is_within = |core: &str, operation| {
+            let (warm, cold) = find(&rows, core, operation);
+            let warm = warm.unwrap();
+            [warm, cold.unwrap_or(warm)].map(|row| row.cycles <= CYCLES * 100)
+        };
         for core in cores(&rows) {
-            for operation in AGAINST {
-                let (warm, cold) = find(&rows, core, operation);
-                let warm = warm.unwrap();
-                let both = [warm, cold.unwrap_or(warm)];
-                within.push(both.map(|row| row.cycles <= CYCLES * 100));
+            let [decision, look, others @ ..] = AGAINST.map(|operation| is_within(core, operation));
+            assert_eq!(others, [[false; 2]; 3], "{core}");
+            match core {
+                "vexriscv,rv32im" => assert_eq!((decision, look[1]), ([true, false], false)),
+                "ibex,rv32imc" => assert_eq!((decision, look), ([true; 2], [true; 2])),
+                _ => assert_eq!((decision, look), ([false; 2], [false; 2])),
             }
         }
-        // A decision, a look, an event; warm and cold.
-        let (vexriscv, ibex) = (
-            [[true, false], [false; 2], [false; 2]],
-            [[true; 2], [true; 2], [false; 2]],
-        );
-        assert_eq!(within[..6], [vexriscv, ibex].concat());
-        assert!(within[6..].iter().all(|within| *within == [false; 2]));
-        // What is more cold is lines of some ten cycles, most of them code.
+        // What is more cold is lines of ten to fourteen cycles, most of them code.
         let (warm, cold) = find(&rows, cores(&rows)[0], AGAINST[0]);
         let (warm, cold) = (warm.unwrap(), cold.unwrap());
-        let more = (cold.code_lines + cold.data_lines - warm.code_lines - warm.data_lines) * 10;
-        assert!((cold.cycles - warm.cycles).abs_diff(more) < more / 5);
+        let more = cold.code_lines + cold.data_lines - warm.code_lines - warm.data_lines;
+        assert!((10 * more..14 * more).contains(&(cold.cycles - warm.cycles)));
         assert!(cold.code_lines > 2 * cold.data_lines);
     }
 
@@ -252,7 +299,7 @@ mod tests {
             "| decision: look; no event | 240.0 (1.0) | 0 + 1 | 300.0 | 2 + 1 | 240.0 (1.0) |\n"
         ));
         let table = against(&rows);
-        assert!(table.contains("| a, x |  |  | **240.0** | 300.0 |  |  |\n"));
-        assert!(table.contains("| b, y |  |  | 240.0 | 240.0 |  |  |\n"));
+        assert!(table.contains("| a, x |  |  | **240.0** | 300.0 |  |  |  |  |  |  |\n"));
+        assert!(table.contains("| b, y |  |  | 240.0 | 240.0 |  |  |  |  |  |  |\n"));
     }
 }

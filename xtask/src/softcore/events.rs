@@ -1,126 +1,187 @@
-//! The event words of a soft-core against what the host makes of the same photons.
+//! What a soft-core decides against what the host decides from the same photons.
 
 use anyhow::{Context, Result, ensure};
-use dtof_core::{AerDecoder, AerRecord, AerWord, AsyncPixel, DepthEvent, Flags};
-use dtof_softcore::stream::{self, BINS};
+use dtof_core::{
+    AerDecoder, AerRecord, AerWord, AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig,
+    Statistics,
+};
+use dtof_softcore::stream::{self, BINS, Mark};
 
 use super::photons::Photon;
 
-/// Decodes the words and decides again, on the host, from the photons of each event's
-/// exposure. How many events there are.
+/// The events of the words over the link.
 ///
 /// # Errors
-/// If a word means nothing or something else, or two exposures of a macropixel share a
-/// laser cycle.
-pub fn check(words: &[u128], photons: &[Photon]) -> Result<u64> {
+/// If a word means nothing, or something else.
+pub fn decoded(words: &[u128]) -> Result<Vec<DepthEvent>> {
     let mut decoder = AerDecoder::new();
-    let mut events = 0;
-    // The laser cycle that ended the last exposure of each macropixel.
-    let mut ended = [0; 1 << u8::BITS];
+    let mut events = Vec::new();
     for &word in words {
         let record = decoder.decode(AerWord::from_le_bytes(word.to_le_bytes()));
-        let event = match record.with_context(|| format!("word {word:032x}"))? {
-            AerRecord::Time(_) => continue,
-            AerRecord::Event(event) => event,
+        match record.with_context(|| format!("word {word:032x}"))? {
+            AerRecord::Time(_) => {}
+            AerRecord::Event(event) => events.push(event),
             other => anyhow::bail!("{other:?} over the link"),
-        };
-        events += 1;
-        let end = event.cycle.0 + 1;
-        let start = end.checked_sub(event.exposure.into());
-        let start = start.with_context(|| format!("{event:?}: before the first laser cycle"))?;
-        let ended = ended.get_mut(usize::from(event.pixel.0));
-        let ended = ended.with_context(|| format!("{event:?}: no such macropixel"))?;
-        ensure!(start >= *ended, "{event:?}: photons counted twice");
-        *ended = end;
-        let again = decide(&event, start, photons)?;
-        ensure!(
-            again == Some(event),
-            "{event:?}: the host decides {again:?}"
-        );
+        }
     }
     Ok(events)
 }
 
-/// What the host decides from the photons from laser cycle `start` to the event.
-fn decide(event: &DepthEvent, start: u64, photons: &[Photon]) -> Result<Option<DepthEvent>> {
+/// What `pixels` macropixels decide on the host that are looked at when the soft-core
+/// looked, and whose events are taken when it took them: those events, and what all pixels count.
+///
+/// # Errors
+/// If an event is taken that is not there.
+pub fn decided(
+    pixels: u8,
+    marks: &[u32],
+    photons: &[Photon],
+) -> Result<(Vec<DepthEvent>, Statistics)> {
     let config = stream::config()?;
-    let mut pixel = AsyncPixel::<BINS>::new(event.pixel);
-    let first = photons.partition_point(|photon| u64::from(photon.cycle) < start);
-    for photon in &photons[first..] {
-        if u64::from(photon.cycle) > event.cycle.0 {
-            break;
-        }
-        if u16::from(photon.pixel) == event.pixel.0 {
-            pixel.count(&config, photon.code);
+    let pixel = |number: u8| Pixel {
+        pixel: AsyncPixel::new(PixelAddress(number.into())),
+        photons: photons
+            .iter()
+            .filter(|photon| photon.pixel == number)
+            .copied()
+            .collect(),
+        counted: 0,
+        looked: 0,
+    };
+    let mut pixels: Vec<Pixel> = (0..pixels).map(pixel).collect();
+    let mut events = Vec::new();
+    let mut turn = 0;
+    for &mark in marks {
+        match Mark::from_raw(mark) {
+            Mark::Look(now) => {
+                let number = pixels.len();
+                let pixel = &mut pixels[turn];
+                turn = (turn + 1) % number;
+                pixel.count(&config, now);
+                let passed = u16::try_from(now - pixel.looked).unwrap_or(u16::MAX);
+                pixel.looked = now;
+                let last = LaserCycle(now - 1);
+                let _ = pixel.pixel.end_laser_cycles(&config, last, passed);
+            }
+            Mark::Taken(address) => {
+                let pixel = pixels.get_mut(usize::from(address.0));
+                let event = pixel.and_then(|pixel| pixel.pixel.acknowledge());
+                events.push(event.with_context(|| format!("no event waits in {address:?}"))?);
+            }
         }
     }
-    let _ = pixel.end_laser_cycles(&config, event.cycle, event.exposure);
-    let again = pixel.acknowledge();
-    // Whether a decision was put off is the link's doing.
-    let put_off = event.flags.contains(Flags::DEFERRED);
-    Ok(again.map(|mut again| {
-        if put_off {
-            again.flags |= Flags::DEFERRED;
+    let mut all = Statistics::default();
+    for pixel in &mut pixels {
+        pixel.count(&config, u64::MAX);
+        all += pixel.pixel.statistics();
+    }
+    Ok((events, all))
+}
+
+struct Pixel {
+    pixel: AsyncPixel<BINS>,
+    photons: Vec<Photon>,
+    /// Photons that have been counted.
+    counted: usize,
+    /// Laser cycles that had ended at the last look.
+    looked: u64,
+}
+
+impl Pixel {
+    /// Counts the photons of the laser cycles before `end`.
+    fn count(&mut self, config: &PixelConfig<BINS>, end: u64) {
+        while let Some(photon) = self.photons.get(self.counted)
+            && u64::from(photon.cycle) < end
+        {
+            self.pixel.count(config, photon.code);
+            self.counted += 1;
         }
-        again
-    }))
+    }
+}
+
+/// Whether both are the same, event by event.
+///
+/// # Errors
+/// Names the first that differs.
+pub fn compare(of_core: &[DepthEvent], of_host: &[DepthEvent]) -> Result<()> {
+    for (of_core, of_host) in of_core.iter().zip(of_host) {
+        ensure!(
+            of_core == of_host,
+            "over the link {of_core:?}, on the host {of_host:?}"
+        );
+    }
+    ensure!(
+        of_core.len() == of_host.len(),
+        "{} events over the link, {} on the host",
+        of_core.len(),
+        of_host.len()
+    );
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
-    use dtof_core::{AerEncoder, LaserCycle, PixelAddress};
+    use dtof_core::AerEncoder;
 
     use super::*;
 
-    /// A target in every laser cycle of macropixel 2, and the events of two exposures.
-    fn target() -> (Vec<Photon>, Vec<u128>) {
-        let config = stream::config().unwrap();
-        let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(2));
-        let mut encoder = AerEncoder::new();
-        let (mut photons, mut words) = (Vec::new(), Vec::new());
-        for cycle in 0..100_u32 {
-            photons.push(Photon {
+    /// A target in every laser cycle of the second of two macropixels, looks in turn, and the
+    /// words of the events.
+    fn target() -> (Vec<Photon>, Vec<u32>, Vec<u128>) {
+        let photons: Vec<Photon> = (0..200)
+            .map(|cycle| Photon {
                 cycle,
-                pixel: 2,
+                pixel: 1,
                 code: 60,
-            });
-            pixel.count(&config, 60);
-            let _ = pixel.end_laser_cycle(&config, LaserCycle(cycle.into()));
-            if let Some(event) = pixel.acknowledge() {
-                let (time, word) = encoder.encode(&event);
-                let word = time.into_iter().chain([word]);
-                words.extend(word.map(|word| u128::from_le_bytes(word.to_le_bytes())));
-            }
+            })
+            .collect();
+        let mut marks = Vec::new();
+        for now in (50..=200).step_by(50) {
+            marks.push(Mark::Look(now).to_raw());
+            marks.push(Mark::Look(now).to_raw());
+            marks.push(Mark::Taken(PixelAddress(1)).to_raw());
         }
-        (photons, words)
+        let (events, _) = decided(2, &marks, &photons).unwrap();
+        let mut encoder = AerEncoder::new();
+        let mut words = Vec::new();
+        for event in &events {
+            let (time, word) = encoder.encode(event);
+            let both = time.into_iter().chain([word]);
+            words.extend(both.map(|word| u128::from_le_bytes(word.to_le_bytes())));
+        }
+        (photons, marks, words)
     }
 
     #[test]
-    fn events_are_those_of_the_photons() {
-        let (photons, words) = target();
-        assert_eq!(words.len(), 3, "a time word and two events");
-        assert_eq!(check(&words, &photons).unwrap(), 2);
-        assert_eq!(check(&[], &photons).unwrap(), 0);
-    }
-
-    #[test]
-    fn every_wrong_bit_of_an_event_is_noticed() {
-        let (photons, words) = target();
+    fn every_wrong_bit_missing_and_additional_event_is_noticed() {
+        let (photons, marks, words) = target();
+        let (events, all) = decided(2, &marks, &photons).unwrap();
+        assert_eq!((words.len(), all.events, all.photons()), (5, 4, 200));
+        assert!(compare(&decoded(&words).unwrap(), &events).is_ok());
         for bit in 0..u128::BITS {
             let mut wrong = words.clone();
-            wrong[1] ^= 1 << bit;
-            let is_put_off = check(&wrong, &photons).is_ok();
-            // Only the flag that the link sets is not known to the host.
-            let flags = u128::from(Flags::DEFERRED.bits()) << 122;
-            assert_eq!(is_put_off, 1 << bit == flags, "bit {bit}");
+            wrong[2] ^= 1 << bit;
+            let same = decoded(&wrong).and_then(|wrong| compare(&wrong, &events));
+            assert!(same.is_err(), "bit {bit}");
+        }
+        assert!(decoded(&words[1..]).is_err(), "no time word");
+        for wrong in [&words[..4], &[words.clone(), vec![words[4]]].concat()] {
+            assert!(compare(&decoded(wrong).unwrap(), &events).is_err());
         }
     }
 
     #[test]
-    fn photons_that_are_missing_or_shared_are_noticed() {
-        let (photons, words) = target();
-        assert!(check(&words, &photons[1..]).is_err());
-        assert!(check(&[words[0], words[1], words[1]], &photons).is_err());
-        assert!(check(&words[1..], &photons).is_err(), "no time word");
+    fn photons_and_looks_make_the_events() {
+        let (photons, marks, words) = target();
+        let same = |marks: &[u32], photons: &[Photon]| {
+            let (events, _) = decided(2, marks, photons)?;
+            compare(&decoded(&words)?, &events)
+        };
+        assert!(same(&marks, &photons).is_ok());
+        assert!(same(&marks, &photons[1..]).is_err());
+        // A look less, and so the other macropixel's turn.
+        assert!(same(&marks[1..], &photons).is_err());
+        let later = Mark::Look(52).to_raw();
+        assert!(same(&[&[marks[0], later], &marks[2..]].concat(), &photons).is_err());
     }
 }

@@ -1,6 +1,7 @@
 //! The files with the figures, and how what is measured is compared with them.
 
 use std::fs;
+use std::iter;
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
@@ -15,9 +16,29 @@ const PHOTONS: &str = "docs/bench/softcore-photons.csv";
 const MEMORY: &str = "docs/bench/softcore-bytes.csv";
 pub const DOCUMENT: &str = "docs/bench/softcore.md";
 
-/// Percent by which a figure may differ, more or less: a simulation gives the same cycle
-/// for cycle, but a change elsewhere may move code by a word.
-const PERCENT: f64 = 2.0;
+/// How a column is compared.
+#[derive(Clone, Copy)]
+enum Column {
+    Name,
+    /// It may differ by so many percent, more or less.
+    Percent(f64),
+    /// It is not.
+    Told,
+}
+
+use Column::{Name, Percent, Told};
+
+/// A simulation gives the same cycle for cycle. But a change anywhere moves code, and in a
+/// cache with one way other lines are then filled; what a processor does when it is as
+/// busy as can be is then not the same at all.
+const COLUMNS: [&[Column]; 3] = [
+    // Cycles, instructions, lines.
+    &[Name, Name, Name, Percent(10.0), Percent(2.0), Told, Told],
+    // The rate, and what came of it.
+    &[Name, Name, Percent(10.0), Told, Told, Told, Told, Told],
+    // Code, data, stack.
+    &[Name, Name, Percent(2.0), Percent(2.0), Percent(10.0)],
+];
 
 /// All figures.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -54,7 +75,10 @@ impl Files {
     }
 
     fn texts(&self) -> [String; 3] {
-        let text = |header: &str, lines: Vec<String>| format!("{header}\n{}\n", lines.join("\n"));
+        let text = |header: &str, lines: Vec<String>| {
+            let lines = iter::once(header.to_owned()).chain(lines);
+            lines.map(|line| line + "\n").collect::<String>()
+        };
         [
             text(table::HEADER, self.rows.iter().map(Row::csv).collect()),
             text(
@@ -82,12 +106,13 @@ impl Files {
             expected.stack = expected.stack.filter(|_| measured.stack.is_some());
         }
         let mut differences = Vec::new();
-        for (expected, measured) in expected.texts().iter().zip(&measured.texts()) {
+        let texts = expected.texts().into_iter().zip(measured.texts());
+        for ((expected, measured), columns) in texts.zip(COLUMNS) {
             let (mut expected, mut measured) = (expected.lines(), measured.lines());
             loop {
                 match (expected.next(), measured.next()) {
                     (None, None) => break,
-                    (Some(expected), Some(measured)) if is_near(expected, measured) => {}
+                    (Some(expected), Some(measured)) if is_near(expected, measured, columns) => {}
                     (expected, measured) => differences.push(format!(
                         "- {}\n+ {}",
                         expected.unwrap_or_default(),
@@ -110,7 +135,7 @@ impl Files {
             "not what {ROWS}, {PHOTONS} and {MEMORY} say, see above; `cargo xtask softcore` writes them"
         );
         println!(
-            "{ROWS}, {PHOTONS}, {MEMORY}: {} lines as measured, to {PERCENT} %",
+            "{ROWS}, {PHOTONS}, {MEMORY}: {} lines as measured",
             measured.rows.len() + measured.photons.len() + measured.memory.len()
         );
         Ok(())
@@ -126,14 +151,19 @@ fn lines<T>(root: &Path, file: &str, header: &str, parse: fn(&str) -> Option<T>)
     lines.map(parse).collect()
 }
 
-/// Whether two lines have the same words, and numbers that differ by little.
-fn is_near(a: &str, b: &str) -> bool {
+/// Whether two lines, or headers, are the same, or nearly.
+fn is_near(a: &str, b: &str, columns: &[Column]) -> bool {
     let (a, b): (Vec<&str>, Vec<&str>) = (a.split(',').collect(), b.split(',').collect());
-    let is_near = |(a, b): (&&str, &&str)| match (a.parse::<f64>(), b.parse::<f64>()) {
-        (Ok(a), Ok(b)) => (a - b).abs() <= a.abs() * PERCENT / 100.0,
+    let is_near = |((a, b), column): ((&&str, &&str), &Column)| match (
+        column,
+        a.parse::<f64>(),
+        b.parse::<f64>(),
+    ) {
+        (Told, Ok(_), Ok(_)) => true,
+        (Percent(percent), Ok(a), Ok(b)) => (a - b).abs() <= a.abs() * percent / 100.0,
         _ => a == b,
     };
-    a.len() == b.len() && a.iter().zip(&b).all(is_near)
+    a.len() == b.len() && a.len() == columns.len() && a.iter().zip(&b).zip(columns).all(is_near)
 }
 
 #[cfg(test)]
@@ -143,18 +173,21 @@ mod tests {
 
     #[test]
     fn figures_may_differ_by_little() {
+        let columns = [Name, Percent(2.0), Told];
         for (a, b, near) in [
-            ("a,100", "a,102", true),
-            ("a,100", "a,98", true),
-            ("a,100", "a,103", false),
-            ("a,100", "b,100", false),
-            ("a,100", "a,100,1", false),
-            ("a,0", "a,1", false),
-            ("a,", "a,", true),
-            ("a,", "a,1", false),
+            ("a,100,5", "a,102,5", true),
+            ("a,100,5", "a,98,9", true),
+            ("a,100,5", "a,103,5", false),
+            ("a,100,5", "b,100,5", false),
+            ("a,100,5", "a,100", false),
+            ("a,0,5", "a,1,5", false),
+            ("a,,5", "a,,5", true),
+            ("a,,5", "a,1,5", false),
+            ("a,1,5", "a,1,x", false),
         ] {
-            assert_eq!(is_near(a, b), near, "{a} {b}");
+            assert_eq!(is_near(a, b, &columns), near, "{a} {b}");
         }
+        assert!(!is_near("a,1", "a,1", &columns));
     }
 
     #[test]
@@ -186,7 +219,7 @@ mod tests {
         };
         assert!(of_a.check(&measured).is_ok());
         assert_eq!(files.differences(&measured).len(), 1);
-        measured.rows[0].cycles = 1021;
+        measured.rows[0].cycles = 1101;
         assert!(of_a.check(&measured).is_err());
         measured.rows[0].cycles = 1000;
         measured.memory[0].stack = Some(5);

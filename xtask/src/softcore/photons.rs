@@ -12,24 +12,34 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 
 use super::events;
+use super::memory::MACROPIXELS;
 use super::program::Ran;
 use super::rtl::{Laser, Simulator};
+use super::table::Row;
 
-/// Photons of a run at the highest rate, about. At others a run has as many laser cycles.
-const PHOTONS: u32 = 10_000;
+/// Photons of a run at the highest rate, about, or as many as come in so many laser cycles. At
+/// other rates a run has as many laser cycles.
+const PHOTONS: u32 = 50_000;
+const LONGEST: u32 = 4_000_000;
 /// Of the photons of a macropixel, background included.
 const SIGNAL: f64 = 0.5;
-/// Macropixels of a run, but for those that tell the stack.
-pub const PIXELS: u8 = 4;
-/// The highest rate tried: one photon a laser cycle, in [`UNIT`].
-const MOST: u32 = 100_000;
+/// Macropixels that share a processor.
+const PIXELS: u8 = 4;
+/// Clock cycles of a laser cycle: a laser of 10 MHz, a processor of 100 MHz.
+const CLOCKS: u64 = 10;
 /// Rates are counted in so many photons a laser cycle, [`PER_PHOTON`] make one.
 const UNIT: f64 = 1e-5;
 const PER_PHOTON: u32 = 100_000;
-/// The highest rate is known to a part of so many.
-const PARTS: u32 = 100;
+/// The highest rate is known to a part of so many: a tenth of a run has 5000 photons, give or
+/// take 1.4 %.
+const PARTS: u32 = 25;
 /// Of the highest rate, the rates whose looks and events are told: one part in so many.
 const RATES: [u32; 3] = [1, 2, 4];
+
+/// Of the runs in which events are certain: laser cycles, and photons of a macropixel a
+/// laser cycle, all of them signal.
+const CERTAIN: u32 = 1500;
+const CERTAIN_RATE: u32 = PER_PHOTON / 50;
 
 /// What a run came to.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -90,9 +100,38 @@ impl Sustained {
         f64::from(self.rate) * UNIT
     }
 
+    /// Events of all macropixels a second, of ten million laser cycles.
+    #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
+    pub fn events_a_second(&self) -> f64 {
+        self.events as f64 / self.photons.max(1) as f64 * self.rate() * 1e7
+    }
+
     /// Laser cycles between two looks at a macropixel, to be looked at.
     pub fn between_looks(&self) -> String {
         format!("{}.{}", self.between_looks / 10, self.between_looks % 10)
+    }
+}
+
+/// Clock cycles that a processor takes.
+#[derive(Clone, Copy, Debug)]
+pub struct Cycles {
+    /// For a photon alone.
+    count: u64,
+    /// For a look without an event.
+    look: u64,
+}
+
+impl Cycles {
+    /// As the bench counted them.
+    pub fn of(rows: &[Row]) -> Option<Self> {
+        let of = |operation| {
+            let row = rows.iter().find(|row| row.operation == operation);
+            row.map(|row| row.cycles / 100)
+        };
+        Some(Self {
+            count: of("photon: AsyncPixel::count")?,
+            look: of("decision: look; no event")?,
+        })
     }
 }
 
@@ -103,6 +142,7 @@ pub struct Trials<'a> {
     pub image: &'a dyn Fn(u8) -> PathBuf,
     pub folder: &'a Path,
     pub core: &'a str,
+    pub cycles: Cycles,
 }
 
 /// What they come to.
@@ -114,77 +154,116 @@ pub struct Found {
     pub slow: (u64, u64),
 }
 
+/// A run.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    pixels: u8,
+    /// Photons of all macropixels a laser cycle, in [`UNIT`], and the part that is signal.
+    rate: u32,
+    signal: f64,
+    /// Laser cycles, and the clock cycles of each.
+    length: u32,
+    clocks: u64,
+    /// Clock cycles until the link answers.
+    wait: u64,
+    /// Whether photons of a macropixel that there is not come as well.
+    strays: bool,
+}
+
 impl Trials<'_> {
-    /// The highest rate, found by halving, and what comes of parts of it. Half of it is also
-    /// run with a slow link and photons of macropixels that there are not, and with one
-    /// and 64 macropixels.
+    /// The highest rate, found by halving, and what comes of parts of it; and runs in which
+    /// events are certain, the last with a slow link and photons of macropixels that
+    /// there are not.
     pub fn run(&self) -> Result<Found> {
-        let (mut held, mut failed) = (0, MOST + 1);
+        let at = |rate, length| Run {
+            pixels: PIXELS,
+            rate,
+            signal: SIGNAL,
+            length,
+            clocks: CLOCKS,
+            wait: 0,
+            strays: false,
+        };
+        // More than that it cannot count.
+        let most = u64::from(PER_PHOTON) * CLOCKS / self.cycles.count.max(1);
+        let (mut held, mut failed) = (0, u32::try_from(most)?);
         while failed - held > (held / PARTS).max(1) {
             let rate = held.midpoint(failed);
-            let (ran, _) = self.stream(PIXELS, rate, cycles(rate), 0)?;
-            if ran.is_sustained() {
+            let (counted, _) = self.stream(&at(rate, cycles(rate)))?;
+            if counted.is_sustained() {
                 held = rate;
             } else {
                 failed = rate;
             }
         }
         ensure!(held >= RATES[2], "no rate is sustained");
-        let length = cycles(held);
-        let mut found = Found {
-            sustained: Vec::new(),
-            stack: Vec::new(),
-            slow: (0, 0),
-        };
-        let mut stack = 0;
+        let mut sustained = Vec::new();
         for part in RATES {
-            let rate = (held / part).max(1);
-            let (ran, photons) = self.stream(PIXELS, rate, length, 0)?;
-            ensure!(ran.is_sustained(), "a lower rate is not sustained");
-            ran.check(&photons)?;
-            stack = stack.max(ran.stack);
-            found.sustained.push(Sustained {
+            let run = at(held / part, cycles(held));
+            let (counted, photons) = self.stream(&run)?;
+            ensure!(counted.is_sustained(), "a lower rate is not sustained");
+            counted.check(&run, &photons)?;
+            sustained.push(Sustained {
                 core: self.core.to_owned(),
-                rate,
-                between_looks: (ran.cycles * u64::from(PIXELS) * 10).div_ceil(ran.looks.max(1)),
-                photons: ran.photons,
-                events: ran.events,
-                expired: ran.expired,
-                fill: ran.fill,
+                rate: run.rate,
+                between_looks: (counted.cycles * u64::from(PIXELS) * 10)
+                    .div_ceil(counted.looks.max(1)),
+                photons: counted.photons,
+                events: counted.events,
+                expired: counted.expired,
+                fill: counted.fill,
             });
         }
-        let half = (held / 2).max(1);
-        for pixels in [1, PIXELS, 64] {
-            if pixels != PIXELS {
-                let (ran, photons) = self.stream(pixels, half, length, 0)?;
-                ran.check(&photons)?;
-                stack = ran.stack;
-            }
-            found.stack.push((pixels, stack));
+        let mut stack = Vec::new();
+        for pixels in MACROPIXELS {
+            let counted = self.certain(pixels, false)?;
+            stack.push((pixels, counted.stack));
         }
-        // A tenth of the run for each word.
-        let wait = u64::from(length);
-        let (ran, photons) = self.stream(PIXELS, half, length, wait)?;
-        ran.check(&photons)?;
-        found.slow = (ran.events, ran.deferred);
-        ensure!(
-            ran.deferred > 0 || ran.events < 10,
-            "{} events over a slow link, none of them late",
-            ran.events
-        );
-        Ok(found)
+        let slow = self.certain(PIXELS, true)?;
+        ensure!(slow.deferred > 0, "a slow link puts nothing off");
+        Ok(Found {
+            sustained,
+            stack,
+            slow: (slow.events, slow.deferred),
+        })
     }
 
-    /// A run of so many macropixels at a rate, over so many laser cycles, with a link that
-    /// answers after `wait` clock cycles. Every hundredth photon is also sent for a
-    /// macropixel that there is not, if the link is slow.
-    fn stream(&self, pixels: u8, rate: u32, length: u32, wait: u64) -> Result<(Counted, Photons)> {
-        let photons = photons(pixels, rate, length)?;
+    /// A run with a laser so slow that every macropixel is looked at in time and fires, at its best with a
+    /// link that takes as long for a word as a macropixel for some events.
+    fn certain(&self, pixels: u8, is_slow: bool) -> Result<Counted> {
+        // A look at each macropixel in 20 laser cycles.
+        let clocks = (u64::from(pixels) * self.cycles.look / 20).max(CLOCKS);
+        let run = Run {
+            pixels,
+            rate: CERTAIN_RATE * u32::from(pixels),
+            signal: 1.0,
+            length: CERTAIN,
+            clocks,
+            wait: if is_slow {
+                clocks * u64::from(CERTAIN) / 4
+            } else {
+                0
+            },
+            strays: is_slow,
+        };
+        let (counted, photons) = self.stream(&run)?;
+        counted.check(&run, &photons)?;
+        ensure!(
+            counted.lost == 0 && counted.events >= u64::from(pixels),
+            "{run:?}: {} photons lost, {} events",
+            counted.lost,
+            counted.events
+        );
+        Ok(counted)
+    }
+
+    fn stream(&self, run: &Run) -> Result<(Counted, Photons)> {
+        let photons = photons(run)?;
         let mut text = String::new();
         let mut strays = 0;
         for (index, Photon { cycle, pixel, code }) in photons.iter().enumerate() {
             writeln!(text, "{cycle} {pixel} {code}")?;
-            if wait > 0 && index % 100 == 0 {
+            if run.strays && index % 10 == 0 {
                 writeln!(text, "{cycle} {} {code}", u8::MAX - pixel)?;
                 strays += 1;
             }
@@ -193,19 +272,18 @@ impl Trials<'_> {
         fs::write(&file, text).with_context(|| file.display().to_string())?;
         let laser = Laser {
             photons: &file,
-            wait,
+            clocks: run.clocks,
+            wait: run.wait,
         };
         // The last photons take as long as the rest at most, and then the bit-serial
-        // processor divides for each digit of the report; and each word waits.
-        let limit = 2 * u64::from(length) * Laser::CLOCKS + 50_000_000 + 100 * wait;
-        let ran = self
-            .simulator
-            .stream(&(self.image)(pixels), limit, &laser)?;
-        let counted = Counted::read(&ran).with_context(|| format!("{}{}", ran.output, ran.errors));
-        let counted = counted.with_context(|| format!("{pixels} macropixels, rate {rate}"))?;
+        // processor divides for each digit of the report; and words that are left wait.
+        let limit = 2 * u64::from(run.length) * run.clocks + 50_000_000 + 10 * run.wait;
+        let image = (self.image)(run.pixels);
+        let ran = self.simulator.stream(&image, limit, &laser)?;
+        let counted = Counted::read(&ran).with_context(|| format!("{run:?}\n{}", ran.said()))?;
         ensure!(
             counted.strays == strays,
-            "{} strays of {strays}",
+            "{run:?}: {} strays of {strays}",
             counted.strays
         );
         Ok((counted, photons))
@@ -214,7 +292,7 @@ impl Trials<'_> {
 
 /// Laser cycles of a run at the highest rate.
 fn cycles(rate: u32) -> u32 {
-    PHOTONS * (PER_PHOTON / 10) / rate * 10
+    (PHOTONS * (PER_PHOTON / 10) / rate.max(2)).min(LONGEST / 10) * 10
 }
 
 /// A photon that is sent.
@@ -228,15 +306,15 @@ pub struct Photon {
 /// In the order of their laser cycles.
 pub type Photons = Vec<Photon>;
 
-/// The photons of so many macropixels over so many laser cycles.
-fn photons(pixels: u8, rate: u32, length: u32) -> Result<Photons> {
+/// The photons of a run.
+fn photons(run: &Run) -> Result<Photons> {
     let bins = u16::try_from(BINS)?;
-    let each = f64::from(rate) * UNIT / f64::from(pixels);
+    let each = f64::from(run.rate) * UNIT / f64::from(run.pixels);
     let mut simulated = Vec::new();
-    for pixel in 0..pixels {
+    for pixel in 0..run.pixels {
         let rates = Rates {
-            background: each * (1.0 - SIGNAL) / f64::from(bins),
-            signal: each * SIGNAL,
+            background: each * (1.0 - run.signal) / f64::from(bins),
+            signal: each * run.signal,
             // Targets at four ranges.
             position: 20.5 + 25.0 * f64::from(pixel % 4),
             sigma: 0.5,
@@ -245,7 +323,7 @@ fn photons(pixels: u8, rate: u32, length: u32) -> Result<Photons> {
         simulated.push(SimulatedPixel::new(&rates, bins, random)?);
     }
     let mut photons = Vec::new();
-    for cycle in 0..length {
+    for cycle in 0..run.length {
         for (pixel, simulated) in (0..).zip(&mut simulated) {
             simulated.next_cycle(|code| photons.push(Photon { cycle, pixel, code }));
         }
@@ -269,6 +347,8 @@ struct Counted {
     lowest: Vec<u64>,
     /// The event words over the link.
     words: Vec<u128>,
+    /// The numbers of the marks.
+    marks: Vec<u32>,
 }
 
 impl Counted {
@@ -280,7 +360,7 @@ impl Counted {
         });
         let mut fifo = || -> Vec<u64> { from_fifo.next().unwrap_or_default() };
         let [sent, lost, fill] = fifo()[..] else {
-            anyhow::bail!("what is this of the photons?");
+            anyhow::bail!("what of the photons?");
         };
         let [ended, 0] = fifo()[..] else {
             anyhow::bail!("laser cycles are lost");
@@ -324,6 +404,10 @@ impl Counted {
             .lines()
             .filter_map(|line| line.strip_prefix("event "));
         let words = words.map(|word| u128::from_str_radix(word, 16));
+        let marks = ran.errors.lines().filter_map(|line| {
+            let number = line.strip_prefix("mark ")?.split(' ').next();
+            Some(number.unwrap_or_default().parse())
+        });
         Ok(Self {
             cycles,
             looks,
@@ -337,6 +421,7 @@ impl Counted {
             fill,
             lowest,
             words: words.collect::<Result<_, _>>()?,
+            marks: marks.collect::<Result<_, _>>()?,
         })
     }
 
@@ -346,13 +431,17 @@ impl Counted {
         self.lost == 0 && self.lowest.iter().all(|&fill| fill <= u64::from(FEW))
     }
 
-    /// Whether the words over the link are what the host makes of the same photons.
-    fn check(&self, photons: &[Photon]) -> Result<()> {
-        let events = events::check(&self.words, photons)?;
+    /// Whether the host decides the same from the same photons and looks.
+    fn check(&self, run: &Run, photons: &[Photon]) -> Result<()> {
+        let (decided, all) = events::decided(run.pixels, &self.marks, photons)?;
+        events::compare(&events::decoded(&self.words)?, &decided)?;
+        let [of_core, of_host] = [
+            [self.photons, self.events, self.expired, self.deferred],
+            [all.photons(), all.events, all.expired, all.deferred],
+        ];
         ensure!(
-            events == self.events,
-            "{events} events over the link, {} decided",
-            self.events
+            of_core == of_host,
+            "{run:?}: photons, events, expired, deferred {of_core:?}, on the host {of_host:?}"
         );
         Ok(())
     }
@@ -362,16 +451,27 @@ impl Counted {
 mod tests {
     use super::*;
 
+    const RUN: Run = Run {
+        pixels: PIXELS,
+        rate: 10_000,
+        signal: SIGNAL,
+        length: 500_000,
+        clocks: CLOCKS,
+        wait: 0,
+        strays: false,
+    };
+
     #[test]
     fn photons_come_in_order_and_as_many_as_asked() {
-        let photons = photons(PIXELS, 10_000, cycles(10_000)).unwrap();
+        assert_eq!(cycles(RUN.rate), RUN.length);
+        let photons = photons(&RUN).unwrap();
         let mut last = 0;
         for photon in &photons {
-            assert!(photon.cycle >= last && photon.cycle < cycles(10_000));
+            assert!(photon.cycle >= last && photon.cycle < RUN.length);
             last = photon.cycle;
         }
-        // A Poisson count of mean 10,000; five standard deviations.
-        assert!(photons.len().abs_diff(10_000) < 5 * 100);
+        // A Poisson count of mean 50,000; five standard deviations.
+        assert!(photons.len().abs_diff(50_000) < 5 * 224);
     }
 
     #[test]
@@ -394,6 +494,7 @@ mod tests {
     fn ran(output: &str, errors: &str) -> Ran {
         Ran {
             code: Some(0),
+            timed_out: false,
             output: output.to_owned(),
             errors: errors.to_owned(),
         }
@@ -415,7 +516,7 @@ fifo: lowest fill of each tenth 0 0 0 0 0 0 0 0 1 0
     fn every_loss_is_noticed() {
         let counted = Counted::read(&ran(OUTPUT, ERRORS)).unwrap();
         assert!(counted.is_sustained() && counted.words == [15]);
-        assert!(counted.check(&[]).is_err());
+        assert!(counted.check(&RUN, &[]).is_err());
         let grows = ERRORS.replace(" 1 0\n", " 1 2\n");
         assert!(!Counted::read(&ran(OUTPUT, &grows)).unwrap().is_sustained());
         let lost = ERRORS.replace("10 photons, 0 lost", "11 photons, 1 lost");

@@ -2,77 +2,169 @@
 
 use std::io::Read;
 use std::process::{Command, Stdio};
-use std::thread;
+use std::sync::{Arc, Mutex};
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 
 /// What came of a program.
 pub struct Ran {
-    /// Its exit code; `None` if it was ended, after the time it was given or by a
-    /// signal.
+    /// Its exit code; `None` if it was ended.
     pub code: Option<i32>,
+    /// Whether it was ended because it took too long.
+    pub timed_out: bool,
     pub output: String,
     pub errors: String,
 }
 
-/// Runs a program, for so long.
-pub fn run(command: &mut Command, limit: Duration) -> Result<Ran> {
+impl Ran {
+    /// All that it said, and how it ended.
+    pub fn said(&self) -> String {
+        let end = match self.code {
+            _ if self.timed_out => "took too long".to_owned(),
+            Some(code) => format!("ends with {code}"),
+            None => "was ended by a signal".to_owned(),
+        };
+        format!("{}{}({end})", self.output, self.errors)
+    }
+}
+
+/// How long a program may take.
+#[derive(Clone, Copy, Debug)]
+pub enum Limit {
+    /// So long.
+    Whole(Duration),
+    /// So long until it has written a line, and so long after that.
+    After(Duration, &'static str, Duration),
+}
+
+/// Runs a program and what it starts, for so long.
+pub fn run(command: &mut Command, limit: Limit) -> Result<Ran> {
     let name = command.get_program().to_string_lossy().into_owned();
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(command, 0);
     let mut child = command
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .with_context(|| format!("{name} does not start"))?;
-    let output = child.stdout.take().context("no output")?;
-    let errors = child.stderr.take().context("no error output")?;
-    let [output, errors] = [
-        thread::spawn(move || text(output)),
-        thread::spawn(move || text(errors)),
-    ];
-    let start = Instant::now();
-    let code = loop {
+    let output = Text::read(child.stdout.take().context("no output")?);
+    let errors = Text::read(child.stderr.take().context("no error output")?);
+    let mut end = match limit {
+        Limit::Whole(most) | Limit::After(most, ..) => Instant::now() + most,
+    };
+    let mut awaited = match limit {
+        Limit::Whole(_) => None,
+        Limit::After(_, line, rest) => Some((line, rest)),
+    };
+    let (code, timed_out) = loop {
         if let Some(status) = child.try_wait()? {
-            break status.code();
+            break (status.code(), false);
         }
-        if start.elapsed() > limit {
-            child.kill()?;
+        if let Some((line, rest)) = awaited
+            && output.has(line)
+        {
+            (end, awaited) = (Instant::now() + rest, None);
+        }
+        if Instant::now() > end {
+            if cfg!(unix) {
+                // What it has started holds the other ends of the pipes.
+                let kill = format!("kill -s KILL -- -{}", child.id());
+                let killed = Command::new("sh").args(["-c", &kill]).status();
+                killed.context("sh does not start")?;
+            } else {
+                child.kill()?;
+            }
             child.wait()?;
-            break None;
+            break (None, true);
         }
         thread::sleep(Duration::from_millis(5));
     };
     Ok(Ran {
         code,
-        output: output.join().unwrap_or_default(),
-        errors: errors.join().unwrap_or_default(),
+        timed_out,
+        output: output.all(),
+        errors: errors.all(),
     })
 }
 
-/// All there is to read; what came before an error is all.
-fn text(mut source: impl Read) -> String {
-    let mut bytes = Vec::new();
-    let _ = source.read_to_end(&mut bytes);
-    String::from_utf8_lossy(&bytes).into_owned()
+/// What a thread reads.
+struct Text {
+    bytes: Arc<Mutex<Vec<u8>>>,
+    reader: JoinHandle<()>,
+}
+
+impl Text {
+    fn read(mut source: impl Read + Send + 'static) -> Self {
+        let bytes = Arc::<Mutex<Vec<u8>>>::default();
+        let read = Arc::clone(&bytes);
+        let reader = thread::spawn(move || {
+            let mut part = [0; 1 << 14];
+            // What came before an error is all.
+            while let Ok(length @ 1..) = source.read(&mut part) {
+                if let (Ok(mut read), Some(part)) = (read.lock(), part.get(..length)) {
+                    read.extend_from_slice(part);
+                }
+            }
+        });
+        Self { bytes, reader }
+    }
+
+    fn text(&self) -> String {
+        let bytes = self.bytes.lock().map(|bytes| bytes.clone());
+        String::from_utf8_lossy(&bytes.unwrap_or_default()).into_owned()
+    }
+
+    fn has(&self, line: &str) -> bool {
+        self.text().lines().any(|written| written == line)
+    }
+
+    fn all(self) -> String {
+        let Self { bytes, reader } = self;
+        // It does not panic.
+        let _ = reader.join();
+        let bytes = bytes.lock().map(|bytes| bytes.clone());
+        String::from_utf8_lossy(&bytes.unwrap_or_default()).into_owned()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const LONG: Limit = Limit::Whole(Duration::from_secs(60));
+
     #[test]
-    fn ends_what_does_not_end() {
-        let mut endless = Command::new("sleep");
-        let ran = run(endless.arg("60"), Duration::from_millis(50)).unwrap();
-        assert_eq!(ran.code, None);
+    fn ends_what_does_not_end_and_what_it_has_started() {
+        let mut endless = Command::new("sh");
+        endless.args(["-c", "echo begun; sleep 600 & sleep 600"]);
+        let rest = Duration::from_millis(50);
+        for limit in [
+            Limit::Whole(rest),
+            Limit::After(Duration::from_secs(60), "begun", rest),
+        ] {
+            let ran = run(&mut endless, limit).unwrap();
+            assert!(ran.timed_out && ran.code.is_none());
+            assert!(ran.said().ends_with("(took too long)"));
+        }
+    }
+
+    #[test]
+    fn the_line_that_is_awaited_is_a_whole_one() {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", "echo a line more; exit 1"]);
+        let limit = Limit::After(Duration::from_secs(60), "a line", Duration::ZERO);
+        let ran = run(&mut shell, limit).unwrap();
+        assert_eq!((ran.code, ran.timed_out), (Some(1), false));
     }
 
     #[test]
     fn tells_both_outputs_and_the_code() {
         let mut shell = Command::new("sh");
         shell.args(["-c", "echo out; echo error >&2; exit 3"]);
-        let ran = run(&mut shell, Duration::from_secs(20)).unwrap();
+        let ran = run(&mut shell, LONG).unwrap();
         assert_eq!(
             (ran.code, &*ran.output, &*ran.errors),
             (Some(3), "out\n", "error\n")

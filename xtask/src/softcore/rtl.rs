@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 
-use super::program::{self, Ran};
+use super::program::{self, Limit, Ran};
 use crate::tools::{VERILATOR, YOSYS};
 use crate::{python, target_folder};
 
@@ -58,7 +58,7 @@ pub const CORES: [Core; 5] = [
 ];
 
 /// Far more than any run takes; the cycles are limited as well.
-const PATIENCE: Duration = Duration::from_secs(600);
+const PATIENCE: Limit = Limit::Whole(Duration::from_secs(600));
 
 /// A core's testbench as a program.
 pub struct Simulator(PathBuf);
@@ -71,7 +71,7 @@ impl Simulator {
         let ask = format!("import {0}; print({0}.data_location)", core.package);
         let mut ask_python = Command::new(python);
         let ran = program::run(ask_python.args(["-c", &ask]), PATIENCE)?;
-        ensure!(ran.code == Some(0), "{}: {}", core.package, ran.errors);
+        ensure!(ran.code == Some(0), "{}: {}", core.package, ran.said());
 
         verilate(root, core.name, ran.output.trim()).map(Self)
     }
@@ -86,7 +86,7 @@ impl Simulator {
         let mut command = self.command(image, cycles);
         command.arg("--stream").arg(laser.photons);
         for (option, number) in [
-            ("--clocks-per-laser-cycle", Laser::CLOCKS),
+            ("--clocks-per-laser-cycle", laser.clocks),
             ("--acknowledge-after", laser.wait),
         ] {
             command.args([option, &number.to_string()]);
@@ -105,13 +105,10 @@ impl Simulator {
 pub struct Laser<'a> {
     /// Lines `laser cycle, macropixel, TDC code`.
     pub photons: &'a Path,
+    /// Clock cycles of a laser cycle.
+    pub clocks: u64,
     /// Clock cycles until the link answers.
     pub wait: u64,
-}
-
-impl Laser<'_> {
-    /// Clock cycles of a laser cycle: a laser of 10 MHz, a processor of 100 MHz.
-    pub const CLOCKS: u64 = 10;
 }
 
 /// Whether the FIFO does with random words what a model of it does, and its memory is
@@ -120,7 +117,7 @@ impl Laser<'_> {
 pub fn check_fifo(root: &Path) -> Result<()> {
     let test = verilate(root, "photon_fifo", "")?;
     let ran = program::run(&mut Command::new(test), PATIENCE)?;
-    ensure!(ran.code == Some(0), "{}{}", ran.output, ran.errors);
+    ensure!(ran.code == Some(0), ran.said());
     print!("{}", ran.output);
 
     YOSYS.require()?;
@@ -133,9 +130,8 @@ pub fn check_fifo(root: &Path) -> Result<()> {
     let ran = program::run(&mut yosys, PATIENCE)?;
     ensure!(
         ran.code == Some(0),
-        "photon FIFO: not four block RAMs of an iCE40\n{}{}",
-        ran.output,
-        ran.errors
+        "photon FIFO: not four block RAMs of an iCE40\n{}",
+        ran.said()
     );
     let cells = |name| {
         let mut lines = ran.output.lines();
@@ -169,7 +165,10 @@ fn verilate(root: &Path, name: &str, data: &str) -> Result<PathBuf> {
         .arg("--Mdir")
         .arg(&folder);
     let ran = program::run(&mut verilator, PATIENCE)?;
-    let said = || format!("{name}: verilator fails\n{}{}", ran.output, ran.errors);
-    ensure!(ran.code == Some(0), said());
+    ensure!(
+        ran.code == Some(0),
+        "{name}: verilator fails\n{}",
+        ran.said()
+    );
     Ok(folder.join("sim"))
 }

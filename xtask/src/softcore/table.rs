@@ -78,17 +78,19 @@ pub fn rows(core: &str, caches: bool, ran: &Ran) -> Result<Vec<Row>> {
             let less = |of: fn(Count) -> u64| {
                 // In parts of a call of nothing, of which there may be more or fewer.
                 let parts = call.1.max(1);
-                let rest = (of(total) * parts).saturating_sub(of(call.0) * measured);
+                let rest = (of(total) * parts).checked_sub(of(call.0) * measured);
+                let rest = rest.with_context(|| format!("{name}: less than a call of nothing"))?;
                 let times = times.max(1) * parts;
-                (rest * 100 + times / 2) / times
+                anyhow::Ok((rest * 100 + times / 2) / times)
             };
             both.push(Row {
                 core: core.to_owned(),
                 operation: name.to_owned(),
-                cycles: less(|count| count.cycle),
-                instructions: less(|count| count.instructions),
-                code_lines: less(|count| count.code),
-                data_lines: less(|count| count.data),
+                cycles: less(|count| count.cycle)?,
+                instructions: less(|count| count.instructions)?,
+                // A call of nothing may meet a line that the operation does not.
+                code_lines: less(|count| count.code).unwrap_or_default(),
+                data_lines: less(|count| count.data).unwrap_or_default(),
             });
         }
         let [cold, warm] = &mut both[..] else {
@@ -245,6 +247,7 @@ mod tests {
     fn ran(output: &str, errors: &str) -> Ran {
         Ran {
             code: Some(0),
+            timed_out: false,
             output: output.into(),
             errors: errors.into(),
         }

@@ -6,19 +6,21 @@ use std::time::Duration;
 
 use anyhow::Result;
 
-use super::program::{self, Ran};
+use super::program::{self, Limit, Ran};
 use crate::tools::QEMU_RISCV;
 
 /// Whatever ends, ends in a fraction of this.
-pub const PATIENCE: Duration = Duration::from_secs(60);
-/// Time enough to print a line.
-pub const A_MOMENT: Duration = Duration::from_secs(5);
+const PATIENCE: Duration = Duration::from_secs(120);
+/// What is long enough to see that a loop has no end.
+const A_MOMENT: Duration = Duration::from_secs(1);
 
-/// Runs an image, for so long. What the instruction set has not is an illegal instruction.
-pub fn run(image: &Path, isa: &str, limit: Duration) -> Result<Ran> {
+/// Runs an image until it ends, or a moment longer than it takes to print a line, after which
+/// no end is expected. What the instruction set has not is an illegal instruction.
+pub fn run(image: &Path, isa: &str, last_line: Option<&'static str>) -> Result<Ran> {
     QEMU_RISCV.require()?;
     let letters = isa.trim_start_matches("rv32");
-    let mut processor = "rv32,a=false,f=false,d=false".to_owned();
+    let mut processor =
+        "rv32,a=false,f=false,d=false,zba=false,zbb=false,zbc=false,zbs=false".to_owned();
     for letter in ["m", "c"] {
         if !letters.contains(letter) {
             processor.push_str(&format!(",{letter}=false"));
@@ -28,5 +30,9 @@ pub fn run(image: &Path, isa: &str, limit: Duration) -> Result<Ran> {
     qemu.args(["-machine", "virt", "-cpu", &processor, "-bios", "none"]);
     qemu.args(["-display", "none", "-monitor", "none", "-serial", "stdio"]);
     qemu.arg("-kernel").arg(image);
+    let limit = match last_line {
+        None => Limit::Whole(PATIENCE),
+        Some(line) => Limit::After(PATIENCE, line, A_MOMENT),
+    };
     program::run(&mut qemu, limit)
 }
