@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::image::Sizes;
 use super::memory::Memory;
-use super::photons::Sustained;
+use super::sustained::Sustained;
 use super::table::{COLD, Row};
 
 const START: &str = "\

@@ -8,7 +8,7 @@ use anyhow::{Context, Result, ensure};
 
 use super::document;
 use super::memory::Memory;
-use super::photons::Sustained;
+use super::sustained::Sustained;
 use super::table::{self, Row};
 
 const ROWS: &str = "docs/bench/softcore.csv";

@@ -1,6 +1,7 @@
 //! `cargo xtask softcore`: the core on RV32 processors, in QEMU and on the processors'
 //! own Verilog in simulation, cycle by cycle.
 
+mod counted;
 mod document;
 mod events;
 mod files;
@@ -9,7 +10,9 @@ mod memory;
 mod photons;
 mod program;
 mod rtl;
+mod sustained;
 mod table;
+mod trials;
 mod virt;
 
 use std::fs;
@@ -21,9 +24,9 @@ use crate::{self_test, target_folder, tools};
 use files::Files;
 use image::Images;
 use memory::{Memory, Stacks};
-use photons::{Cycles, Found, Trials};
 use program::Ran;
 use rtl::{CORES, Core, Simulator};
+use trials::{Cycles, Found, Trials};
 
 /// The instruction sets with an image, the least first.
 const ISAS: [&str; 3] = ["rv32i", "rv32im", "rv32imc"];

@@ -1,0 +1,235 @@
+//! Photons into the FIFO at the paper's setting: the highest rate a processor sustains,
+//! and what comes of lower ones.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+
+use super::counted::Counted;
+use super::memory::MACROPIXELS;
+use super::photons::{PER_PHOTON, Photon, Photons, photons};
+use super::rtl::{Laser, Simulator};
+use super::sustained::Sustained;
+use super::table::Row;
+
+/// Photons of a run at the highest rate, about, or as many as come in so many laser cycles. At
+/// other rates a run has as many laser cycles.
+const PHOTONS: u32 = 50_000;
+const LONGEST: u32 = 4_000_000;
+/// Of the photons of a macropixel, background included.
+const SIGNAL: f64 = 0.5;
+/// Macropixels that share a processor.
+const PIXELS: u8 = 4;
+/// Clock cycles of a laser cycle: a laser of 10 MHz, a processor of 100 MHz.
+const CLOCKS: u64 = 10;
+/// The highest rate is known to a part of so many: a tenth of a run has 5000 photons, give or
+/// take 1.4 %.
+const PARTS: u32 = 25;
+/// Of the highest rate, the rates whose looks and events are told: one part in so many.
+const RATES: [u32; 3] = [1, 2, 4];
+
+/// Of the runs in which events are certain: laser cycles, and photons of a macropixel a
+/// laser cycle, all of them signal.
+const CERTAIN: u32 = 1500;
+const CERTAIN_RATE: u32 = PER_PHOTON / 50;
+
+/// Clock cycles that a processor takes.
+#[derive(Clone, Copy, Debug)]
+pub struct Cycles {
+    /// For a photon alone.
+    count: u64,
+    /// For a look without an event.
+    look: u64,
+}
+
+impl Cycles {
+    /// As the bench counted them.
+    pub fn of(rows: &[Row]) -> Option<Self> {
+        let of = |operation| {
+            let row = rows.iter().find(|row| row.operation == operation);
+            row.map(|row| row.cycles / 100)
+        };
+        Some(Self {
+            count: of("photon: AsyncPixel::count")?,
+            look: of("decision: look; no event")?,
+        })
+    }
+}
+
+/// What the photons of a processor are tried with.
+pub struct Trials<'a> {
+    pub simulator: &'a Simulator,
+    /// Of the image `stream-N`.
+    pub image: &'a dyn Fn(u8) -> PathBuf,
+    pub folder: &'a Path,
+    pub core: &'a str,
+    pub cycles: Cycles,
+}
+
+/// What they come to.
+pub struct Found {
+    pub sustained: Vec<Sustained>,
+    /// Bytes of the stack with so many macropixels.
+    pub stack: Vec<(u8, u64)>,
+    /// Events and decisions put off with a link that is slow.
+    pub slow: (u64, u64),
+}
+
+/// A run.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    pixels: u8,
+    /// Photons of all macropixels a laser cycle, in [`UNIT`], and the part that is signal.
+    rate: u32,
+    signal: f64,
+    /// Laser cycles, and the clock cycles of each.
+    length: u32,
+    clocks: u64,
+    /// Clock cycles until the link answers.
+    wait: u64,
+    /// Whether photons of a macropixel that there is not come as well.
+    strays: bool,
+}
+
+impl Trials<'_> {
+    /// The highest rate, found by halving, and what comes of parts of it; and runs in which
+    /// events are certain, the last with a slow link and photons of macropixels that
+    /// there are not.
+    pub fn run(&self) -> Result<Found> {
+        let at = |rate, length| Run {
+            pixels: PIXELS,
+            rate,
+            signal: SIGNAL,
+            length,
+            clocks: CLOCKS,
+            wait: 0,
+            strays: false,
+        };
+        // More than that it cannot count.
+        let most = u64::from(PER_PHOTON) * CLOCKS / self.cycles.count.max(1);
+        let (mut held, mut failed) = (0, u32::try_from(most)?);
+        while failed - held > (held / PARTS).max(1) {
+            let rate = held.midpoint(failed);
+            let (counted, _) = self.stream(&at(rate, cycles(rate)))?;
+            if counted.is_sustained() {
+                held = rate;
+            } else {
+                failed = rate;
+            }
+        }
+        ensure!(held >= RATES[2], "no rate is sustained");
+        let mut sustained = Vec::new();
+        for part in RATES {
+            let run = at(held / part, cycles(held));
+            let (counted, photons) = self.stream(&run)?;
+            ensure!(counted.is_sustained(), "a lower rate is not sustained");
+            counted
+                .check(run.pixels, &photons)
+                .with_context(|| format!("{run:?}"))?;
+            sustained.push(Sustained {
+                core: self.core.to_owned(),
+                rate: run.rate,
+                between_looks: (counted.cycles * u64::from(PIXELS) * 10)
+                    .div_ceil(counted.looks.max(1)),
+                photons: counted.photons,
+                events: counted.events,
+                expired: counted.expired,
+                fill: counted.fill,
+            });
+        }
+        let mut stack = Vec::new();
+        for pixels in MACROPIXELS {
+            let counted = self.certain(pixels, false)?;
+            stack.push((pixels, counted.stack));
+        }
+        let slow = self.certain(PIXELS, true)?;
+        ensure!(slow.deferred > 0, "a slow link puts nothing off");
+        Ok(Found {
+            sustained,
+            stack,
+            slow: (slow.events, slow.deferred),
+        })
+    }
+
+    /// A run with a laser so slow that every macropixel is looked at in time and fires, at its best with a
+    /// link that takes as long for a word as a macropixel for some events.
+    fn certain(&self, pixels: u8, is_slow: bool) -> Result<Counted> {
+        // A look at each macropixel in 20 laser cycles.
+        let clocks = (u64::from(pixels) * self.cycles.look / 20).max(CLOCKS);
+        let run = Run {
+            pixels,
+            rate: CERTAIN_RATE * u32::from(pixels),
+            signal: 1.0,
+            length: CERTAIN,
+            clocks,
+            wait: if is_slow {
+                clocks * u64::from(CERTAIN) / 4
+            } else {
+                0
+            },
+            strays: is_slow,
+        };
+        let (counted, photons) = self.stream(&run)?;
+        counted
+            .check(run.pixels, &photons)
+            .with_context(|| format!("{run:?}"))?;
+        ensure!(
+            counted.lost == 0 && counted.events >= u64::from(pixels),
+            "{run:?}: {} photons lost, {} events",
+            counted.lost,
+            counted.events
+        );
+        Ok(counted)
+    }
+
+    fn stream(&self, run: &Run) -> Result<(Counted, Photons)> {
+        let photons = photons(run.pixels, run.rate, run.signal, run.length)?;
+        let mut text = String::new();
+        let mut strays = 0;
+        for (index, Photon { cycle, pixel, code }) in photons.iter().enumerate() {
+            writeln!(text, "{cycle} {pixel} {code}")?;
+            if run.strays && index % 10 == 0 {
+                writeln!(text, "{cycle} {} {code}", u8::MAX - pixel)?;
+                strays += 1;
+            }
+        }
+        let file = self.folder.join("photons.txt");
+        fs::write(&file, text).with_context(|| file.display().to_string())?;
+        let laser = Laser {
+            photons: &file,
+            clocks: run.clocks,
+            wait: run.wait,
+        };
+        // The last photons take as long as the rest at most, and then the bit-serial
+        // processor divides for each digit of the report; and words that are left wait.
+        let limit = 2 * u64::from(run.length) * run.clocks + 50_000_000 + 10 * run.wait;
+        let image = (self.image)(run.pixels);
+        let ran = self.simulator.stream(&image, limit, &laser)?;
+        let counted = Counted::read(&ran).with_context(|| format!("{run:?}\n{}", ran.said()))?;
+        ensure!(
+            counted.strays == strays,
+            "{run:?}: {} strays of {strays}",
+            counted.strays
+        );
+        Ok((counted, photons))
+    }
+}
+
+/// Laser cycles of a run at the highest rate.
+fn cycles(rate: u32) -> u32 {
+    (PHOTONS * (PER_PHOTON / 10) / rate.max(2)).min(LONGEST / 10) * 10
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_has_its_photons_or_its_length() {
+        assert_eq!(cycles(PER_PHOTON / 10), 10 * PHOTONS);
+        assert_eq!(cycles(100), LONGEST);
+        assert_eq!(cycles(0), LONGEST);
+    }
+}
