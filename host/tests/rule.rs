@@ -137,9 +137,12 @@ fn options_that_contradict_each_other_are_refused_in_one_line() {
         ),
         ("--z 4", &["--z is for --rule window"]),
         ("--window 3", &["--window is for --rule window"]),
-        ("--false-one-in 9", &["--false-one-in is for --rule window"]),
         (
-            "--rule window --window 3 --z 4 --false-one-in 9",
+            "--false-one-in 99",
+            &["--false-one-in is for --rule window"],
+        ),
+        (
+            "--rule window --window 3 --z 4 --false-one-in 99",
             &["--z", "--false-one-in"],
         ),
         ("--rule window", &["--window", "--sigma-bins"]),
@@ -155,7 +158,7 @@ fn options_that_contradict_each_other_are_refused_in_one_line() {
             &["--z", "a number from 0"],
         ),
         (
-            "--rule window --window 3 --false-one-in 0",
+            "--rule window --window 3 --false-one-in 9",
             &["--false-one-in"],
         ),
         ("--sigma-bins 0", &["--sigma-bins", "above 0"]),

@@ -89,6 +89,8 @@ std::vector<uint8_t> read_image(const std::string &path) {
     std::ifstream file = open(path);
     std::vector<uint8_t> bytes((std::istreambuf_iterator<char>(file)), {});
     if (bytes.empty()) fail(path + ": empty");
+    if (std::string(bytes.begin(), bytes.begin() + std::min<size_t>(bytes.size(), 4)) == "\x7f" "ELF")
+        fail(path + ": an ELF file, not memory from address 0 on");
     if (bytes.size() > RAM_BYTES) fail(path + ": larger than RAM");
     bytes.resize((bytes.size() + 3) / 4 * 4);
     return bytes;

@@ -26,8 +26,8 @@ pub struct Detection {
     #[arg(long, value_parser = number::<U4F12>, conflicts_with = "false_one_in", allow_hyphen_values = true)]
     z: Option<U4F12>,
     /// Window rule, instead: the z with which one in N exposures without a target brings a false
-    /// event [default: 100]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// event, 10 or more [default: 100]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(10..))]
     false_one_in: Option<u32>,
     /// Standard deviation of the pulse in bins, rounded to 1/256: takes the depth from a window that
     /// suits it [default: depth from three bins, whatever the pulse]

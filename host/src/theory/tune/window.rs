@@ -66,6 +66,10 @@ pub fn tune(request: &Request) -> Result<Tuned> {
         // As a cast: limited to what a u32 holds.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let one_in = (1.0 / request.wanted.in_an_exposure(looks)).ceil() as u32;
+        ensure!(
+            one_in >= 10,
+            "a false event in {one_in} exposures: there is a z for one in 10 or fewer"
+        );
         let z = z_for(one_in, &gate, request.x, l1, request.l2);
         ensure!(
             z < HIGHEST_Z,
