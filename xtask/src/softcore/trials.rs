@@ -81,7 +81,7 @@ pub struct Found {
 #[derive(Clone, Copy, Debug)]
 struct Run {
     pixels: u8,
-    /// Photons of all macropixels a laser cycle, in [`UNIT`], and the part that is signal.
+    /// Photons of all macropixels a laser cycle, [`PER_PHOTON`] for one, and the part that is signal.
     rate: u32,
     signal: f64,
     /// Laser cycles, and the clock cycles of each.
