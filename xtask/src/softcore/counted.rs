@@ -129,15 +129,6 @@ impl Counted {
 mod tests {
     use super::*;
 
-    fn ran(output: &str, errors: &str) -> Ran {
-        Ran {
-            code: Some(0),
-            timed_out: false,
-            output: output.to_owned(),
-            errors: errors.to_owned(),
-        }
-    }
-
     const OUTPUT: &str = "\
 event 0000000000000000000000000000000f
 cycles 30 looks 4 losses 0 strays 1 photons 9 events 1 expired 0 deferred 0
@@ -152,14 +143,22 @@ fifo: lowest fill of each tenth 0 0 0 0 0 0 0 0 1 0
 
     #[test]
     fn every_loss_is_noticed() {
-        let counted = Counted::read(&ran(OUTPUT, ERRORS)).unwrap();
+        let counted = Counted::read(&Ran::success(OUTPUT, ERRORS)).unwrap();
         assert!(counted.is_sustained() && counted.words == [15]);
         assert!(counted.check(4, &[]).is_err());
         let grows = ERRORS.replace(" 1 0\n", " 1 2\n");
-        assert!(!Counted::read(&ran(OUTPUT, &grows)).unwrap().is_sustained());
+        assert!(
+            !Counted::read(&Ran::success(OUTPUT, &grows))
+                .unwrap()
+                .is_sustained()
+        );
         let lost = ERRORS.replace("10 photons, 0 lost", "11 photons, 1 lost");
         let seen = OUTPUT.replace("losses 0", "losses 1");
-        assert!(!Counted::read(&ran(&seen, &lost)).unwrap().is_sustained());
+        assert!(
+            !Counted::read(&Ran::success(&seen, &lost))
+                .unwrap()
+                .is_sustained()
+        );
 
         for (output, errors) in [
             (OUTPUT, &*lost),
@@ -173,11 +172,11 @@ fifo: lowest fill of each tenth 0 0 0 0 0 0 0 0 1 0
             (OUTPUT, ""),
         ] {
             assert!(
-                Counted::read(&ran(output, errors)).is_err(),
+                Counted::read(&Ran::success(output, errors)).is_err(),
                 "{output}{errors}"
             );
         }
-        let mut failed = ran(OUTPUT, ERRORS);
+        let mut failed = Ran::success(OUTPUT, ERRORS);
         failed.code = Some(2);
         assert!(Counted::read(&failed).is_err());
     }

@@ -19,6 +19,17 @@ pub struct Ran {
 }
 
 impl Ran {
+    /// A success that has said so much.
+    #[cfg(test)]
+    pub fn success(output: &str, errors: &str) -> Self {
+        Self {
+            code: Some(0),
+            timed_out: false,
+            output: output.to_owned(),
+            errors: errors.to_owned(),
+        }
+    }
+
     /// All that it said, and how it ended.
     pub fn said(&self) -> String {
         let end = match self.code {
@@ -112,22 +123,21 @@ impl Text {
         Self { bytes, reader }
     }
 
-    fn text(&self) -> String {
-        let bytes = self.bytes.lock().map(|bytes| bytes.clone());
-        String::from_utf8_lossy(&bytes.unwrap_or_default()).into_owned()
-    }
-
     fn has(&self, line: &str) -> bool {
-        self.text().lines().any(|written| written == line)
+        text(&self.bytes).lines().any(|written| written == line)
     }
 
     fn all(self) -> String {
-        let Self { bytes, reader } = self;
         // It does not panic.
-        let _ = reader.join();
-        let bytes = bytes.lock().map(|bytes| bytes.clone());
-        String::from_utf8_lossy(&bytes.unwrap_or_default()).into_owned()
+        let _ = self.reader.join();
+        text(&self.bytes)
     }
+}
+
+/// What has been read.
+fn text(bytes: &Mutex<Vec<u8>>) -> String {
+    let bytes = bytes.lock().map(|bytes| bytes.clone());
+    String::from_utf8_lossy(&bytes.unwrap_or_default()).into_owned()
 }
 
 #[cfg(test)]

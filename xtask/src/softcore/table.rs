@@ -244,15 +244,6 @@ fn hundredths(value: u64) -> f64 {
 mod tests {
     use super::*;
 
-    fn ran(output: &str, errors: &str) -> Ran {
-        Ran {
-            code: Some(0),
-            timed_out: false,
-            output: output.into(),
-            errors: errors.into(),
-        }
-    }
-
     const OUTPUT: &str = "\
 operation 0 1 call; cold
 operation 1 2 call; warm
@@ -276,7 +267,7 @@ exit 0x0 cycle 250 instructions 60
 
     #[test]
     fn takes_a_call_of_the_same_kind_off_and_divides_by_the_times() {
-        let rows = rows("vexriscv,rv32im", true, &ran(OUTPUT, MARKS)).unwrap();
+        let rows = rows("vexriscv,rv32im", true, &Ran::success(OUTPUT, MARKS)).unwrap();
         let lines: Vec<String> = rows.iter().map(Row::csv).collect();
         assert_eq!(
             lines,
@@ -301,7 +292,7 @@ exit 0x0 cycle 250 instructions 60
 
     #[test]
     fn a_processor_without_a_cache_has_nothing_cold() {
-        let error = rows("serv,rv32i", false, &ran(OUTPUT, MARKS)).unwrap_err();
+        let error = rows("serv,rv32i", false, &Ran::success(OUTPUT, MARKS)).unwrap_err();
         assert!(error.to_string().starts_with("without a cache"));
         let same = "\
 mark 1 cycle 1 instructions 1 code 0 data 0
@@ -314,14 +305,14 @@ mark 7 cycle 9 instructions 9 code 0 data 0
 mark 8 cycle 12 instructions 12 code 0 data 0
 ";
         let output = OUTPUT.replace("1 2 call", "1 1 call");
-        let rows = rows("serv,rv32i", false, &ran(&output, same)).unwrap();
+        let rows = rows("serv,rv32i", false, &Ran::success(&output, same)).unwrap();
         let lines: Vec<String> = rows.iter().map(Row::csv).collect();
         assert_eq!(lines, ["serv,rv32i,a: b,0.50,0.50,0.00,0.00"]);
     }
 
     #[test]
     fn marks_out_of_order_and_operations_without_marks_fail() {
-        let rows = |output: &str, marks: &str| rows("", true, &ran(output, marks));
+        let rows = |output: &str, marks: &str| rows("", true, &Ran::success(output, marks));
         assert!(rows(OUTPUT, MARKS).is_ok());
         assert!(rows(OUTPUT, &MARKS.replacen("mark 3", "mark 2", 1)).is_err());
         let unended = format!("{MARKS}mark 1 cycle 999 instructions 60 code 6 data 12\n");

@@ -123,11 +123,8 @@ impl Trials<'_> {
         let mut sustained = Vec::new();
         for part in RATES {
             let run = at(held / part, cycles(held));
-            let (counted, photons) = self.stream(&run)?;
+            let counted = self.checked(&run)?;
             ensure!(counted.is_sustained(), "a lower rate is not sustained");
-            counted
-                .check(run.pixels, &photons)
-                .with_context(|| format!("{run:?}"))?;
             sustained.push(Sustained {
                 core: self.core.to_owned(),
                 rate: run.rate,
@@ -153,8 +150,8 @@ impl Trials<'_> {
         })
     }
 
-    /// A run with a laser so slow that every macropixel is looked at in time and fires, at its best with a
-    /// link that takes as long for a word as a macropixel for some events.
+    /// A run with a laser so slow that every macropixel is looked at in time and fires; or
+    /// would, if `is_slow`, for a link that takes a quarter of the run for a word.
     fn certain(&self, pixels: u8, is_slow: bool) -> Result<Counted> {
         // A look at each macropixel in 20 laser cycles.
         let clocks = (u64::from(pixels) * self.cycles.look / 20).max(CLOCKS);
@@ -171,16 +168,21 @@ impl Trials<'_> {
             },
             strays: is_slow,
         };
-        let (counted, photons) = self.stream(&run)?;
-        counted
-            .check(run.pixels, &photons)
-            .with_context(|| format!("{run:?}"))?;
+        let counted = self.checked(&run)?;
         ensure!(
             counted.lost == 0 && counted.events >= u64::from(pixels),
             "{run:?}: {} photons lost, {} events",
             counted.lost,
             counted.events
         );
+        Ok(counted)
+    }
+
+    /// A run in which the host decides the same.
+    fn checked(&self, run: &Run) -> Result<Counted> {
+        let (counted, photons) = self.stream(run)?;
+        let checked = counted.check(run.pixels, &photons);
+        checked.with_context(|| format!("{run:?}"))?;
         Ok(counted)
     }
 
