@@ -3,11 +3,11 @@
 //! images that put it onto a board (`src/bin`).
 //!
 //! ```text
-//! sensor::Sensor      photons and histograms, over embedded-hal
+//! dtof_sensors        photons and histograms, over embedded-hal
 //!   ↓
 //! sidecar::Sidecar    pixels, configuration, events
 //!   ↕
-//! link                frames, and messages that arrive once and in order
+//! dtof_link           frames, and messages that arrive once and in order
 //!   ↕ embedded-io
 //! serial::Serial      two queues between the interrupt handler and the main loop
 //!   ↕ interrupts
@@ -20,9 +20,6 @@
 extern crate std;
 
 pub mod board;
-pub mod i2c;
-pub mod link;
 pub mod self_test;
-pub mod sensor;
 pub mod serial;
 pub mod sidecar;

@@ -8,10 +8,12 @@ use dtof_core::{
     AerDecoder, AerRecord, AerWord, AsyncPixel, Count, DepthEvent, LaserCycle, PaperRule,
     PixelAddress, PixelConfig, RangeGate,
 };
-use dtof_firmware::link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
-use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
-use dtof_firmware::link::message::{self, Configuration, Report, Token};
-use dtof_firmware::sidecar::{Sidecar, greeting};
+use dtof_firmware::sidecar::Sidecar;
+use dtof_link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
+use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_link::message;
+use dtof_link::message::greeting;
+use dtof_link::{Configuration, Report, Token};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 

@@ -9,12 +9,12 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use common::host::{CONFIGURATION, Host};
-use common::tmf882x::{Bench, Counts, packet, packets, settings};
+use common::mocks::tmf882x::{Bench, Counts, packet, packets, settings};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, Count24, DepthEstimator, Histogram, PaperRule, RangeGate, detect};
-use dtof_firmware::link::message::Configuration;
-use dtof_firmware::sensor::{About, Sensor};
 use dtof_firmware::sidecar::{Pixel, Sidecar};
+use dtof_link::Configuration;
+use dtof_sensors::{About, Sensor};
 use serde_json::Value;
 
 /// Writes past the test harness, which hides what passing tests print.

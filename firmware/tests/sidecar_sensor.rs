@@ -11,10 +11,11 @@ use dtof_core::{
     DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Flags, Histogram, LaserCycle,
     PaperRule, PixelAddress, PixelConfig, RangeGate, RangeScale, Reference, WindowRule, detect,
 };
-use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
-use dtof_firmware::link::message::{self, Configuration, Refusal, Report};
-use dtof_firmware::sensor::{About, PhotonSink, Polled, Sensor, SensorFault, simulated};
 use dtof_firmware::sidecar::{Pixel, Sidecar};
+use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_link::message;
+use dtof_link::{Configuration, FaultRecord, Refusal, Report, SensorRecord};
+use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault, simulated};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -369,7 +370,7 @@ fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<1
     }
     let report = host.report(&mut device, 3);
     assert_eq!(report.sensor_errors, 2);
-    assert_eq!(report.last_sensor_error, SensorFault::Data as u8);
+    assert_eq!(report.last_sensor_error, FaultRecord::Data as u8);
     assert_eq!((report.cycles, report.unaddressed), (4, 128));
     let statistics = report.statistics;
     assert_eq!(
@@ -577,19 +578,24 @@ fn bins_that_are_not_the_sensors_are_refused() {
 #[test]
 fn the_host_is_told_what_the_sensor_is() {
     let told = Told::default().about();
+    let told_record = SensorRecord {
+        pixels: told.pixels,
+        bin_width: told.bin_width,
+        offset: told.offset,
+    };
     let mut pixels = Pixels::new();
     let mut host = Host::new(1, 0);
     let mut device = Sidecar::new(&mut pixels, Some(told));
     let body = host.answer(&mut device, 0, message::SENSOR_REQUEST, &[]);
     assert_eq!(body, [3, 0, 0, 0, 160, 0, 0, 0, 0, 0]);
-    assert_eq!(message::about_from_le_bytes(&body), Some(Some(told)));
+    assert_eq!(SensorRecord::from_le_bytes(&body), Some(Some(told_record)));
 
     let mut pixels = Pixels::new();
     let mut host = Host::new(1, 0);
     let mut device = Sidecar::new(&mut pixels, None);
     let body = host.answer(&mut device, 0, message::SENSOR_REQUEST, &[]);
-    assert_eq!(message::about_from_le_bytes(&body), Some(None));
-    assert_eq!(message::about_from_le_bytes(&body[1..]), None);
+    assert_eq!(SensorRecord::from_le_bytes(&body), Some(None));
+    assert_eq!(SensorRecord::from_le_bytes(&body[1..]), None);
 }
 
 /// A sensor that gives the first photon of a laser cycle only.

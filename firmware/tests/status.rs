@@ -5,16 +5,17 @@
 mod common;
 
 use common::host::{CONFIGURATION, Host};
-use common::plug::{Answers, Bus, Tdc, Tmf};
-use common::{Broken, Line};
+use common::mocks::plug::{Answers, Bus, Tdc, Tmf};
+use common::mocks::{Broken, Line};
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{DepthEvent, PixelAddress, Statistics};
-use dtof_firmware::link::endpoint::LinkCounters;
-use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
-use dtof_firmware::link::message::{self, Configuration, Refusal, Report, Token};
-use dtof_firmware::sensor::tmf882x::{BootCommand, Command, Tmf882x, Waiting};
-use dtof_firmware::sensor::{About, Sensor, SensorFault, simulated, tdc7200, tmf882x};
 use dtof_firmware::sidecar::{Pixel, Sidecar};
+use dtof_link::endpoint::LinkCounters;
+use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_link::message;
+use dtof_link::{Configuration, FaultRecord, Refusal, Report, Token};
+use dtof_sensors::tmf882x::{BootCommand, Command, Tmf882x, Waiting};
+use dtof_sensors::{About, Sensor, SensorFault, simulated, tdc7200, tmf882x};
 
 type Pixels = heapless::Vec<Pixel, 9>;
 
@@ -47,7 +48,7 @@ fn unplug<Chip: Default>(
     bus: &Bus<Chip>,
     how: Answers,
     most_a_second: u32,
-    said: SensorFault,
+    said: FaultRecord,
 ) {
     let mut pixels = Pixels::new();
     let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
@@ -100,8 +101,8 @@ fn unplug<Chip: Default>(
 #[test]
 fn an_unplugged_tdc7200_is_reported_and_found_again() {
     for (how, said) in [
-        (Answers::Error, SensorFault::Bus),
-        (Answers::Ones, SensorFault::NoAnswer),
+        (Answers::Error, FaultRecord::Bus),
+        (Answers::Ones, FaultRecord::NoAnswer),
     ] {
         let bus = Bus::<Tdc>::new();
         let settings = tdc7200::Settings {
@@ -128,7 +129,7 @@ fn an_unplugged_tmf882x_is_reported_and_found_again() {
         &[1, 2, 3],
         config,
     );
-    unplug(sensor, &bus, Answers::Error, 60, SensorFault::NoAnswer);
+    unplug(sensor, &bus, Answers::Error, 60, FaultRecord::NoAnswer);
 }
 
 #[test]

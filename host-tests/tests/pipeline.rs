@@ -7,13 +7,14 @@
 //! the two thresholds fires in integers alone. Wherever that is claimed the test
 //! proves it from the counts.
 
-use dtof::simulation::{Rates, SimulatedPixel};
-use dtof::source::pixel_rng;
+use dtof::simulation::SimulatedPixel;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AsyncPixel, Count, LaserCycle, Look, PaperRule, PixelAddress, PixelConfig, RangeGate,
 };
 use dtof_host_tests::reference;
+use dtof_theory::random::pixel_rng;
+use dtof_theory::rates::Rates;
 use rand_core::Rng;
 
 /// What the exposures of one run came to.

@@ -4,18 +4,21 @@
 use dtof::detection::{Estimator, Rule};
 use dtof::engine::host_engine;
 use dtof::settings::{I24F8Number, Settings, U16F16Number};
-use dtof::simulation::{Rates, SimulatedArray, SimulatedPixel};
-use dtof::source::{Geometry, PhotonSource, pixel_rng};
-use dtof::theory::binomial::{alike, plausible};
-use dtof::theory::exposure::{Exposures, Looks, trial_rng};
-use dtof::theory::repeated_looks::{
-    ALPHA_STEPS, FalseEvents, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
-};
-use dtof::theory::single_look::SingleLook;
-use dtof::theory::table::{self, Found, MARGIN, Row, Table};
-use dtof::theory::tune::{Request, Tuned, Wanted, tune};
+use dtof::simulation::{SimulatedArray, SimulatedPixel};
+use dtof::source::{Geometry, PhotonSource};
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{Count, DepthEvent, PixelAddress, Threshold};
+use dtof_theory::counts::binomial::{alike, plausible};
+use dtof_theory::looks::exposure::{Exposures, Looks};
+use dtof_theory::looks::repeated_looks::{
+    ALPHA_STEPS, FalseEvents, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
+};
+use dtof_theory::looks::single_look::SingleLook;
+use dtof_theory::looks::table::{self, Found, MARGIN, Row, Table};
+use dtof_theory::random::pixel_rng;
+use dtof_theory::random::trial_rng;
+use dtof_theory::rates::Rates;
+use dtof_theory::tune::{Request, Tuned, Wanted, tune};
 
 /// The chance that a test fails for nothing.
 const LEVEL: f64 = 1e-3;

@@ -11,18 +11,16 @@
 
 pub mod aer_file;
 pub mod chart;
+pub mod cli;
 pub mod detection;
 pub mod device;
 pub mod dynamic_depth;
 pub mod engine;
 pub mod events_csv;
 pub mod export;
-pub mod failures;
-pub mod figures;
 pub mod frame;
 pub mod geometry;
 pub mod maps;
-pub mod methods;
 pub mod monitor;
 pub mod npy;
 pub mod output;
@@ -38,6 +36,4 @@ pub mod settings;
 pub mod simulation;
 pub mod source;
 pub mod summary;
-pub mod sweep;
-pub mod theory;
 pub mod tmf8820;

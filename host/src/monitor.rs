@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use dtof_core::{RangeScale, Statistics};
-use dtof_firmware::link::endpoint::LinkCounters;
-use dtof_firmware::link::message::Report;
-use dtof_firmware::sensor::SensorFault;
+use dtof_link::FaultRecord;
+use dtof_link::Report;
+use dtof_link::endpoint::LinkCounters;
 
 use crate::aer_file::Event;
 use crate::device::{Client, configuration};
@@ -298,7 +298,7 @@ pub fn losses(report: &Report, first: &Report, here: &LinkCounters) -> String {
     }
     if sensor_errors > 0 {
         let number = report.last_sensor_error;
-        line += &match SensorFault::from_number(number) {
+        line += &match FaultRecord::from_number(number) {
             Some(fault) => format!(" (last: {fault})"),
             None => format!(" (last: number {number})"),
         };

@@ -12,7 +12,8 @@ use rand_distr::{Binomial, Distribution, Uniform};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use crate::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice, pixel_rng};
+use crate::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
+use dtof_theory::random::pixel_rng;
 
 /// Photons of a histogram and laser cycles of a recording, at most: within it
 /// the binomial numbers are exact to better than one in ten thousand.

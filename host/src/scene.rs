@@ -16,8 +16,10 @@ use crate::detection::{Estimator, Rule};
 use crate::geometry::FieldOfView;
 use crate::settings::{I24F8Number, Settings, U16F16Number};
 use crate::simulation::effects::{Effects, Timing};
-use crate::simulation::{MM_PER_PS, Rates, RatesAt, SimulatedArray, SimulatedPixel};
-use crate::source::{Geometry, PhotonSource, pixel_rng};
+use crate::simulation::{MM_PER_PS, RatesAt, SimulatedArray, SimulatedPixel};
+use crate::source::{Geometry, PhotonSource};
+use dtof_theory::random::pixel_rng;
+use dtof_theory::rates::Rates;
 
 pub use surface::{Ball, Fan, Light, Plane, Rectangle, Shape, Surface};
 

@@ -35,6 +35,7 @@ pub mod tdc;
 
 use anyhow::{Context, Result};
 use dtof_core::PixelAddress;
+use dtof_theory::rates::Rates;
 use rand_distr::{Bernoulli, Distribution, Normal, Poisson, Uniform};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
@@ -45,19 +46,6 @@ use effects::{Effects, Timing};
 
 /// Millimetres of range a picosecond, half the speed of light.
 pub const MM_PER_PS: f64 = 0.149_896_229;
-
-/// What one pixel receives in a laser cycle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rates {
-    /// Background photons a bin (B).
-    pub background: f64,
-    /// Signal photons (A).
-    pub signal: f64,
-    /// Where the pulse lies, in bins from the start of bin 0 (µ).
-    pub position: f64,
-    /// Its standard deviation in bins (σ).
-    pub sigma: f64,
-}
 
 /// A photon of the plain model.
 enum Arrival {

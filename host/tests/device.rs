@@ -15,8 +15,8 @@ use dtof::settings::Settings;
 use dtof::source::{Geometry, PhotonSource};
 use dtof_core::DepthEvent;
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
 use dtof_firmware::sidecar::Sidecar;
+use dtof_link::frame::{Deframer, WIRE_BYTES};
 
 const PIXELS: usize = 64;
 

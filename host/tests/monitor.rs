@@ -21,12 +21,12 @@ use dtof_core::{
     AnyRule, AsyncPixel, DepthEvent, DynamicDepthPixel, LaserCycle, PixelAddress, PixelConfig,
     Reference,
 };
-use dtof_firmware::link::endpoint::LinkCounters;
-use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
-use dtof_firmware::link::message::Report;
-use dtof_firmware::sensor::simulated::{self, Pulse, Simulated, SimulatedPixel};
-use dtof_firmware::sensor::{About, PhotonSink, Polled, Sensor, SensorFault};
 use dtof_firmware::sidecar::Sidecar;
+use dtof_link::Report;
+use dtof_link::endpoint::LinkCounters;
+use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_sensors::simulated::{self, Pulse, Simulated, SimulatedPixel};
+use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
 
 const PIXELS: u16 = 4;
 const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);

@@ -19,10 +19,11 @@ use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
     AerEncoder, BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, SubBinOffset,
 };
-use dtof_firmware::link::endpoint::Endpoint;
-use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
-use dtof_firmware::link::message::{self, Configuration, Report};
-use dtof_firmware::sidecar::greeting;
+use dtof_link::endpoint::Endpoint;
+use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_link::message;
+use dtof_link::message::greeting;
+use dtof_link::{Configuration, Report};
 
 const PIXELS: u16 = 4;
 

@@ -12,7 +12,7 @@ use dtof::scene;
 use dtof::settings::{Settings, U16F16Number};
 use dtof::source::{Geometry, PhotonSource};
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_firmware::sensor::SensorFault;
+use dtof_link::FaultRecord;
 
 use crate::firmware::{Board, Sensor};
 use crate::log;
@@ -216,10 +216,10 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
 /// all of them read as zeros: a TDC7200 that does not answer, and an I²C bus that
 /// nothing pulls up. On a real board its resistors pull it up, and both are "no
 /// answer".
-fn unplugged(sensor: Sensor) -> SensorFault {
+fn unplugged(sensor: Sensor) -> FaultRecord {
     match sensor {
-        Sensor::Tdc7200 => SensorFault::NoAnswer,
-        Sensor::Tmf882x => SensorFault::Bus,
+        Sensor::Tdc7200 => FaultRecord::NoAnswer,
+        Sensor::Tmf882x => FaultRecord::Bus,
     }
 }
 
@@ -249,7 +249,7 @@ fn says_unplugged(board: Board, image: &Path, sensor: Sensor, array: Geometry) -
             "{name}: a missing sensor is not noticed"
         );
     };
-    let fault = SensorFault::from_number(report.last_sensor_error);
+    let fault = FaultRecord::from_number(report.last_sensor_error);
     let fault = fault.with_context(|| format!("{name}: no reason for {report:?}"))?;
     let expected = unplugged(sensor);
     ensure!(fault == expected, "{name}: \"{fault}\", not \"{expected}\"");

@@ -4,7 +4,6 @@ mod bench;
 mod boards;
 mod debugger;
 mod emulate;
-mod figures;
 mod firmware;
 mod image;
 mod log;
@@ -57,10 +56,6 @@ cargo xtask <command>
                 --picture writes docs/figures/report.png
   check-export  the files of dtof export agree with what other projects' readers find in
                 them; installs those below target/ first
-  figures [--all] [--check]
-                work out the figures of the documentation and the verdicts on the
-                paper's claims, from the seeds of a quick look and the kept rest or
-                from all; --check changes nothing and fails if something would change
   self-test     the core works out the same on the target; --bless writes down
                 what it works out here
   bench         instructions the core's operations take on the target; writes
@@ -100,7 +95,6 @@ fn run() -> Result<()> {
         ["check-report"] => report::check(root()?, false),
         ["check-report", "--picture"] => report::check(root()?, true),
         ["check-export"] => readers::check(root()?),
-        ["figures", ref rest @ ..] => figures::make(root()?, rest),
         ["self-test"] => self_test::run(root()?),
         ["self-test", "--bless"] => self_test::bless(root()?),
         ["bench"] => bench::run(root()?),

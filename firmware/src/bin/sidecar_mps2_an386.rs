@@ -10,9 +10,9 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use dtof_firmware::board::{mps2_an386::Mps2An386, turn};
-use dtof_firmware::sensor::Sensor;
-use dtof_firmware::sensor::simulated;
 use dtof_firmware::sidecar::{Pixel, Sidecar};
+use dtof_sensors::Sensor;
+use dtof_sensors::simulated;
 use heapless::Vec;
 use static_cell::ConstStaticCell;
 

@@ -10,10 +10,10 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use dtof_firmware::board::{stm32f405::Stm32F405, turn};
-use dtof_firmware::sensor::Sensor;
-#[cfg(not(any(feature = "sensor-tdc7200", feature = "sensor-tmf882x")))]
-use dtof_firmware::sensor::simulated;
 use dtof_firmware::sidecar::{Pixel, Sidecar};
+use dtof_sensors::Sensor;
+#[cfg(not(any(feature = "sensor-tdc7200", feature = "sensor-tmf882x")))]
+use dtof_sensors::simulated;
 use heapless::Vec;
 use static_cell::ConstStaticCell;
 

@@ -7,7 +7,7 @@ use dtof_core::{
 };
 
 use super::{Pixel, Sidecar};
-use crate::link::message::{Configuration, Refusal, Source};
+use dtof_link::{Configuration, Refusal, Source};
 
 impl Sidecar<'_> {
     /// Validates a configuration and takes it on, all pixels at the beginning of

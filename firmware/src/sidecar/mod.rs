@@ -14,21 +14,21 @@
 
 mod configuration;
 mod photons;
+mod records;
 mod sensor;
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{
-    AER_VERSION, AerEncoder, AerWord, AnyRule, AsyncPixel, DepthEvent, DynamicDepthConfig,
-    DynamicDepthPixel, PixelAddress, PixelConfig, Statistics,
+    AerEncoder, AerWord, AnyRule, AsyncPixel, DepthEvent, DynamicDepthConfig, DynamicDepthPixel,
+    PixelAddress, PixelConfig, Statistics,
 };
+use dtof_link::endpoint::{BODY_BYTES, Endpoint, Message};
+use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
+use dtof_link::message::{self, greeting};
+use dtof_link::{Configuration, Refusal, Report, SensorRecord, Source};
+use dtof_sensors::{About, SensorFault};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::spsc::Queue;
 use heapless::vec::{Vec, VecView};
-
-use crate::link::endpoint::{BODY_BYTES, Endpoint, Message};
-use crate::link::frame::{Deframer, FrameError, WIRE_BYTES};
-use crate::link::message::{self, Configuration, LINK_VERSION, Refusal, Report, Source};
-use crate::sensor::About;
-use crate::sensor::SensorFault;
 
 use self::photons::Photons;
 
@@ -259,8 +259,9 @@ impl<'a> Sidecar<'a> {
             }
             message::SYNCHRONISE => Some((message::SYNCHRONISED, message.body)),
             message::SENSOR_REQUEST => {
-                let about = message::about_to_le_bytes(self.sensor.as_ref());
-                Some((message::SENSOR, about.into_iter().collect()))
+                let sensor = self.sensor.as_ref().map(records::sensor);
+                let sensor = SensorRecord::to_le_bytes(sensor.as_ref());
+                Some((message::SENSOR, sensor.into_iter().collect()))
             }
             message::STATISTICS_REQUEST => {
                 let report = self.report(overrun).to_le_bytes();
@@ -396,7 +397,9 @@ impl<'a> Sidecar<'a> {
             overrun,
             unknown: self.unknown,
             sensor_errors: self.sensor_errors,
-            last_sensor_error: self.sensor_fault.map_or(0, |fault| fault as u8),
+            last_sensor_error: self
+                .sensor_fault
+                .map_or(0, |fault| records::fault(fault) as u8),
             link: *self.endpoint.counters(),
         }
     }
@@ -405,15 +408,4 @@ impl<'a> Sidecar<'a> {
 /// An event may need a time word before it.
 fn has_room_for_event(words: &Queue<AerWord, QUEUE>) -> bool {
     words.capacity() - words.len() >= 2
-}
-
-/// What an end says of itself: versions of link and AER words, and of a device
-/// its bins and pixels.
-#[must_use]
-pub const fn greeting(bins: u16, pixels: u16) -> [u8; 8] {
-    let [a, b] = LINK_VERSION.to_le_bytes();
-    let [c, d] = AER_VERSION.to_le_bytes();
-    let [e, f] = bins.to_le_bytes();
-    let [g, h] = pixels.to_le_bytes();
-    [a, b, c, d, e, f, g, h]
 }

@@ -4,8 +4,8 @@ use dtof_core::{LaserCycle, Look};
 use heapless::vec::Vec;
 
 use super::Sidecar;
-use crate::link::endpoint::BODY_BYTES;
-use crate::link::message::Token;
+use dtof_link::Token;
+use dtof_link::endpoint::BODY_BYTES;
 
 /// A photons message and how far it has been worked through.
 #[derive(Debug)]

@@ -6,8 +6,9 @@ use dtof_core::{
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
 use super::{BINS, Sidecar, has_room_for_event};
-use crate::link::message::{self, Source};
-use crate::sensor::{PhotonSink, Polled, Sensor, SensorFault};
+use dtof_link::Source;
+use dtof_link::message;
+use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault};
 
 /// Polls of the sensor one after the other. A sensor that always has more must
 /// not keep the link waiting.

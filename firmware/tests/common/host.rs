@@ -2,11 +2,13 @@
 
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{AerDecoder, AerRecord, AerWord, DepthEvent, DynamicDepthEvent, PixelAddress};
-use dtof_firmware::link::endpoint::Endpoint;
-use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
-use dtof_firmware::link::message::{self, Configuration, Report};
-use dtof_firmware::sensor::{About, PhotonSink, Polled, Sensor, SensorFault};
-use dtof_firmware::sidecar::{Sidecar, greeting};
+use dtof_firmware::sidecar::Sidecar;
+use dtof_link::endpoint::Endpoint;
+use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_link::message;
+use dtof_link::message::greeting;
+use dtof_link::{Configuration, Report};
+use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
 
 /// A configuration that takes photons from the sensor.
 pub const CONFIGURATION: Configuration = Configuration {

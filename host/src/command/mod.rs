@@ -5,12 +5,10 @@ pub mod demo;
 mod detection;
 mod dynamic_depth;
 pub mod export;
-pub mod figures;
 pub mod monitor;
 mod operation;
 pub mod replay;
 pub mod simulate;
-pub mod sweep;
 pub mod tune;
 
 use std::io::{self, Write};

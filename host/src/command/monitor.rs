@@ -14,7 +14,7 @@ use dtof::device::{self, Client};
 use dtof::monitor::map::{LiveMap, SHOW_CURSOR};
 use dtof::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_firmware::sensor::About;
+use dtof_link::SensorRecord;
 
 use super::dynamic_depth;
 use super::operation::{Operation, number};
@@ -90,7 +90,7 @@ impl Monitor {
         })?;
         // A device without a sensor says so when it is configured.
         let sensor = client.sensor().with_context(name)?;
-        let sensor = sensor.unwrap_or(About::new(client.pixels()));
+        let sensor = sensor.unwrap_or(SensorRecord::new(client.pixels()));
         let pixels = self.pixels.unwrap_or(sensor.pixels.min(client.pixels()));
         let any = const { U16F16::lit("250") };
         let settings = self.operation.settings(

@@ -8,11 +8,11 @@ use std::io::{self, Write};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::simulation::MM_PER_PS;
-use dtof::theory::detections::Detections;
-use dtof::theory::gaussian;
-use dtof::theory::rates::{signal_for_snr, snr};
-use dtof::theory::table::Table;
-use dtof::theory::tune::{Request, Source, Wanted, tune};
+use dtof_theory::gaussian;
+use dtof_theory::looks::detections::Detections;
+use dtof_theory::looks::table::Table;
+use dtof_theory::rates::{signal_for_snr, snr};
+use dtof_theory::tune::{Request, Source, Wanted, tune};
 use serde_json::json;
 
 use super::detection::RuleName;

@@ -4,11 +4,12 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::{AER_VERSION, AerDecoder, AerRecord, AerWord};
-use dtof_firmware::link::endpoint::{Endpoint, LinkCounters, Message};
-use dtof_firmware::link::frame::{Deframer, WIRE_BYTES};
-use dtof_firmware::link::message::{self, Configuration, LINK_VERSION, Refusal, Report};
-use dtof_firmware::sensor::About;
-use dtof_firmware::sidecar::greeting;
+use dtof_link::SensorRecord;
+use dtof_link::endpoint::{Endpoint, LinkCounters, Message};
+use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_link::message::greeting;
+use dtof_link::message::{self, LINK_VERSION};
+use dtof_link::{Configuration, Refusal, Report};
 
 use super::port::Port;
 use crate::aer_file::Event;
@@ -120,7 +121,7 @@ impl Client {
     ///
     /// # Errors
     /// If the device is gone.
-    pub fn sensor(&mut self) -> Result<Option<About>> {
+    pub fn sensor(&mut self) -> Result<Option<SensorRecord>> {
         self.send(message::SENSOR_REQUEST, &[])?;
         let answer = self.answer()?;
         ensure!(
@@ -128,7 +129,7 @@ impl Client {
             "the device answers with message {:#04x}",
             answer.kind
         );
-        message::about_from_le_bytes(&answer.body).context("the device says nothing of its sensor")
+        SensorRecord::from_le_bytes(&answer.body).context("the device says nothing of its sensor")
     }
 
     /// Waits until the device has done all it was sent, and gives its events.

@@ -7,8 +7,9 @@ mod qemu;
 
 use anyhow::{Result, bail, ensure};
 use dtof_core::{DepthEstimator, DepthEvent, PixelAddress, Reference, Statistics};
-use dtof_firmware::link::endpoint::BODY_BYTES;
-use dtof_firmware::link::message::{self, Configuration, Report, Token};
+use dtof_link::endpoint::BODY_BYTES;
+use dtof_link::message;
+use dtof_link::{Configuration, Report, Token};
 
 pub use client::Client;
 pub use port::{Port, open};

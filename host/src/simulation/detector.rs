@@ -13,7 +13,8 @@ use super::jitter::TimingError;
 use super::second_echo::Echo;
 use super::stream::Stream;
 use super::tail::Late;
-use super::{Arrival, Rates, code};
+use super::{Arrival, code};
+use dtof_theory::rates::Rates;
 
 /// One pixel's light and SPAD and TDC. All times are in bins from the start of
 /// the laser cycle.

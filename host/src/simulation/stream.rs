@@ -3,7 +3,7 @@
 use dtof_core::PixelAddress;
 use rand_pcg::Pcg64;
 
-use crate::source::pixel_rng;
+use dtof_theory::random::pixel_rng;
 
 /// Who draws.
 #[derive(Clone, Copy, Debug)]

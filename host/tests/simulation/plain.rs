@@ -2,8 +2,9 @@
 //! nothing.
 
 use dtof::scene::{self, Scene};
-use dtof::source::{Geometry, PhotonSource, pixel_rng};
+use dtof::source::{Geometry, PhotonSource};
 use dtof_core::PixelAddress;
+use dtof_theory::random::pixel_rng;
 use rand_distr::{Bernoulli, Distribution, Normal, Poisson, Uniform};
 
 use super::{Photons, array, pixel, sliced};

@@ -1,8 +1,9 @@
 //! Simulated photons for the FIFO.
 
 use anyhow::Result;
-use dtof::simulation::{Rates, SimulatedPixel};
+use dtof::simulation::SimulatedPixel;
 use dtof_softcore::stream::BINS;
+use dtof_theory::rates::Rates;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 

@@ -28,10 +28,10 @@ use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::spi::{Mode, Phase, Polarity};
 
 use crate::board::systick::SystickDelay;
-use crate::i2c::SoftwareI2c;
-use crate::sensor::Sensor;
-use crate::sensor::tdc7200::{self, Tdc7200};
-use crate::sensor::tmf882x::{self, Tmf882x};
+use dtof_sensors::Sensor;
+use dtof_sensors::i2c::SoftwareI2c;
+use dtof_sensors::tdc7200::{self, Tdc7200};
+use dtof_sensors::tmf882x::{self, Tmf882x};
 
 /// The pins of a sensor. One sensor takes them all.
 pub struct SensorPort {

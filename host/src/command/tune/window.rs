@@ -1,8 +1,8 @@
 //! The window rule.
 
 use anyhow::Result;
-use dtof::theory::tune::{Request, window};
 use dtof_core::DepthEstimator;
+use dtof_theory::tune::{Request, window};
 
 use super::{Line, Tune};
 

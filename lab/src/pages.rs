@@ -1,0 +1,181 @@
+//! The documents that studies make: figures, their captions, and the verdicts on
+//! the paper's claims.
+//!
+//! Of every study the seeds of a quick look and the rest are kept apart in
+//! `docs/results/data`. So a quick look that is taken again must give the kept numbers
+//! bit for bit, and together with the kept rest every document.
+
+pub mod failures;
+pub mod methods;
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::studies;
+use crate::studies::failures::STUDY as FAILURES;
+use crate::studies::methods::{depth_error, event_depth, time_to_detect};
+use crate::sweep::results::Results;
+use crate::sweep::{self, Part, SeedRange, Study};
+
+/// What is done anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Anew {
+    /// The seeds of a quick look: minutes.
+    Few,
+    /// All seeds.
+    All,
+}
+
+/// Works out the seeds and gives every document below `docs` with its content.
+/// `progress` is told which study comes next.
+///
+/// # Errors
+/// If a trial fails or what is kept cannot be read.
+pub fn documents(
+    docs: &Path,
+    anew: Anew,
+    mut progress: impl FnMut(&Study),
+) -> Result<Vec<(PathBuf, String)>> {
+    let data = |study: &Study, which| format!("results/data/{}.{which}.json", study.name);
+    let mut documents = Vec::new();
+    let mut all = Vec::new();
+    let mut parts = BTreeMap::new();
+    for study in studies::ALL {
+        progress(study);
+        let few = work_out(study, 0, study.few_seeds)?;
+        let kept = data(study, "rest");
+        let rest = match anew {
+            Anew::Few => Part::load(&docs.join(&kept))?,
+            Anew::All => work_out(study, study.few_seeds, study.all_seeds)?,
+        };
+        documents.push((data(study, "few").into(), few.to_json()?));
+        documents.push((kept.into(), rest.to_json()?));
+        let mut part = few;
+        part.add(&rest)
+            .with_context(|| format!("{}: the kept rest", study.name))?;
+        let all_seeds = SeedRange {
+            first: 0,
+            end: study.all_seeds,
+        };
+        ensure!(
+            part.seeds() == [all_seeds],
+            "{}: the kept rest is not of the seeds {}..{}",
+            study.name,
+            study.few_seeds,
+            study.all_seeds
+        );
+        let results = (study.results)(&part).with_context(|| study.name.to_owned())?;
+        all.push((study, results));
+        parts.insert(study.name, part);
+    }
+    for (_, results) in &all {
+        for figure in &results.figures {
+            let path = format!("figures/{}.svg", figure.name);
+            documents.push((path.into(), figure.svg.clone()));
+        }
+        for table in &results.tables {
+            documents.push((table.path.into(), table.csv.clone()));
+        }
+    }
+    let part = |study: Study| parts.get(study.name).context(study.name);
+    let used = [
+        time_to_detect::STUDY,
+        depth_error::STUDY,
+        event_depth::STUDY,
+    ];
+    let [time, depth, events] = used.map(part);
+    let read = |path| {
+        let path = docs.join(path);
+        fs::read_to_string(&path).with_context(|| path.display().to_string())
+    };
+    let (counts, recorded) = (read(methods::INSTRUCTIONS)?, read(methods::RECORDED)?);
+    let methods = methods::documents(&counts, &recorded, time?, depth?, events?)?;
+    documents.extend(methods);
+    let failures = failures::document(part(FAILURES)?)?;
+    documents.push(("results/failures.md".into(), failures));
+    documents.push(("results/figures.md".into(), captions(&all)?));
+    documents.push(("results/paper-claims.md".into(), claims(&all)?));
+    Ok(documents)
+}
+
+fn work_out(study: &Study, first: u64, end: u64) -> Result<Part> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("part");
+    let hour = Duration::from_secs(3600);
+    sweep::run(study, SeedRange { first, end }, &path, hour, |_| ())
+}
+
+/// Writes documents below `docs` and gives those that changed.
+///
+/// # Errors
+/// If one cannot be written.
+pub fn write(docs: &Path, documents: &[(PathBuf, String)]) -> Result<Vec<PathBuf>> {
+    let mut changed = Vec::new();
+    for path in different(docs, documents) {
+        let name = || path.display().to_string();
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).with_context(name)?;
+        }
+        let content = documents.iter().find(|(of, _)| docs.join(of) == path);
+        if let Some((_, content)) = content {
+            fs::write(&path, content).with_context(name)?;
+        }
+        changed.push(path);
+    }
+    Ok(changed)
+}
+
+/// Documents that are not below `docs` as they should be.
+#[must_use]
+pub fn different(docs: &Path, documents: &[(PathBuf, String)]) -> Vec<PathBuf> {
+    let differs = |(path, content): &&(PathBuf, String)| {
+        fs::read(docs.join(path)).ok().as_deref() != Some(content.as_bytes())
+    };
+    let different = documents.iter().filter(differs);
+    different.map(|(path, _)| docs.join(path)).collect()
+}
+
+fn captions(all: &[(&Study, Results)]) -> Result<String> {
+    let mut text = "# Figures\n\n\
+        Made by `cargo lab figures`; do not edit. `--all` works out every seed again, which takes \
+        longer. Intervals hold 99 %.\n"
+        .to_owned();
+    for (study, results) in all {
+        for figure in &results.figures {
+            write!(
+                text,
+                "\n## {name}\n\n![{name}](../figures/{name}.svg)\n\n{caption}\n\n\
+                 Study `{study}`, seeds 0 to {last}.\n",
+                name = figure.name,
+                caption = figure.caption,
+                study = study.name,
+                last = study.all_seeds - 1
+            )?;
+        }
+    }
+    Ok(text)
+}
+
+fn claims(all: &[(&Study, Results)]) -> Result<String> {
+    let mut text = "# The paper's claims\n\n\
+        Made by `cargo lab figures`; do not edit. Each claim of the paper, its number, ours, and whether \
+        they go together; the [figures](figures.md) show more.\n\n\
+        **Agrees**: so here as well, in all that was tried. **Differs**: in part, or by another number. **Refuted**: \
+        not so in anything that was tried, or not as it is stated. **Not decided**: the sample cannot tell. What \
+        counts as what is said with the claim, or in its study in `lab/src/studies`.\n\n\
+        | claim | the paper | here | verdict | why |\n|---|---|---|---|---|\n"
+        .to_owned();
+    for claim in all.iter().flat_map(|(_, results)| &results.claims) {
+        writeln!(
+            text,
+            "| {} | {} | {} | **{}** | {} |",
+            claim.claim, claim.paper, claim.here, claim.verdict, claim.why
+        )?;
+    }
+    Ok(text)
+}

@@ -1,0 +1,349 @@
+//! Which method for which scene: what the studies of time and error found, against
+//! the instructions it takes.
+
+mod events;
+mod recorded;
+mod tables;
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+
+pub use self::recorded::RECORDED;
+use self::recorded::recorded;
+use crate::studies::methods::depth_error::{self, Method as Estimator};
+use crate::studies::methods::passage::Method as Rule;
+use crate::studies::methods::time_to_detect::{self, Outcome};
+use crate::sweep::mean::Measured;
+use crate::sweep::{Part, PointTally};
+use dtof::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
+
+/// The instruction counts, below the documentation.
+pub const INSTRUCTIONS: &str = "bench/instructions.csv";
+/// The cheapest method that may be no more than this share above the best is chosen.
+const MARGIN: f64 = 0.1;
+
+/// Instructions of the operations of the core on a Cortex-M4F, optimised for speed.
+struct Instructions<'a>(&'a str);
+
+impl Instructions<'_> {
+    fn of(&self, operation: &str, variant: &str) -> Result<f64> {
+        let line = format!("{operation},{variant},3,");
+        let found = self.0.lines().find_map(|row| row.strip_prefix(&line));
+        let found = found.with_context(|| format!("{INSTRUCTIONS}: no `{line}`"))?;
+        found
+            .parse()
+            .with_context(|| format!("{INSTRUCTIONS}: {line}{found}"))
+    }
+
+    /// A decision without an event.
+    fn rule(&self, rule: Rule) -> Result<f64> {
+        match rule {
+            Rule::Window(width) => self.of("decision", &format!("window of {width}; no event")),
+            _ => self.of("decision", "kept peak; no event"),
+        }
+    }
+
+    /// A depth, for a pulse of `sigma` bins.
+    fn estimator(&self, estimator: Estimator, sigma: f64) -> Result<f64> {
+        let centred = |sigma: f64| {
+            // The next wider pulse that was counted.
+            let counted = [0.4, 0.5, 1.0]
+                .into_iter()
+                .find(|&counted| sigma <= counted);
+            self.of(
+                "depth",
+                &format!("centred window, σ {}", counted.unwrap_or(1.5)),
+            )
+        };
+        match estimator {
+            Estimator::HighestBin => Ok(0.0),
+            Estimator::Paper | Estimator::CentreOfMass3 => self.of("depth", "centre_of_mass"),
+            Estimator::CentredWindow(sigma) => centred(sigma),
+            Estimator::OwnWindow => centred(sigma),
+        }
+    }
+}
+
+/// A method: what it costs, and how it does over several scenes.
+struct Entry {
+    label: String,
+    cost: f64,
+    /// Mean over the scenes of the time or error over the reference's. The interval is
+    /// the mean of theirs, which may have their errors in common.
+    mean: Measured,
+    /// From the best scene to the worst.
+    range: (f64, f64),
+}
+
+impl Entry {
+    #[allow(clippy::cast_precision_loss, reason = "a few scenes")]
+    fn new(label: String, cost: f64, scenes: &[Measured]) -> Self {
+        let values = || scenes.iter().map(|scene| scene.value);
+        let mean = |of: fn(&Measured) -> f64| {
+            scenes.iter().map(of).sum::<f64>() / scenes.len().max(1) as f64
+        };
+        Self {
+            label,
+            cost,
+            mean: Measured {
+                value: mean(|scene| scene.value),
+                interval: (
+                    mean(|scene| scene.interval.0),
+                    mean(|scene| scene.interval.1),
+                ),
+            },
+            range: (
+                values().fold(f64::INFINITY, f64::min),
+                values().fold(0.0, f64::max),
+            ),
+        }
+    }
+}
+
+/// The chosen: the cheapest whose interval ends within [`MARGIN`] of the best's mean, or
+/// the best.
+fn chosen(entries: &[Entry]) -> Result<&Entry> {
+    let best = entries
+        .iter()
+        .min_by(|a, b| a.mean.value.total_cmp(&b.mean.value));
+    let best = best.context("no methods")?;
+    let limit = best.mean.value * (1.0 + MARGIN);
+    let good = entries
+        .iter()
+        .filter(|entry| entry.mean.interval.1 <= limit);
+    let cheapest = good.min_by(|a, b| a.cost.total_cmp(&b.cost));
+    Ok(cheapest.unwrap_or(best))
+}
+
+/// Those that no other is both cheaper and better than, by cost.
+fn frontier(entries: &[Entry]) -> Vec<Dot> {
+    let mut by_cost: Vec<&Entry> = entries.iter().collect();
+    by_cost.sort_by(|a, b| {
+        a.cost
+            .total_cmp(&b.cost)
+            .then(a.mean.value.total_cmp(&b.mean.value))
+    });
+    let mut dots: Vec<Dot> = Vec::new();
+    for entry in by_cost {
+        let before = dots.last().map_or(f64::INFINITY, |dot| dot.y);
+        if entry.mean.value < before {
+            // A step: what costs less than this does no better than the one before.
+            if let Some(last) = dots.last().copied() {
+                dots.push(Dot::exact(entry.cost, last.y));
+            }
+            dots.push(Dot::exact(entry.cost, entry.mean.value));
+        }
+    }
+    dots
+}
+
+fn chart(title: &str, y: Axis, entries: &[Entry]) -> Result<String> {
+    let mut series = vec![Series {
+        name: Some("frontier".to_owned()),
+        colour: 6,
+        style: Style::Thin,
+        points: frontier(entries),
+    }];
+    for (colour, entry) in entries.iter().enumerate() {
+        series.push(Series {
+            name: Some(entry.label.clone()),
+            colour,
+            style: Style::Dots,
+            points: vec![Dot {
+                x: entry.cost,
+                y: entry.mean.value,
+                interval: Some(entry.range),
+            }],
+        });
+    }
+    line_chart(&Chart {
+        title,
+        x: Axis::linear("instructions on a Cortex-M4F"),
+        y,
+        series,
+    })
+}
+
+/// Every rule over the outcomes that `of` takes.
+fn rules(
+    counts: &Instructions,
+    outcomes: &[Outcome],
+    of: impl Fn(&Outcome) -> bool,
+) -> Result<Vec<Entry>> {
+    let entry = |rule: Rule| {
+        let those = outcomes
+            .iter()
+            .filter(|outcome| outcome.method == rule && of(outcome));
+        // Without how sure the likelihood ratio's time is, the same for all rules.
+        let ratios = those.map(|outcome| {
+            let one = outcome.ratio.value / outcome.cycles.value;
+            outcome.cycles.times(one)
+        });
+        let ratios: Vec<Measured> = ratios.collect();
+        Ok(Entry::new(rule.label(), counts.rule(rule)?, &ratios))
+    };
+    Rule::RULES.into_iter().map(entry).collect()
+}
+
+/// For each pulse the rule that is fastest over its scenes.
+#[allow(clippy::float_cmp, reason = "parameters are as they were written")]
+fn suited(counts: &Instructions, outcomes: &[Outcome]) -> Result<Entry> {
+    let (mut ratios, mut cost) = (Vec::new(), 0.0f64);
+    for sigma in time_to_detect::SIGMAS {
+        let entries = rules(counts, outcomes, |outcome| outcome.sigma == sigma)?;
+        let fastest = entries
+            .iter()
+            .min_by(|a, b| a.mean.value.total_cmp(&b.mean.value));
+        let fastest = fastest.context("no rules")?;
+        cost = cost.max(fastest.cost);
+        let those = outcomes
+            .iter()
+            .filter(|outcome| outcome.sigma == sigma && outcome.method.label() == fastest.label);
+        ratios.extend(those.map(|outcome| outcome.ratio));
+    }
+    Ok(Entry::new(
+        "the window that suits the pulse".to_owned(),
+        cost,
+        &ratios,
+    ))
+}
+
+/// Every estimator over the points that `of` takes.
+fn estimators(
+    counts: &Instructions,
+    part: &Part,
+    of: impl Fn(&PointTally) -> bool,
+) -> Result<Vec<Entry>> {
+    let entry = |(estimator, name): (Estimator, &str)| {
+        let (mut ratios, mut cost) = (Vec::new(), 0.0f64);
+        for point in part.points().iter().filter(|&point| of(point)) {
+            cost = cost.max(counts.estimator(estimator, point.parameter("sigma"))?);
+            ratios.push(depth_error::over_bound(point, name));
+        }
+        Ok(Entry::new(estimator.label(), cost, &ratios))
+    };
+    Estimator::ALL.into_iter().map(entry).collect()
+}
+
+/// The documents, below `docs`: the table and its figures.
+///
+/// # Errors
+/// If an operation was not counted, a part is not the study's, or the file of recorded
+/// photons has another form.
+pub fn documents(
+    instructions: &str,
+    recorded_rules: &str,
+    time: &Part,
+    depth: &Part,
+    events: &Part,
+) -> Result<Vec<(PathBuf, String)>> {
+    let counts = Instructions(instructions);
+    let outcomes = time_to_detect::outcomes(time)?;
+    let photon = counts.of("photon", "AsyncPixel::count_batch")?;
+    let mut all_rules = rules(&counts, &outcomes, |_| true)?;
+    all_rules.push(suited(&counts, &outcomes)?);
+    let all_estimators = estimators(&counts, depth, |_| true)?;
+    let decision_svg = chart(
+        "A decision: its cost against the time to an event",
+        Axis::logarithmic("laser cycles over the likelihood ratio's"),
+        &all_rules,
+    )?;
+    let depth_svg = chart(
+        "A depth: its cost against its error",
+        Axis::logarithmic("root mean square error over the Cramér-Rao bound"),
+        &all_estimators,
+    )?;
+    let recorded_svg = chart(
+        "Recorded photons: cost of a decision and a depth against its error",
+        Axis::linear("millimetres: median error, line to 95 %"),
+        &recorded(&counts, recorded_rules)?,
+    )?;
+    let (worst, elsewhere) = depth_error::elsewhere(depth)?;
+    let [sigma, signal, background] =
+        ["sigma", "signal", "background"].map(|name| worst.parameter(name));
+    let mut text = format!(
+        "# Which method for which scene\n\n\
+         Made by `cargo xtask figures` from the studies `time-to-detect`, `depth-error` and `event-depth` and from the\n\
+         [instruction counts](../bench/README.md); do not edit. The tables name the cheapest method whose 99 % interval\n\
+         ends no more than {:.0} % above the best one's figure, or the best.\n\n\
+         ## What it costs\n\n\
+         A photon takes {photon:.1} instructions whatever the method. A dot is the mean over all scenes of the studies,\n\
+         its bar from the best scene to the worst; the line is the frontier, methods that no other is both cheaper and\n\
+         better than.\n\n\
+         ![Cost of a decision against time to an event](../figures/cost-time-to-detect.svg)\n\n\
+         ![Cost of a depth against its error](../figures/cost-depth-error.svg)\n\n\
+         Errors are those of peaks in the pulse. Peaks farther than 2 σ + 1 bins from it are false events and left out:\n\
+         at most {:.1} %, with σ {sigma}, {signal} signal photons and {background} background counts a bin.\n\n\
+         On recorded photons, all rules set to one false event in 100 exposures, and the minimum count of window rules\n\
+         so that they take no more photons an event than the paper's ([all rows](data/recorded_rules.csv), made by the\n\
+         test `recorded_rules`):\n\n\
+         ![Recorded photons: cost against error](../figures/cost-recorded.svg)\n\n",
+        MARGIN * 100.0,
+        elsewhere * 100.0
+    );
+    tables::decision(&mut text, &counts, &outcomes)?;
+    tables::depth(&mut text, &counts, depth)?;
+    events::section(&mut text, events)?;
+    Ok(vec![
+        ("figures/cost-time-to-detect.svg".into(), decision_svg),
+        ("figures/cost-depth-error.svg".into(), depth_svg),
+        ("figures/cost-recorded.svg".into(), recorded_svg),
+        ("results/methods.md".into(), text),
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As sure as 0.02 either way.
+    fn entry(cost: f64, value: f64) -> Entry {
+        let interval = (value - 0.02, value + 0.02);
+        Entry::new(format!("{cost}"), cost, &[Measured { value, interval }])
+    }
+
+    #[test]
+    fn the_frontier_is_what_nothing_beats() {
+        let entries = [
+            (300.0, 1.0),
+            (100.0, 2.0),
+            (200.0, 2.1),
+            (250.0, 1.5),
+            (250.0, 1.7),
+        ]
+        .map(|(cost, mean)| entry(cost, mean));
+        let found: Vec<(f64, f64)> = frontier(&entries)
+            .iter()
+            .map(|dot| (dot.x, dot.y))
+            .collect();
+        let expected = [
+            (100.0, 2.0),
+            (250.0, 2.0),
+            (250.0, 1.5),
+            (300.0, 1.5),
+            (300.0, 1.0),
+        ];
+        assert_eq!(found, expected);
+    }
+
+    /// Intervals end at 1.02 times the mean: a tenth above the best is where one of 1.078 ends.
+    #[test]
+    fn the_cheapest_that_is_surely_within_the_margin_is_chosen() {
+        let chosen = |second: f64| {
+            let entries = [(300.0, 1.0), (100.0, 1.2), (200.0, second)];
+            let entries = entries.map(|(cost, mean)| entry(cost, mean));
+            chosen(&entries).unwrap().label.clone()
+        };
+        assert_eq!([1.077, 1.081].map(chosen), ["200", "300"]);
+    }
+
+    #[test]
+    fn a_count_is_found_by_its_name() {
+        let counts =
+            Instructions("operation,variant,opt,instructions\na,b; c,3,12.5\na,b; c,s,9\n");
+        assert_eq!(counts.of("a", "b; c").unwrap(), 12.5);
+        let error = counts.of("a", "b").unwrap_err().to_string();
+        assert_eq!(error, "bench/instructions.csv: no `a,b,3,`");
+    }
+}

@@ -1,0 +1,58 @@
+//! The cost of methods against their error on recorded photons.
+
+use anyhow::{Context, Result, bail};
+
+use super::{Entry, Estimator, Instructions, Rule};
+use crate::sweep::mean::Measured;
+
+/// What rules came to on recorded photons, below the documentation; a test of
+/// `host-tests` makes it from the public capture log.
+pub const RECORDED: &str = "results/data/recorded_rules.csv";
+
+/// The methods on recorded photons at equal rates of false events, without added
+/// background: the paper's rule, and window rules that take as many photons an event.
+pub(super) fn recorded(counts: &Instructions, csv: &str) -> Result<Vec<Entry>> {
+    let mut entries = Vec::new();
+    for line in csv.lines().filter(|line| line.starts_with("0,")) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let [
+            _,
+            rule,
+            _,
+            minimum,
+            _,
+            estimator,
+            _,
+            _,
+            median,
+            within_95,
+            ..,
+        ] = cells[..]
+        else {
+            bail!("{RECORDED}: {line}");
+        };
+        let found = Rule::RULES.into_iter().find(|found| found.label() == rule);
+        let rule = found.with_context(|| format!("{RECORDED}: {line}"))?;
+        // Window rules with the common minimum take fewer photons, and err more.
+        if rule != Rule::Paper && minimum == "5" {
+            continue;
+        }
+        let depth = match estimator {
+            "centred window" => Estimator::CentredWindow(1.0),
+            _ => Estimator::Paper,
+        };
+        let number = |text: &str| text.parse::<f64>().with_context(|| line.to_owned());
+        let median = number(median)?;
+        entries.push(Entry {
+            label: format!("{}, {estimator}", rule.label()),
+            cost: counts.rule(rule)? + counts.estimator(depth, 1.0)?,
+            // How sure it is, is not known.
+            mean: Measured {
+                value: median,
+                interval: (median, median),
+            },
+            range: (median, number(within_95)?),
+        });
+    }
+    Ok(entries)
+}

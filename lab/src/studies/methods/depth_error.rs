@@ -1,0 +1,297 @@
+//! How well a pulse is placed, against the Cramér-Rao bound.
+
+use std::fmt::Write as _;
+
+use anyhow::{Context, Result};
+use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
+use dtof_core::{
+    BinPosition, Count, Count10, DepthEstimator, DetectionRule, Histogram, Peak, RangeGate,
+    SubBinOffset, WindowRule, background, whole_background,
+};
+use rand_core::Rng;
+use rand_pcg::Pcg64;
+
+use crate::sweep::mean::Measured;
+use crate::sweep::results::{Figure, Results, Table};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
+use dtof::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
+use dtof::summary::grouped;
+use dtof_theory::bounds::cramer_rao::Pulse;
+use dtof_theory::looks::exposure::{Exposures, Looks};
+use dtof_theory::rates::Rates;
+
+const BINS: usize = 128;
+/// Standard deviations of the pulse in bins.
+pub const SIGMAS: [f64; 7] = [0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.5];
+/// Signal photons.
+pub const SIGNALS: [f64; 4] = [30.0, 60.0, 100.0, 200.0];
+/// Background counts a bin.
+pub const BACKGROUNDS: [f64; 4] = [0.5, 1.0, 2.0, 5.0];
+/// Positions of a trial, evenly over a bin.
+const POSITIONS: u32 = 64;
+
+/// The estimators of the core over the width of the pulse.
+pub const STUDY: Study = Study {
+    name: "depth-error",
+    about: "depth error against the Cramér-Rao bound, by pulse, signal and background",
+    revision: 3,
+    few_seeds: 30,
+    all_seeds: 300,
+    points,
+    trial,
+    results,
+};
+
+/// How a depth is found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// The middle of the highest bin.
+    HighestBin,
+    /// The paper's: centre of mass of three bins less the quadrant background.
+    Paper,
+    /// The same less the mean of the bins outside a window.
+    CentreOfMass3,
+    /// The centred window for a pulse of this standard deviation, in bins.
+    CentredWindow(f64),
+    /// The centred window for the pulse there is.
+    OwnWindow,
+}
+
+impl Method {
+    /// All, and their names in tallies.
+    pub const ALL: [(Self, &str); 7] = [
+        (Self::HighestBin, "highest"),
+        (Self::Paper, "paper"),
+        (Self::CentreOfMass3, "mass3"),
+        (Self::CentredWindow(0.5), "centred0.5"),
+        (Self::CentredWindow(1.0), "centred1.0"),
+        (Self::CentredWindow(1.5), "centred1.5"),
+        (Self::OwnWindow, "centred"),
+    ];
+
+    /// Its name in a legend.
+    #[must_use]
+    pub fn label(self) -> String {
+        match self {
+            Self::HighestBin => "highest bin".to_owned(),
+            Self::Paper => "centre of mass of 3, quadrant background".to_owned(),
+            Self::CentreOfMass3 => "centre of mass of 3, mean background".to_owned(),
+            Self::CentredWindow(sigma) => format!("centred window for σ {sigma}"),
+            Self::OwnWindow => "centred window for the pulse's σ".to_owned(),
+        }
+    }
+
+    /// Where the pulse, whose standard deviation is `sigma`, lies.
+    fn position(self, histogram: &Histogram<BINS>, peak: Peak, sigma: f64) -> BinPosition {
+        let gate = RangeGate::full();
+        let estimate = |estimator: DepthEstimator, background| {
+            estimator
+                .estimate(histogram, &gate, peak, background)
+                .offset
+        };
+        let centred = |sigma: f64| {
+            let estimator = DepthEstimator::for_pulse(U8F8::saturating_from_num(sigma));
+            estimate(estimator, mean_background(histogram, peak))
+        };
+        let mass = |background| estimate(DepthEstimator::CentreOfMass3, background);
+        let offset = match self {
+            Self::HighestBin => SubBinOffset::CENTRE,
+            Self::Paper => mass(whole_background(background::quadrant(
+                histogram.counts(),
+                &gate,
+                peak.bin,
+            ))),
+            Self::CentreOfMass3 => mass(mean_background(histogram, peak)),
+            Self::CentredWindow(for_sigma) => centred(for_sigma),
+            Self::OwnWindow => centred(sigma),
+        };
+        BinPosition::of(peak.bin, offset)
+    }
+}
+
+/// As a window rule of five bins has it.
+fn mean_background(histogram: &Histogram<BINS>, peak: Peak) -> U24F8 {
+    // Any excess is a detection: only the background is wanted.
+    let rule = WindowRule::new(5, U4F12::ZERO, Count::default());
+    let background = rule.map(|rule| rule.detect(histogram, &RangeGate::full(), peak));
+    background.ok().flatten().unwrap_or_default()
+}
+
+fn points() -> Vec<Point> {
+    let mut points = Vec::new();
+    for sigma in SIGMAS {
+        for signal in SIGNALS {
+            for background in BACKGROUNDS {
+                points.push(point([
+                    ("sigma", sigma),
+                    ("signal", signal),
+                    ("background", background),
+                ]));
+            }
+        }
+    }
+    points
+}
+
+fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+    let sigma = point["sigma"];
+    let looks = Looks {
+        x: 1,
+        first: 1,
+        last: 1,
+    };
+    let steps = 256 / POSITIONS;
+    let mut tally = Tally::new();
+    for index in 0..POSITIONS {
+        // In 1/256 bins, as the core counts.
+        let place = (64 << 8) + index * steps + rng.next_u32() % steps;
+        let rates = Rates {
+            background: point["background"],
+            signal: point["signal"],
+            position: f64::from(place) / 256.0,
+            sigma,
+        };
+        let mut histogram = Histogram::<BINS, Count10>::new();
+        Exposures::new(&rates, u16::try_from(BINS)?, looks)?.frames::<BINS>(rng, |_, frame| {
+            histogram.add_frame(frame, &RangeGate::full());
+            true
+        });
+        let mut count = |name: &str, by: u64| *tally.entry(name.to_owned()).or_default() += by;
+        count("histograms", 1);
+        let peak = histogram.peak();
+        let middle = f64::from(peak.bin.raw()) + 0.5;
+        if (middle - rates.position).abs() > 2.0 * sigma + 1.0 {
+            // A false event, not an error of depth.
+            count("elsewhere", 1);
+            continue;
+        }
+        for (method, name) in Method::ALL {
+            let position = method.position(&histogram, peak, sigma).raw();
+            let square = u64::from(position.abs_diff(place.cast_signed())).pow(2);
+            count(name, square);
+            count(&format!("{name} fourths"), square.pow(2));
+        }
+    }
+    Ok(tally)
+}
+
+/// Root mean square error of a method at a point, in bins, over the smallest
+/// possible.
+#[must_use]
+pub fn over_bound(point: &PointTally, name: &str) -> Measured {
+    let near = point.count("histograms") - point.count("elsewhere");
+    let fourths = point.count(&format!("{name} fourths"));
+    let [near, squares, fourths] = [near, point.count(name), fourths].map(u128::from);
+    let bound = Pulse {
+        signal: point.parameter("signal"),
+        background: point.parameter("background"),
+        sigma: point.parameter("sigma"),
+    };
+    let error = Measured::root_of_squares(near, squares, fourths);
+    error.times(1.0 / 256.0 / bound.position_error())
+}
+
+/// Where most peaks lie outside the pulse, which are left out of its error, and their
+/// share.
+///
+/// # Errors
+/// If there is no point.
+pub fn elsewhere(part: &Part) -> Result<(&PointTally, f64)> {
+    let shares = part.points().iter().map(|point| {
+        let share = point.share("elsewhere", "histograms");
+        (point, share.value)
+    });
+    shares
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .context("depth-error: no points")
+}
+
+/// Over all signals and backgrounds: the root mean square of [`over_bound`], and the
+/// least and the largest.
+fn summary(part: &Part, sigma: f64, name: &str) -> (f64, (f64, f64)) {
+    let ratios: Vec<f64> = part
+        .at([("sigma", sigma)])
+        .map(|point| over_bound(point, name).value)
+        .collect();
+    let squares: f64 = ratios.iter().map(|ratio| ratio * ratio).sum();
+    #[allow(clippy::cast_precision_loss)]
+    let mean = (squares / ratios.len().max(1) as f64).sqrt();
+    let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
+    (mean, (least, ratios.into_iter().fold(0.0, f64::max)))
+}
+
+fn results(part: &Part) -> Result<Results> {
+    let mut series = Vec::new();
+    for (colour, (method, name)) in Method::ALL.into_iter().enumerate() {
+        let dot = |sigma| {
+            let (mean, range) = summary(part, sigma, name);
+            Dot {
+                x: sigma,
+                y: mean,
+                interval: Some(range),
+            }
+        };
+        series.push(Series {
+            name: Some(method.label()),
+            colour,
+            style: Style::JoinedDots,
+            points: SIGMAS.map(dot).to_vec(),
+        });
+    }
+    let svg = line_chart(&Chart {
+        title: "Depth error over the Cramér-Rao bound",
+        x: Axis::linear("pulse σ (bins)"),
+        y: Axis {
+            range: Some((0.9, 9.0)),
+            ..Axis::logarithmic("root mean square error over the bound")
+        },
+        series,
+    })?;
+    let own = SIGMAS.map(|sigma| {
+        let (mean, (_, largest)) = summary(part, sigma, "centred");
+        format!("{mean:.2} at {sigma} (at most {largest:.2})")
+    });
+    let histograms = part
+        .points()
+        .first()
+        .map_or(0, |point| point.count("histograms"));
+    Ok(Results {
+        figures: vec![Figure {
+            name: "depth-error",
+            svg,
+            caption: format!(
+                "Root mean square depth error over the Cramér-Rao bound (shape known, amplitude and background not), \
+                 averaged over positions in a bin: 30 to 200 signal photons on 0.5 to 5 background counts a bin; \
+                 bars from the least to the largest of the 16 combinations. Peaks outside the pulse, farther than 2 σ + 1 \
+                 bins from it, are left out: they are false events, up to {:.1} %. The centred window for the pulse's σ has {} ({} histograms \
+                 a combination)",
+                100.0 * elsewhere(part)?.1,
+                own.join(", "),
+                grouped(histograms)
+            ),
+        }],
+        claims: Vec::new(),
+        tables: vec![Table {
+            path: "results/data/depth_error.csv",
+            csv: csv(part)?,
+        }],
+    })
+}
+
+fn csv(part: &Part) -> Result<String> {
+    let mut csv = "sigma,signal,background,elsewhere,method,error,low,high\n".to_owned();
+    for point in part.points() {
+        let [sigma, signal, background] =
+            ["sigma", "signal", "background"].map(|name| point.parameter(name));
+        let elsewhere = point.share("elsewhere", "histograms").value;
+        for (_, name) in Method::ALL {
+            let Measured { value, interval } = over_bound(point, name);
+            let (low, high) = interval;
+            writeln!(
+                csv,
+                "{sigma},{signal},{background},{elsewhere:.4},{name},{value:.3},{low:.3},{high:.3}"
+            )?;
+        }
+    }
+    Ok(csv)
+}

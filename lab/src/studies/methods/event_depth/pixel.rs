@@ -1,0 +1,248 @@
+//! Pixels that watch the same photons until each has had its event.
+
+use anyhow::{Result, ensure};
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{
+    AnyRule, BinPosition, Count, DepthEstimator, DetectionRule, Histogram, PaperRule, RangeGate,
+    WindowRule, detect, z_for,
+};
+use rand_pcg::Pcg64;
+
+use super::{BACKGROUNDS, FIRST_LOOKS};
+use crate::studies::methods::passage::{BINS, LOOKS, MINIMUM_COUNT, Method};
+use dtof_theory::looks::exposure::Exposures;
+use dtof_theory::rates::Rates;
+
+/// For each of [`FIRST_LOOKS`] and [`BACKGROUNDS`] the least α, in 1/16, with at most 1 %
+/// false events an exposure. There is none with 1 %: counts are whole, so that their
+/// share falls in steps.
+const ALPHAS: [[f64; 3]; 2] = [[5.0, 4.0, 3.5], [3.6875, 3.1875, 3.0]];
+
+/// A rule with its threshold, and when it looks first.
+#[derive(Clone, Copy, Debug)]
+pub struct Pixel {
+    /// What decides.
+    pub method: Method,
+    /// The first laser cycle it may fire after.
+    pub first_look: u32,
+    /// The core's rule.
+    pub rule: AnyRule,
+    /// α or z.
+    pub threshold: f64,
+}
+
+impl Pixel {
+    /// With 1 % false events an exposure at this background.
+    ///
+    /// # Errors
+    /// If the background or the first look is not one of the study's.
+    pub fn new(method: Method, first_look: u32, background: f64) -> Result<Self> {
+        let count = Count::saturating(MINIMUM_COUNT);
+        let (rule, threshold) = match method {
+            Method::Window(width) => {
+                // As the commands take it, L1 being one less than the first look.
+                let [x, l1, l2] = [LOOKS.x, first_look - 1, LOOKS.expiry()].map(u16::try_from);
+                let z = z_for(100, &RangeGate::<BINS>::full(), x?, l1?, l2?);
+                (WindowRule::new(width, z, count)?.into(), z.to_num())
+            }
+            _ => {
+                let looks = FIRST_LOOKS.into_iter().zip(ALPHAS);
+                let alphas = looks.filter(|(first, _)| *first == first_look);
+                let mut all = alphas.flat_map(|(_, alphas)| BACKGROUNDS.into_iter().zip(alphas));
+                let alpha = all.find(|(of, _)| of.total_cmp(&background).is_eq());
+                ensure!(alpha.is_some(), "no α for {background} from {first_look}");
+                let alpha = alpha.map_or(0.0, |(_, alpha)| alpha);
+                let rule = PaperRule::new(U8F8::saturating_from_num(alpha), count);
+                (rule.into(), alpha)
+            }
+        };
+        Ok(Self {
+            method,
+            first_look,
+            rule,
+            threshold,
+        })
+    }
+
+    /// What tallies call it.
+    #[must_use]
+    pub fn name(&self) -> String {
+        format!("{} {}", self.method.name(), self.first_look)
+    }
+}
+
+/// The event of an exposure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Event {
+    /// Laser cycles of its exposure.
+    pub cycles: u32,
+    /// Photons of the pulse in it, wherever they lie.
+    pub signal: u64,
+    /// The highest bin.
+    pub peak: u16,
+    /// Where the pulse lies, in 1/256 bin from the start of bin 0, by each estimator of
+    /// [`ESTIMATORS`](super::ESTIMATORS).
+    pub positions: [i32; 3],
+}
+
+/// One exposure of the same photons for all `pixels`, with the events of those that have
+/// one. `estimators` find the depth on the histogram of the event.
+///
+/// # Errors
+/// If a rate is not possible.
+pub fn exposure(
+    rates: &Rates,
+    pixels: &[Pixel],
+    estimators: &[DepthEstimator; 2],
+    rng: &mut Pcg64,
+) -> Result<Vec<Option<Event>>> {
+    let bins = u16::try_from(BINS)?;
+    // Apart from the background, to be counted.
+    let mut pulse = Vec::new();
+    if rates.signal > 0.0 {
+        let rates = Rates {
+            background: 0.0,
+            ..*rates
+        };
+        Exposures::new(&rates, bins, LOOKS)?.frames::<BINS>(rng, |_, frame| {
+            pulse.push(*frame);
+            false
+        });
+    }
+    let background = Rates {
+        signal: 0.0,
+        ..*rates
+    };
+    let background = Exposures::new(&background, bins, LOOKS)?;
+    let gate = RangeGate::full();
+    let mut histogram = Histogram::<BINS>::new();
+    let mut events = vec![None; pixels.len()];
+    let mut signal = 0;
+    let mut pulse = pulse.iter();
+    background.frames::<BINS>(rng, |cycles, frame| {
+        histogram.add_frame(frame, &gate);
+        if let Some(frame) = pulse.next() {
+            histogram.add_frame(frame, &gate);
+            signal += frame.iter().map(|&photons| u64::from(photons)).sum::<u64>();
+        }
+        let waiting = pixels.iter().zip(&mut events);
+        for (pixel, event) in waiting.filter(|(_, event)| event.is_none()) {
+            if cycles < pixel.first_look {
+                continue;
+            }
+            let detect = |estimator| detect(&histogram, &gate, &pixel.rule, estimator);
+            let [Some(mass), Some(centred)] = estimators.each_ref().map(detect) else {
+                continue;
+            };
+            let with_rules = match (
+                estimators[1],
+                pixel.rule.detect(&histogram, &gate, mass.peak),
+            ) {
+                (DepthEstimator::CentredWindow(window), Some(background)) => {
+                    window.estimate(&histogram, &gate, mass.peak, background)
+                }
+                _ => centred.depth,
+            };
+            let position = |offset| BinPosition::of(mass.peak.bin, offset).raw();
+            *event = Some(Event {
+                cycles,
+                signal,
+                peak: mass.peak.bin.raw(),
+                positions: [
+                    position(mass.depth.offset),
+                    position(centred.depth.offset),
+                    position(with_rules.offset),
+                ],
+            });
+        }
+        events.iter().all(Option::is_some)
+    });
+    Ok(events)
+}
+
+#[cfg(test)]
+mod tests {
+    use dtof_core::{AsyncPixel, LaserCycle, PixelAddress, PixelConfig};
+
+    use super::super::estimators;
+    use super::*;
+    use dtof_theory::random::trial_rng;
+
+    const RATES: Rates = Rates {
+        background: 0.05,
+        signal: 0.3,
+        position: 64.2,
+        sigma: 1.0,
+    };
+
+    /// The photons of [`exposure`], from look to look.
+    fn frames(seed: u64) -> Vec<(u32, [u16; BINS])> {
+        let rng = &mut trial_rng(seed, 0);
+        let mut all = Vec::<(u32, [u16; BINS])>::new();
+        for (background, signal) in [(0.0, RATES.signal), (RATES.background, 0.0)] {
+            let rates = Rates {
+                background,
+                signal,
+                ..RATES
+            };
+            let mut index = 0;
+            let exposures = Exposures::new(&rates, 128, LOOKS).unwrap();
+            exposures.frames::<BINS>(rng, |cycles, frame| {
+                match all.get_mut(index) {
+                    Some((_, sum)) => (0..BINS).for_each(|bin| sum[bin] += frame[bin]),
+                    None => all.push((cycles, *frame)),
+                }
+                index += 1;
+                false
+            });
+        }
+        all
+    }
+
+    /// Of both rules and first looks, with both estimators.
+    #[test]
+    fn events_are_those_of_a_pixel() {
+        let mut pixels = Vec::new();
+        for first in FIRST_LOOKS {
+            for method in [Method::Paper, Method::Window(3)] {
+                pixels.push(Pixel::new(method, first, RATES.background).unwrap());
+            }
+        }
+        let both = estimators(RATES.sigma);
+        let mut differ = 0;
+        for seed in 0..10 {
+            let events = exposure(&RATES, &pixels, &both, &mut trial_rng(seed, 0)).unwrap();
+            let frames = frames(seed);
+            for (pixel, event) in pixels.iter().zip(events) {
+                for (index, estimator) in both.into_iter().enumerate() {
+                    let l1 = u16::try_from(pixel.first_look - 1).unwrap();
+                    let config = PixelConfig::new(4, l1, 1000, RangeGate::full(), pixel.rule)
+                        .unwrap()
+                        .with_estimator(estimator);
+                    let mut of_core = AsyncPixel::<BINS>::new(PixelAddress(0));
+                    let mut before = 0;
+                    let mut found = None;
+                    for (cycles, frame) in &frames {
+                        of_core.count_frame(&config, frame);
+                        let passed = u16::try_from(cycles - before).unwrap();
+                        let cycle = LaserCycle((*cycles).into());
+                        let _ = of_core.end_laser_cycles(&config, cycle, passed);
+                        before = *cycles;
+                        found = of_core.acknowledge();
+                        if found.is_some() {
+                            break;
+                        }
+                    }
+                    let here = event.map(|event| (event.cycles, event.positions[index]));
+                    let there =
+                        found.map(|found| (u32::from(found.exposure), found.position().raw()));
+                    assert_eq!(here, there);
+                }
+                differ += event.map_or(0, |event| {
+                    u32::from(event.positions[0] != event.positions[1])
+                });
+            }
+        }
+        assert!(differ > 20, "{differ}");
+    }
+}

@@ -1,0 +1,12 @@
+//! Sections III and IV-C: the scenes, and Table I.
+
+pub mod depth_step;
+pub mod dynamic_depth;
+pub mod fan_motion;
+pub mod hyperparameters;
+pub mod latency;
+pub mod mixed;
+pub mod one_pixel;
+pub mod radial_motion;
+mod ranks;
+pub mod static_scene;

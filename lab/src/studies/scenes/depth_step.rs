@@ -1,0 +1,324 @@
+//! How soon a pixel reports a surface that is suddenly there, and what it reports
+//! of an exposure that saw two (section III-D).
+
+use anyhow::Result;
+use dtof_core::PixelAddress;
+use rand_core::Rng;
+use rand_distr::{Distribution, Uniform};
+use rand_pcg::Pcg64;
+
+use super::mixed::{self, add_pair, excess, is_sharp, neither};
+use super::one_pixel::{CODES, FRAMES, PER_BIN, Reading, SENSORS, in_parts, prototype, watch};
+use crate::sweep::mean::{Measured, add, add_value};
+use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
+use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
+use dtof::simulation::SimulatedPixel;
+use dtof::summary::grouped;
+use dtof_theory::random::pixel_rng;
+use dtof_theory::rates::Rates;
+
+/// Steps of a trial.
+const STEPS: u64 = 10;
+/// Laser cycles after it in which it must be reported.
+const AFTER: u64 = 6000;
+/// Background photons a bin and laser cycle.
+const BACKGROUND: f64 = 0.02;
+/// Laser cycles after it by which every exposure over it has ended: L2, the
+/// longest frame.
+const OVER: u64 = 2000;
+/// A reading so near has noticed the new surface; others are false.
+const NOTICED: i64 = 3 * PER_BIN;
+/// Signal photons a laser cycle of the verdict, and its step in bins.
+const SIGNAL: f64 = 0.5;
+const EDGE: f64 = 20.0;
+/// Bins of the steps.
+const STEPS_BINS: [f64; 3] = [2.0, 4.0, EDGE];
+/// Of the brightest pixel and of the dimmest.
+const BRIGHT: f64 = 2.0;
+const DIM: f64 = 0.1;
+
+/// Held against "reduces latency" and "no motion blur".
+pub const STUDY: Study = Study {
+    name: "depth-step",
+    about: "laser cycles to notice a step in depth, and readings of both surfaces at once",
+    revision: 2,
+    few_seeds: 10,
+    all_seeds: 300,
+    points,
+    trial,
+    results,
+};
+
+/// Steps towards the sensor of 75 mm to 0.75 m.
+fn points() -> Vec<Point> {
+    let mut points = Vec::new();
+    for step in STEPS_BINS {
+        for signal in [DIM, 0.2, SIGNAL, 1.0, BRIGHT] {
+            points.push(point([("step", step), ("signal", signal)]));
+        }
+    }
+    points
+}
+
+fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+    let config = prototype(40)?;
+    let mut tally = Tally::new();
+    for _ in 0..STEPS {
+        // A random place in a bin, and random phases of exposures and frames.
+        let old = 60.0 + Uniform::new(0.0, 1.0)?.sample(rng);
+        let new = old - point["step"];
+        let at = 2000 + Uniform::new(0, 4000_u64)?.sample(rng);
+        let mut phases = FRAMES;
+        for phase in &mut phases {
+            *phase = Uniform::new(0, *phase)?.sample(rng);
+        }
+        let rates = |position| Rates {
+            background: BACKGROUND,
+            signal: point["signal"],
+            position,
+            sigma: 1.0,
+        };
+        let mut pixel = SimulatedPixel::new(
+            &rates(old),
+            CODES,
+            pixel_rng(rng.next_u64(), PixelAddress(0)),
+        )?;
+        let mut same = pixel.clone();
+        let readings = watch(at + AFTER, &config, phases, |cycle, photon| {
+            if cycle == at {
+                pixel.set_rates(&rates(new))?;
+            }
+            pixel.next_cycle(photon);
+            Ok(())
+        })?;
+        let without = watch(at + OVER, &config, phases, |_, photon| {
+            same.next_cycle(photon);
+            Ok(())
+        })?;
+        let surfaces = [in_parts(old), in_parts(new)];
+        for ((sensor, with), without) in SENSORS.into_iter().zip(&readings).zip(&without) {
+            add_step(&mut tally, sensor, with, at, surfaces);
+            add_pair(&mut tally, sensor, [with, without], at, &surfaces);
+        }
+    }
+    Ok(tally)
+}
+
+/// When `readings` notice a step from `old` to `new` at the start of laser cycle
+/// `at`. One that is not noticed counts as [`AFTER`] laser cycles, and apart.
+fn add_step(tally: &mut Tally, sensor: &str, readings: &[Reading], at: u64, [old, new]: [i64; 2]) {
+    let off = |reading: &Reading, surface: i64| (reading.position - surface).abs();
+    let later = readings.iter().filter(|reading| reading.last >= at);
+    let noticed = later
+        .into_iter()
+        .find(|reading| off(reading, new) < off(reading, old) && off(reading, new) <= NOTICED);
+    let cycles = noticed.map_or(AFTER, |reading| reading.last + 1 - at);
+    add_value(tally, sensor, i64::try_from(cycles).unwrap_or(i64::MAX));
+    add(tally, sensor, "not noticed", noticed.is_none().into());
+}
+
+fn results(part: &Part) -> Result<Results> {
+    let axis = |label, logarithmic| Axis {
+        label,
+        logarithmic,
+        range: None,
+    };
+    let series = |step: f64, y: &dyn Fn(&PointTally, &str) -> Measured| {
+        let sensors = SENSORS.into_iter().enumerate();
+        let lines = sensors.map(|(colour, sensor)| Series {
+            name: Some(sensor.to_owned()),
+            colour,
+            style: Style::JoinedDots,
+            points: part
+                .at([("step", step)])
+                .map(|point| {
+                    let measured = y(point, sensor);
+                    chart::Point {
+                        x: point.parameter("signal"),
+                        y: measured.value,
+                        interval: Some(measured.interval),
+                    }
+                })
+                .collect(),
+        });
+        lines.collect::<Vec<_>>()
+    };
+    let x = axis("signal photons a laser cycle", true);
+    let reaction = line_chart(&Chart {
+        title: "From a step of 20 bins to the first reading of the new surface",
+        x,
+        y: axis("laser cycles, mean to 6,000", true),
+        series: series(EDGE, &Measured::mean),
+    })?;
+    let blur = line_chart(&Chart {
+        title: "Exposures over a step of 2 bins that are read as neither surface",
+        x,
+        y: axis("share", false),
+        series: series(2.0, &|point, sensor| {
+            let Share { value, interval } = neither(point, sensor, "mixed");
+            Measured { value, interval }
+        }),
+    })?;
+    let steps = grouped(STEPS * part.seed_count());
+    Ok(Results {
+        figures: vec![
+            Figure {
+                name: "step-reaction",
+                svg: reaction,
+                caption: format!(
+                    "Mean laser cycles from a step of 20 bins (0.75 m) to the end of the first reading nearer to the \
+                     new surface (within 3 bins of it): events at α = 8, L1 = 40, X = 4, L2 = 2000, and frames of \
+                     the same photons at a random phase; 0.02 background photons a bin and laser cycle. {steps} steps a \
+                     dot; those not noticed in {AFTER} laser cycles count as {AFTER}, so that the mean is a lower bound where there are any. Short frames of a dim pixel are mostly false: see the next figure"
+                ),
+            },
+            Figure {
+                name: "step-blur",
+                svg: blur,
+                caption: format!(
+                    "Of the exposures in which the surface steps by 2 bins (75 mm), those read farther than half a bin \
+                     from both ranges: blur, and the noise of the reading. The centre of mass sees three bins, so that \
+                     surfaces farther apart do not mix. At most {steps} exposures a dot"
+                ),
+            },
+        ],
+        claims: claims(part)?,
+        tables: Vec::new(),
+    })
+}
+
+fn claims(part: &Part) -> Result<Vec<Claim>> {
+    Ok(vec![latency_claim(part)?, blur_claim(part)?])
+}
+
+/// What there are of `what` at every signal of a step, from dim to bright.
+fn at_signals(part: &Part, step: f64, what: &str) -> String {
+    let counts = part
+        .at([("step", step)])
+        .map(|point| grouped(point.count(what)));
+    counts.collect::<Vec<_>>().join(", ")
+}
+
+fn latency_claim(part: &Part) -> Result<Claim> {
+    let edge = part.one([("step", EDGE), ("signal", SIGNAL)])?;
+    let frames = SENSORS.map(|sensor| Measured::mean(edge, sensor));
+    let events = frames[0];
+    let bright = part.one([("step", EDGE), ("signal", BRIGHT)])?;
+    let dim = part.one([("step", EDGE), ("signal", DIM)])?;
+    // Than frames of L2, at every signal.
+    let mut steps = part.at([("step", EDGE)]);
+    let faster = steps.all(|point| {
+        let [events, .., frames] = SENSORS.map(|sensor| Measured::mean(point, sensor));
+        events.interval.1 < frames.interval.0
+    });
+    Ok(Claim {
+        claim: "asynchronous operation reduces latency (abstract, section V)",
+        paper: "no number for a change in depth",
+        here: format!(
+            "a step is noticed after {} laser cycles; by frames of 100 after {:.0}, of 500 {:.0}, of 1000 {:.0}, of 2000 {:.0} ({SIGNAL} signal photons a laser cycle); events {} and frames of 100 {} at {BRIGHT} photons; events {} and frames of 2000 {} at {DIM}; not noticed in {AFTER} laser cycles, and counted as {AFTER}: at 0.1, 0.2, 0.5, 1, 2 photons {} of {} by events, {} by frames of 100, {} by frames of 2000",
+            events.text(0),
+            frames[1].value,
+            frames[2].value,
+            frames[3].value,
+            frames[4].value,
+            Measured::mean(bright, SENSORS[0]).text(0),
+            Measured::mean(bright, SENSORS[1]).text(0),
+            Measured::mean(dim, SENSORS[0]).text(0),
+            Measured::mean(dim, SENSORS[4]).text(0),
+            at_signals(part, EDGE, "events not noticed"),
+            grouped(STEPS * part.seed_count()),
+            at_signals(part, EDGE, "frames of 100 not noticed"),
+            at_signals(part, EDGE, "frames of 2000 not noticed"),
+        ),
+        verdict: match (faster, events.interval.1 < frames[4].interval.0) {
+            (true, _) => Verdict::Agrees,
+            (false, true) => Verdict::Differs,
+            _ => Verdict::Refuted,
+        },
+        why: "against frames of L2: a bright pixel need not wait for the darkest; a dim one waits longer than a frame, as events ask for α = 8 where a frame takes any peak; frames as short as the exposures of events are as quick",
+    })
+}
+
+fn blur_claim(part: &Part) -> Result<Claim> {
+    let mut here = Vec::new();
+    let mut verdicts = Vec::new();
+    for step in STEPS_BINS {
+        let points = part.at([("step", step)]);
+        let excesses = |sensor| points.clone().map(move |point| excess(point, sensor));
+        verdicts.push(is_sharp(&excesses(SENSORS[0]).collect::<Vec<_>>()));
+        let texts = excesses(SENSORS[0]).map(mixed::points);
+        let frames = mixed::worst(excesses(SENSORS[4])).map_or(String::new(), mixed::points);
+        here.push(format!(
+            "step of {step} bins {}, worst of frames of 2000 {frames}; exposures over it that expired {} of {} (without the step {})",
+            texts.collect::<Vec<_>>().join(", "),
+            at_signals(part, step, "events mixed, not read"),
+            grouped(STEPS * part.seed_count()),
+            at_signals(part, step, "events clean, not read"),
+        ));
+    }
+    let is = |verdict| verdicts.iter().filter(|&&other| other == verdict).count();
+    Ok(Claim {
+        claim: "an edge that passes within an exposure does not blur (sections III-D, IV-C)",
+        paper: "without motion blur",
+        here: format!(
+            "percentage points by which an event over the step is read as neither surface more often than the same exposure without it, at 0.1, 0.2, 0.5, 1, 2 signal photons a laser cycle: {}",
+            here.join("; ")
+        ),
+        verdict: match (is(Verdict::Agrees), is(Verdict::Refuted)) {
+            (3, _) => Verdict::Agrees,
+            (_, 3) => Verdict::Refuted,
+            (_, 1..) => Verdict::Differs,
+            _ => Verdict::NotDecided,
+        },
+        why: "a step does not blur if the excess is below 2 percentage points with 99 % confidence at every signal, and blurs if it is above them at one; agrees if no step blurs, differs if one does; each exposure beside one of the same random numbers, over the same laser cycle, without the step, where both were read: a dim pixel often reads nothing of an exposure with a step in it; a peak is of one surface or of the other if they lie farther apart than the centre of mass sees, for frames as well, but has only its part of the photons; surfaces two bins apart mix in every exposure that saw both",
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One photon a laser cycle, in bin 40 and from laser cycle 1,010 on in bin 20.
+    /// The exposure from 968 to 1,011 holds both; so do frames.
+    #[test]
+    fn the_step_is_noticed_when_its_photons_are_the_peak() {
+        let readings = watch(5000, &prototype(40).unwrap(), [0; 4], |cycle, photon| {
+            photon(if cycle < 1010 { 40 } else { 20 });
+            Ok(())
+        })
+        .unwrap();
+        let mut tally = Tally::new();
+        for (sensor, readings) in SENSORS.into_iter().zip(&readings) {
+            add_step(
+                &mut tally,
+                sensor,
+                readings,
+                1010,
+                [in_parts(40.5), in_parts(20.5)],
+            );
+        }
+        // Exposures of 44: 968 to 1011 reads the old surface, 1012 to 1055 the new.
+        assert_eq!(tally["events above 0"], 46);
+        // The frame up to 1099 has 90 of its 100 photons from the new surface.
+        assert_eq!(tally["frames of 100 above 0"], 90);
+        // That up to 1999 has 990 of 2,000: the next one is the first.
+        assert_eq!(tally["frames of 2000 above 0"], 2990);
+    }
+
+    #[test]
+    fn a_step_that_is_not_noticed_counts_as_the_time_it_had() {
+        let readings = [Reading {
+            first: 100,
+            last: 199,
+            position: 512,
+        }];
+        let mut tally = Tally::new();
+        add_step(&mut tally, "frames", &readings, 150, [0, 1024]);
+        assert_eq!(tally["frames not noticed"], 1);
+        assert_eq!(
+            (tally["frames values"], tally["frames above 0"]),
+            (1, AFTER)
+        );
+    }
+}

@@ -1,0 +1,361 @@
+//! False events and depth error of a board, by SNR, α and L1 (section III-C).
+//!
+//! The paper's board stands where the pulse lies on an edge between two bins of 8.75
+//! ns, in a window of 8 bins; mini-frames of 5 laser cycles, so X = 5; L2 = 2000. It
+//! gives neither the background nor the pulse's width. Taken here, each with each:
+//! the background of its analysis (B = 0.05) and the one that its rule of thumb asks
+//! for at L1 = 20 (L1·B = 30, so 1.5; 10-bit counters are full there well before L2);
+//! pulses with σ = 1 bin, the lower end of what the paper names, and 0.33 bins, that
+//! of a rectangle of 10 ns (1.2 % of 1/1.2 MHz).
+
+mod setting;
+
+use anyhow::Result;
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{
+    AsyncPixel, Count, LaserCycle, Look, PaperRule, PixelAddress, PixelConfig, RangeGate,
+};
+use rand_distr::{Distribution, Poisson};
+use rand_pcg::Pcg64;
+
+use self::setting::{NOTHING, Setting, error, false_share};
+use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, point, tally};
+use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
+use dtof::simulation::MM_PER_PS;
+use dtof::summary::grouped;
+use dtof_theory::rates::bin_share;
+
+const BINS: usize = 8;
+/// The board, in bins from the start of the window.
+const POSITION: u8 = 4;
+/// 114 MHz in metres of range.
+const METRES_A_BIN: f64 = 8750.0 * MM_PER_PS / 1000.0;
+/// Background photons a bin and laser cycle (B), and standard deviation of the pulse
+/// in bins.
+const SETTINGS: [(f64, f64); 4] = [(0.05, 1.0), (0.05, 0.33), (1.5, 1.0), (1.5, 0.33)];
+/// Normalised SNR, A/B.
+const SNRS: [f64; 5] = [1.0, 2.0, 5.0, 10.0, 20.0];
+const ALPHAS: [u16; 4] = [2, 4, 6, 8];
+const L1S: [u16; 5] = [5, 10, 20, 40, 80];
+const L2: u16 = 2000;
+/// Laser cycles of a mini-frame, and X.
+const FRAME: u16 = 5;
+/// Mini-frames of a trial: 10,000 laser cycles, as the paper's recording has.
+const FRAMES: u16 = 2000;
+
+/// With the pixel and the rule of the core.
+pub const STUDY: Study = Study {
+    name: "hyperparameters",
+    about: "false events and depth error of a board by SNR, α and L1",
+    revision: 1,
+    few_seeds: 20,
+    all_seeds: 400,
+    points,
+    trial,
+    results,
+};
+
+fn points() -> Vec<Point> {
+    let mut points = Vec::new();
+    for (background, sigma) in SETTINGS {
+        for l1 in L1S {
+            for alpha in ALPHAS {
+                for snr in SNRS {
+                    points.push(point([
+                        ("background", background),
+                        ("sigma", sigma),
+                        ("l1", l1.into()),
+                        ("alpha", alpha.into()),
+                        ("snr", snr),
+                    ]));
+                }
+            }
+        }
+    }
+    points
+}
+
+/// A pixel in front of the board for 10,000 laser cycles.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "counts of a mini-frame, and parameters that are small whole numbers"
+)]
+fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+    let background = point["background"];
+    let signal = point["snr"] * background;
+    let mut laws = [Poisson::new(1.0)?; BINS];
+    for (law, bin) in laws.iter_mut().zip(0..) {
+        let share = bin_share(bin, POSITION.into(), point["sigma"]);
+        *law = Poisson::new(f64::from(FRAME) * (background + signal * share))?;
+    }
+    // The paper has no minimum count; a peak holds a photon.
+    let alpha = U8F8::from_num(point["alpha"]);
+    let rule = PaperRule::new(alpha, Count::saturating(1));
+    let config = PixelConfig::new(FRAME, point["l1"] as u16, L2, RangeGate::full(), rule)?;
+    let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(0));
+    let [mut false_events, mut squares, mut fourth_powers] = [0; 3];
+    for frame in 1..=u64::from(FRAMES) {
+        let counts = laws.map(|law| law.sample(rng) as u32);
+        pixel.count_frame(&config, &counts);
+        let last = LaserCycle(frame * u64::from(FRAME) - 1);
+        if pixel.end_laser_cycles(&config, last, FRAME) != Look::Event {
+            continue;
+        }
+        if let Some(event) = pixel.acknowledge() {
+            // In 1/256 bin.
+            let error =
+                u64::from((event.position().raw() - i32::from(POSITION) * 256).unsigned_abs());
+            false_events += u64::from(error > 128);
+            squares += error.pow(2);
+            fourth_powers += error.pow(4);
+        }
+    }
+    let statistics = pixel.statistics();
+    Ok(tally([
+        ("events", statistics.events),
+        ("expired", statistics.expired),
+        ("false", false_events),
+        ("squares", squares),
+        ("fourth", fourth_powers),
+    ]))
+}
+
+fn results(part: &Part) -> Result<Results> {
+    let main = Setting::all(part)[0];
+    let settings = |of: fn(Setting) -> String| {
+        let texts = Setting::all(part).map(|setting| setting.text(of));
+        texts.join("; ")
+    };
+    let verdict = |holds: fn(Setting) -> Option<bool>| in_all(Setting::all(part).map(holds));
+    let claims = vec![
+        Claim {
+            claim: "the false positive rate does not depend on the SNR (III-C, Eq. 10)",
+            paper: "figure",
+            here: format!(
+                "share of events that are false, α = 4, L1 = 20: {}",
+                settings(|setting| setting.list(4, 20, percent))
+            ),
+            verdict: verdict(|setting| setting.false_events_ignore_snr()),
+            why: "Eq. 10 is the rate of a look at background; of the events of a board fewer are false \
+                  the more its signal brings",
+        },
+        Claim {
+            claim: "RMSE falls with the SNR for L1 above 20 (III-C)",
+            paper: "figure",
+            here: format!(
+                "RMSE in bins, α = 4, L1 = 40: {}",
+                settings(|setting| setting.list(4, 40, bins))
+            ),
+            verdict: verdict(|setting| setting.error_falls_with_snr()),
+            why: "down to what the three bins of the centre of mass leave: with the pulse on an edge \
+                  they hold one side of it more than the other, the wider the more",
+        },
+        Claim {
+            claim: "α has no effect on RMSE for L1 above 20 (III-C)",
+            paper: "none",
+            here: format!(
+                "greatest factor between α = 2 and 8 at one SNR, L1 = 40 and 80: {}",
+                settings(|setting| setting
+                    .error_by_alpha()
+                    .map_or(NOTHING.to_owned(), |factor| format!("{factor:.2}")))
+            ),
+            // To a tenth.
+            verdict: verdict(|setting| setting.error_by_alpha().map(|factor| factor <= 1.1)),
+            why: "a larger α waits for more photons and lets fewer false events through, both of which \
+                  lower the error where signal is scarce",
+        },
+        Claim {
+            claim: "larger L1 brings little beyond 40 (III-C)",
+            paper: "figure",
+            here: format!(
+                "mean RMSE in bins at L1 = 10, 20, 40, 80 over the SNRs that have enough events at each, \
+                 α = 4: {}",
+                settings(|setting| match setting.mean_errors([10, 20, 40, 80]) {
+                    None => NOTHING.to_owned(),
+                    Some((errors, snrs)) => {
+                        let errors = errors.map(|error| format!("{error:.3}"));
+                        format!("{} ({snrs} SNRs)", errors.join(", "))
+                    }
+                })
+            ),
+            verdict: verdict(|setting| setting.little_gain_beyond_40()),
+            why: "what is left is the centre of mass's own error where signal is plenty; where it is \
+                  scarce, more photons go on helping",
+        },
+        Claim {
+            claim: "α = 4 with L1 = 20 gives below 0.1 % false events (III-C)",
+            paper: "< 0.1 %",
+            here: format!(
+                "events outside ±0.5 bin: {}",
+                settings(|setting| setting.list(4, 20, percent))
+            ),
+            // At every SNR of every setting, at none of any, or at some.
+            verdict: in_all(Setting::all(part).into_iter().flat_map(|setting| {
+                let shares = setting.shares(4, 20, false_share).into_iter();
+                shares.map(below_a_thousandth)
+            })),
+            why: "at B = 0.05 a quadrant of two bins often holds nothing at L1 = 20, and then any peak passes; at B = 1.5 it takes a signal well above the background",
+        },
+    ];
+    Ok(Results {
+        figures: figures(main)?,
+        claims,
+        tables: Vec::new(),
+    })
+}
+
+fn percent(point: &PointTally) -> String {
+    format!("{:.3} %", false_share(point).value * 100.0)
+}
+
+fn bins(point: &PointTally) -> String {
+    format!("{:.3}", error(point).value)
+}
+
+/// Whether a claim holds everywhere, nowhere, or in some places; what could not be told
+/// (`None`) leaves it open, unless places that could be told differ.
+fn in_all(holds: impl IntoIterator<Item = Option<bool>>) -> Verdict {
+    let [mut open, mut held, mut failed] = [false; 3];
+    for holds in holds {
+        match holds {
+            None => open = true,
+            Some(true) => held = true,
+            Some(false) => failed = true,
+        }
+    }
+    match (held, failed) {
+        (true, true) => Verdict::Differs,
+        (true, false) if !open => Verdict::Agrees,
+        (false, true) if !open => Verdict::Refuted,
+        _ => Verdict::NotDecided,
+    }
+}
+
+/// Whether the whole interval lies below 0.1 %, or above; `None` if it holds it.
+fn below_a_thousandth(share: Share) -> Option<bool> {
+    if share.holds(0.001) {
+        None
+    } else {
+        Some(share.value < 0.001)
+    }
+}
+
+fn figures(setting: Setting) -> Result<Vec<Figure>> {
+    let pixels = setting.part.seed_count();
+    let caption = |what: &str| {
+        format!(
+            "{what} Board on a bin edge, 8 bins of 8.75 ns ({METRES_A_BIN:.3} m), B = {}, σ = {} bins, X = 5, \
+             L2 = 2000, no minimum count; {} pixels of 10,000 laser cycles a point, 99 % intervals. Points \
+             with fewer than 50 events are left out.",
+            setting.background,
+            setting.sigma,
+            grouped(pixels)
+        )
+    };
+    let by_snr =
+        |name: String, colour, points: Vec<&PointTally>, of: fn(&PointTally) -> Share| Series {
+            name: Some(name),
+            colour,
+            style: Style::JoinedDots,
+            points: points
+                .into_iter()
+                .map(|point| of(point).at(point.parameter("snr")))
+                .collect(),
+        };
+    let x = Axis::logarithmic("normalised SNR, A/B");
+    let false_events = ALPHAS.into_iter().enumerate().map(|(colour, alpha)| {
+        by_snr(
+            format!("α = {alpha}"),
+            colour,
+            setting.by_snr(alpha, 20),
+            false_share,
+        )
+    });
+    let errors = L1S.into_iter().enumerate().map(|(colour, l1)| {
+        by_snr(
+            format!("L1 = {l1}"),
+            colour,
+            setting.by_snr(4, l1),
+            |point| metres(error(point)),
+        )
+    });
+    let by_l1 = ALPHAS
+        .into_iter()
+        .enumerate()
+        .map(|(colour, alpha)| Series {
+            name: Some(format!("α = {alpha}")),
+            colour,
+            style: Style::JoinedDots,
+            points: L1S
+                .into_iter()
+                .flat_map(|l1| setting.by_snr(alpha, l1))
+                .filter(|point| point.is_at([("snr", 5.0)]))
+                .map(|point| metres(error(point)).at(point.parameter("l1")))
+                .collect::<Vec<chart::Point>>(),
+        });
+    Ok(vec![
+        Figure {
+            name: "hyperparameters-false",
+            svg: line_chart(&Chart {
+                title: "Events outside ±0.5 bin, L1 = 20",
+                x,
+                y: Axis::logarithmic("share of events"),
+                series: false_events.collect(),
+            })?,
+            caption: caption("Share of events that are false, by SNR and α, at L1 = 20."),
+        },
+        Figure {
+            name: "hyperparameters-error",
+            svg: line_chart(&Chart {
+                title: "Root mean square error of all events, α = 4",
+                x,
+                y: Axis::linear("metres"),
+                series: errors.collect(),
+            })?,
+            caption: caption(
+                "Depth error of all events, false ones included, by SNR and L1, at α = 4.",
+            ),
+        },
+        Figure {
+            name: "hyperparameters-alpha",
+            svg: line_chart(&Chart {
+                title: "Root mean square error of all events, A/B = 5",
+                x: Axis::logarithmic("L1, laser cycles"),
+                y: Axis::linear("metres"),
+                series: by_l1.collect(),
+            })?,
+            caption: caption(
+                "Depth error of all events, false ones included, by L1 and α, at A/B = 5.",
+            ),
+        },
+    ])
+}
+
+/// From bins.
+fn metres(bins: Share) -> Share {
+    Share {
+        value: bins.value * METRES_A_BIN,
+        interval: (
+            bins.interval.0 * METRES_A_BIN,
+            bins.interval.1 * METRES_A_BIN,
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_not_seen_is_no_pass() {
+        assert_eq!(in_all([]), Verdict::NotDecided);
+        assert_eq!(in_all([Some(true), None]), Verdict::NotDecided);
+        assert_eq!(in_all([Some(true), Some(true)]), Verdict::Agrees);
+        assert_eq!(in_all([Some(false), Some(false)]), Verdict::Refuted);
+        assert_eq!(in_all([Some(true), None, Some(false)]), Verdict::Differs);
+        assert_eq!(below_a_thousandth(Share::new(0, 50)), None);
+        assert_eq!(below_a_thousandth(Share::new(0, 50_000)), Some(true));
+    }
+}

@@ -1,0 +1,169 @@
+//! One pixel: its events, and what a frame-based sensor makes of the same
+//! photons.
+
+use anyhow::Result;
+use dtof_core::{
+    AnyRule, AsyncPixel, BinPosition, DepthEstimator, DepthEvent, LaserCycle, PixelAddress,
+    PixelConfig, RangeGate,
+};
+
+use dtof::frame::FramePixel;
+use dtof::scene;
+use dtof::settings::Settings;
+
+/// Bins of a histogram.
+pub const BINS: usize = CODES as usize;
+/// The same, as a TDC counts.
+pub const CODES: u16 = 128;
+/// Picoseconds a bin.
+pub const BIN_WIDTH_PS: f64 = 250.0;
+/// Positions are counted in this part of a bin.
+pub const PER_BIN: i64 = 1 << BinPosition::FRACTIONAL_BITS;
+/// Exposures of the frames that events are held against, in laser cycles.
+pub const FRAMES: [u64; 4] = [100, 500, 1000, 2000];
+/// The sensors that see the same photons: events, then [`FRAMES`].
+pub const SENSORS: [&str; 5] = [
+    "events",
+    "frames of 100",
+    "frames of 500",
+    "frames of 1000",
+    "frames of 2000",
+];
+
+/// Laser cycles of the prototype from one look at the histogram to the next (X).
+pub const PROTOTYPE_X: u16 = 4;
+
+/// The paper's FPGA prototype: α = 8, X = 4, L2 = 2000, and `l1`.
+pub fn prototype(l1: u16) -> Result<PixelConfig<BINS, AnyRule>> {
+    let settings = Settings {
+        l1,
+        x: PROTOTYPE_X,
+        ..scene::settings(0)
+    };
+    settings.config()
+}
+
+/// A depth and the laser cycles it was exposed for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reading {
+    /// The first laser cycle of the exposure.
+    pub first: u64,
+    /// The last: then it is reported.
+    pub last: u64,
+    /// Bins from the start of bin 0, [`PER_BIN`] a bin.
+    pub position: i64,
+}
+
+impl Reading {
+    /// What an event or a frame reports.
+    pub fn of(event: &DepthEvent) -> Self {
+        Self {
+            first: event.cycle.0 + 1 - u64::from(event.exposure),
+            last: event.cycle.0,
+            position: event.position().raw().into(),
+        }
+    }
+
+    /// How many laser cycles it was exposed for.
+    pub const fn exposure(&self) -> u64 {
+        self.last + 1 - self.first
+    }
+}
+
+/// Frames of a pixel of 128 bins, the first from laser cycle `first` on.
+pub fn frames(first: u64, length: u64) -> FramePixel<BINS> {
+    let length = u16::try_from(length).unwrap_or(u16::MAX);
+    FramePixel::new(PixelAddress(0), first, length)
+}
+
+/// Ends a laser cycle of frames; without a gate, and with the same centre of mass as that
+/// of events.
+pub fn end_laser_cycle(frames: &mut FramePixel<BINS>, cycle: u64) -> Option<Reading> {
+    let read = frames.end_laser_cycle(&RangeGate::full(), &DepthEstimator::default(), cycle);
+    read.as_ref().map(Reading::of)
+}
+
+/// What each of [`SENSORS`] reports of `cycles` laser cycles. The frames of each
+/// length begin with the laser cycle of `phases`. `photons` gives the TDC codes of
+/// a laser cycle.
+pub fn watch(
+    cycles: u64,
+    config: &PixelConfig<BINS, AnyRule>,
+    phases: [u64; 4],
+    mut photons: impl FnMut(u64, &mut dyn FnMut(u16)) -> Result<()>,
+) -> Result<[Vec<Reading>; 5]> {
+    let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(0));
+    let mut lengths = FRAMES.into_iter();
+    let mut frames = phases.map(|first| frames(first, lengths.next().unwrap_or_default()));
+    let mut readings: [Vec<Reading>; 5] = Default::default();
+    for cycle in 0..cycles {
+        photons(cycle, &mut |code| {
+            pixel.count(config, code);
+            for frame in &mut frames {
+                frame.count(&RangeGate::full(), cycle, code);
+            }
+        })?;
+        pixel.end_laser_cycle(config, LaserCycle(cycle));
+        let [events, of_frames @ ..] = &mut readings;
+        events.extend(pixel.acknowledge().as_ref().map(Reading::of));
+        for (readings, frame) in of_frames.iter_mut().zip(&mut frames) {
+            readings.extend(end_laser_cycle(frame, cycle));
+        }
+    }
+    Ok(readings)
+}
+
+/// Bins as a position, rounded to the nearest.
+#[allow(clippy::cast_possible_truncation, reason = "some hundred bins")]
+#[allow(clippy::cast_precision_loss, reason = "256")]
+pub fn in_parts(bins: f64) -> i64 {
+    (bins * PER_BIN as f64).round() as i64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One photon a laser cycle: bin 40 in the first 1,000, then bin 20.
+    fn step() -> [Vec<Reading>; 5] {
+        let config = prototype(40).unwrap();
+        watch(5000, &config, [30, 0, 250, 0], |cycle, photon| {
+            photon(if cycle < 1000 { 40 } else { 20 });
+            Ok(())
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn frames_follow_each_other_from_their_phase() {
+        let [events, short, .., long] = step();
+        assert!(events.iter().all(|event| event.exposure() == 44));
+        assert_eq!(events[0].position, in_parts(40.5));
+        assert_eq!((short[0].first, short[0].last), (30, 129));
+        assert!(
+            short
+                .windows(2)
+                .all(|pair| pair[0].last + 1 == pair[1].first)
+        );
+        assert!(short.iter().all(|frame| frame.exposure() == 100));
+        assert_eq!(long.len(), 2);
+    }
+
+    /// 70 photons in bin 40 against 30 in bin 20, and half of 2,000 each: the
+    /// lower bin is the peak of equals.
+    #[test]
+    fn a_frame_with_both_surfaces_reports_that_with_more_photons() {
+        let [_, short, _, middle, long] = step();
+        let at = |frames: &[Reading], last: u64| {
+            frames
+                .iter()
+                .find(|frame| frame.last == last)
+                .unwrap()
+                .position
+        };
+        assert_eq!(at(&short, 1029), in_parts(40.5));
+        assert_eq!(at(&short, 1129), in_parts(20.5));
+        assert_eq!(at(&middle, 1249), in_parts(40.5));
+        assert_eq!(at(&long, 1999), in_parts(20.5));
+    }
+}

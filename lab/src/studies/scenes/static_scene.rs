@@ -1,0 +1,366 @@
+//! The static scene (section III-B): when, how often and how well pixels report,
+//! and what their events say of the reflectivity.
+
+mod results;
+
+use anyhow::Result;
+use dtof_core::{DepthEvent, PixelAddress, RangeGate, Reflectivity};
+use rand_core::Rng;
+use rand_distr::{Distribution, Uniform};
+use rand_pcg::Pcg64;
+
+use super::one_pixel::{self, PER_BIN, in_parts};
+use super::ranks::rank_correlation;
+use crate::sweep::mean::{add, add_error, add_value};
+use crate::sweep::{Point, Study, Tally, point};
+use dtof::engine::host_engine;
+use dtof::scene::{self, Light, Scene};
+use dtof::source::{Geometry, PhotonSource};
+
+const CYCLES: u64 = 10_000;
+/// Laser cycles of a frame (L2).
+const FRAME: u64 = 2000;
+/// Laser cycles handled at a time.
+const SLICE: u16 = 250;
+/// Events that are averaged.
+const MEAN_OF: usize = 10;
+/// A depth farther off is false and counts apart.
+const FALSE: i64 = 3 * PER_BIN;
+/// Whole numbers of a correlation, a relative error, a reflectivity.
+const MILLION: f64 = 1e6;
+/// Pixels of a row over which a surface turns by one bin of range: the boards are as
+/// wide, so that they lie evenly in a bin, not on the edge of one.
+const PIXELS_A_BIN: f64 = 8.0;
+/// The pulse of the figures, in bins.
+const WIDE: f64 = 1.0;
+/// The scenes, as a point names them.
+const SCENES: [&str; 2] = ["scenes/static.toml", "scenes/demo.toml"];
+const DEPTHS: [&str; 3] = ["frame of 2000", "last event", "mean of ten"];
+/// What differs from one of these to the next of the same pixel.
+const NOISES: [&str; 3] = [
+    "noise of frame of 2000",
+    "noise of last event",
+    "noise of mean of ten",
+];
+
+/// Held against the paper's static scene.
+pub const STUDY: Study = Study {
+    name: "static-scene",
+    about: "first events, event rates, depth errors and reflectivity of two static scenes",
+    revision: 3,
+    few_seeds: 4,
+    all_seeds: 40,
+    points,
+    trial,
+    results: results::results,
+};
+
+/// Both scenes, and the first with a pulse as narrow as that of the paper's system,
+/// 10 ns in bins of 8.75 ns.
+fn points() -> Vec<Point> {
+    let points = [(0.0, WIDE), (1.0, WIDE), (0.0, 0.5)].into_iter();
+    points
+        .map(|(scene, sigma)| point([("scene", scene), ("pulse_sigma_bins", sigma)]))
+        .collect()
+}
+
+/// The scene of the file at 32×16 pixels, with every surface turned by a bin in
+/// [`PIXELS_A_BIN`], and `shift` bins farther away.
+fn scene(point: &Point, shift: f64) -> Result<Scene> {
+    let text = if point["scene"] > 0.0 {
+        include_str!("../../../../scenes/demo.toml")
+    } else {
+        include_str!("../../../../scenes/static.toml")
+    };
+    let mut scene = Scene {
+        geometry: Geometry {
+            columns: 32,
+            rows: 16,
+        },
+        pulse_sigma_bins: point["pulse_sigma_bins"],
+        ..Scene::parse(text)?
+    };
+    let mm_per_bin = scene.mm_per_bin();
+    // From the first column of the layout to the last, in pixels.
+    let across = f64::from(scene.geometry.columns) / f64::from(scene.layout.columns);
+    let pixels = f64::from(scene.layout.columns - 1) * across;
+    for surface in &mut scene.surfaces {
+        // A surface that is turned already is as good.
+        #[allow(clippy::float_cmp, reason = "one is the default of the other")]
+        if surface.range_right_mm == surface.range_mm {
+            surface.range_right_mm += pixels / PIXELS_A_BIN * mm_per_bin;
+        }
+        surface.range_mm += shift * mm_per_bin;
+        surface.range_right_mm += shift * mm_per_bin;
+    }
+    Ok(scene)
+}
+
+/// What there is of a pixel.
+#[derive(Default)]
+struct Pixel {
+    /// Of its events.
+    positions: Vec<i64>,
+    reflectivity: Reflectivity,
+    /// Of its frames.
+    frames: Vec<i64>,
+}
+
+impl Pixel {
+    fn add(&mut self, event: &DepthEvent) {
+        self.positions.push(event.position().raw().into());
+        self.reflectivity.add(event);
+    }
+}
+
+fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+    let scene = scene(point, Uniform::new(0.0, 1.0)?.sample(rng))?;
+    let settings = scene::settings(rng.next_u64());
+    let mut photons = scene.photons(settings.seed, CYCLES)?;
+    let addresses = photons.addresses();
+    let mut engine = host_engine(&settings, &addresses)?;
+    let mut pixels: Vec<Pixel> = addresses.iter().map(|_| Pixel::default()).collect();
+    let mut frames: Vec<_> = addresses
+        .iter()
+        .map(|_| one_pixel::frames(0, FRAME))
+        .collect();
+    let mut tally = Tally::new();
+    for _ in 0..CYCLES / u64::from(SLICE) {
+        let slice = photons.next_slice(SLICE)?;
+        for event in engine.run(&slice)? {
+            add(&mut tally, "events", "of all pixels", 1);
+            for by in [100, 109, 110] {
+                let early = event.cycle.0 < by;
+                add(&mut tally, "events", &format!("by {by}"), early.into());
+            }
+            pixels[usize::from(event.pixel.0)].add(&event);
+        }
+        for ((pixel, frame), received) in pixels.iter_mut().zip(&mut frames).zip(&slice.pixels) {
+            let mut codes = received.photons.iter().peekable();
+            for cycle in 0..SLICE {
+                let now = slice.first_cycle + u64::from(cycle);
+                while let Some(photon) = codes.next_if(|photon| photon.cycle == cycle) {
+                    frame.count(&RangeGate::full(), now, photon.code);
+                }
+                let reading = one_pixel::end_laser_cycle(frame, now);
+                pixel.frames.extend(reading.map(|reading| reading.position));
+            }
+        }
+    }
+    for (&address, pixel) in addresses.iter().zip(&pixels) {
+        add_pixel(&mut tally, &scene, address, pixel);
+    }
+    add_scene(&mut tally, &scene, &addresses, &pixels);
+    Ok(tally)
+}
+
+#[allow(clippy::cast_precision_loss, reason = "at most ten positions")]
+fn mean_of_last(positions: &[i64], most: usize) -> f64 {
+    let last = &positions[positions.len().saturating_sub(most)..];
+    last.iter().sum::<i64>() as f64 / last.len() as f64
+}
+
+/// Adds the events and the depths of a pixel to those of its surface.
+fn add_pixel(tally: &mut Tally, scene: &Scene, address: PixelAddress, pixel: &Pixel) {
+    let Some(view) = scene.truth(address, 0) else {
+        return;
+    };
+    let surface = &scene.surfaces[view.surface].name;
+    let events = i64::try_from(pixel.positions.len()).unwrap_or(i64::MAX);
+    add_value(tally, &format!("{surface}, events"), events);
+    add(tally, surface, "without an event", (events == 0).into());
+    if pixel.positions.len() < MEAN_OF {
+        return;
+    }
+    let truth = in_parts(view.range_mm / scene.mm_per_bin());
+    #[allow(clippy::cast_possible_truncation, reason = "a position")]
+    let mean = |most| mean_of_last(&pixel.positions, most).round() as i64;
+    let frames = pixel.frames.iter().map(|&position| (DEPTHS[0], position));
+    let of_events = [(DEPTHS[1], mean(1)), (DEPTHS[2], mean(MEAN_OF))];
+    for (depth, position) in frames.chain(of_events) {
+        add_depth(tally, &format!("{surface}, {depth}"), position - truth);
+    }
+    add_noises(tally, surface, pixel);
+}
+
+/// Adds what differs from one depth of a pixel to its next: what the centre of mass
+/// always errs by there drops out. All three depths are of the same pixels, those
+/// with twice [`MEAN_OF`] events and two frames, and no difference that is false.
+fn add_noises(tally: &mut Tally, surface: &str, pixel: &Pixel) {
+    let Some(at) = pixel.positions.len().checked_sub(2 * MEAN_OF) else {
+        return;
+    };
+    let (before, last) = pixel.positions[at..].split_at(MEAN_OF);
+    #[allow(clippy::cast_possible_truncation, reason = "a position")]
+    let mean = |positions| mean_of_last(positions, MEAN_OF).round() as i64;
+    let [first, second, ..] = pixel.frames[..] else {
+        return;
+    };
+    let differences = [
+        second - first,
+        last[MEAN_OF - 1] - last[MEAN_OF - 2],
+        mean(last) - mean(before),
+    ];
+    let any_false = differences.iter().any(|off| off.abs() > FALSE);
+    for (name, difference) in NOISES.into_iter().zip(differences) {
+        let name = format!("{surface}, {name}");
+        if !any_false || difference.abs() > FALSE {
+            add_depth(tally, &name, difference);
+        }
+    }
+}
+
+/// Adds an error, or a difference of two depths, unless it is false.
+fn add_depth(tally: &mut Tally, name: &str, error: i64) {
+    if error.abs() > FALSE {
+        add(tally, name, "false", 1);
+    } else {
+        add_error(tally, name, error);
+    }
+}
+
+/// Adds what is compared from pixel to pixel: ranks, and the reflectivity that
+/// follows from the events and the depth reported.
+#[allow(clippy::cast_precision_loss, reason = "some thousand events")]
+#[allow(clippy::cast_possible_truncation, reason = "some millions")]
+fn add_scene(tally: &mut Tally, scene: &Scene, addresses: &[PixelAddress], pixels: &[Pixel]) {
+    let signals = addresses
+        .iter()
+        .map(|&address| scene.rates(address, 0).signal);
+    let signals: Vec<f64> = signals.collect();
+    let events: Vec<f64> = pixels
+        .iter()
+        .map(|pixel| pixel.positions.len() as f64)
+        .collect();
+    let correlation = rank_correlation(&signals, &events).unwrap_or_default();
+    add_value(
+        tally,
+        "rank correlation",
+        (correlation * MILLION).round() as i64,
+    );
+    let estimates: [fn(&Pixel) -> f64; 2] = [
+        |pixel| pixel.reflectivity.events().into(),
+        |pixel| pixel.reflectivity.signal().to_num(),
+    ];
+    for (name, estimate) in ESTIMATES.into_iter().zip(estimates) {
+        // Estimate over truth, up to one scale for all. A pixel without an event is
+        // black.
+        let ratios: Vec<(usize, f64)> = addresses
+            .iter()
+            .zip(pixels)
+            .filter_map(|(&address, pixel)| {
+                let surface = scene.truth(address, 0)?.surface;
+                let Light::Reflectivity(truth) = scene.surfaces[surface].light else {
+                    return None;
+                };
+                if pixel.positions.is_empty() {
+                    return Some((surface, 0.0));
+                }
+                let z = mean_of_last(&pixel.positions, MEAN_OF) / PER_BIN as f64;
+                Some((surface, estimate(pixel) * z * z / truth))
+            })
+            .collect();
+        let (scale, error) = common_scale(ratios.iter().map(|(_, ratio)| *ratio));
+        add_value(tally, name, (error * MILLION).round() as i64);
+        // Black pixels have no say in the scale.
+        let seen = ratios.iter().map(|(_, ratio)| *ratio);
+        let (_, error) = common_scale(seen.filter(|&ratio| ratio > 0.0));
+        add_value(
+            tally,
+            &format!("{name}, with an event"),
+            (error * MILLION).round() as i64,
+        );
+        for (surface, ratio) in ratios {
+            let name = format!("{}, {name}", scene.surfaces[surface].name);
+            add_value(tally, &name, (ratio * scale * 1000.0).round() as i64);
+        }
+    }
+}
+
+/// How the reflectivity is estimated, before it is multiplied by z².
+const ESTIMATES: [&str; 2] = ["events × z²", "count rate × z²"];
+
+/// The scale that brings `ratios` nearest to 1, and their root mean square
+/// distance from 1 then.
+fn common_scale(ratios: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
+    let sum: f64 = ratios.clone().sum();
+    let squares: f64 = ratios.clone().map(|ratio| ratio * ratio).sum();
+    let scale = sum / squares;
+    let (mut off, mut count) = (0.0, 0.0);
+    for ratio in ratios {
+        off += (ratio * scale - 1.0) * (ratio * scale - 1.0);
+        count += 1.0;
+    }
+    (scale, (off / count).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_scale_for_all() {
+        let (scale, error) = common_scale([2.0, 2.0].into_iter());
+        assert_eq!((scale, error), (0.5, 0.0));
+        // s = 4 / 10: 0.4 and 1.2.
+        let (scale, error) = common_scale([1.0, 3.0].into_iter());
+        assert!((scale - 0.4).abs() < 1e-15);
+        assert!((error - 0.2_f64.sqrt()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_mean_is_that_of_the_last() {
+        let positions: Vec<i64> = (1..=12).collect();
+        assert_eq!(mean_of_last(&positions, 10), 7.5);
+        assert_eq!(mean_of_last(&positions, 1), 12.0);
+        assert_eq!(mean_of_last(&positions[..3], 10), 2.0);
+    }
+
+    /// The parts of a bin at which the pixels of a board lie.
+    #[test]
+    fn boards_lie_evenly_in_a_bin() {
+        let scene = scene(&points()[0], 0.3).unwrap();
+        for column in [2, 12, 22] {
+            let mut phases: Vec<f64> = (column..column + 8)
+                .map(|column| {
+                    let view = scene.truth(PixelAddress(8 * 32 + column), 0).unwrap();
+                    assert_ne!(scene.surfaces[view.surface].name, "wall");
+                    view.range_mm / scene.mm_per_bin() % 1.0
+                })
+                .collect();
+            phases.sort_by(f64::total_cmp);
+            for pair in phases.windows(2) {
+                assert!((pair[1] - pair[0] - 0.125).abs() < 1e-9, "{phases:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn all_noises_are_of_the_same_pixels() {
+        let noises = |positions: Vec<i64>, frames: Vec<i64>| {
+            let mut tally = Tally::new();
+            let pixel = Pixel {
+                positions,
+                frames,
+                ..Pixel::default()
+            };
+            add_noises(&mut tally, "a", &pixel);
+            let of = |what: &str| {
+                NOISES.map(|name| {
+                    let name = format!("a, {name} {what}");
+                    tally.get(&name).copied().unwrap_or_default()
+                })
+            };
+            (of("values"), of("false"))
+        };
+        let none = [0; 3];
+        assert_eq!(noises(vec![0; 19], vec![0, 1]), (none, none));
+        assert_eq!(noises(vec![0; 20], vec![0]), (none, none));
+        assert_eq!(noises(vec![0; 20], vec![0, 1]), ([1; 3], none));
+        let (frames, far) = (vec![0, 1], FALSE + 1);
+        let mut positions = vec![0; 20];
+        positions[19] = far;
+        assert_eq!(noises(positions, frames), (none, [0, 1, 0]));
+        assert_eq!(noises(vec![0; 20], vec![0, far]), (none, [1, 0, 0]));
+    }
+}

@@ -1,0 +1,379 @@
+//! What the static scene comes to.
+
+use std::f64::consts::SQRT_2;
+
+use anyhow::Result;
+use dtof_core::PixelAddress;
+
+use super::super::one_pixel::PER_BIN;
+use super::{DEPTHS, ESTIMATES, MILLION, NOISES, SCENES, WIDE, scene};
+use crate::sweep::mean::Measured;
+use crate::sweep::results::{Claim, Figure, Results, Verdict};
+use crate::sweep::{Part, PointTally};
+use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
+use dtof::summary::grouped;
+
+/// Every surface of a point with its mean signal photons a laser cycle.
+fn surfaces(point: &PointTally) -> Result<Vec<(String, f64)>> {
+    let scene = scene(&point.parameters, 0.0)?;
+    let mut sums = vec![(0.0, 0.0); scene.surfaces.len()];
+    for address in (0..32 * 16).map(PixelAddress) {
+        if let Some(view) = scene.truth(address, 0) {
+            let (sum, count) = &mut sums[view.surface];
+            *sum += scene.rates(address, 0).signal;
+            *count += 1.0;
+        }
+    }
+    let names = scene.surfaces.into_iter().map(|surface| surface.name);
+    Ok(names
+        .zip(sums)
+        .map(|(name, (sum, count))| (name, sum / count))
+        .collect())
+}
+
+/// A chart over the signal of every surface: a series of dots of each of `names`,
+/// measured by `y` for the tally `"surface, name"`.
+fn by_signal(
+    part: &Part,
+    title: &str,
+    y_axis: (&str, bool),
+    names: &[&str],
+    y: impl Fn(&PointTally, &str) -> Measured,
+) -> Result<String> {
+    let mut series = Vec::new();
+    for (colour, &name) in names.iter().enumerate() {
+        let mut points = Vec::new();
+        for point in part.at([("pulse_sigma_bins", WIDE)]) {
+            for (surface, signal) in surfaces(point)? {
+                let measured = y(point, &format!("{surface}, {name}"));
+                points.push(chart::Point {
+                    x: signal,
+                    y: measured.value,
+                    interval: Some(measured.interval),
+                });
+            }
+        }
+        // Without an event there is nothing to draw.
+        points.retain(|point| point.y.is_finite());
+        series.push(Series {
+            name: Some(name.to_owned()),
+            colour,
+            style: Style::Dots,
+            points,
+        });
+    }
+    line_chart(&Chart {
+        title,
+        x: Axis::logarithmic("signal photons a laser cycle, mean of a surface"),
+        y: Axis {
+            label: y_axis.0,
+            logarithmic: y_axis.1,
+            range: None,
+        },
+        series,
+    })
+}
+
+pub fn results(part: &Part) -> Result<Results> {
+    let events = by_signal(
+        part,
+        "Events of a pixel in 10,000 laser cycles",
+        ("events", false),
+        &["events"],
+        Measured::mean,
+    )?;
+    let depth = by_signal(
+        part,
+        "Depth error",
+        ("root mean square error, bins", true),
+        &DEPTHS,
+        |point, name| {
+            Measured::root_mean_square(point, &[name.to_owned()]).times(1.0 / parts_a_bin())
+        },
+    )?;
+    let noise = by_signal(
+        part,
+        "Depth noise",
+        ("standard deviation, bins", true),
+        &NOISES,
+        |point, name| {
+            let difference = Measured::root_mean_square(point, &[name.to_owned()]);
+            difference.times(1.0 / SQRT_2 / parts_a_bin())
+        },
+    )?;
+    let reflectivity = by_signal(
+        part,
+        "Reflectivity from events",
+        ("estimate over truth", false),
+        &ESTIMATES,
+        |point, name| Measured::mean(point, name).times(1e-3),
+    )?;
+    let about = format!(
+        "every surface of `{}` and `{}` at 32×16 pixels, turned by a bin of range in eight pixels and at a random place \
+         in a bin, at α = 8, L1 = 100, L2 = 2000, X = 10 and 10,000 laser cycles; \
+         {} pixels a scene",
+        SCENES[0],
+        SCENES[1],
+        grouped(512 * part.seed_count())
+    );
+    let figure = |name, svg, text: &str| Figure {
+        name,
+        svg,
+        caption: format!("{text}: {about}"),
+    };
+    Ok(Results {
+        figures: vec![
+            figure(
+                "static-events",
+                events,
+                "Events of a pixel, mean, by the signal it receives",
+            ),
+            figure(
+                "static-depth",
+                depth,
+                "Depth errors of pixels with ten events or more, those beyond three bins left out: a frame of \
+                 2000 laser cycles, the last event, the mean of the last ten",
+            ),
+            figure(
+                "static-noise",
+                noise,
+                "Depth noise, from the difference of two depths of the same pixel, of the pixels with twenty events or more",
+            ),
+            figure(
+                "static-reflectivity",
+                reflectivity,
+                "Reflectivity over the truth after one scale for the scene, where a pixel without an event is 0: the number of \
+                 events times z² as in the paper, and peak counts less background over exposure, times z²",
+            ),
+        ],
+        claims: claims(part)?,
+        tables: Vec::new(),
+    })
+}
+
+#[allow(clippy::cast_precision_loss, reason = "256")]
+fn parts_a_bin() -> f64 {
+    PER_BIN as f64
+}
+
+/// For each scene what `text` makes of it.
+fn of_each(part: &Part, text: impl FnMut(&PointTally) -> Result<String>) -> Result<String> {
+    let texts: Result<Vec<String>> = part.points().iter().map(text).collect();
+    let names = [
+        "static scene",
+        "demo scene",
+        "static scene with a pulse of σ = 0.5 bin",
+    ];
+    let texts = names
+        .iter()
+        .zip(texts?)
+        .map(|(name, text)| format!("{name} {text}"));
+    Ok(texts.collect::<Vec<_>>().join("; "))
+}
+
+/// What is said of the noise of a depth against that of the frame, and their ratio
+/// on every surface of which half of the pixels or more say it.
+fn noises(part: &Part, depth: &str) -> Result<(String, Vec<Measured>)> {
+    let mut all = Vec::new();
+    let text = of_each(part, |point| {
+        let mut ratios: Vec<(Measured, String)> = Vec::new();
+        let mut few = Vec::new();
+        let [mut beyond, mut frames_beyond] = [0; 2];
+        for (surface, _) in surfaces(point)? {
+            let name = |depth: &str| format!("{surface}, noise of {depth}");
+            beyond += point.count(&format!("{} false", name(depth)));
+            frames_beyond += point.count(&format!("{} false", name(DEPTHS[0])));
+            let pixels = point.count(&format!("{surface}, events values"));
+            if 2 * point.count(&format!("{} values", name(depth))) < pixels {
+                few.push(surface);
+                continue;
+            }
+            let noise = |depth: &str| Measured::root_mean_square(point, &[name(depth)]);
+            ratios.push((noise(depth).over(noise(DEPTHS[0])), surface));
+        }
+        ratios.sort_by(|(a, _), (b, _)| a.value.total_cmp(&b.value));
+        let [least, most] = [ratios.first(), ratios.last()].map(|ratio| {
+            let text = |(ratio, surface): &(Measured, String)| {
+                format!("{} times ({surface})", ratio.text(2))
+            };
+            ratio.map_or("-".to_owned(), text)
+        });
+        all.extend(ratios.iter().map(|(ratio, _)| *ratio));
+        let few = match few.join(", ") {
+            few if few.is_empty() => String::new(),
+            few => format!("; fewer than half of the pixels have twenty events: {few}"),
+        };
+        Ok(format!(
+            "noise {least} to {most} that of the frame; {beyond} beyond three bins, of frames {frames_beyond}{few}"
+        ))
+    })?;
+    Ok((text, all))
+}
+
+/// Whether a depth is noisier than the frame, by the ratios of the surfaces.
+fn noisier(ratios: &[Measured]) -> Verdict {
+    let all = |holds: fn(&Measured) -> bool| !ratios.is_empty() && ratios.iter().all(holds);
+    if all(|ratio| ratio.interval.0 > 1.0) {
+        Verdict::Agrees
+    } else if all(|ratio| ratio.interval.1 < 1.0) {
+        Verdict::Refuted
+    } else if ratios.iter().any(|ratio| ratio.interval.1 < 1.0) {
+        Verdict::Differs
+    } else {
+        Verdict::NotDecided
+    }
+}
+
+/// Whether a depth is as noisy as the frame, within half as much again, by the
+/// worst surface.
+fn comparable(ratios: &[Measured]) -> Verdict {
+    let any = |least: f64| ratios.iter().any(|ratio| ratio.interval.0 > least);
+    if any(2.0) {
+        Verdict::Refuted
+    } else if any(1.5) {
+        Verdict::Differs
+    } else if !ratios.is_empty() && ratios.iter().all(|ratio| ratio.interval.1 <= 1.5) {
+        Verdict::Agrees
+    } else {
+        Verdict::NotDecided
+    }
+}
+
+fn claims(part: &Part) -> Result<Vec<Claim>> {
+    let sum = |name: &str| {
+        part.points()
+            .iter()
+            .map(|point| point.count(name))
+            .sum::<u64>()
+    };
+    let [by_100, by_109, at_110] = [100, 109, 110].map(|by| sum(&format!("events by {by}")));
+    let correlations = part
+        .points()
+        .iter()
+        .map(|point| Measured::mean(point, "rank correlation"));
+    let lowest = correlations
+        .map(|measured| measured.interval.0 / MILLION)
+        .fold(1.0, f64::min);
+    let (last, last_ratios) = noises(part, DEPTHS[1])?;
+    let (mean, mean_ratios) = noises(part, DEPTHS[2])?;
+    let errors = |name: &str| -> Vec<Measured> {
+        let points = part.points().iter();
+        points
+            .map(|point| Measured::mean(point, name).times(100.0 / MILLION))
+            .collect()
+    };
+    let worst = errors(ESTIMATES[0])
+        .iter()
+        .map(|error| error.value)
+        .fold(0.0, f64::max);
+    Ok(vec![
+        Claim {
+            claim: "no event before laser cycle 100 (section III-B)",
+            paper: "an empty region, due to L1 = 100",
+            here: format!(
+                "{by_100} of {} events by 100, {by_109} by 109, {} at 110",
+                grouped(sum("events of all pixels")),
+                grouped(at_110)
+            ),
+            verdict: Verdict::of(by_100 == 0 && by_109 == 0 && at_110 > 0),
+            why: "N must exceed L1; the first such look with X = 10 is at 110",
+        },
+        Claim {
+            claim: "bright pixels report more often (section III-B)",
+            paper: "\"a clear correlation\"",
+            here: format!(
+                "rank correlation of events with the signal {}",
+                of_each(part, |point| {
+                    Ok(Measured::mean(point, "rank correlation")
+                        .times(1.0 / MILLION)
+                        .text(3))
+                })?
+            ),
+            verdict: if lowest > 0.8 {
+                Verdict::Agrees
+            } else if lowest > 0.5 {
+                Verdict::Differs
+            } else {
+                Verdict::Refuted
+            },
+            why: "ties lower it: pixels of one board receive the same, and no pixel can report more often than every 110 laser cycles",
+        },
+        Claim {
+            claim: "the last event is noisier than the frame of 2000 laser cycles (section III-B)",
+            paper: "\"noisier\"",
+            here: last,
+            verdict: noisier(&last_ratios),
+            why: "agrees if it is on every surface, with 99 % confidence; an event has as many photons as it takes, a frame all; noise is what differs from one depth of a pixel to its next; with the bias, which the three bins of the centre of mass leave near the edge of a bin in events and frames, the two lie closer together",
+        },
+        Claim {
+            claim: "the mean of ten events is comparable to the frame (section III-B)",
+            paper: "\"comparable\"",
+            here: mean,
+            verdict: comparable(&mean_ratios),
+            why: "by the worst surface, with 99 % confidence: agrees if its noise is at most half as much again, differs if it is more, refuted if it is more than twice as much; ten events of a dim pixel are exposed longer than one frame, those of a bright one about half as long; beside the edge of a bin a frame reads one or the other side of it, and the mean of ten events both, the more so the wider the pulse",
+        },
+        Claim {
+            claim: "events × z² gives the relative reflectivity (section III-B)",
+            paper: "a map, no number",
+            here: format!(
+                "rms error after one scale {}",
+                of_each(part, |point| {
+                    let percent =
+                        |name: &str| Measured::mean(point, name).times(100.0 / MILLION).text(1);
+                    let without = surfaces(point)?
+                        .into_iter()
+                        .map(|(surface, _)| point.count(&format!("{surface} without an event")));
+                    let seen = |name| percent(&format!("{name}, with an event"));
+                    Ok(format!(
+                        "{} % (by counts and exposure {} %) with the {} of {} pixels without an event as 0, {} % ({} %) without them",
+                        percent(ESTIMATES[0]),
+                        percent(ESTIMATES[1]),
+                        grouped(without.sum()),
+                        grouped(512 * part.seed_count()),
+                        seen(ESTIMATES[0]),
+                        seen(ESTIMATES[1]),
+                    ))
+                })?
+            ),
+            verdict: match worst {
+                worst if worst < 10.0 => Verdict::Agrees,
+                worst if worst < 25.0 => Verdict::Differs,
+                _ => Verdict::Refuted,
+            },
+            why: "refuted if wrong by a quarter or more in one scene, a pixel without an event counted as black; events grow faster than the signal while the background limits, and stop growing at one every 110 laser cycles; peak count less background over exposure, which every event carries, is linear",
+        },
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ratios<const N: usize>(ratios: [(f64, f64); N]) -> Vec<Measured> {
+        let measured = |interval: (f64, f64)| Measured {
+            value: f64::midpoint(interval.0, interval.1),
+            interval,
+        };
+        ratios.map(measured).to_vec()
+    }
+
+    #[test]
+    fn the_worst_surface_decides() {
+        let of = |worst| comparable(&ratios([(0.8, 0.9), worst]));
+        assert_eq!(of((1.3, 1.5)), Verdict::Agrees);
+        assert_eq!(of((1.4, 1.6)), Verdict::NotDecided);
+        assert_eq!(of((1.6, 2.5)), Verdict::Differs);
+        assert_eq!(of((2.1, 2.5)), Verdict::Refuted);
+        assert_eq!(comparable(&[]), Verdict::NotDecided);
+    }
+
+    #[test]
+    fn noisier_on_every_surface() {
+        let of = |worst| noisier(&ratios([(1.2, 1.4), worst]));
+        assert_eq!(of((1.1, 1.5)), Verdict::Agrees);
+        assert_eq!(of((0.9, 1.1)), Verdict::NotDecided);
+        assert_eq!(of((0.8, 0.9)), Verdict::Differs);
+        assert_eq!(noisier(&ratios([(0.8, 0.9)])), Verdict::Refuted);
+        assert_eq!(noisier(&[]), Verdict::NotDecided);
+    }
+}

@@ -1,0 +1,94 @@
+//! Monte-Carlo sweeps: many trials at every point of a grid of parameters, in
+//! parts that add up.
+//!
+//! A [`Study`] has points, and for each point and seed one trial. A trial depends
+//! on nothing but those two and gives whole numbers, so that the tallies of any
+//! seeds can be added in any order: a sweep split over machines and merged is the
+//! single run, bit for bit.
+//!
+//! ```text
+//! Study, seeds   [`run`]
+//!   → Part       a file: the seeds that are in it, and the tallies of every point
+//!   → [`merge`]  parts of disjoint seeds as one
+//! ```
+
+pub mod mean;
+mod part;
+pub mod results;
+mod run;
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+use rand_core::SeedableRng;
+use rand_pcg::Pcg64;
+
+use self::results::Results;
+
+pub use self::part::{Part, PointTally, SeedRange, merge};
+pub use self::run::run;
+
+/// The parameters of a point, by name.
+pub type Point = BTreeMap<String, f64>;
+
+/// Counts of a point, by name. They add up without rounding.
+pub type Tally = BTreeMap<String, u64>;
+
+/// What is swept.
+#[derive(Clone, Copy)]
+pub struct Study {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// What it finds out, in one line.
+    pub about: &'static str,
+    /// Grows when a trial changes: parts of different revisions do not add up.
+    pub revision: u32,
+    /// Seeds of a quick look, from 0.
+    pub few_seeds: u64,
+    /// Seeds of the figures, from 0.
+    pub all_seeds: u64,
+    /// The grid.
+    pub points: fn() -> Vec<Point>,
+    /// The trials of one seed at one point.
+    pub trial: fn(&Point, &mut Pcg64) -> Result<Tally>,
+    /// What all seeds come to.
+    pub results: fn(&Part) -> Result<Results>,
+}
+
+impl Study {
+    /// The random numbers of a seed at a point: independent of those of every other
+    /// study, point and seed, and of a simulated pixel's.
+    fn rng(&self, point: usize, seed: u64) -> Pcg64 {
+        // FNV-1a.
+        let name = self.name.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        });
+        Pcg64::seed_from_u64(mixed(mixed(name) ^ mixed(point as u64)) ^ mixed(seed))
+    }
+}
+
+/// The finaliser of `SplitMix64`: each bit in changes half of the bits out.
+const fn mixed(mut bits: u64) -> u64 {
+    bits = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    bits ^ (bits >> 31)
+}
+
+/// A point of these parameters.
+#[must_use]
+pub fn point<const N: usize>(parameters: [(&str, f64); N]) -> Point {
+    let parameters = parameters.into_iter();
+    parameters
+        .map(|(name, value)| (name.to_owned(), value))
+        .collect()
+}
+
+/// A tally of these counts.
+#[must_use]
+pub fn tally<const N: usize>(counts: [(&str, u64); N]) -> Tally {
+    let counts = counts.into_iter();
+    counts
+        .map(|(name, count)| (name.to_owned(), count))
+        .collect()
+}

@@ -1,0 +1,298 @@
+//! Parts of a sweep, and adding them up.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail, ensure};
+use serde::{Deserialize, Serialize};
+use tempfile::NamedTempFile;
+
+use super::{Point, Study, Tally};
+
+/// Seeds `first` to `end - 1`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "(u64, u64)", into = "(u64, u64)")]
+pub struct SeedRange {
+    /// The first seed.
+    pub first: u64,
+    /// One past the last.
+    pub end: u64,
+}
+
+impl From<(u64, u64)> for SeedRange {
+    fn from((first, end): (u64, u64)) -> Self {
+        Self { first, end }
+    }
+}
+
+impl From<SeedRange> for (u64, u64) {
+    fn from(range: SeedRange) -> Self {
+        (range.first, range.end)
+    }
+}
+
+/// One point with the sum of its trials.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointTally {
+    /// Where in the grid.
+    pub parameters: Point,
+    /// The sum over the seeds of the part.
+    pub tally: Tally,
+}
+
+impl PointTally {
+    /// A parameter of the point.
+    ///
+    /// # Panics
+    /// If the study has no such parameter.
+    #[must_use]
+    pub fn parameter(&self, name: &str) -> f64 {
+        self.parameters[name]
+    }
+
+    /// A count of the tally; 0 if no trial gave it.
+    #[must_use]
+    pub fn count(&self, name: &str) -> u64 {
+        self.tally.get(name).copied().unwrap_or_default()
+    }
+}
+
+/// Every point of a study over some seeds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Part {
+    study: String,
+    revision: u32,
+    /// Disjoint, ascending, none next to another.
+    seeds: Vec<SeedRange>,
+    points: Vec<PointTally>,
+}
+
+impl Part {
+    /// Without a seed.
+    #[must_use]
+    pub fn empty(study: &Study) -> Self {
+        let points = (study.points)().into_iter();
+        Self {
+            study: study.name.to_owned(),
+            revision: study.revision,
+            seeds: Vec::new(),
+            points: points
+                .map(|parameters| PointTally {
+                    parameters,
+                    tally: Tally::new(),
+                })
+                .collect(),
+        }
+    }
+
+    /// The study's name.
+    #[must_use]
+    pub fn study(&self) -> &str {
+        &self.study
+    }
+
+    /// The seeds whose trials are in it.
+    #[must_use]
+    pub fn seeds(&self) -> &[SeedRange] {
+        &self.seeds
+    }
+
+    /// How many seeds those are.
+    #[must_use]
+    pub fn seed_count(&self) -> u64 {
+        let lengths = self.seeds.iter().map(|range| range.end - range.first);
+        lengths.sum()
+    }
+
+    /// Every point of the grid, in the study's order.
+    #[must_use]
+    pub fn points(&self) -> &[PointTally] {
+        &self.points
+    }
+
+    /// Adds the tallies of `seed`, one a point.
+    pub(super) fn add_seed(&mut self, seed: u64, tallies: Vec<Tally>) -> Result<()> {
+        let end = seed.checked_add(1).context("the last seed is too large")?;
+        self.add_range(SeedRange { first: seed, end })?;
+        for (point, tally) in self.points.iter_mut().zip(tallies) {
+            add(&mut point.tally, &tally)?;
+        }
+        Ok(())
+    }
+
+    /// Adds another part of the same study.
+    ///
+    /// # Errors
+    /// If it is of another study, revision or grid, shares a seed, or a count would not
+    /// fit. This part is then as it was.
+    pub fn add(&mut self, other: &Self) -> Result<()> {
+        ensure!(
+            (&self.study, self.revision) == (&other.study, other.revision),
+            "{} (revision {}) does not add to {} (revision {})",
+            other.study,
+            other.revision,
+            self.study,
+            self.revision
+        );
+        let same = self.points.len() == other.points.len()
+            && self
+                .points
+                .iter()
+                .zip(&other.points)
+                .all(|(a, b)| a.parameters == b.parameters);
+        ensure!(same, "{}: not the same points", self.study);
+        // Aside, so that an error leaves this part as it was.
+        let mut sum = self.clone();
+        for &range in &other.seeds {
+            sum.add_range(range)?;
+        }
+        for (point, other) in sum.points.iter_mut().zip(&other.points) {
+            add(&mut point.tally, &other.tally)?;
+        }
+        *self = sum;
+        Ok(())
+    }
+
+    /// Notes seeds, which must be new.
+    fn add_range(&mut self, range: SeedRange) -> Result<()> {
+        ensure!(
+            range.first < range.end,
+            "no seeds: {}..{}",
+            range.first,
+            range.end
+        );
+        let at = self.seeds.partition_point(|seeds| seeds.end <= range.first);
+        if let Some(shared) = self.seeds.get(at).filter(|next| next.first < range.end) {
+            let first = shared.first.max(range.first);
+            bail!("seed {first} would count twice");
+        }
+        self.seeds.insert(at, range);
+        self.seeds.dedup_by(|next, before| {
+            let touches = before.end == next.first;
+            if touches {
+                before.end = next.end;
+            }
+            touches
+        });
+        Ok(())
+    }
+
+    /// Reads a part.
+    ///
+    /// # Errors
+    /// If there is none at `path`, or it is none.
+    pub fn load(path: &Path) -> Result<Self> {
+        let name = || path.display().to_string();
+        let text = fs::read_to_string(path).with_context(name)?;
+        let read: Self = serde_json::from_str(&text).with_context(name)?;
+        // The ranges may be anything; adding them up again checks them.
+        let mut part = Self {
+            seeds: Vec::new(),
+            ..read.clone()
+        };
+        for range in read.seeds {
+            part.add_range(range).with_context(name)?;
+        }
+        Ok(part)
+    }
+
+    /// As a file holds it: a line a point.
+    ///
+    /// # Errors
+    /// If a parameter is not finite.
+    pub fn to_json(&self) -> Result<String> {
+        let points: Vec<String> = self
+            .points
+            .iter()
+            .map(serde_json::to_string)
+            .collect::<Result<_, _>>()?;
+        Ok(format!(
+            "{{\"study\":{},\"revision\":{},\"seeds\":{},\"points\":[\n{}\n]}}\n",
+            serde_json::to_string(&self.study)?,
+            self.revision,
+            serde_json::to_string(&self.seeds)?,
+            points.join(",\n")
+        ))
+    }
+
+    /// Writes it aside and moves it to `path`, so that a part there is whole.
+    ///
+    /// # Errors
+    /// If the folder cannot be written.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        let name = || path.display().to_string();
+        let folder = match path.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        };
+        let mut file = NamedTempFile::new_in(folder).with_context(name)?;
+        let text = self.to_json().with_context(name)?;
+        file.write_all(text.as_bytes()).with_context(name)?;
+        file.persist(path).with_context(name)?;
+        Ok(())
+    }
+}
+
+/// Adds counts by name.
+fn add(sum: &mut Tally, more: &Tally) -> Result<()> {
+    for (name, &count) in more {
+        let sum = sum.entry(name.clone()).or_default();
+        *sum = sum
+            .checked_add(count)
+            .with_context(|| format!("too many {name} for 64 bits"))?;
+    }
+    Ok(())
+}
+
+/// The sum of all parts at `paths`, of a study that `named` knows and of its grid.
+///
+/// # Errors
+/// The part that does not fit, and why.
+pub fn merge<P: AsRef<Path>>(
+    paths: &[P],
+    named: impl Fn(&str) -> Result<&'static Study>,
+) -> Result<Part> {
+    let mut sum: Option<Part> = None;
+    for path in paths.iter().map(AsRef::as_ref) {
+        let name = || path.display().to_string();
+        let part = Part::load(path)?;
+        let sum = match &mut sum {
+            Some(sum) => sum,
+            none => none.insert(Part::empty(named(&part.study).with_context(name)?)),
+        };
+        sum.add(&part).with_context(name)?;
+    }
+    sum.context("no parts")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::studies::analysis::hit_rate;
+    use crate::sweep::tally;
+
+    fn part(seed: u64, count: u64) -> Part {
+        let mut part = Part::empty(&hit_rate::STUDY);
+        let tallies = vec![tally([("trials", count)]); part.points.len()];
+        part.add_seed(seed, tallies).unwrap();
+        part
+    }
+
+    #[test]
+    fn what_does_not_add_leaves_a_part_as_it_was() {
+        let mut sum = part(3, 1);
+        let before = sum.clone();
+        // Its first seed is new, its second is not; the other's counts do not fit.
+        let mut shares = part(1, 1);
+        shares.add(&part(3, 1)).unwrap();
+        for bad in [shares, part(4, u64::MAX)] {
+            assert!(sum.add(&bad).is_err());
+            assert_eq!(sum, before);
+        }
+        sum.add(&part(4, 1)).unwrap();
+        assert_eq!(sum.seed_count(), 2);
+    }
+}

@@ -1,0 +1,77 @@
+//! Every study: its trials are pure, and one seed is enough for results.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use dtof_lab::studies;
+use dtof_lab::sweep::{self, Part, SeedRange, Study};
+
+/// One seed of a study.
+fn part(study: &Study, seed: u64) -> Part {
+    let folder = tempfile::tempdir().unwrap();
+    let seeds = SeedRange {
+        first: seed,
+        end: seed + 1,
+    };
+    let path = folder.path().join("part");
+    sweep::run(study, seeds, &path, Duration::MAX, |_| ()).unwrap()
+}
+
+#[test]
+fn one_seed_of_every_study_gives_figures_and_claims() {
+    let mut names = BTreeSet::new();
+    for study in studies::ALL {
+        let results = (study.results)(&part(study, 0)).unwrap();
+        assert!(!results.figures.is_empty(), "{}", study.name);
+        for figure in &results.figures {
+            assert!(names.insert(figure.name), "{} twice", figure.name);
+            assert!(!figure.caption.is_empty(), "{}", figure.name);
+            let svg = figure.svg.trim_end();
+            assert!(svg.starts_with("<svg") && svg.ends_with("</svg>"), "{svg}");
+            // At least one dot or line beside axes and legend.
+            assert!(
+                svg.contains("<circle") || svg.contains("<polyline"),
+                "{svg}"
+            );
+        }
+        for claim in &results.claims {
+            // They are cells of a table.
+            for text in [claim.claim, claim.paper, &claim.here, claim.why] {
+                assert!(!text.is_empty() && !text.contains(['|', '\n']), "{text}");
+            }
+            assert!(!claim.here.contains("NaN"), "{}", claim.here);
+        }
+    }
+}
+
+#[test]
+fn a_trial_depends_on_its_point_and_random_numbers_only() {
+    use rand_core::SeedableRng;
+    use rand_pcg::Pcg64;
+    for study in studies::ALL {
+        let points = (study.points)();
+        assert_eq!(points, (study.points)(), "{}", study.name);
+        // A few points all over the grid, in either order.
+        let some: Vec<_> = points.iter().step_by(points.len().div_ceil(4)).collect();
+        let trials = |seed| {
+            let trial =
+                move |point: &&_| (study.trial)(point, &mut Pcg64::seed_from_u64(seed)).unwrap();
+            let forward: Vec<_> = some.iter().map(trial).collect();
+            let mut backward: Vec<_> = some.iter().rev().map(trial).collect();
+            backward.reverse();
+            assert_eq!(forward, backward, "{}", study.name);
+            forward
+        };
+        assert_ne!(trials(1), trials(2), "{}: not random", study.name);
+    }
+}
+
+#[test]
+fn names_are_told_apart() {
+    let names: BTreeSet<_> = studies::ALL.iter().map(|study| study.name).collect();
+    assert_eq!(names.len(), studies::ALL.len());
+    for study in studies::ALL {
+        assert!(study.few_seeds < study.all_seeds, "{}", study.name);
+        assert_eq!(studies::named(study.name).unwrap().about, study.about);
+    }
+}

@@ -1,0 +1,165 @@
+//! Sweeps in parts: what is split and merged is the single run bit for bit, and
+//! nothing counts twice.
+
+mod common;
+
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::Duration;
+
+use common::Scratch;
+
+const STUDY: &str = "hit-rate";
+
+impl Scratch {
+    fn sweep(&self, seeds: &str, out: &str) -> std::process::Output {
+        self.lab(&["sweep", STUDY, "--seeds", seeds, "--out", out])
+    }
+
+    #[track_caller]
+    fn swept(&self, seeds: &str, out: &str) -> String {
+        let output = self.sweep(seeds, out);
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{error}");
+        self.read(out)
+    }
+
+    #[track_caller]
+    fn merged(&self, parts: &[&str], out: &str) -> String {
+        let output = self.lab(&[&["merge", "--out", out], parts].concat());
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{error}");
+        self.read(out)
+    }
+}
+
+#[test]
+fn parts_in_any_order_merge_into_the_single_run() {
+    let scratch = Scratch::new();
+    let single = scratch.swept("0..7", "single");
+    scratch.swept("0..1", "a");
+    scratch.swept("1..4", "b");
+    scratch.swept("4..7", "c");
+    assert_eq!(scratch.merged(&["c", "a", "b"], "abc"), single);
+    // Also by way of a part that has a gap.
+    scratch.merged(&["c", "a"], "ac");
+    assert_eq!(scratch.merged(&["b", "ac"], "abc"), single);
+    assert_eq!(scratch.merged(&["single"], "same"), single);
+    // Other seeds are other photons.
+    assert_ne!(
+        scratch.swept("7..14", "other").replace("7", "0"),
+        single.replace("7", "0")
+    );
+}
+
+#[test]
+fn a_part_that_was_begun_is_gone_on_with() {
+    let scratch = Scratch::new();
+    let single = scratch.swept("0..6", "single");
+    scratch.swept("2..4", "part");
+    assert_eq!(scratch.swept("0..6", "part"), single);
+    // Complete: nothing is added.
+    assert_eq!(scratch.swept("0..6", "part"), single);
+    let output = scratch.sweep("1..6", "part");
+    Scratch::refused(&output, &["part", "seeds that are not asked for"]);
+    assert_eq!(scratch.read("part"), single);
+}
+
+#[test]
+fn a_part_that_was_killed_is_gone_on_with() {
+    let scratch = Scratch::new();
+    let part = scratch.path("part");
+    let mut killed = Command::new(env!("CARGO_BIN_EXE_dtof-lab"))
+        .args(["sweep", STUDY, "--seeds", "0..100000", "--save-every", "0"])
+        .arg("--out")
+        .arg(&part)
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    while !part.exists() {
+        thread::sleep(Duration::from_millis(10));
+    }
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+
+    let saved: serde_json::Value = serde_json::from_str(&scratch.read("part")).unwrap();
+    assert_eq!(saved["seeds"].as_array().unwrap().len(), 1);
+    let done = saved["seeds"][0][1].as_u64().unwrap();
+    let seeds = format!("0..{}", done + 3);
+    assert_eq!(
+        scratch.swept(&seeds, "part"),
+        scratch.swept(&seeds, "single")
+    );
+}
+
+#[test]
+fn what_does_not_add_up_is_refused() {
+    let scratch = Scratch::new();
+    let part = scratch.swept("0..4", "part");
+    scratch.swept("3..5", "shares");
+    let merge = |parts: &[&str]| scratch.lab(&[&["merge", "--out", "sum"], parts].concat());
+    Scratch::refused(
+        &merge(&["part", "shares"]),
+        &["shares", "seed 3 would count twice"],
+    );
+    Scratch::refused(&merge(&["part", "nothing"]), &["nothing", "No such file"]);
+    for (name, text, reason) in [
+        ("cut", &part[..part.len() / 2], "EOF"),
+        ("foreign", "{}", "missing field"),
+        (
+            "study",
+            &part.replace(STUDY, "other"),
+            "other (revision 2) does not add to hit-rate",
+        ),
+        (
+            "revision",
+            &part.replace("\"revision\":2", "\"revision\":3"),
+            "revision 3",
+        ),
+        (
+            "points",
+            &part.replace("\"snr\":7.0", "\"snr\":7.5"),
+            "not the same points",
+        ),
+        (
+            "empty",
+            &part.replace("[[0,4]]", "[[0,0]]"),
+            "no seeds: 0..0",
+        ),
+    ] {
+        scratch.file(name, text);
+        Scratch::refused(&merge(&["part", name]), &[name, reason]);
+    }
+    // Nor is one taken alone that is of no study, or not of its points.
+    for (name, reason) in [
+        ("study", "no study `other`"),
+        ("revision", "revision 3"),
+        ("points", "not the same points"),
+    ] {
+        Scratch::refused(&merge(&[name]), &[name, reason]);
+    }
+    assert!(!scratch.path("sum").exists());
+}
+
+#[test]
+fn bad_command_lines_are_refused() {
+    let scratch = Scratch::new();
+    for (arguments, reason) in [
+        (&["sweep", "no-such"][..], "no study `no-such`"),
+        (&["sweep", STUDY], "--seeds A..B and --out FILE"),
+        (&["sweep", STUDY, "--seeds", "3..3", "--out", "p"], "3..3"),
+        (&["sweep", STUDY, "--seeds", "5", "--out", "p"], "A..B"),
+        (&["sweep", STUDY, "--seeds", "-1..2", "--out", "p"], "-1"),
+        (&["sweep", STUDY, "--seeds", "0..1"], "--out"),
+        (
+            &["sweep", STUDY, "--seeds", "0..1", "--out", "no/such/p"],
+            "no/such",
+        ),
+        (&["merge", "--out", "p"], "PART"),
+    ] {
+        Scratch::refused(&scratch.lab(arguments), &[reason]);
+    }
+    let list = scratch.lab(&["sweep"]);
+    assert!(list.status.success());
+    assert!(String::from_utf8(list.stdout).unwrap().contains(STUDY));
+}

@@ -1,0 +1,453 @@
+//! One end of the link: messages arrive whole, once and in order, or not yet.
+//!
+//! Every frame carries, beside its message, the number of the message its
+//! sender expects next and the first number it has no room for. Messages are
+//! kept until they are acknowledged and sent again when that takes too long; a
+//! message that is not the one expected is dropped and comes again. A receiver
+//! that does not take its messages closes its window, which stops the sender:
+//! back-pressure, not loss.
+//!
+//! Sequence numbers are 8 bits and a window holds a few messages, so that a
+//! number never stands for two messages at once. The session, drawn anew by the
+//! host at each start, keeps frames of an earlier life apart.
+
+use heapless::{Deque, Vec};
+
+use crate::frame::{self, FrameError, PAYLOAD_BYTES, WIRE_BYTES};
+
+/// What a message holds at most.
+pub const BODY_BYTES: usize = PAYLOAD_BYTES - HEADER_BYTES;
+/// Messages under way, and messages that wait to be taken.
+pub const WINDOW: usize = 4;
+/// A message not acknowledged for so long is sent again. Each time the wait
+/// doubles, to [`RETRANSMIT_MOST_MS`]; it halves with every eight messages that
+/// arrive without.
+pub const RETRANSMIT_MS: u32 = 100;
+/// The longest wait.
+pub const RETRANSMIT_MOST_MS: u32 = 1600;
+/// An end with nothing to say says so this often.
+pub const KEEP_ALIVE_MS: u32 = 50;
+
+/// What an end says of itself when a session begins.
+pub const GREETING_BYTES: usize = 8;
+
+const HEADER_BYTES: usize = 6;
+/// Messages that arrive before the wait is halved.
+const PATIENCE: u8 = 8;
+const WINDOW_U8: u8 = 4;
+
+/// Kinds below this one are numbered; the others stand outside the sequence.
+const FIRST_UNNUMBERED: u8 = 0xf0;
+/// Carries no message.
+const KEEP_ALIVE: u8 = 0xf0;
+/// The host begins a session.
+const HELLO: u8 = 0xf1;
+/// The device has begun it.
+const WELCOME: u8 = 0xf2;
+/// The device knows no such session.
+const NO_SESSION: u8 = 0xf3;
+
+/// A numbered message: what it is and what it says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// Its kind, below 0xf0.
+    pub kind: u8,
+    /// What it says.
+    pub body: Vec<u8, BODY_BYTES>,
+}
+
+/// As many messages are under way as may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Full;
+
+impl core::fmt::Display for Full {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("as many messages are under way as may be")
+    }
+}
+
+impl core::error::Error for Full {}
+
+/// What went wrong on the way, since the end was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct LinkCounters {
+    /// Frames received whole.
+    pub frames: u32,
+    /// Not COBS, a wrong checksum, or too short.
+    pub corrupt: u32,
+    /// Longer than a frame can be.
+    pub oversized: u32,
+    /// Of another session, or of a kind that does not exist.
+    pub foreign: u32,
+    /// Messages dropped because one before them is missing, or there is no
+    /// room; they come again.
+    pub out_of_order: u32,
+    /// Messages that had arrived before.
+    pub duplicate: u32,
+    /// Messages sent again.
+    pub retransmitted: u32,
+}
+
+/// One end. The host draws sessions, the device follows.
+#[derive(Debug)]
+pub struct Endpoint {
+    host: bool,
+    session: u16,
+    open: bool,
+    /// A session began and nobody has asked yet.
+    began: bool,
+    /// The device has forgotten the session.
+    lost: bool,
+    greeting: [u8; GREETING_BYTES],
+    peer_greeting: [u8; GREETING_BYTES],
+    /// Not acknowledged yet; the front one has the number `first`.
+    outbox: Deque<Message, WINDOW>,
+    first: u8,
+    /// How many of the outbox have been sent, and how many had been before they
+    /// are sent again.
+    sent: u8,
+    sent_before: u8,
+    /// The first number the other end has no room for.
+    peer_limit: u8,
+    /// Arrived and not taken yet.
+    inbox: Deque<Message, WINDOW>,
+    /// The number that comes next.
+    expected: u8,
+    /// An unnumbered frame that is due, and the session it is about.
+    reply: Option<(u8, u16)>,
+    acknowledge: bool,
+    progress_ms: u32,
+    /// How long until what is under way is sent again.
+    wait_ms: u32,
+    /// Messages acknowledged since it was last changed.
+    quiet: u8,
+    /// The first message is being sent again, and goes alone.
+    alone: bool,
+    spoke_ms: u32,
+    heard_ms: u32,
+    counters: LinkCounters,
+}
+
+impl Endpoint {
+    /// The host's end, which opens `session` (a number not used just before).
+    #[must_use]
+    pub const fn host(session: u16, greeting: [u8; GREETING_BYTES], now_ms: u32) -> Self {
+        let mut end = Self::closed(greeting);
+        end.host = true;
+        end.session = session;
+        // The first greeting is due at once.
+        end.progress_ms = now_ms.wrapping_sub(RETRANSMIT_MS);
+        end.heard_ms = now_ms;
+        end
+    }
+
+    /// The device's end, which waits for a session.
+    #[must_use]
+    pub const fn device(greeting: [u8; GREETING_BYTES]) -> Self {
+        Self::closed(greeting)
+    }
+
+    const fn closed(greeting: [u8; GREETING_BYTES]) -> Self {
+        Self {
+            host: false,
+            session: 0,
+            open: false,
+            began: false,
+            lost: false,
+            greeting,
+            peer_greeting: [0; GREETING_BYTES],
+            outbox: Deque::new(),
+            first: 0,
+            sent: 0,
+            sent_before: 0,
+            peer_limit: WINDOW_U8,
+            inbox: Deque::new(),
+            expected: 0,
+            reply: None,
+            acknowledge: false,
+            progress_ms: 0,
+            wait_ms: RETRANSMIT_MS,
+            quiet: 0,
+            alone: false,
+            spoke_ms: 0,
+            heard_ms: 0,
+            counters: LinkCounters {
+                frames: 0,
+                corrupt: 0,
+                oversized: 0,
+                foreign: 0,
+                out_of_order: 0,
+                duplicate: 0,
+                retransmitted: 0,
+            },
+        }
+    }
+
+    /// Whether there is a session.
+    #[must_use]
+    pub const fn is_open(&self) -> bool {
+        self.open
+    }
+
+    /// Whether a session began since this was last asked. All that belonged to
+    /// the session before is gone.
+    pub const fn take_began(&mut self) -> bool {
+        core::mem::replace(&mut self.began, false)
+    }
+
+    /// Whether the device has said that it knows nothing of this session, as
+    /// after a restart. It does not come back.
+    #[must_use]
+    pub const fn is_lost(&self) -> bool {
+        self.lost
+    }
+
+    /// What the other end said of itself when the session began.
+    #[must_use]
+    pub const fn peer_greeting(&self) -> &[u8; GREETING_BYTES] {
+        &self.peer_greeting
+    }
+
+    /// Milliseconds since the other end was last heard.
+    #[must_use]
+    pub const fn silent_ms(&self, now_ms: u32) -> u32 {
+        now_ms.wrapping_sub(self.heard_ms)
+    }
+
+    /// What went wrong on the way so far.
+    #[must_use]
+    pub const fn counters(&self) -> &LinkCounters {
+        &self.counters
+    }
+
+    /// Whether [`Self::offer`] has room.
+    #[must_use]
+    pub fn has_room(&self) -> bool {
+        !self.outbox.is_full()
+    }
+
+    /// Whether the other end has everything that was offered.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        self.outbox.is_empty()
+    }
+
+    /// Sends a message, sooner or later. Of `body` only [`BODY_BYTES`] are
+    /// taken.
+    ///
+    /// # Errors
+    /// [`Full`] while the window is; nothing was taken.
+    pub fn offer(&mut self, kind: u8, body: &[u8]) -> Result<(), Full> {
+        let body = body.iter().copied().take(BODY_BYTES).collect();
+        self.outbox
+            .push_back(Message { kind, body })
+            .map_err(|_| Full)
+    }
+
+    /// The next message from the other end, left where it is.
+    #[must_use]
+    pub fn peek(&self) -> Option<&Message> {
+        self.inbox.front()
+    }
+
+    /// The next message from the other end.
+    pub fn take(&mut self) -> Option<Message> {
+        // A window that was closed is open again, which the other end must hear.
+        self.acknowledge |= self.inbox.is_full();
+        self.inbox.pop_front()
+    }
+
+    /// Takes what a [`Deframer`](super::frame::Deframer) found on the wire.
+    pub fn receive(&mut self, frame: Result<&[u8], FrameError>, now_ms: u32) {
+        match frame {
+            Ok(payload) => self.frame(payload, now_ms),
+            Err(FrameError::Corrupt) => self.counters.corrupt += 1,
+            Err(FrameError::Oversized) => self.counters.oversized += 1,
+        }
+    }
+
+    fn frame(&mut self, payload: &[u8], now_ms: u32) {
+        let Some((&[kind, session0, session1, number, expects, limit], body)) =
+            payload.split_first_chunk::<HEADER_BYTES>()
+        else {
+            self.counters.corrupt += 1;
+            return;
+        };
+        if body.len() > BODY_BYTES {
+            self.counters.oversized += 1;
+            return;
+        }
+        self.counters.frames += 1;
+        let session = u16::from_le_bytes([session0, session1]);
+        let ours = self.open && session == self.session;
+        match kind {
+            HELLO if !self.host => {
+                let Some(greeting) = body.first_chunk() else {
+                    self.counters.corrupt += 1;
+                    return;
+                };
+                // After a message of the session, only from another host that has
+                // drawn the same number.
+                if !ours || self.expected != 0 {
+                    self.begin(session, *greeting);
+                }
+                self.reply = Some((WELCOME, session));
+            }
+            WELCOME if self.host && session == self.session => {
+                if let (false, Some(greeting)) = (self.open, body.first_chunk()) {
+                    self.begin(session, *greeting);
+                }
+            }
+            NO_SESSION if self.host && ours => self.lost = true,
+            KEEP_ALIVE if ours => self.acknowledged(expects, limit, now_ms),
+            0..FIRST_UNNUMBERED if ours => {
+                self.acknowledged(expects, limit, now_ms);
+                self.numbered(kind, number, body);
+            }
+            _ => {
+                self.counters.foreign += 1;
+                // Only what is known to be wrong is answered, and never an answer.
+                if !self.host && kind <= KEEP_ALIVE {
+                    self.reply = Some((NO_SESSION, session));
+                }
+                return;
+            }
+        }
+        self.heard_ms = now_ms;
+    }
+
+    fn begin(&mut self, session: u16, peer_greeting: [u8; GREETING_BYTES]) {
+        *self = Self {
+            host: self.host,
+            session,
+            open: true,
+            began: true,
+            peer_greeting,
+            counters: self.counters,
+            ..Self::closed(self.greeting)
+        };
+    }
+
+    /// The other end has all messages before `expects`, and room up to `limit`.
+    fn acknowledged(&mut self, expects: u8, limit: u8, now_ms: u32) {
+        let arrived = expects.wrapping_sub(self.first);
+        if arrived > self.sent_before {
+            return; // older than what is known
+        }
+        for _ in 0..arrived {
+            self.outbox.pop_front();
+        }
+        if arrived > 0 {
+            self.progress_ms = now_ms;
+            self.alone = false;
+            self.quiet = self.quiet.saturating_add(arrived);
+            if self.quiet >= PATIENCE {
+                self.quiet = 0;
+                self.wait_ms = RETRANSMIT_MS.max(self.wait_ms / 2);
+            }
+        }
+        self.first = expects;
+        self.sent = self.sent.saturating_sub(arrived);
+        self.sent_before = self.sent_before.saturating_sub(arrived);
+        self.peer_limit = limit;
+    }
+
+    fn numbered(&mut self, kind: u8, number: u8, body: &[u8]) {
+        let ahead = number.wrapping_sub(self.expected);
+        self.acknowledge = true;
+        if ahead >= 128 {
+            self.counters.duplicate += 1;
+            return;
+        }
+        let body = Vec::from_slice(body).unwrap_or_default();
+        if ahead > 0 || self.inbox.push_back(Message { kind, body }).is_err() {
+            self.counters.out_of_order += 1;
+            return;
+        }
+        self.expected = self.expected.wrapping_add(1);
+    }
+
+    /// The next frame to put on the wire, or 0 bytes if none is due.
+    pub fn transmit(&mut self, now_ms: u32, wire: &mut [u8; WIRE_BYTES]) -> usize {
+        if let Some((kind, session)) = self.reply.take() {
+            return self.unnumbered(kind, session, now_ms, wire);
+        }
+        let waited_ms = now_ms.wrapping_sub(self.progress_ms);
+        if !self.open {
+            if self.host && waited_ms >= RETRANSMIT_MS {
+                self.progress_ms = now_ms;
+                return self.unnumbered(HELLO, self.session, now_ms, wire);
+            }
+            return 0;
+        }
+        if self.sent > 0 && waited_ms >= self.wait_ms {
+            self.sent = 0;
+            self.wait_ms = RETRANSMIT_MOST_MS.min(2 * self.wait_ms);
+            self.quiet = 0;
+            self.alone = true;
+        }
+        let number = self.first.wrapping_add(self.sent);
+        let room = self.peer_limit.wrapping_sub(number);
+        let next = self.outbox.iter().nth(self.sent.into());
+        // What is sent again goes alone until it arrives: a line that is slow
+        // rather than bad is not filled with repetitions.
+        let held = self.alone && self.sent > 0;
+        if let Some(message) = next.filter(|_| (1..128).contains(&room) && !held) {
+            let header = self.header(message.kind, self.session, number);
+            let length = frame::encode([&header, &message.body], wire);
+            if self.sent == 0 {
+                self.progress_ms = now_ms;
+            }
+            self.sent += 1;
+            if self.sent <= self.sent_before {
+                self.counters.retransmitted += 1;
+            } else {
+                self.sent_before = self.sent;
+            }
+            self.acknowledge = false;
+            self.spoke_ms = now_ms;
+            return length;
+        }
+        if self.acknowledge || now_ms.wrapping_sub(self.spoke_ms) >= KEEP_ALIVE_MS {
+            return self.unnumbered(KEEP_ALIVE, self.session, now_ms, wire);
+        }
+        0
+    }
+
+    fn unnumbered(
+        &mut self,
+        kind: u8,
+        session: u16,
+        now_ms: u32,
+        wire: &mut [u8; WIRE_BYTES],
+    ) -> usize {
+        if kind == KEEP_ALIVE {
+            self.spoke_ms = now_ms;
+            self.acknowledge = false;
+        }
+        let header = self.header(kind, session, 0);
+        let greeting: &[u8] = if matches!(kind, HELLO | WELCOME) {
+            &self.greeting
+        } else {
+            &[]
+        };
+        frame::encode([&header, greeting], wire)
+    }
+
+    fn header(&self, kind: u8, session: u16, number: u8) -> [u8; HEADER_BYTES] {
+        let [session0, session1] = session.to_le_bytes();
+        // At most WINDOW.
+        #[allow(clippy::cast_possible_truncation)]
+        let free = (WINDOW - self.inbox.len()) as u8;
+        [
+            kind,
+            session0,
+            session1,
+            number,
+            self.expected,
+            self.expected.wrapping_add(free),
+        ]
+    }
+}

@@ -1,0 +1,32 @@
+//! The link between a dToF sidecar and its host: messages arrive whole, once and
+//! in order, or not yet. Its format is `docs/link-format.md`.
+//!
+//! ```text
+//! endpoint       numbers, acknowledges and repeats messages; closes its window when full
+//!   ↕
+//! frame          COBS and CRC-32: a damaged frame is dropped and counted
+//!   ↕
+//! bytes          of a serial port or a TCP stream, whatever carries them
+//! ```
+//!
+//! [`message`] has the kinds of messages; [`Configuration`], [`Token`], [`Refusal`],
+//! [`Report`] and [`SensorRecord`] are their bodies. Neither a board nor a host is
+//! known here.
+
+#![no_std]
+#![forbid(unsafe_code)]
+
+mod configuration;
+pub mod endpoint;
+pub mod frame;
+pub mod message;
+mod refusal;
+mod report;
+mod sensor;
+mod token;
+
+pub use self::configuration::{Configuration, Source};
+pub use self::refusal::Refusal;
+pub use self::report::Report;
+pub use self::sensor::{FaultRecord, SensorRecord};
+pub use self::token::Token;

@@ -1,0 +1,124 @@
+//! What a device says of its sensor and of what is wrong with it.
+
+use core::fmt;
+
+use dtof_core::fixed::types::{I24F8, U16F16};
+
+/// A sensor, as the device describes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SensorRecord {
+    /// Its pixels have addresses below this.
+    pub pixels: u16,
+    /// How wide its bins are, in picoseconds; `None` if as wide as the
+    /// configuration says.
+    pub bin_width: Option<U16F16>,
+    /// The range of the start of bin 0 in millimetres, as far as it is known.
+    pub offset: I24F8,
+}
+
+impl SensorRecord {
+    /// Bytes of the record.
+    pub const BYTES: usize = 10;
+
+    /// Bins of any width, from the laser pulse on.
+    #[must_use]
+    pub const fn new(pixels: u16) -> Self {
+        Self {
+            pixels,
+            bin_width: None,
+            offset: I24F8::ZERO,
+        }
+    }
+
+    /// As it is sent. A device without a sensor sends one without pixels.
+    #[must_use]
+    pub fn to_le_bytes(sensor: Option<&Self>) -> [u8; Self::BYTES] {
+        let Some(sensor) = sensor else {
+            return [0; Self::BYTES];
+        };
+        let [a, b] = sensor.pixels.to_le_bytes();
+        let [c, d, e, f] = sensor.bin_width.unwrap_or_default().to_le_bytes();
+        let [g, h, i, j] = sensor.offset.to_le_bytes();
+        [a, b, c, d, e, f, g, h, i, j]
+    }
+
+    /// As it was received: the sensor, or that there is none. `None` if it is not as
+    /// long as the record.
+    #[must_use]
+    pub fn from_le_bytes(bytes: &[u8]) -> Option<Option<Self>> {
+        let [a, b, c, d, e, f, g, h, i, j]: [u8; Self::BYTES] = bytes.try_into().ok()?;
+        let pixels = u16::from_le_bytes([a, b]);
+        let bin_width = U16F16::from_le_bytes([c, d, e, f]);
+        Some((pixels > 0).then_some(Self {
+            pixels,
+            bin_width: (bin_width > 0).then_some(bin_width),
+            offset: I24F8::from_le_bytes([g, h, i, j]),
+        }))
+    }
+}
+
+/// The kind of a sensor's error. The drivers' own errors say more; each is of one
+/// of these kinds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum FaultRecord {
+    /// Nobody is on the bus: unplugged, without power, or another address.
+    NoAnswer = 1,
+    /// The bus failed otherwise.
+    Bus = 2,
+    /// A pin failed.
+    Pin = 3,
+    /// Another chip, or another program on it, than the driver is for.
+    WrongChip = 4,
+    /// The sensor does not take a command or a setting, or is never done with it.
+    NotTaken = 5,
+    /// No data in time: the laser or its START does not come, or the sensor is
+    /// gone.
+    Timeout = 6,
+    /// The interrupt pin stays active for no reason the sensor names.
+    StuckInterrupt = 7,
+    /// The sensor has to be loaded with its program, and there is none.
+    NoImage = 8,
+    /// Data that cannot be. They are given up.
+    Data = 9,
+}
+
+impl FaultRecord {
+    const ALL: [Self; 9] = [
+        Self::NoAnswer,
+        Self::Bus,
+        Self::Pin,
+        Self::WrongChip,
+        Self::NotTaken,
+        Self::Timeout,
+        Self::StuckInterrupt,
+        Self::NoImage,
+        Self::Data,
+    ];
+
+    /// From its number on the wire.
+    #[must_use]
+    pub fn from_number(number: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|&fault| fault as u8 == number)
+    }
+}
+
+impl fmt::Display for FaultRecord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NoAnswer => "no answer",
+            Self::Bus => "bus error",
+            Self::Pin => "pin error",
+            Self::WrongChip => "wrong chip or program",
+            Self::NotTaken => "command or setting not taken",
+            Self::Timeout => "no data in time",
+            Self::StuckInterrupt => "stuck interrupt",
+            Self::NoImage => "no image to load",
+            Self::Data => "damaged data",
+        })
+    }
+}
+
+impl core::error::Error for FaultRecord {}

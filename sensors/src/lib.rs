@@ -1,0 +1,132 @@
+//! Drivers of the sensors that photons come from.
+//!
+//! | module | sensor | what it gives |
+//! |---|---|---|
+//! | [`tdc7200`] | TI TDC7200 time-to-digital converter, SPI | one photon time for each of up to five stops |
+//! | [`tmf882x`] | ams OSRAM TMF8820/21/28, I²C | whole histograms of nine zones |
+//! | [`simulated`] | none | photons drawn on the device |
+//!
+//! A driver never waits. Each [`Sensor::poll`] does what can be done at once,
+//! at most one register block on the bus, and keeps in its state what it waits
+//! for; the time is an argument. So a sensor that is unplugged or hangs costs
+//! its own error every few milliseconds and nobody else's time. Every error
+//! leaves the driver usable: the next polls bring the sensor up again.
+//!
+//! A driver owns an `SpiDevice` or an `I2c` of embedded-hal 1.0, so that several
+//! sensors share a bus by way of embedded-hal-bus.
+
+#![no_std]
+#![forbid(unsafe_code)]
+#![deny(
+    clippy::expect_used,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used
+)]
+
+mod fault;
+pub mod i2c;
+pub mod simulated;
+pub mod tdc7200;
+mod timer;
+pub mod tmf882x;
+
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::{I24F8, U16F16};
+
+pub use self::fault::SensorFault;
+
+/// Where a sensor's photons go.
+pub trait PhotonSink {
+    /// One photon of `pixel` in the present laser cycle.
+    fn photon(&mut self, pixel: PixelAddress, code: u16);
+    /// The present laser cycle and `cycles - 1` empty ones after it have ended.
+    fn end_laser_cycles(&mut self, cycles: u16);
+    /// A whole histogram of `pixel`, complete in itself.
+    fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]);
+}
+
+/// A sensor that is asked when its interrupt pin (or a timer) says so; never
+/// blocks longer than its bus transfers.
+///
+/// Ask on every edge of the interrupt pin and once a millisecond besides:
+/// bringing a sensor up and noticing that it is gone take the timer. Ask again
+/// at once while the answer is not [`Polled::Idle`], but not without a bound: a
+/// fast sensor may always have more.
+pub trait Sensor {
+    /// What can go wrong; the error of the bus is inside. A host is told the kind.
+    type Error: Into<SensorFault>;
+
+    /// What a host has to know of it.
+    fn about(&self) -> About;
+
+    /// Whether it gives the first photon of a laser cycle only, so that at high rates
+    /// early photons hide late ones. Events then say so:
+    /// [`PixelConfig::with_one_hit_tdc`](dtof_core::PixelConfig::with_one_hit_tdc).
+    fn is_one_hit(&self) -> bool {
+        false
+    }
+
+    /// A configuration comes into force: whatever is under way is given up, and
+    /// what the next polls give begins anew. A sensor that measures times makes its
+    /// TDC codes `bin_width` picoseconds wide, which is above 0; for one with bins
+    /// of its own it is about theirs.
+    fn start(&mut self, bin_width: U16F16);
+
+    /// Nothing is asked before the next [`Self::start`]: as far as it can at once
+    /// and without an answer, the sensor rests.
+    fn stop(&mut self);
+
+    /// Takes the next step. `now_ms` counts milliseconds and may wrap.
+    ///
+    /// # Errors
+    /// What went wrong. The sensor is brought up again by the polls that
+    /// follow.
+    fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Self::Error>;
+}
+
+/// What a host has to know of a sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct About {
+    /// Its pixels have addresses below this.
+    pub pixels: u16,
+    /// How wide its bins are, in picoseconds; `None` if as wide as the
+    /// configuration says.
+    pub bin_width: Option<U16F16>,
+    /// The range of the start of bin 0 in millimetres, as far as it is known.
+    pub offset: I24F8,
+}
+
+impl About {
+    /// Bins of any width, from the laser pulse on.
+    #[must_use]
+    pub const fn new(pixels: u16) -> Self {
+        Self {
+            pixels,
+            bin_width: None,
+            offset: I24F8::ZERO,
+        }
+    }
+
+    /// Whether bins of the width of a configuration are this sensor's: within a
+    /// sixteenth, which leaves room for a calibration.
+    #[must_use]
+    pub fn has_bins_of(&self, bin_width: U16F16) -> bool {
+        self.bin_width
+            .is_none_or(|own| own.abs_diff(bin_width) <= own / 16)
+    }
+}
+
+/// What a poll came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Polled {
+    /// Nothing to do before the next interrupt or millisecond.
+    Idle,
+    /// A step was taken, but nothing is complete yet.
+    Working,
+    /// The sink was given something.
+    Data,
+}

@@ -1,0 +1,269 @@
+//! A sensor that is not there: photons are drawn on the device, to bring a board
+//! up with nothing attached and to load it with known rates.
+//!
+//! In every laser cycle each pixel sees a Poisson count of photons. Each of them
+//! is signal or background by their rates; a signal photon falls into the bins
+//! of the pulse, a background photon into any bin. That is the same as two
+//! independent Poisson counts. Integers throughout; see [`Poisson`] for how
+//! exact.
+//!
+//! The photons depend on the seed and the pixels alone: the n-th laser cycle is
+//! the same whenever and however often the driver is asked. The time only says
+//! how many laser cycles are due.
+//!
+//! ```
+//! use core::num::NonZeroU16;
+//! use dtof_core::PixelAddress;
+//! use dtof_core::fixed::types::{U0F32, U8F24};
+//! use dtof_sensors::simulated::{Pulse, Settings, Simulated, SimulatedPixel};
+//! use dtof_sensors::{PhotonSink, Polled, Sensor};
+//!
+//! struct Counter { photons: u32, cycles: u32 }
+//! impl PhotonSink for Counter {
+//!     fn photon(&mut self, _: PixelAddress, code: u16) {
+//!         assert!(code < 128);
+//!         self.photons += 1;
+//!     }
+//!     fn end_laser_cycles(&mut self, cycles: u16) {
+//!         self.cycles += u32::from(cycles);
+//!     }
+//!     fn histogram(&mut self, _: PixelAddress, _: &[u32; 128]) {}
+//! }
+//!
+//! // A quarter, a half and the rest in bins 60, 61 and 62.
+//! const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
+//! let pixels = [
+//!     SimulatedPixel::new(PixelAddress(0), 60, U8F24::lit("0.2"), U8F24::lit("0.3"))?,
+//! ];
+//! let settings = Settings {
+//!     seed: 1,
+//!     bins: 128,
+//!     cycles_per_second: 10_000,
+//!     cycles_per_poll: NonZeroU16::new(1000).unwrap(),
+//! };
+//! let mut sensor = Simulated::new(&pixels, PULSE, settings);
+//! let mut sink = Counter { photons: 0, cycles: 0 };
+//! assert_eq!(sensor.poll(0, &mut sink), Ok(Polled::Idle));
+//! assert_eq!(sensor.poll(100, &mut sink), Ok(Polled::Data));
+//! assert_eq!(sink.cycles, 1000);
+//! assert!((400..600).contains(&sink.photons));
+//! # Ok::<(), dtof_sensors::simulated::RateError>(())
+//! ```
+
+mod poisson;
+mod scene;
+
+use core::convert::Infallible;
+use core::fmt;
+use core::num::NonZeroU16;
+
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::{U0F32, U8F24, U16F16};
+use rand_core::Rng;
+use rand_pcg::Pcg32;
+
+use crate::{About, PhotonSink, Polled, Sensor};
+
+pub use self::poisson::Poisson;
+pub use self::scene::scene;
+
+/// The stream of random numbers; any will do.
+const STREAM: u64 = 0x6474_6f66;
+
+/// The shape of the laser pulse.
+#[derive(Clone, Copy, Debug)]
+pub struct Pulse<'a>(&'a [U0F32]);
+
+impl<'a> Pulse<'a> {
+    /// The share of the photons in each bin of the pulse but the last, which
+    /// takes what is left. Of shares that add up to more than 1 the last do not
+    /// count.
+    #[must_use]
+    pub const fn new(shares: &'a [U0F32]) -> Self {
+        Self(shares)
+    }
+
+    /// How many bins after the first.
+    fn draw(&self, random: &mut impl Rng) -> u16 {
+        let mut rest = random.next_u32();
+        let mut bin = 0;
+        for share in self.0 {
+            match rest.checked_sub(share.to_bits()) {
+                Some(left) => rest = left,
+                None => break,
+            }
+            bin += 1;
+        }
+        bin
+    }
+}
+
+/// What a pixel sees in a laser cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SimulatedPixel {
+    address: PixelAddress,
+    position: u16,
+    photons: Poisson,
+    /// The share of the signal, 32 fractional bits; 1 is 2³².
+    signal: u64,
+}
+
+/// More photons a laser cycle than [`Poisson::MAX_MEAN`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RateError;
+
+impl fmt::Display for RateError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let most = Poisson::MAX_MEAN;
+        write!(f, "more than {most} photons a laser cycle in a pixel")
+    }
+}
+
+impl core::error::Error for RateError {}
+
+impl SimulatedPixel {
+    /// The pulse starts in bin `position`; `signal` and `background` are mean
+    /// photons a laser cycle, the latter over all bins.
+    ///
+    /// # Errors
+    /// [`RateError`] if they add up to more than [`Poisson::MAX_MEAN`].
+    pub const fn new(
+        address: PixelAddress,
+        position: u16,
+        signal: U8F24,
+        background: U8F24,
+    ) -> Result<Self, RateError> {
+        let total = signal.saturating_add(background);
+        let Some(photons) = Poisson::new(total) else {
+            return Err(RateError);
+        };
+        let signal = ((signal.to_bits() as u64) << 32).checked_div(total.to_bits() as u64);
+        let signal = match signal {
+            Some(share) => share,
+            None => 0,
+        };
+        Ok(Self {
+            address,
+            position,
+            photons,
+            signal,
+        })
+    }
+}
+
+/// What all pixels share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Settings {
+    /// Where the random numbers start.
+    pub seed: u64,
+    /// Bins the background falls into.
+    pub bins: u16,
+    /// The rate of the laser.
+    pub cycles_per_second: u32,
+    /// The most laser cycles one poll makes up for. Those that are due beyond
+    /// them are skipped: a laser does not wait either.
+    pub cycles_per_poll: NonZeroU16,
+}
+
+/// A simulated sensor.
+#[derive(Clone, Debug)]
+pub struct Simulated<'a> {
+    pixels: &'a [SimulatedPixel],
+    pulse: Pulse<'a>,
+    settings: Settings,
+    random: Pcg32,
+    last_ms: Option<u32>,
+    /// Thousandths of a laser cycle that are due.
+    due: u64,
+    skipped: u64,
+}
+
+impl<'a> Simulated<'a> {
+    /// The first laser cycles are due a while after the first poll.
+    #[must_use]
+    pub fn new(pixels: &'a [SimulatedPixel], pulse: Pulse<'a>, settings: Settings) -> Self {
+        Self {
+            pixels,
+            pulse,
+            settings,
+            random: Pcg32::new(settings.seed, STREAM),
+            last_ms: None,
+            due: 0,
+            skipped: 0,
+        }
+    }
+
+    /// Laser cycles that were due but never simulated.
+    #[must_use]
+    pub const fn skipped(&self) -> u64 {
+        self.skipped
+    }
+
+    /// Takes the whole laser cycles that are due.
+    fn cycles(&mut self, now_ms: u32) -> u16 {
+        let last_ms = self.last_ms.replace(now_ms).unwrap_or(now_ms);
+        let elapsed = u64::from(now_ms.wrapping_sub(last_ms));
+        self.due += elapsed * u64::from(self.settings.cycles_per_second);
+        let due = self.due / 1000;
+        self.due %= 1000;
+        let most = self.settings.cycles_per_poll.get();
+        let cycles = u16::try_from(due).unwrap_or(most).min(most);
+        self.skipped = self.skipped.saturating_add(due - u64::from(cycles));
+        cycles
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "less than `bins`")]
+    fn code(&mut self, pixel: &SimulatedPixel) -> u16 {
+        if u64::from(self.random.next_u32()) < pixel.signal {
+            let bin = self.pulse.draw(&mut self.random);
+            return pixel.position.saturating_add(bin);
+        }
+        // From 0 to `bins - 1`: the upper part of a 32 × 16-bit product.
+        let product = u64::from(self.random.next_u32()) * u64::from(self.settings.bins);
+        (product >> 32) as u16
+    }
+}
+
+impl Sensor for Simulated<'_> {
+    type Error = Infallible;
+
+    fn about(&self) -> About {
+        let addresses = self.pixels.iter().map(|pixel| pixel.address.0);
+        About::new(addresses.max().map_or(0, |last| last.saturating_add(1)))
+    }
+
+    fn start(&mut self, _: U16F16) {
+        self.last_ms = None;
+        self.due = 0;
+    }
+
+    fn stop(&mut self) {}
+
+    fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Infallible> {
+        let cycles = self.cycles(now_ms);
+        let pixels = self.pixels;
+        // Laser cycles that are over but not yet said to be.
+        let mut over = 0;
+        for _ in 0..cycles {
+            for pixel in pixels {
+                for _ in 0..pixel.photons.draw(&mut self.random) {
+                    if over > 0 {
+                        sink.end_laser_cycles(over);
+                        over = 0;
+                    }
+                    let code = self.code(pixel);
+                    sink.photon(pixel.address, code);
+                }
+            }
+            over += 1;
+        }
+        if over > 0 {
+            sink.end_laser_cycles(over);
+            return Ok(Polled::Data);
+        }
+        Ok(Polled::Idle)
+    }
+}

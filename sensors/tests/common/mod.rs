@@ -1,0 +1,117 @@
+//! What the tests of the drivers share: a sink that notes what it is given, and
+//! a pin whose level the test sets.
+
+#![allow(dead_code, reason = "no test uses all of it")]
+
+pub mod plug;
+pub mod tmf882x;
+
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+
+use dtof_core::PixelAddress;
+use dtof_sensors::PhotonSink;
+use embedded_hal::digital::{Error, ErrorKind, ErrorType, InputPin, OutputPin};
+
+/// One call of the sink.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Given {
+    Photon(u16, u16),
+    End(u16),
+    Histogram(u16, Vec<u32>),
+}
+
+/// Notes every call.
+#[derive(Debug, Default)]
+pub struct Notes(pub Vec<Given>);
+
+impl Notes {
+    /// What was given since the last call.
+    pub fn take(&mut self) -> Vec<Given> {
+        std::mem::take(&mut self.0)
+    }
+}
+
+impl PhotonSink for Notes {
+    fn photon(&mut self, pixel: PixelAddress, code: u16) {
+        self.0.push(Given::Photon(pixel.0, code));
+    }
+    fn end_laser_cycles(&mut self, cycles: u16) {
+        self.0.push(Given::End(cycles));
+    }
+    fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]) {
+        self.0.push(Given::Histogram(pixel.0, counts.to_vec()));
+    }
+}
+
+/// A pin; clones are the same pin.
+#[derive(Clone, Debug)]
+pub struct Line {
+    level: Rc<Cell<bool>>,
+    broken: Rc<Cell<bool>>,
+    /// Every level set by the driver.
+    pub driven: Rc<RefCell<Vec<bool>>>,
+}
+
+/// What a broken pin says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Broken;
+
+impl Error for Broken {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::Other
+    }
+}
+
+impl Line {
+    pub fn new(high: bool) -> Self {
+        Self {
+            level: Rc::new(Cell::new(high)),
+            broken: Rc::default(),
+            driven: Rc::default(),
+        }
+    }
+    pub fn set(&self, high: bool) {
+        self.level.set(high);
+    }
+    pub fn set_broken(&self, broken: bool) {
+        self.broken.set(broken);
+    }
+    fn check(&self) -> Result<(), Broken> {
+        if self.broken.get() {
+            Err(Broken)
+        } else {
+            Ok(())
+        }
+    }
+    fn drive(&self, high: bool) -> Result<(), Broken> {
+        self.check()?;
+        self.driven.borrow_mut().push(high);
+        self.set(high);
+        Ok(())
+    }
+}
+
+impl ErrorType for Line {
+    type Error = Broken;
+}
+
+impl InputPin for Line {
+    fn is_high(&mut self) -> Result<bool, Broken> {
+        self.check()?;
+        Ok(self.level.get())
+    }
+    fn is_low(&mut self) -> Result<bool, Broken> {
+        self.check()?;
+        Ok(!self.level.get())
+    }
+}
+
+impl OutputPin for Line {
+    fn set_low(&mut self) -> Result<(), Broken> {
+        self.drive(false)
+    }
+    fn set_high(&mut self) -> Result<(), Broken> {
+        self.drive(true)
+    }
+}

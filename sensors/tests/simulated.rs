@@ -1,0 +1,240 @@
+//! The simulated sensor: exact probabilities, the rates and shapes it was given,
+//! and the same photons for the same seed however often it is asked.
+
+mod common;
+
+use std::num::NonZeroU16;
+
+use common::{Given, Notes};
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::{U0F32, U8F24};
+use dtof_sensors::simulated::{Poisson, Pulse, RateError, Settings, Simulated, SimulatedPixel};
+use dtof_sensors::{Polled, Sensor};
+use proptest::prelude::*;
+use rand_pcg::Pcg32;
+
+const SHARES: [U0F32; 2] = [U0F32::lit("0.25"), U0F32::lit("0.5")];
+const PULSE: Pulse = Pulse::new(&SHARES);
+
+fn settings(seed: u64) -> Settings {
+    Settings {
+        seed,
+        bins: 128,
+        cycles_per_second: 100_000,
+        cycles_per_poll: NonZeroU16::MAX,
+    }
+}
+
+fn pixel(address: u16, position: u16, signal: f64, background: f64) -> SimulatedPixel {
+    let rate = U8F24::from_num::<f64>;
+    SimulatedPixel::new(
+        PixelAddress(address),
+        position,
+        rate(signal),
+        rate(background),
+    )
+    .unwrap()
+}
+
+/// Polls until `cycles` laser cycles have ended; what was given.
+fn run(sensor: &mut Simulated, cycles: u32) -> Vec<Given> {
+    let mut sink = Notes::default();
+    assert_eq!(sensor.poll(0, &mut sink), Ok(Polled::Idle));
+    for now_ms in 1..=cycles / 100 {
+        assert_eq!(sensor.poll(now_ms, &mut sink), Ok(Polled::Data));
+    }
+    let given = sink.take();
+    assert_eq!(ended(&given), cycles);
+    given
+}
+
+fn ended(given: &[Given]) -> u32 {
+    given
+        .iter()
+        .map(|given| match given {
+            Given::End(cycles) => u32::from(*cycles),
+            _ => 0,
+        })
+        .sum()
+}
+
+/// Pixel and code of each photon, with its laser cycle.
+fn photons(given: &[Given]) -> Vec<(u32, u16, u16)> {
+    let mut cycle = 0;
+    let mut photons = Vec::new();
+    for given in given {
+        match given {
+            Given::Photon(pixel, code) => photons.push((cycle, *pixel, *code)),
+            Given::End(cycles) => cycle += u32::from(*cycles),
+            Given::Histogram(..) => panic!("a histogram"),
+        }
+    }
+    photons
+}
+
+proptest! {
+    /// The bound that the module states, 2⁻²⁶, against the formula in floating
+    /// point.
+    #[test]
+    fn cumulative_probabilities_are_exact(mean in 0u32..=4 << 24) {
+        let mean = U8F24::from_bits(mean);
+        let lambda: f64 = mean.to_num();
+        let (mut probability, mut sum, mut count) = ((-lambda).exp(), 0.0, 0);
+        for cumulative in Poisson::new(mean).unwrap().cumulative() {
+            sum += probability;
+            count += 1;
+            probability *= lambda / f64::from(count);
+            let error = cumulative as f64 / 2f64.powi(32) - sum;
+            prop_assert!(error.abs() < 2f64.powi(-26), "{error:e} at {count}");
+        }
+        // What is never drawn has that much of a probability at most, too.
+        prop_assert!(1.0 - sum < 2f64.powi(-26));
+        prop_assert!(count <= 24);
+    }
+}
+
+#[test]
+fn counts_have_the_mean_and_the_variance_of_their_rate() {
+    const DRAWS: u32 = 1_000_000;
+    for rate in ["0", "0.001", "0.1", "1", "2.5", "4"] {
+        let poisson = Poisson::new(U8F24::from_str(rate).unwrap()).unwrap();
+        let mut random = Pcg32::new(1, 2);
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for _ in 0..DRAWS {
+            let count = f64::from(poisson.draw(&mut random));
+            sum += count;
+            squares += count * count;
+        }
+        let draws = f64::from(DRAWS);
+        let lambda: f64 = poisson.mean().to_num();
+        let mean = sum / draws;
+        let variance = squares / draws - mean * mean;
+        // Five standard deviations of a mean and of a variance of Poisson counts.
+        let mean_limit = 5.0 * (lambda / draws).sqrt();
+        let variance_limit = 5.0 * ((lambda + 2.0 * lambda * lambda) / draws).sqrt();
+        assert!((mean - lambda).abs() <= mean_limit, "{rate}: mean {mean}");
+        assert!(
+            (variance - lambda).abs() <= variance_limit,
+            "{rate}: variance {variance}"
+        );
+    }
+}
+
+#[test]
+fn photons_come_at_their_rates_in_their_bins() {
+    const CYCLES: u32 = 100_000;
+    let pixels = [pixel(3, 60, 0.5, 0.0), pixel(4, 9, 0.2, 1.28)];
+    let mut sensor = Simulated::new(&pixels, PULSE, settings(5));
+    let photons = photons(&run(&mut sensor, CYCLES));
+    let count = |pixel: u16, code: u16| {
+        let of_bin = |photon: &&(u32, u16, u16)| (photon.1, photon.2) == (pixel, code);
+        photons.iter().filter(of_bin).count() as f64
+    };
+    // Each bin is a Poisson count of its own: five standard deviations.
+    let check = |pixel: u16, code: u16, rate: f64| {
+        let expected = rate * f64::from(CYCLES);
+        let difference = (count(pixel, code) - expected).abs();
+        assert!(difference <= 5.0 * expected.sqrt(), "{pixel}, {code}");
+    };
+    for code in 0..128u16 {
+        let signal = |position: u16, rate: f64| match code.checked_sub(position) {
+            Some(0 | 2) => 0.25 * rate,
+            Some(1) => 0.5 * rate,
+            _ => 0.0,
+        };
+        check(3, code, signal(60, 0.5));
+        check(4, code, 0.01 + signal(9, 0.2));
+    }
+    assert!(photons.iter().all(|photon| photon.2 < 128));
+    assert!(photons.is_sorted_by_key(|photon| photon.0));
+}
+
+#[test]
+fn a_pulse_past_the_last_bin_is_passed_on() {
+    let pixels = [pixel(0, 127, 1.0, 0.0), pixel(1, u16::MAX, 1.0, 0.0)];
+    let mut sensor = Simulated::new(&pixels, PULSE, settings(5));
+    let photons = photons(&run(&mut sensor, 1000));
+    let codes = |pixel| {
+        let mut codes: Vec<u16> = photons
+            .iter()
+            .filter(|photon| photon.1 == pixel)
+            .map(|photon| photon.2)
+            .collect();
+        codes.sort_unstable();
+        codes.dedup();
+        codes
+    };
+    assert_eq!((codes(0), codes(1)), (vec![127, 128, 129], vec![u16::MAX]));
+}
+
+#[test]
+fn the_same_seed_gives_the_same_photons_however_often_it_is_asked() {
+    let pixels = [pixel(0, 20, 0.3, 0.4), pixel(1, 90, 0.01, 0.02)];
+    let stream = |seed, step: usize| {
+        let mut sensor = Simulated::new(&pixels, PULSE, settings(seed));
+        let mut sink = Notes::default();
+        for now_ms in (0..=600).step_by(step) {
+            sensor.poll(now_ms, &mut sink).unwrap();
+        }
+        let given = sink.take();
+        assert_eq!(ended(&given), 60_000);
+        photons(&given)
+    };
+    let once = stream(1, 600);
+    assert_eq!(once, stream(1, 1));
+    assert_eq!(once, stream(1, 24));
+    assert_ne!(once, stream(2, 600));
+    // Golden: what a host that runs the same code sees too.
+    assert_eq!(once[..4], GOLDEN);
+}
+
+const GOLDEN: [(u32, u16, u16); 4] = [(0, 0, 9), (1, 0, 21), (1, 0, 22), (2, 0, 115)];
+
+#[test]
+fn the_time_says_how_many_laser_cycles_are_due() {
+    let dark = [pixel(0, 0, 0.0, 0.0)];
+    let mut sensor = Simulated::new(
+        &dark,
+        PULSE,
+        Settings {
+            cycles_per_second: 1500,
+            cycles_per_poll: NonZeroU16::new(10).unwrap(),
+            ..settings(0)
+        },
+    );
+    let mut sink = Notes::default();
+    let start = u32::MAX - 2;
+    let mut poll = |after: u32| {
+        let polled = sensor.poll(start.wrapping_add(after), &mut sink).unwrap();
+        let given = sink.take();
+        let expected = if given.is_empty() {
+            Polled::Idle
+        } else {
+            Polled::Data
+        };
+        assert_eq!(polled, expected);
+        // Empty laser cycles come in one call.
+        assert!(given.len() <= 1);
+        (ended(&given), sensor.skipped())
+    };
+    assert_eq!(poll(0), (0, 0));
+    // 1.5 laser cycles a millisecond; halves are not lost.
+    assert_eq!(poll(1), (1, 0));
+    assert_eq!(poll(2), (2, 0));
+    assert_eq!(poll(2), (0, 0));
+    assert_eq!(poll(8), (9, 0));
+    // 15 are due, 10 are made up for.
+    assert_eq!(poll(18), (10, 5));
+    assert_eq!(poll(19), (1, 5));
+}
+
+#[test]
+fn too_many_photons_are_refused() {
+    let two = U8F24::lit("2");
+    let more = two + U8F24::DELTA;
+    let new = |signal, background| SimulatedPixel::new(PixelAddress(0), 0, signal, background);
+    assert!(new(two, two).is_ok());
+    assert_eq!(new(two, more), Err(RateError));
+    assert_eq!(new(U8F24::MAX, U8F24::MAX), Err(RateError));
+    assert_eq!(Poisson::new(more + two), None);
+}

@@ -1,0 +1,622 @@
+//! The driver of the TDC7200 on a mocked SPI bus: every register access in
+//! order, every error, and that the driver works after each.
+
+mod common;
+
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+
+use common::{Broken, Given, Line, Notes};
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_sensors::tdc7200::{
+    CalibrationPeriods, Config, ConfigError, Counts, Edge, Error, Mode, Settings, Stops, Tdc7200,
+};
+use dtof_sensors::{Polled, Sensor};
+use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
+use embedded_hal_mock::eh1::spi::{Mock, Transaction};
+
+type Access = Transaction<u8>;
+
+/// An SPI device that can be unplugged.
+#[derive(Clone)]
+struct Plug {
+    mock: Mock<u8>,
+    out: Rc<Cell<bool>>,
+}
+
+impl ErrorType for Plug {
+    type Error = ErrorKind;
+}
+
+impl SpiDevice for Plug {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), ErrorKind> {
+        if self.out.get() {
+            return Err(ErrorKind::Other);
+        }
+        self.mock.transaction(operations)
+    }
+}
+
+fn write(register: u8, value: u8) -> Vec<Access> {
+    vec![
+        Access::transaction_start(),
+        Access::write_vec(vec![0x40 | register, value]),
+        Access::transaction_end(),
+    ]
+}
+
+fn read(command: u8, bytes: &[u8]) -> Vec<Access> {
+    vec![
+        Access::transaction_start(),
+        Access::write(command),
+        Access::read_vec(bytes.to_vec()),
+        Access::transaction_end(),
+    ]
+}
+
+/// 24-bit registers, most significant byte first, with auto-increment.
+fn read_results(first: u8, values: &[u32]) -> Vec<Access> {
+    let bytes: Vec<u8> = values
+        .iter()
+        .flat_map(|value| value.to_be_bytes()[1..].to_vec())
+        .collect();
+    read(0x80 | first, &bytes)
+}
+
+/// The registers 0x01 and 0x03 to 0x09 as they should be configured, then
+/// CONFIG1 with `START_MEAS`.
+fn configure(registers: [(u8, u8); 8], config1: u8) -> Vec<Access> {
+    let reset = [read(0x01, &[0x40]), read(0x03, &[0x07])].concat();
+    let writes = registers.map(|(register, value)| write(register, value));
+    let reads = registers.map(|(register, value)| read(register, &[value]));
+    [reset, writes.concat(), reads.concat(), write(0x00, config1)].concat()
+}
+
+const MODE_1: [(u8, u8); 8] = [
+    (0x01, 0x40),
+    (0x03, 0x07),
+    (0x04, 0xff),
+    (0x05, 0xff),
+    (0x06, 0xff),
+    (0x07, 0xff),
+    (0x08, 0),
+    (0x09, 0),
+];
+const ARM_1: u8 = 0b1000_0001;
+
+fn mode_1() -> Settings {
+    Settings {
+        first_bin_ps: 240_000,
+        ..Settings::new(PixelAddress(7), 8_000, U16F16::lit("250"))
+    }
+}
+
+struct Bench<const CHUNK: usize> {
+    sensor: Tdc7200<Plug, Line, Line, CHUNK>,
+    spi: Plug,
+    interrupt: Line,
+    enable: Line,
+    sink: Notes,
+    now_ms: u32,
+}
+
+impl<const CHUNK: usize> Bench<CHUNK> {
+    fn new(settings: Settings) -> Self {
+        let spi = Plug {
+            mock: Mock::new(&[]),
+            out: Rc::default(),
+        };
+        let interrupt = Line::new(true);
+        let enable = Line::new(false);
+        let config = Config::new(settings).unwrap();
+        Self {
+            sensor: Tdc7200::new(spi.clone(), interrupt.clone(), enable.clone(), config),
+            spi,
+            interrupt,
+            enable,
+            sink: Notes::default(),
+            // So that the milliseconds wrap in the middle of it.
+            now_ms: u32::MAX - 3,
+        }
+    }
+
+    /// Polls with exactly these accesses.
+    fn poll(&mut self, accesses: &[Access]) -> Result<Polled, Error<ErrorKind, Broken>> {
+        self.spi.mock.update_expectations(accesses);
+        let polled = self.sensor.poll(self.now_ms, &mut self.sink);
+        self.spi.mock.done();
+        polled
+    }
+
+    /// From off to armed.
+    fn bring_up(&mut self, registers: [(u8, u8); 8], config1: u8) {
+        self.enable.driven.take();
+        assert_eq!(self.poll(&[]), Ok(Polled::Working));
+        assert_eq!(*self.enable.driven.borrow(), [false]);
+        self.now_ms = self.now_ms.wrapping_add(1);
+        assert_eq!(self.poll(&[]), Ok(Polled::Idle));
+        self.now_ms = self.now_ms.wrapping_add(1);
+        assert_eq!(self.poll(&[]), Ok(Polled::Working));
+        assert_eq!(*self.enable.driven.borrow(), [false, true]);
+        self.now_ms = self.now_ms.wrapping_add(2);
+        assert_eq!(self.poll(&[]), Ok(Polled::Idle));
+        self.now_ms = self.now_ms.wrapping_add(1);
+        assert_eq!(
+            self.poll(&configure(registers, config1)),
+            Ok(Polled::Working)
+        );
+        assert!(self.sensor.is_armed());
+        assert_eq!(self.poll(&[]), Ok(Polled::Idle));
+    }
+
+    /// One measurement of mode 1 with one stop, as the data sheet's example.
+    fn measure(&mut self) {
+        self.interrupt.set(false);
+        let accesses = [
+            read(0x02, &[0x19]),
+            read_results(0x10, &[4175]),
+            read_results(0x1b, &[2110, 21121]),
+            write(0x00, ARM_1),
+        ];
+        assert_eq!(self.poll(&accesses.concat()), Ok(Polled::Data));
+        // 247.061 ns are 7.061 ns into the histogram: bin 28.
+        assert_eq!(self.sink.take(), [Given::Photon(7, 28), Given::End(1)]);
+        self.interrupt.set(true);
+        assert_eq!(self.poll(&[]), Ok(Polled::Idle));
+    }
+
+    /// After an error nothing was given away, and all works again.
+    fn recover(&mut self) {
+        assert!(!self.sensor.is_armed());
+        assert_eq!(self.sink.take(), []);
+        self.interrupt.set(true);
+        self.bring_up(MODE_1, ARM_1);
+        self.measure();
+    }
+}
+
+fn armed() -> Bench<13> {
+    let mut bench = Bench::new(mode_1());
+    bench.bring_up(MODE_1, ARM_1);
+    bench
+}
+
+#[test]
+fn measures_in_mode_1() {
+    let mut bench = armed();
+    bench.measure();
+    bench.measure();
+    let counts = Counts {
+        cycles: 2,
+        photons: 2,
+        ..Counts::default()
+    };
+    assert_eq!(bench.sensor.counts(), counts);
+}
+
+/// 7.061 ns into the histogram are bin 28 of 250 ps and bin 14 of 500 ps.
+#[test]
+fn each_start_brings_it_up_with_bins_of_its_width() {
+    let mut bench = armed();
+    for (bin_width, code) in [(500, 14), (250, 28)] {
+        bench.sensor.start(U16F16::from_num(bin_width));
+        assert!(!bench.sensor.is_armed());
+        bench.bring_up(MODE_1, ARM_1);
+        bench.interrupt.set(false);
+        let accesses = [
+            read(0x02, &[0x19]),
+            read_results(0x10, &[4175]),
+            read_results(0x1b, &[2110, 21121]),
+            write(0x00, ARM_1),
+        ];
+        assert_eq!(bench.poll(&accesses.concat()), Ok(Polled::Data));
+        assert_eq!(bench.sink.take(), [Given::Photon(7, code), Given::End(1)]);
+        bench.interrupt.set(true);
+    }
+}
+
+#[test]
+fn stopped_it_is_off_until_it_is_started() {
+    let mut bench = armed();
+    bench.enable.driven.take();
+    bench.sensor.stop();
+    assert_eq!(*bench.enable.driven.borrow(), [false]);
+    bench.sensor.start(U16F16::lit("250"));
+    bench.recover();
+}
+
+/// 240 ns are 35.975 m.
+#[test]
+fn it_says_where_its_bins_start() {
+    let bench = armed();
+    assert!(bench.sensor.is_one_hit());
+    let about = bench.sensor.about();
+    assert_eq!((about.pixels, about.bin_width), (8, None));
+    assert_eq!(about.offset, I24F8::from_num(240_000.0 * 0.149_896_229));
+}
+
+#[test]
+fn times_that_mode_1_does_not_measure_are_rejected() {
+    let config = |mode| {
+        let settings = Settings::new(PixelAddress(0), 8_000, U16F16::lit("8000"));
+        Config::new(Settings { mode, ..settings }).unwrap()
+    };
+    let codes = |mode| [11_999, 12_000, 500_000, 500_001].map(|ps| config(mode).code(ps));
+    assert_eq!(codes(Mode::One), [u16::MAX, 1, 62, u16::MAX]);
+    assert_eq!(codes(Mode::Two), [1, 1, 62, 62]);
+}
+
+#[test]
+fn every_setting_reaches_its_register() {
+    let mut bench = Bench::<13>::new(Settings {
+        mode: Mode::Two,
+        stops: Stops::Five,
+        calibration: CalibrationPeriods::Forty,
+        start_edge: Edge::Falling,
+        stop_edge: Edge::Falling,
+        overflow: 0x1234,
+        stop_mask: 0x0123,
+        parity: true,
+        ..mode_1()
+    });
+    let registers = [
+        (0x01, 0b1100_0100),
+        (0x03, 0x07),
+        (0x04, 0xff),
+        (0x05, 0xff),
+        (0x06, 0x12),
+        (0x07, 0x34),
+        (0x08, 0x01),
+        (0x09, 0x23),
+    ];
+    bench.bring_up(registers, 0b1101_1011);
+}
+
+#[test]
+fn the_overflow_of_mode_1_is_the_coarse_counters() {
+    let mut bench = Bench::<13>::new(Settings {
+        overflow: 0x0100,
+        ..mode_1()
+    });
+    let mut registers = MODE_1;
+    registers[2] = (0x04, 0x01);
+    registers[3] = (0x05, 0x00);
+    bench.bring_up(registers, ARM_1);
+}
+
+/// Mode 2, five stops of which three come before the clock counter overflows,
+/// read one, four or all registers at a time.
+#[test]
+fn reads_in_chunks_and_gives_the_stops_that_came() {
+    fn run<const CHUNK: usize>() {
+        let mut bench = Bench::<CHUNK>::new(Settings {
+            mode: Mode::Two,
+            stops: Stops::Five,
+            first_bin_ps: 0,
+            ..mode_1()
+        });
+        let mut registers = MODE_1;
+        registers[0] = (0x01, 0x44);
+        assert!(!bench.sensor.is_one_hit());
+        bench.bring_up(registers, ARM_1 | 0b10);
+        bench.interrupt.set(false);
+
+        // 59.18 ps a count: 1000 counts are 59.176 ns. The second stop meets an
+        // edge of the reference clock.
+        let results = [2000u32, 8, 1000, 9, 0, 200, 3000, 0, 0, 0, 0];
+        let mut accesses = read(0x02, &[0x0c]);
+        for (first, values) in (0x10..).step_by(CHUNK).zip(results.chunks(CHUNK)) {
+            accesses.extend(read_results(first, values));
+        }
+        for (first, values) in (0x1b..).step_by(CHUNK).zip([2110, 21121].chunks(CHUNK)) {
+            accesses.extend(read_results(first, values));
+        }
+        accesses.extend(write(0x00, ARM_1 | 0b10));
+        assert_eq!(bench.poll(&accesses), Ok(Polled::Data));
+        // 1000, 2000 and -1000 counts, and 8, 9 and 200 periods of 125 ns.
+        let bins = [1_059_176 / 250, 1_243_353 / 250, 24_940_824 / 250];
+        let photons = bins.map(|bin| Given::Photon(7, u16::try_from(bin).unwrap_or(u16::MAX)));
+        let [a, b, c] = photons;
+        assert_eq!(bench.sink.take(), [a, b, c, Given::End(1)]);
+        let counts = bench.sensor.counts();
+        assert_eq!((counts.photons, counts.overflowed), (3, 1));
+    }
+    run::<1>();
+    run::<4>();
+    run::<13>();
+}
+
+#[test]
+fn a_bin_past_the_histogram_is_passed_on_and_one_before_it_is_rejected() {
+    let mut bench = Bench::<13>::new(Settings {
+        stops: Stops::Three,
+        ..mode_1()
+    });
+    let mut registers = MODE_1;
+    registers[0] = (0x01, 0x42);
+    bench.bring_up(registers, ARM_1);
+    bench.interrupt.set(false);
+    let accesses = [
+        read(0x02, &[0x19]),
+        // 236.7 ns, 473.4 ns and 0.496 ms.
+        read_results(0x10, &[4000, 0, 8_000, 0, 0x7f_ffff]),
+        read_results(0x1b, &[2110, 21121]),
+        write(0x00, ARM_1),
+    ];
+    assert_eq!(bench.poll(&accesses.concat()), Ok(Polled::Data));
+    let expected = [
+        Given::Photon(7, u16::MAX),
+        Given::Photon(7, 933),
+        Given::Photon(7, u16::MAX),
+        Given::End(1),
+    ];
+    assert_eq!(bench.sink.take(), expected);
+}
+
+#[test]
+fn a_laser_cycle_without_a_stop_is_empty_and_needs_no_calibration() {
+    let mut bench = armed();
+    bench.interrupt.set(false);
+    let accesses = [
+        read(0x02, &[0x0a]),
+        read_results(0x10, &[0]),
+        read_results(0x1b, &[0, 0]),
+        write(0x00, ARM_1),
+    ];
+    assert_eq!(bench.poll(&accesses.concat()), Ok(Polled::Data));
+    assert_eq!(bench.sink.take(), [Given::End(1)]);
+    let counts = Counts {
+        cycles: 1,
+        empty: 1,
+        overflowed: 1,
+        ..Counts::default()
+    };
+    assert_eq!(bench.sensor.counts(), counts);
+    bench.interrupt.set(true);
+    bench.measure();
+}
+
+#[test]
+fn parity_is_not_part_of_the_value_and_is_checked() {
+    let mut bench = Bench::<13>::new(Settings {
+        parity: true,
+        ..mode_1()
+    });
+    let arm = ARM_1 | 0b100_0000;
+    bench.bring_up(MODE_1, arm);
+    bench.interrupt.set(false);
+    let even = |value: u32| value | (value.count_ones() & 1) << 23;
+    let accesses = [
+        read(0x02, &[0x19]),
+        read_results(0x10, &[even(4175)]),
+        read_results(0x1b, &[even(2110), even(21121)]),
+        write(0x00, arm),
+    ];
+    assert_eq!(bench.poll(&accesses.concat()), Ok(Polled::Data));
+    assert_eq!(bench.sink.take(), [Given::Photon(7, 28), Given::End(1)]);
+
+    let accesses = [
+        read(0x02, &[0x19]),
+        read_results(0x10, &[even(4175)]),
+        read_results(0x1b, &[even(2110), even(21121) ^ 0x80_0000]),
+    ];
+    let polled = bench.poll(&accesses.concat());
+    assert_eq!(polled, Err(Error::Parity { register: 0x1c }));
+    assert_eq!(bench.sink.take(), []);
+    bench.interrupt.set(true);
+    bench.bring_up(MODE_1, arm);
+}
+
+#[test]
+fn a_wrong_chip_is_an_error_each_time_and_a_right_one_works_afterwards() {
+    let mut bench = Bench::<13>::new(mode_1());
+    for _ in 0..2 {
+        for _ in 0..2 {
+            bench.now_ms = bench.now_ms.wrapping_add(3);
+            assert_eq!(bench.poll(&[]), Ok(Polled::Working));
+        }
+        bench.now_ms = bench.now_ms.wrapping_add(3);
+        let accesses = [read(0x01, &[0xff]), read(0x03, &[0xff])].concat();
+        let wrong = Error::WrongChip {
+            config2: 0xff,
+            int_mask: 0xff,
+        };
+        assert_eq!(bench.poll(&accesses), Err(wrong));
+    }
+    assert_eq!(bench.sensor.counts().errors, 2);
+    bench.recover();
+}
+
+#[test]
+fn a_register_that_does_not_take_its_value_is_an_error() {
+    let mut bench = Bench::<13>::new(mode_1());
+    for _ in 0..2 {
+        bench.now_ms = bench.now_ms.wrapping_add(3);
+        bench.poll(&[]).unwrap();
+    }
+    bench.now_ms = bench.now_ms.wrapping_add(3);
+    let accesses = [
+        read(0x01, &[0x40]),
+        read(0x03, &[0x07]),
+        MODE_1
+            .map(|(register, value)| write(register, value))
+            .concat(),
+        read(0x01, &[0x40]),
+        read(0x03, &[0x07]),
+        read(0x04, &[0xfe]),
+    ];
+    let error = Error::NotTaken {
+        register: 0x04,
+        wrote: 0xff,
+        read: 0xfe,
+    };
+    assert_eq!(bench.poll(&accesses.concat()), Err(error));
+    bench.recover();
+}
+
+#[test]
+fn a_start_that_does_not_come_times_out() {
+    let mut bench = armed();
+    bench.now_ms = bench.now_ms.wrapping_add(100);
+    assert_eq!(bench.poll(&[]), Ok(Polled::Idle));
+    bench.now_ms = bench.now_ms.wrapping_add(1);
+    assert_eq!(bench.poll(&[]), Err(Error::Timeout));
+    bench.recover();
+}
+
+#[test]
+fn a_stuck_interrupt_is_an_error_at_the_limit() {
+    let mut bench = armed();
+    // Twice is not enough, and only polls in a row count.
+    for _ in 0..2 {
+        bench.interrupt.set(false);
+        for _ in 0..2 {
+            assert_eq!(bench.poll(&read(0x02, &[0x08])), Ok(Polled::Idle));
+        }
+        bench.interrupt.set(true);
+        assert_eq!(bench.poll(&[]), Ok(Polled::Idle));
+    }
+    bench.interrupt.set(false);
+    for _ in 0..2 {
+        assert_eq!(bench.poll(&read(0x02, &[0x00])), Ok(Polled::Idle));
+    }
+    let stuck = Error::StuckInterrupt { status: 0x08 };
+    assert_eq!(bench.poll(&read(0x02, &[0x08])), Err(stuck));
+    bench.recover();
+}
+
+#[test]
+fn a_bus_that_reads_as_ones_is_no_answer() {
+    let mut bench = armed();
+    bench.interrupt.set(false);
+    assert_eq!(bench.poll(&read(0x02, &[0xff])), Err(Error::NoAnswer));
+    bench.recover();
+}
+
+#[test]
+fn stops_without_a_calibration_are_an_error() {
+    let mut bench = armed();
+    bench.interrupt.set(false);
+    let accesses = [
+        read(0x02, &[0x19]),
+        read_results(0x10, &[4175]),
+        read_results(0x1b, &[2110, 2110]),
+    ];
+    let error = Error::Calibration {
+        calibration1: 2110,
+        calibration2: 2110,
+    };
+    assert_eq!(bench.poll(&accesses.concat()), Err(error));
+    bench.recover();
+}
+
+#[test]
+fn an_error_of_the_bus_is_inside() {
+    let mut bench = armed();
+    bench.interrupt.set(false);
+    bench.spi.out.set(true);
+    assert_eq!(bench.poll(&[]), Err(Error::Bus(ErrorKind::Other)));
+    bench.spi.out.set(false);
+    bench.recover();
+}
+
+#[test]
+fn an_error_of_a_pin_is_inside() {
+    let mut bench = armed();
+    bench.interrupt.set_broken(true);
+    assert_eq!(bench.poll(&[]), Err(Error::Pin(Broken)));
+    bench.interrupt.set_broken(false);
+    bench.enable.set_broken(true);
+    assert_eq!(bench.poll(&[]), Err(Error::Pin(Broken)));
+    bench.enable.set_broken(false);
+    bench.recover();
+}
+
+#[test]
+fn settings_that_cannot_be_are_refused() {
+    let refused = |settings| Config::new(settings).unwrap_err();
+    let with = mode_1();
+    let clock = |clock_khz| refused(Settings { clock_khz, ..with });
+    assert_eq!(
+        (clock(999), clock(16_001)),
+        (ConfigError::Clock, ConfigError::Clock)
+    );
+    let bin_width = U16F16::ZERO;
+    assert_eq!(
+        refused(Settings { bin_width, ..with }),
+        ConfigError::ZeroBinWidth
+    );
+    assert_eq!(
+        refused(Settings {
+            overflow: 0,
+            ..with
+        }),
+        ConfigError::Overflow
+    );
+    let masked = Settings {
+        mode: Mode::Two,
+        overflow: 5,
+        stop_mask: 5,
+        ..with
+    };
+    assert_eq!(refused(masked), ConfigError::Overflow);
+}
+
+/// Two of them on one bus, with one chip select each.
+#[test]
+fn two_sensors_share_a_bus() {
+    use embedded_hal_bus::spi::{NoDelay, RefCellDevice};
+
+    let mut bus = Mock::new(&[]);
+    let shared = RefCell::new(bus.clone());
+    let selects = [Line::new(true), Line::new(true)];
+    let interrupts = [Line::new(true), Line::new(true)];
+    let config = Config::new(mode_1()).unwrap();
+    let mut sensors = [0, 1].map(|index: usize| {
+        let select = selects[index].clone();
+        let device = RefCellDevice::new(&shared, select, NoDelay).unwrap();
+        let enable = Line::new(false);
+        Tdc7200::<_, _, _>::new(device, interrupts[index].clone(), enable, config)
+    });
+    let mut sink = Notes::default();
+
+    // What the bus sees: no transactions, but a flush at the end of each.
+    let plain = |accesses: Vec<Access>| -> Vec<Access> {
+        let start = Access::transaction_start();
+        accesses
+            .into_iter()
+            .filter(|access| *access != start)
+            .map(|access| match access == Access::transaction_end() {
+                true => Access::flush(),
+                false => access,
+            })
+            .collect()
+    };
+    for now_ms in [0, 3] {
+        for sensor in &mut sensors {
+            assert_eq!(sensor.poll(now_ms, &mut sink).unwrap(), Polled::Working);
+        }
+    }
+    for (sensor, select) in sensors.iter_mut().zip(&selects) {
+        bus.update_expectations(&plain(configure(MODE_1, ARM_1)));
+        select.driven.take();
+        assert_eq!(sensor.poll(6, &mut sink).unwrap(), Polled::Working);
+        // One selection for each of the 19 transactions.
+        assert_eq!(*select.driven.borrow(), [false, true].repeat(19));
+        bus.done();
+    }
+    for (sensor, interrupt) in sensors.iter_mut().zip(&interrupts) {
+        interrupt.set(false);
+        let accesses = [
+            read(0x02, &[0x19]),
+            read_results(0x10, &[4175]),
+            read_results(0x1b, &[2110, 21121]),
+            write(0x00, ARM_1),
+        ];
+        bus.update_expectations(&plain(accesses.concat()));
+        assert_eq!(sensor.poll(7, &mut sink).unwrap(), Polled::Data);
+        assert_eq!(sink.take(), [Given::Photon(7, 28), Given::End(1)]);
+        bus.done();
+    }
+}

@@ -1,0 +1,193 @@
+//! The generalised likelihood ratio of a pulse against none, for whoever knows
+//! everything but where it lies: what a detection rule can be measured against.
+//!
+//! With background `B` a bin and laser cycle, signal `A` a laser cycle and the
+//! share `h_i(µ)` of the pulse in bin i, counts `n_i` after N laser cycles have the
+//! log likelihood ratio
+//!
+//! ```text
+//! L(µ) = Σ n_i·ln(1 + A·h_i(µ)/B) − N·A·Σ h_i(µ)
+//! ```
+//!
+//! of a pulse at µ against background alone. The largest over the positions µ,
+//! every half bin, is what is compared with a threshold. No rule that has to
+//! estimate `A`, `B` or the shape knows more.
+
+use crate::rates::bin_share;
+
+/// Positions a bin: its start and its middle.
+const POSITIONS: usize = 2;
+
+/// The scene, which is known, and what follows from it.
+#[derive(Clone, Debug)]
+pub struct LikelihoodRatio {
+    bins: usize,
+    /// Bins beside its own that a pulse reaches.
+    reach: usize,
+    /// `ln(1 + A·h/B)` of a photon for each position from `reach` bins before its
+    /// own bin to `reach` bins after.
+    gains: Vec<f64>,
+    /// `A·Σ h_i`, of each position.
+    losses: Vec<f64>,
+}
+
+/// The ratio of one exposure so far.
+#[derive(Clone, Debug)]
+pub struct Evidence<'a> {
+    scene: &'a LikelihoodRatio,
+    /// Of each position, with `reach` bins more at both ends.
+    gains: Vec<f64>,
+}
+
+impl LikelihoodRatio {
+    /// Histograms of `bins` bins, `background` photons a bin and laser cycle,
+    /// `signal` photons a laser cycle in a pulse of standard deviation `sigma`
+    /// bins, all above 0.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    pub fn new(bins: u32, background: f64, signal: f64, sigma: f64) -> Self {
+        // One photon in ten million lies farther out.
+        let reach = (5.5 * sigma).ceil() as usize + 1;
+        let position = |index: usize| index as f64 / POSITIONS as f64;
+        let gain = |index: usize| {
+            // The photon's bin is `reach`.
+            let share = bin_share(reach as u32, position(index), sigma);
+            (signal * share / background).ln_1p()
+        };
+        let loss = |index: usize| {
+            let share = |bin| bin_share(bin, position(index), sigma);
+            signal * (0..bins).map(share).sum::<f64>()
+        };
+        Self {
+            bins: bins as usize,
+            reach,
+            gains: (0..(2 * reach + 1) * POSITIONS).map(gain).collect(),
+            losses: (0..bins as usize * POSITIONS).map(loss).collect(),
+        }
+    }
+
+    /// Of an exposure that begins.
+    #[must_use]
+    pub fn evidence(&self) -> Evidence<'_> {
+        Evidence {
+            scene: self,
+            gains: vec![0.0; (self.bins + 2 * self.reach) * POSITIONS],
+        }
+    }
+}
+
+impl Evidence<'_> {
+    /// Counts `photons` more in `bin`, which is one of the histogram's.
+    pub fn add(&mut self, bin: u16, photons: u16) {
+        let photons = f64::from(photons);
+        let from = usize::from(bin) * POSITIONS;
+        for (sum, gain) in self.gains[from..].iter_mut().zip(&self.scene.gains) {
+            *sum += photons * gain;
+        }
+    }
+
+    /// The log likelihood ratio of the best position after `cycles` laser cycles.
+    #[must_use]
+    pub fn highest(&self, cycles: u32) -> f64 {
+        let cycles = f64::from(cycles);
+        let gains = &self.gains[self.scene.reach * POSITIONS..];
+        let ratios = gains.iter().zip(&self.scene.losses);
+        let ratios = ratios.map(|(gain, loss)| gain - cycles * loss);
+        ratios.fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+/// How fast the ratio grows at the true position: nats a laser cycle, on average,
+/// of a pulse of `signal` photons a laser cycle at `position`.
+#[must_use]
+pub fn information(background: f64, signal: f64, position: f64, sigma: f64) -> f64 {
+    // Far from both ends, wherever in its bin the pulse lies.
+    let far = (8.0 * sigma).ceil() + 1.0;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let bins = 2 * far as u32 + 1;
+    let position = far + position.fract();
+    let one_bin = |bin| {
+        let mean = signal * bin_share(bin, position, sigma);
+        (background + mean) * (mean / background).ln_1p() - mean
+    };
+    (0..bins).map(one_bin).sum()
+}
+
+/// The signal photons a laser cycle with which [`information`] is `wanted`.
+#[must_use]
+pub fn signal_for_information(background: f64, position: f64, sigma: f64, wanted: f64) -> f64 {
+    let is_less = |signal| information(background, signal, position, sigma) < wanted;
+    let (mut low, mut high) = (0.0, 1.0);
+    while is_less(high) {
+        high *= 2.0;
+    }
+    // Every halving is a bit.
+    for _ in 0..60 {
+        let middle = (low + high) / 2.0;
+        if is_less(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::counts::poisson::Poisson;
+
+    /// ln of the probability of `counts`, whose means are `means`.
+    fn ln_likelihood(counts: &[u16], means: &[f64]) -> f64 {
+        let pairs = counts.iter().zip(means);
+        pairs
+            .map(|(&count, &mean)| Poisson::new(mean).mass(count.into()).ln())
+            .sum()
+    }
+
+    #[test]
+    fn it_is_the_ratio_of_two_likelihoods() {
+        const BINS: u32 = 16;
+        let (background, signal, cycles) = (0.3, 0.7, 20);
+        let counts: [u16; BINS as usize] = [6, 4, 9, 6, 3, 8, 14, 19, 8, 6, 5, 7, 2, 6, 11, 5];
+        for sigma in [0.4, 1.0, 2.5] {
+            let scene = LikelihoodRatio::new(BINS, background, signal, sigma);
+            let mut evidence = scene.evidence();
+            for (bin, &count) in (0..).zip(&counts) {
+                evidence.add(bin, count / 2);
+                evidence.add(bin, count - count / 2);
+            }
+            let of = |position: Option<f64>| {
+                let mean = |bin| {
+                    let pulse = position.map_or(0.0, |position| bin_share(bin, position, sigma));
+                    f64::from(cycles) * (background + signal * pulse)
+                };
+                ln_likelihood(&counts, &(0..BINS).map(mean).collect::<Vec<_>>())
+            };
+            let ratios = (0..2 * BINS).map(|half| of(Some(f64::from(half) / 2.0)) - of(None));
+            let highest = ratios.fold(f64::NEG_INFINITY, f64::max);
+            let found = evidence.highest(cycles);
+            assert!((found - highest).abs() < 1e-5, "{sigma}: {found} {highest}");
+        }
+    }
+
+    #[test]
+    fn information_is_the_mean_growth() {
+        let (background, signal, position, sigma) = (0.05, 0.4, 64.5, 1.0);
+        let scene = LikelihoodRatio::new(128, background, signal, sigma);
+        // 10,000 laser cycles of exactly the mean counts, but for rounding.
+        let cycles = 10_000;
+        let mut evidence = scene.evidence();
+        for bin in 0..128 {
+            let mean = background + signal * bin_share(bin.into(), position, sigma);
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            evidence.add(bin, (mean * f64::from(cycles)).round() as u16);
+        }
+        let expected = information(background, signal, position, sigma);
+        let found = evidence.highest(cycles) / f64::from(cycles);
+        assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
+        let inverse = signal_for_information(background, position, sigma, expected);
+        assert!((inverse / signal - 1.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,6 @@
+//! Laws of counts, and the numbers they need.
+
+pub mod binomial;
+pub mod normal;
+pub mod poisson;
+pub mod quadrature;

@@ -1,0 +1,32 @@
+//! The paper's performance analysis (section II-C) and what it leaves out.
+//!
+//! | module | what | source |
+//! |---|---|---|
+//! | [`rates`] | photons a bin | Eq. 1 to 3, 6 |
+//! | [`gaussian`] | threshold, hit rate, true and false positive rate, limits of α, ROC | Eq. 4, 5, 7 to 11 |
+//! | [`known_background`] | the same with Poisson counts | exact |
+//! | [`looks::single_look`] | false alarms of one look with the quadrant background | exact |
+//! | [`looks::repeated_looks`] | false alarms of an exposure | bounds, exact |
+//! | [`looks::table`] | what lies between the bounds | simulation |
+//! | [`looks::exposure`] | exposures, from look to look | simulation |
+//! | [`looks::detections`] | the time to a detection | simulation |
+//! | [`bounds::likelihood_ratio`] | the fastest a rule can be that knows the scene | exact |
+//! | [`bounds::cramer_rao`] | the smallest error of a pulse's position | exact |
+//! | [`counts`] | Poisson, normal and binomial laws | exact |
+//! | [`tune`] | settings for a wanted false-alarm rate | all of these |
+//! | [`random`] | random numbers of a pixel or a trial | |
+//!
+//! Times are in bins from the start of bin 0, counts are mean photons, all in
+//! `f64`. Inputs are not checked: rates are finite and not negative,
+//! probabilities lie strictly between 0 and 1 where an inverse is taken of them.
+
+#![forbid(unsafe_code)]
+
+pub mod bounds;
+pub mod counts;
+pub mod gaussian;
+pub mod known_background;
+pub mod looks;
+pub mod random;
+pub mod rates;
+pub mod tune;

@@ -1,0 +1,117 @@
+//! What simulated exposures with a target come to.
+
+use anyhow::Result;
+use dtof_core::{AnyRule, BinPosition, DepthEstimator};
+
+use crate::looks::exposure::{Exposures, Looks};
+use crate::random::trial_rng;
+use crate::rates::Rates;
+
+/// When a pixel looks and what decides then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Decisions {
+    /// When.
+    pub looks: Looks,
+    /// Whether there is an event.
+    pub rule: AnyRule,
+    /// Where.
+    pub estimator: DepthEstimator,
+}
+
+/// What some exposures with a target came to; sums of integers, so that they
+/// add up the same in any order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Detections {
+    /// Exposures.
+    pub exposures: u64,
+    /// Laser cycles of all of them.
+    pub cycles: u64,
+    /// Those with an event whose depth lies within [`Self::NEAR_BINS`] of the
+    /// target's.
+    pub near: u64,
+    /// Those with an event elsewhere.
+    pub far: u64,
+    /// Laser cycles of the exposures counted in `near`.
+    pub near_cycles: u64,
+    /// Squared depth errors of the events in `near`, in (1/256 bin)².
+    pub squared_errors: u64,
+}
+
+impl Detections {
+    /// An event farther from the target is a false one.
+    pub const NEAR_BINS: f64 = 3.0;
+
+    /// As many as `exposures`, of trial number `trial`.
+    ///
+    /// # Errors
+    /// If a rate is negative or not a number.
+    pub fn trial<const BINS: usize>(
+        seed: u64,
+        trial: u16,
+        rates: &Rates,
+        decisions: &Decisions,
+        exposures: u32,
+    ) -> Result<Self> {
+        let Decisions {
+            looks,
+            rule,
+            estimator,
+        } = decisions;
+        let bins = u16::try_from(BINS)?;
+        let simulated = Exposures::new(rates, bins, *looks)?;
+        let mut rng = trial_rng(seed, trial);
+        let mut sum = Self::default();
+        for _ in 0..exposures {
+            let (cycles, event) = simulated.event::<BINS>(rule, estimator, &mut rng);
+            sum.exposures += 1;
+            sum.cycles += u64::from(cycles);
+            let Some(event) = event else { continue };
+            let found = BinPosition::of(event.peak.bin, event.depth.offset);
+            let error = f64::from(found.raw()) - rates.position * 256.0;
+            if error.abs() > Self::NEAR_BINS * 256.0 {
+                sum.far += 1;
+                continue;
+            }
+            sum.near += 1;
+            sum.near_cycles += u64::from(cycles);
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            {
+                sum.squared_errors += error.powi(2).round() as u64;
+            }
+        }
+        Ok(sum)
+    }
+
+    /// Mean laser cycles to an event near the target, expired exposures and
+    /// those with a false event included.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss)]
+    pub fn cycles_to_event(&self) -> f64 {
+        self.cycles as f64 / self.near as f64
+    }
+
+    /// Root mean square depth error of the events near the target, in bins.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss)]
+    pub fn depth_error_bins(&self) -> f64 {
+        (self.squared_errors as f64 / self.near as f64).sqrt() / 256.0
+    }
+
+    /// Exposures with an event near the target, of all.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss)]
+    pub fn detected(&self) -> f64 {
+        self.near as f64 / self.exposures as f64
+    }
+}
+
+impl std::ops::AddAssign for Detections {
+    fn add_assign(&mut self, other: Self) {
+        self.exposures += other.exposures;
+        self.cycles += other.cycles;
+        self.near += other.near;
+        self.far += other.far;
+        self.near_cycles += other.near_cycles;
+        self.squared_errors += other.squared_errors;
+    }
+}

@@ -1,0 +1,336 @@
+//! Simulated exposures, from look to look.
+//!
+//! Between two looks the counts of a bin grow by a Poisson number. Background
+//! is the same everywhere, so its photons of all bins are drawn at once and
+//! thrown into bins, which is the same law and costs a photon, not a bin. The
+//! histogram and the rule are the core's.
+
+use anyhow::{Context, Result};
+use dtof_core::{
+    AnyRule, Count, Count10, CounterWidth, DepthEstimator, Detection, Histogram, RangeGate,
+    background, detect,
+};
+use rand_core::Rng;
+use rand_distr::{Distribution, Poisson};
+use rand_pcg::Pcg64;
+
+use crate::rates::Rates;
+use crate::rates::bin_share;
+
+/// When a pixel looks, counted in steps of X laser cycles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Looks {
+    /// Laser cycles a step (X).
+    pub x: u32,
+    /// The first look with N > L1.
+    pub first: u32,
+    /// The last look with N < L2.
+    pub last: u32,
+}
+
+impl Looks {
+    /// Those of a [`PixelConfig`](dtof_core::PixelConfig) of these, valid as
+    /// one.
+    #[must_use]
+    pub fn new(x: u16, l1: u16, l2: u16) -> Self {
+        let [x, l1, l2] = [x, l1, l2].map(u32::from);
+        Self {
+            x,
+            first: l1 / x + 1,
+            last: (l2 - 1) / x,
+        }
+    }
+
+    /// Laser cycles of an exposure without an event: the first look with
+    /// N ≥ L2.
+    #[must_use]
+    pub fn expiry(&self) -> u32 {
+        (self.last + 1) * self.x
+    }
+}
+
+/// The photons of some laser cycles of one pixel.
+#[derive(Clone, Debug)]
+struct Photons {
+    background: Option<Poisson<f64>>,
+    signal: Vec<(u16, Poisson<f64>)>,
+}
+
+impl Photons {
+    /// Of `cycles` laser cycles with `bins` bins, a power of two.
+    fn new(rates: &Rates, bins: u16, cycles: f64) -> Result<Self> {
+        let background = rates.background * f64::from(bins) * cycles;
+        let signal = |bin: u16| {
+            let mean = rates.signal * cycles * bin_share(bin.into(), rates.position, rates.sigma);
+            // One photon in 1e12 exposures does not show.
+            (mean > 1e-12).then(|| Ok((bin, Poisson::new(mean)?)))
+        };
+        let signal = (0..bins).filter_map(signal).collect::<Result<_>>();
+        let background = (background > 0.0).then(|| Poisson::new(background));
+        Ok(Self {
+            background: background.transpose().context("the background")?,
+            signal: signal.context("the signal")?,
+        })
+    }
+
+    /// Calls `photon` with the bin of each, one of `BINS`.
+    fn draw<const BINS: usize>(&self, rng: &mut Pcg64, mut photon: impl FnMut(u16)) {
+        // A Poisson sample is a whole number.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let sample = |law: &Poisson<f64>, rng: &mut Pcg64| law.sample(rng) as u64;
+        let background = &self.background;
+        let mut left = background.as_ref().map_or(0, |law| sample(law, rng));
+        // Four uniform bins from one random number: BINS is a power of two.
+        while left > 0 {
+            let mut random = rng.next_u64();
+            for _ in 0..left.min(4) {
+                #[allow(clippy::cast_possible_truncation)]
+                photon((random as usize & (BINS - 1)) as u16);
+                random >>= 16;
+            }
+            left = left.saturating_sub(4);
+        }
+        for (bin, law) in &self.signal {
+            // A counter is full by then.
+            for _ in 0..sample(law, rng).min(1024) {
+                photon(*bin);
+            }
+        }
+    }
+
+    fn add_to<const BINS: usize>(&self, histogram: &mut Histogram<BINS>, rng: &mut Pcg64) {
+        self.draw::<BINS>(rng, |bin| histogram.add(bin));
+    }
+}
+
+/// Exposures of one pixel at constant rates.
+#[derive(Clone, Debug)]
+pub struct Exposures {
+    looks: Looks,
+    until_first: Photons,
+    between: Photons,
+}
+
+impl Exposures {
+    /// With `bins` bins, a power of two from 8 to 1024.
+    ///
+    /// # Errors
+    /// If a rate is negative or not a number.
+    pub fn new(rates: &Rates, bins: u16, looks: Looks) -> Result<Self> {
+        let photons = |steps: u32| Photons::new(rates, bins, f64::from(steps * looks.x));
+        Ok(Self {
+            looks,
+            until_first: photons(looks.first)?,
+            between: photons(1)?,
+        })
+    }
+
+    /// Calls `look` with the histogram at each look until it returns `true` or
+    /// the exposure expires. Gives the laser cycles it lasted.
+    fn run<const BINS: usize>(
+        &self,
+        rng: &mut Pcg64,
+        mut look: impl FnMut(u32, &Histogram<BINS>) -> bool,
+    ) -> u32 {
+        let mut histogram = Histogram::new();
+        self.until_first.add_to(&mut histogram, rng);
+        for step in self.looks.first..=self.looks.last {
+            if look(step, &histogram) {
+                return step * self.looks.x;
+            }
+            self.between.add_to(&mut histogram, rng);
+        }
+        self.looks.expiry()
+    }
+
+    /// One exposure, photons only: calls `look` at each look with the laser cycles so
+    /// far and the photons since the look before, until it returns `true` or the
+    /// exposure expires.
+    pub fn frames<const BINS: usize>(
+        &self,
+        rng: &mut Pcg64,
+        mut look: impl FnMut(u32, &[u16; BINS]) -> bool,
+    ) {
+        let frame = |photons: &Photons, rng: &mut Pcg64| {
+            let mut frame = [0u16; BINS];
+            photons.draw::<BINS>(rng, |bin| frame[usize::from(bin)] += 1);
+            frame
+        };
+        let mut photons = frame(&self.until_first, rng);
+        for step in self.looks.first..=self.looks.last {
+            if look(step * self.looks.x, &photons) {
+                break;
+            }
+            photons = frame(&self.between, rng);
+        }
+    }
+
+    /// One exposure: the laser cycles it lasted, and its event if there was one.
+    pub fn event<const BINS: usize>(
+        &self,
+        rule: &AnyRule,
+        estimator: &DepthEstimator,
+        rng: &mut Pcg64,
+    ) -> (u32, Option<Detection>) {
+        let mut event = None;
+        let cycles = self.run::<BINS>(rng, |_, histogram| {
+            event = detect(histogram, &RangeGate::full(), rule, estimator);
+            event.is_some()
+        });
+        (cycles, event)
+    }
+
+    /// One exposure without a rule: for each look of `lasts`, ascending, the
+    /// highest α (in 1/256) that would have given an event by then, if any
+    /// would.
+    pub fn highest_alphas<const BINS: usize>(
+        &self,
+        minimum_count: Count,
+        lasts: &[u32],
+        rng: &mut Pcg64,
+    ) -> Vec<Option<u16>> {
+        let mut highest = None;
+        let mut by_last = Vec::with_capacity(lasts.len());
+        self.run::<BINS>(rng, |step, histogram| {
+            highest = highest.max(highest_alpha(histogram, minimum_count));
+            if lasts.get(by_last.len()) == Some(&step) {
+                by_last.push(highest);
+            }
+            false
+        });
+        by_last
+    }
+}
+
+/// The highest α in 1/256 with which the paper's rule fires on `histogram`.
+///
+/// The rule fires if `256·peak > 256·q + α·⌊√q⌋`, in α's units.
+fn highest_alpha<const BINS: usize>(
+    histogram: &Histogram<BINS>,
+    minimum_count: Count,
+) -> Option<u16> {
+    let peak = histogram.peak();
+    let background = background::quadrant(histogram.counts(), &RangeGate::full(), peak.bin);
+    if peak.count < minimum_count || peak.count <= background {
+        return None;
+    }
+    let excess = (peak.count.raw() - background.raw()) << 8;
+    let root = Count10::square_root(background.raw());
+    // Without a background every α fires.
+    let highest = (excess - 1).checked_div(root).unwrap_or(u32::MAX);
+    Some(u16::try_from(highest).unwrap_or(u16::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use dtof_core::fixed::types::U8F8;
+    use dtof_core::{AsyncPixel, LaserCycle, Look, PaperRule, PixelConfig};
+
+    use super::*;
+    use crate::random::trial_rng;
+    use dtof_core::PixelAddress;
+
+    #[test]
+    fn looks_are_those_of_a_pixel() {
+        for (x, l1, l2) in [
+            (1, 1, 3),
+            (4, 40, 2000),
+            (10, 100, 203),
+            (7, 10, 22),
+            (3, 5, 7),
+        ] {
+            let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+            let config = PixelConfig::<8>::new(x, l1, l2, RangeGate::full(), rule).unwrap();
+            let looks = Looks::new(x, l1, l2);
+            let mut pixel = AsyncPixel::<8>::new(PixelAddress(0));
+            let mut seen = Vec::new();
+            for cycle in 0.. {
+                match pixel.end_laser_cycle(&config, LaserCycle(cycle)) {
+                    Look::NoPeak => seen.push(u32::from(pixel.exposure())),
+                    Look::Expired => {
+                        assert_eq!(cycle + 1, u64::from(looks.expiry()));
+                        break;
+                    }
+                    _ => {}
+                }
+            }
+            let expected: Vec<u32> = (looks.first..=looks.last)
+                .map(|look| look * looks.x)
+                .collect();
+            assert_eq!(seen, expected, "{x} {l1} {l2}");
+        }
+    }
+
+    #[test]
+    fn the_highest_alpha_fires_and_the_next_does_not() {
+        let mut rng = trial_rng(5, 0);
+        let minimum_count = Count::saturating(5);
+        let mut seen = [0; 3];
+        for mean in [0.002, 0.5, 3.0, 60.0] {
+            let rates = Rates {
+                background: mean,
+                signal: 10.0,
+                position: 40.3,
+                sigma: 0.7,
+            };
+            let photons = Photons::new(&rates, 128, 1.0).unwrap();
+            for _ in 0..2000 {
+                let mut histogram = Histogram::<128>::new();
+                photons.add_to(&mut histogram, &mut rng);
+                let fires = |alpha: u16| {
+                    let rule = PaperRule::new(U8F8::from_bits(alpha), minimum_count);
+                    detect(
+                        &histogram,
+                        &RangeGate::full(),
+                        &rule,
+                        &DepthEstimator::default(),
+                    )
+                    .is_some()
+                };
+                match highest_alpha(&histogram, minimum_count) {
+                    None => {
+                        assert!(!fires(0));
+                        seen[0] += 1;
+                    }
+                    Some(u16::MAX) => {
+                        assert!(fires(u16::MAX));
+                        seen[1] += 1;
+                    }
+                    Some(alpha) => {
+                        assert!(fires(alpha) && !fires(alpha + 1));
+                        seen[2] += 1;
+                    }
+                }
+            }
+        }
+        assert!(seen.iter().all(|&seen| seen > 50), "{seen:?}");
+    }
+
+    #[test]
+    fn counts_have_the_means_of_the_rates() {
+        let rates = Rates {
+            background: 0.05,
+            signal: 2.0,
+            position: 20.0,
+            sigma: 1.5,
+        };
+        let photons = Photons::new(&rates, 64, 10.0).unwrap();
+        let mut rng = trial_rng(1, 1);
+        let mut sums = [0u32; 64];
+        let times = 20_000;
+        for _ in 0..times {
+            let mut histogram = Histogram::<64>::new();
+            photons.add_to(&mut histogram, &mut rng);
+            for (sum, &count) in sums.iter_mut().zip(histogram.counts()) {
+                *sum += u32::from(count);
+            }
+        }
+        for (bin, &sum) in (0..).zip(&sums) {
+            let mean = 0.5 + 20.0 * bin_share(bin, rates.position, rates.sigma);
+            let expected = mean * f64::from(times);
+            // 4.5 standard deviations: one in 2,000 runs, over 64 bins.
+            let deviation = (f64::from(sum) - expected) / expected.sqrt();
+            assert!(deviation.abs() < 4.5, "{bin}: {sum} {expected}");
+        }
+    }
+}

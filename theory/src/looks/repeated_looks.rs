@@ -1,0 +1,155 @@
+//! False events of a whole exposure: a pixel that looks every X laser cycles
+//! while L1 < N < L2.
+//!
+//! There is no closed form, as the looks share photons. Whatever they share, an
+//! exposure has a false event at least as often as its worst look alone and at
+//! most as often as the looks' probabilities add up to. What lies between comes
+//! from simulation: [`FalseEvents`] tallies it, [`table`](crate::looks::table) keeps
+//! it.
+
+use anyhow::Result;
+use dtof_core::{Count, Threshold};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+use crate::looks::exposure::{Exposures, Looks};
+use crate::looks::single_look::SingleLook;
+use crate::rates::Rates;
+
+/// The exact law of each look of an exposure.
+#[derive(Clone, Debug)]
+pub struct RepeatedLooks<'a> {
+    looks: &'a [SingleLook],
+}
+
+/// The single looks up to `last`, the first being step 1: what
+/// [`RepeatedLooks`] takes its looks from.
+#[must_use]
+pub fn single_looks(bins: u32, mean_a_step: f64, last: u32) -> Vec<SingleLook> {
+    let look = |step: u32| SingleLook::new(bins, mean_a_step * f64::from(step));
+    (1..=last).into_par_iter().map(look).collect()
+}
+
+impl<'a> RepeatedLooks<'a> {
+    /// Looks `first` to `last` of [`single_looks`].
+    #[must_use]
+    pub fn new(steps: &'a [SingleLook], first: u32, last: u32) -> Self {
+        Self {
+            looks: &steps[first as usize - 1..last as usize],
+        }
+    }
+
+    /// What the exact laws of the looks say of the exposure.
+    #[must_use]
+    pub fn bounds(&self, threshold: &Threshold) -> Bounds {
+        let mut bounds = Bounds::default();
+        for look in self.looks {
+            let probability = look.false_event_probability(threshold);
+            bounds.worst_look = bounds.worst_look.max(probability);
+            bounds.sum += probability;
+            bounds.independent -= (-probability).ln_1p();
+        }
+        bounds.sum = bounds.sum.min(1.0);
+        bounds
+    }
+}
+
+/// Between what the probability of a false event in an exposure lies.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bounds {
+    /// At least: the probability of its worst look.
+    pub worst_look: f64,
+    /// At most: the probabilities of its looks added up, at most 1.
+    pub sum: f64,
+    /// `H`: −ln of the probability of no false event, were the looks
+    /// independent. Looks share photons, so the simulated intensity is lower:
+    /// [`table`](crate::looks::table) has its ratio to this.
+    pub independent: f64,
+}
+
+/// Where repeated looks are simulated: 128 bins, background only.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// Mean background photons a bin at the first look.
+    pub first_mean: f64,
+    /// The first look, in steps of X laser cycles.
+    pub first: u32,
+    /// Last looks to tally, ascending.
+    pub lasts: Vec<u32>,
+}
+
+/// Bins of the histograms simulated.
+pub const BINS: usize = 128;
+/// Photons a reported peak holds at least, the default of the commands.
+pub const MINIMUM_COUNT: u16 = 5;
+/// α from 1 to 10 in halves.
+pub const ALPHA_STEPS: usize = 19;
+
+/// α number `step`, in 1/256.
+#[must_use]
+pub fn alpha_bits(step: usize) -> u16 {
+    u16::try_from(256 + 128 * step).unwrap_or(u16::MAX)
+}
+
+/// Exposures with a false event.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FalseEvents {
+    /// Exposures simulated.
+    pub exposures: u64,
+    /// For each last look and each α, exposures with a false event.
+    pub events: Vec<[u64; ALPHA_STEPS]>,
+}
+
+impl FalseEvents {
+    /// None yet, for as many last looks.
+    #[must_use]
+    pub fn new(lasts: usize) -> Self {
+        Self {
+            exposures: 0,
+            events: vec![[0; ALPHA_STEPS]; lasts],
+        }
+    }
+
+    /// `exposures` of them at `point`.
+    ///
+    /// # Errors
+    /// If the mean is negative or not a number.
+    pub fn trial(point: &Point, exposures: u32, rng: &mut Pcg64) -> Result<Self> {
+        let rates = Rates {
+            background: point.first_mean / f64::from(point.first),
+            signal: 0.0,
+            position: 0.0,
+            sigma: 1.0,
+        };
+        let looks = Looks {
+            x: 1,
+            first: point.first,
+            last: point.lasts.last().copied().unwrap_or(point.first),
+        };
+        let simulated = Exposures::new(&rates, u16::try_from(BINS)?, looks)?;
+        let minimum_count = Count::saturating(MINIMUM_COUNT.into());
+        let mut tally = Self::new(point.lasts.len());
+        for _ in 0..exposures {
+            let highest = simulated.highest_alphas::<BINS>(minimum_count, &point.lasts, rng);
+            for (events, highest) in tally.events.iter_mut().zip(highest) {
+                let Some(highest) = highest else { continue };
+                for (step, events) in events.iter_mut().enumerate() {
+                    *events += u64::from(alpha_bits(step) <= highest);
+                }
+            }
+            tally.exposures += 1;
+        }
+        Ok(tally)
+    }
+}
+
+impl std::ops::AddAssign<&Self> for FalseEvents {
+    fn add_assign(&mut self, other: &Self) {
+        self.exposures += other.exposures;
+        for (sum, more) in self.events.iter_mut().zip(&other.events) {
+            for (sum, more) in sum.iter_mut().zip(more) {
+                *sum += more;
+            }
+        }
+    }
+}
