@@ -163,19 +163,24 @@ fn captions(all: &[(&Study, Results)]) -> Result<String> {
 
 fn claims(all: &[(&Study, Results)]) -> Result<String> {
     let mut text = "# The paper's claims\n\n\
-        Made by `cargo lab figures`; do not edit. Each claim of the paper, its number, ours, and whether \
-        they go together; the [figures](figures.md) show more.\n\n\
-        **Agrees**: so here as well, in all that was tried. **Differs**: in part, or by another number. **Refuted**: \
-        not so in anything that was tried, or not as it is stated. **Not decided**: the sample cannot tell. What \
-        counts as what is said with the claim, or in its study in `lab/src/studies`.\n\n\
-        | claim | the paper | here | verdict | why |\n|---|---|---|---|---|\n"
+        Made by `cargo lab figures`; do not edit. Each claim of the paper, its number, ours, and a verdict. The \
+        [figures](figures.md) show more; [the paper, line by line](../paper.md) has the rest of the paper.\n\n\
+        | verdict | meaning |\n|---|---|\n\
+        | agrees | the same here, in all that was tried |\n\
+        | differs | in part, or with another number |\n\
+        | refuted | not so in anything that was tried, or not as stated |\n\
+        | not decided | the sample is too small to tell |\n\n\
+        The criterion stands with the claim, or in its study in `lab/src/studies`.\n\n\
+        | claim | the paper | here | verdict | why | study |\n|---|---|---|---|---|---|\n"
         .to_owned();
-    for claim in all.iter().flat_map(|(_, results)| &results.claims) {
-        writeln!(
-            text,
-            "| {} | {} | {} | **{}** | {} |",
-            claim.claim, claim.paper, claim.here, claim.verdict, claim.why
-        )?;
+    for (study, results) in all {
+        for claim in &results.claims {
+            writeln!(
+                text,
+                "| {} | {} | {} | **{}** | {} | `{}` |",
+                claim.claim, claim.paper, claim.here, claim.verdict, claim.why, study.name
+            )?;
+        }
     }
     Ok(text)
 }

@@ -1,0 +1,152 @@
+//! Which files of a package import which, read from their syntax.
+//!
+//! Only a path that begins with `crate`, `self` or `super` is an import, and it leads
+//! to the deepest module on it. A module and what lies in its own folder are one room:
+//! what a child takes from its parent is no import. Tests are left out.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+use syn::visit::Visit;
+
+/// A module by its path from the package, `["detect", "window"]`.
+type Module = Vec<String>;
+/// What each module imports.
+pub type Imports = BTreeMap<Module, BTreeSet<Module>>;
+
+/// The imports of all modules below `source`.
+pub fn imports(source: &Path) -> Imports {
+    let mut files = BTreeMap::new();
+    read(source, &mut Vec::new(), &mut files);
+    let modules: BTreeSet<&Module> = files.keys().collect();
+    let of = |(module, file): (&Module, &syn::File)| {
+        let mut paths = Paths { module: module.clone(), found: Vec::new() };
+        paths.visit_file(file);
+        let led = paths.found.iter().filter_map(|path| {
+            (1..=path.len()).rev().map(|length| path[..length].to_vec()).find(|path| modules.contains(path))
+        });
+        (module.clone(), led.filter(|to| !module.starts_with(to)).collect())
+    };
+    files.iter().map(of).collect()
+}
+
+fn read(folder: &Path, module: &mut Module, files: &mut BTreeMap<Module, syn::File>) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for path in entries.map(|entry| entry.unwrap().path()) {
+        let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        if path.is_dir() {
+            module.push(name);
+            read(&path, module, files);
+            module.pop();
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            let mut module = module.clone();
+            match name.as_str() {
+                "tests" => continue,
+                "mod" | "lib" | "main" => {}
+                _ => module.push(name),
+            }
+            let file = syn::parse_file(&fs::read_to_string(&path).unwrap()).unwrap();
+            // A program and the library beside it begin at the same place.
+            files.entry(module).or_insert_with(|| syn::File { shebang: None, attrs: Vec::new(), items: Vec::new() }).items.extend(file.items);
+        }
+    }
+}
+
+/// Collects paths, as seen from the package.
+struct Paths {
+    module: Module,
+    found: Vec<Module>,
+}
+
+impl Paths {
+    /// Notes a path, if it begins within the package.
+    fn note(&mut self, path: &[String]) {
+        let mut from = self.module.clone();
+        let mut rest = path;
+        match path.first().map(String::as_str) {
+            Some("crate") => from.clear(),
+            Some("self") => {}
+            Some("super") => {
+                from.pop();
+            }
+            _ => return,
+        }
+        rest = &rest[1..];
+        while rest.first().is_some_and(|first| first == "super") {
+            from.pop();
+            rest = &rest[1..];
+        }
+        self.found.push([&from, rest].concat());
+    }
+
+    fn tree(&mut self, before: &mut Module, tree: &syn::UseTree) {
+        match tree {
+            syn::UseTree::Path(path) => {
+                before.push(path.ident.to_string());
+                self.tree(before, &path.tree);
+                before.pop();
+            }
+            syn::UseTree::Group(group) => group.items.iter().for_each(|tree| self.tree(before, tree)),
+            syn::UseTree::Name(syn::UseName { ident }) | syn::UseTree::Rename(syn::UseRename { ident, .. }) => {
+                before.push(ident.to_string());
+                self.note(before);
+                before.pop();
+            }
+            syn::UseTree::Glob(_) => self.note(before),
+        }
+    }
+}
+
+/// Whether an item is there in tests only.
+fn is_test(attributes: &[syn::Attribute]) -> bool {
+    attributes.iter().any(|attribute| {
+        attribute.path().is_ident("cfg")
+            && attribute.parse_args::<syn::Ident>().is_ok_and(|of| of == "test")
+    })
+}
+
+impl<'file> Visit<'file> for Paths {
+    fn visit_item_mod(&mut self, item: &'file syn::ItemMod) {
+        if !is_test(&item.attrs) {
+            syn::visit::visit_item_mod(self, item);
+        }
+    }
+
+    fn visit_item_use(&mut self, item: &'file syn::ItemUse) {
+        // What is handed on is not used.
+        if matches!(item.vis, syn::Visibility::Inherited) && !is_test(&item.attrs) {
+            self.tree(&mut Vec::new(), &item.tree);
+        }
+    }
+
+    fn visit_path(&mut self, path: &'file syn::Path) {
+        let names: Vec<String> = path.segments.iter().map(|segment| segment.ident.to_string()).collect();
+        self.note(&names);
+        syn::visit::visit_path(self, path);
+    }
+}
+
+/// The modules that import each other in a circle, circle by circle.
+pub fn circles(imports: &Imports) -> Vec<Vec<String>> {
+    let reached = |from: &Module| {
+        let (mut reached, mut next) = (BTreeSet::new(), vec![from.clone()]);
+        while let Some(module) = next.pop() {
+            for to in imports.get(&module).into_iter().flatten() {
+                if reached.insert(to.clone()) {
+                    next.push(to.clone());
+                }
+            }
+        }
+        reached
+    };
+    let reached: BTreeMap<&Module, BTreeSet<Module>> =
+        imports.keys().map(|module| (module, reached(module))).collect();
+    let in_circle = |module: &&Module| reached[module].contains(*module);
+    let circle = |module: &Module| -> Vec<String> {
+        let back = |other: &&Module| reached[module].contains(*other) && reached[other].contains(module);
+        imports.keys().filter(back).map(|module| module.join("::")).collect()
+    };
+    let circles: BTreeSet<Vec<String>> = imports.keys().filter(in_circle).map(circle).collect();
+    circles.into_iter().collect()
+}
