@@ -50,9 +50,15 @@ fn arrows(metadata: &Value) -> (Arrows, Arrows) {
 fn documented() -> Vec<[String; 3]> {
     let page = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
     let (_, table) = page.split_once("| package |").expect("a table of packages");
-    let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+    let rows = table
+        .lines()
+        .skip(2)
+        .take_while(|line| line.starts_with('|'));
     rows.map(|row| {
-        let mut cells = row.trim_matches('|').split('|').map(|cell| cell.trim().replace('`', ""));
+        let mut cells = row
+            .trim_matches('|')
+            .split('|')
+            .map(|cell| cell.trim().replace('`', ""));
         let [_, package, uses, tests] = [(); 4].map(|()| cells.next().unwrap());
         [package, uses, tests]
     })
@@ -79,7 +85,9 @@ fn wrong(documented: &[[String; 3]], built: &Arrows, tested: &Arrows) -> Vec<Str
         // What the code uses its tests may use.
         let more: BTreeSet<String> = tested.difference(built).cloned().collect();
         if more != names(tests) {
-            wrong.push(format!("tests of {package} use {more:?}, the table says {tests}"));
+            wrong.push(format!(
+                "tests of {package} use {more:?}, the table says {tests}"
+            ));
         }
         for used in built.union(tested).filter(|&used| !above.contains(used)) {
             wrong.push(format!("{package} uses {used}, which is not above it"));
@@ -101,7 +109,9 @@ fn packages_use_what_the_table_says_and_only_what_is_above_them() {
 #[test]
 fn an_arrow_that_is_turned_round_is_found() {
     let (built, tested) = arrows(&metadata());
-    let arrows = built.iter().flat_map(|(from, to)| to.iter().map(move |to| (from, to)));
+    let arrows = built
+        .iter()
+        .flat_map(|(from, to)| to.iter().map(move |to| (from, to)));
     let mut turned = 0;
     for (from, to) in arrows {
         let mut built = built.clone();

@@ -16,15 +16,20 @@ fn rows(page: &str) -> Vec<[&str; 5]> {
     let rows = page.lines().filter(|line| line.starts_with('|'));
     let rows = rows.map(|line| line.trim_matches('|').split('|').map(str::trim).collect());
     let rows: Vec<Vec<&str>> = rows.collect();
-    let rows = rows.iter().filter_map(|row| <[&str; 5]>::try_from(row.as_slice()).ok());
-    rows.filter(|row| row[0] != "in the paper" && !row[0].starts_with("---")).collect()
+    let rows = rows
+        .iter()
+        .filter_map(|row| <[&str; 5]>::try_from(row.as_slice()).ok());
+    rows.filter(|row| row[0] != "in the paper" && !row[0].starts_with("---"))
+        .collect()
 }
 
 /// A cell `file` or `file: name`. The name must be defined there.
 fn is_there(cell: &str) -> bool {
     let cell = cell.trim_matches('`');
     let (path, name) = cell.split_once(": ").unwrap_or((cell, ""));
-    let Ok(text) = fs::read_to_string(root().join(path)) else { return false };
+    let Ok(text) = fs::read_to_string(root().join(path)) else {
+        return false;
+    };
     let kinds = ["fn", "struct", "enum", "trait", "type", "const", "mod"];
     let defined = |kind: &&str| {
         let start = format!("{kind} {name}");
@@ -40,7 +45,10 @@ fn is_there(cell: &str) -> bool {
 fn names_of_the_page_are_there() {
     let page = read("docs/paper.md");
     let rows = rows(&page);
-    let cells = rows.iter().flat_map(|row| [row[1], row[2]]).filter(|cell| !cell.is_empty());
+    let cells = rows
+        .iter()
+        .flat_map(|row| [row[1], row[2]])
+        .filter(|cell| !cell.is_empty());
     let gone: Vec<&str> = cells.filter(|cell| !is_there(cell)).collect();
     assert_eq!(gone, [""; 0]);
     assert!(rows.len() >= 40, "{} rows", rows.len());
@@ -54,18 +62,33 @@ fn verdicts_of_the_page_are_those_of_the_studies() {
     let studies = read("docs/results/figures.md");
     for [paper, _, test, study, verdict] in rows(&page) {
         let judged = ["agrees", "differs", "refuted"].contains(&verdict);
-        assert!(judged || verdict == "built" || verdict.contains(": "), "{paper}: {verdict}");
-        assert!(verdict != "built" || !test.is_empty(), "{paper}: built, but no test");
+        assert!(
+            judged || verdict == "built" || verdict.contains(": "),
+            "{paper}: {verdict}"
+        );
+        assert!(
+            verdict != "built" || !test.is_empty(),
+            "{paper}: built, but no test"
+        );
         let study = study.trim_matches('`');
-        assert!(!judged || !study.is_empty(), "{paper}: a verdict without a study");
+        assert!(
+            !judged || !study.is_empty(),
+            "{paper}: a verdict without a study"
+        );
         if !study.is_empty() {
-            assert!(studies.contains(&format!("Study `{study}`")), "{paper}: no study {study}");
+            assert!(
+                studies.contains(&format!("Study `{study}`")),
+                "{paper}: no study {study}"
+            );
         }
         if judged {
             let given = claims.lines().any(|line| {
                 line.contains(&format!("`{study}`")) && line.contains(&format!("**{verdict}**"))
             });
-            assert!(given, "{paper}: no claim of {study} with the verdict {verdict}");
+            assert!(
+                given,
+                "{paper}: no claim of {study} with the verdict {verdict}"
+            );
         }
     }
 }

@@ -7,7 +7,7 @@
 //! the two thresholds fires in integers alone. Wherever that is claimed the test
 //! proves it from the counts.
 
-use dtof::simulation::SimulatedPixel;
+use dtof::simulate::SimulatedPixel;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AsyncPixel, Count, LaserCycle, Look, PaperRule, PixelAddress, PixelConfig, RangeGate,

@@ -6,12 +6,12 @@ mod capture_log;
 use std::path::PathBuf;
 
 use capture_log::{ground_truth, log, tell};
-use dtof::detection::{Estimator, Rule};
-use dtof::engine::host_engine;
-use dtof::recorded::{RecordedHistograms, RecordingLength};
-use dtof::settings::{I24F8Number, Settings, U16F16Number};
-use dtof::source::PhotonSource;
-use dtof::tmf8820;
+use dtof::engine::detection::{Estimator, Rule};
+use dtof::engine::host::host_engine;
+use dtof::engine::settings::{I24F8Number, Settings, U16F16Number};
+use dtof::input::recorded::{RecordedHistograms, RecordingLength};
+use dtof::input::source::PhotonSource;
+use dtof::input::tmf8820;
 use dtof_core::fixed::types::U8F8;
 
 const ZONES: usize = 9;

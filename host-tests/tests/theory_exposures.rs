@@ -1,11 +1,11 @@
 //! False events of whole exposures: the table against new simulations and
 //! against what lies between its points, and `tune` against the engine.
 
-use dtof::detection::{Estimator, Rule};
-use dtof::engine::host_engine;
-use dtof::settings::{I24F8Number, Settings, U16F16Number};
-use dtof::simulation::{SimulatedArray, SimulatedPixel};
-use dtof::source::{Geometry, PhotonSource};
+use dtof::engine::detection::{Estimator, Rule};
+use dtof::engine::host::host_engine;
+use dtof::engine::settings::{I24F8Number, Settings, U16F16Number};
+use dtof::input::source::{Geometry, PhotonSource};
+use dtof::simulate::{SimulatedArray, SimulatedPixel};
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{Count, DepthEvent, PixelAddress, Threshold};
 use dtof_theory::counts::binomial::{alike, plausible};

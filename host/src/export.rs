@@ -26,12 +26,12 @@ use clap::ValueEnum;
 use dtof_core::RangeScale;
 use tempfile::NamedTempFile;
 
-use crate::aer_file::{Event, EventKind};
-use crate::dynamic_depth::DynamicDepth;
+use crate::events::aer_file::{Event, EventKind};
+use crate::events::dynamic_depth::DynamicDepth;
+use crate::events::output::{aside, flushed, place_of};
 use crate::geometry::{FieldOfView, Rays};
-use crate::output::{aside, flushed, place_of};
+use crate::input::source::Geometry;
 use crate::progress::Progress;
-use crate::source::Geometry;
 
 pub use clock::LaserClock;
 use events::Survey;

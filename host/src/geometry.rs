@@ -18,7 +18,7 @@ use std::str::FromStr;
 
 use dtof_core::PixelAddress;
 
-use crate::source::Geometry;
+use crate::input::source::Geometry;
 
 /// Degrees across the longer side of an array unless said otherwise.
 const LONGER_SIDE_DEGREES: f64 = 60.0;

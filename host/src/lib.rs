@@ -9,31 +9,15 @@
 //!   → Output         events.csv, events.aer, summary.json, pictures, report
 //! ```
 
-pub mod aer_file;
 pub mod chart;
 pub mod cli;
-pub mod detection;
 pub mod device;
-pub mod dynamic_depth;
 pub mod engine;
-pub mod events_csv;
+pub mod events;
 pub mod export;
-pub mod frame;
 pub mod geometry;
-pub mod maps;
-pub mod monitor;
-pub mod npy;
-pub mod output;
-pub mod photon_csv;
+pub mod input;
 pub mod picture;
 pub mod progress;
-pub mod recorded;
 pub mod report;
-pub mod run;
-pub mod sample;
-pub mod scene;
-pub mod settings;
-pub mod simulation;
-pub mod source;
-pub mod summary;
-pub mod tmf8820;
+pub mod simulate;

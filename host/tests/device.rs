@@ -7,12 +7,12 @@ use std::net::{TcpListener, TcpStream};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use dtof::detection::{Estimator, Rule};
 use dtof::device::{self, Client, DeviceEngine};
-use dtof::engine::{Engine, host_engine};
-use dtof::scene;
-use dtof::settings::Settings;
-use dtof::source::{Geometry, PhotonSource};
+use dtof::engine::detection::{Estimator, Rule};
+use dtof::engine::settings::Settings;
+use dtof::engine::{Engine, host::host_engine};
+use dtof::input::source::{Geometry, PhotonSource};
+use dtof::simulate::scene;
 use dtof_core::DepthEvent;
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_firmware::sidecar::Sidecar;

@@ -4,7 +4,7 @@ mod common;
 
 use common::Scratch;
 use common::aer::{HEADER, depth, dynamic, events, exported, file};
-use dtof::aer_file::EventKind;
+use dtof::events::aer_file::EventKind;
 use dtof::export::{Format, Options};
 
 /// A record: x, y, z, value, pixel, flags, time.

@@ -4,9 +4,9 @@ mod common;
 
 use common::Scratch;
 use common::aer::{HEADER, byte_of, depth, dynamic, events, exported, file, folder};
-use dtof::aer_file::{Event, Header};
+use dtof::events::aer_file::{Event, Header};
 use dtof::export::{Format, Options};
-use dtof::source::Geometry;
+use dtof::input::source::Geometry;
 
 /// How many whole points a file holds, which must be as many as it says.
 fn points(format: Format, bytes: &[u8]) -> u64 {

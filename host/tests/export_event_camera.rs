@@ -5,10 +5,10 @@ mod common;
 
 use common::Scratch;
 use common::aer::{HEADER, byte_of, depth, dynamic, exported, file};
-use dtof::aer_file::{Event, Header};
-use dtof::dynamic_depth::DynamicDepth;
+use dtof::events::aer_file::{Event, Header};
+use dtof::events::dynamic_depth::DynamicDepth;
 use dtof::export::{Format, LaserClock, Options};
-use dtof::source::Geometry;
+use dtof::input::source::Geometry;
 use dtof_core::fixed::types::U24F8;
 use dtof_core::{DepthEvent, Flags, Reference};
 

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use common::Scratch;
 use common::aer::{HEADER, depth};
-use dtof::aer_file::Writer;
+use dtof::events::aer_file::Writer;
 
 const FORMATS: [&str; 5] = ["csv", "pcd", "ply", "mcap", "evt2"];
 

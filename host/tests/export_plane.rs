@@ -5,7 +5,7 @@ mod common;
 use std::path::Path;
 
 use common::Scratch;
-use dtof::scene::{Scene, Shape};
+use dtof::simulate::scene::{Scene, Shape};
 use dtof_core::PixelAddress;
 
 /// Beyond this an event is false, as in the reports.

@@ -10,12 +10,12 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use dtof::detection::Rule;
+use dtof::device::monitor::{Outputs, Task, losses, monitor};
 use dtof::device::{self, Client};
-use dtof::dynamic_depth::DynamicDepth;
-use dtof::events_csv;
-use dtof::monitor::{Outputs, Task, losses, monitor};
-use dtof::settings::Settings;
+use dtof::engine::detection::Rule;
+use dtof::engine::settings::Settings;
+use dtof::events::dynamic_depth::DynamicDepth;
+use dtof::events::events_csv;
 use dtof_core::fixed::types::{U0F32, U8F8, U8F24, U16F16, U24F8};
 use dtof_core::{
     AnyRule, AsyncPixel, DepthEvent, DynamicDepthPixel, LaserCycle, PixelAddress, PixelConfig,
@@ -36,7 +36,7 @@ fn settings() -> Settings {
         rule: Rule::paper(U8F8::lit("4")),
         l1: 40,
         x: 4,
-        ..dtof::scene::settings(0)
+        ..dtof::simulate::scene::settings(0)
     }
 }
 

@@ -8,13 +8,13 @@ use std::path::Path;
 use std::rc::Rc;
 use std::time::Duration;
 
-use dtof::aer_file::{Event, Header, Reader};
-use dtof::detection::Rule;
+use dtof::device::monitor::map::LiveMap;
+use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::device::{Client, Port};
-use dtof::monitor::map::LiveMap;
-use dtof::monitor::{Outputs, Recording, Task, array, monitor};
-use dtof::scene;
-use dtof::settings::Settings;
+use dtof::engine::detection::Rule;
+use dtof::engine::settings::Settings;
+use dtof::events::aer_file::{Event, Header, Reader};
+use dtof::simulate::scene;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
     AerEncoder, BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, SubBinOffset,

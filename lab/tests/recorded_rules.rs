@@ -9,9 +9,9 @@ mod capture_log;
 use std::fmt::Write as _;
 
 use capture_log::{ground_truth, log, tell};
-use dtof::recorded::{RecordedHistograms, RecordingLength};
-use dtof::source::{PhotonSource, Slice};
-use dtof::tmf8820::{self, BINS};
+use dtof::input::recorded::{RecordedHistograms, RecordingLength};
+use dtof::input::source::{PhotonSource, Slice};
+use dtof::input::tmf8820::{self, BINS};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
     AsyncPixel, Count, DepthEstimator, DetectionRule, LaserCycle, PaperRule, PixelAddress,

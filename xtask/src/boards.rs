@@ -4,13 +4,13 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use dtof::detection::{Estimator, Rule};
+use dtof::device::monitor;
 use dtof::device::{Client, DeviceEngine, configuration};
-use dtof::engine::{Engine, host_engine};
-use dtof::monitor;
-use dtof::scene;
-use dtof::settings::{Settings, U16F16Number};
-use dtof::source::{Geometry, PhotonSource};
+use dtof::engine::detection::{Estimator, Rule};
+use dtof::engine::settings::{Settings, U16F16Number};
+use dtof::engine::{Engine, host::host_engine};
+use dtof::input::source::{Geometry, PhotonSource};
+use dtof::simulate::scene;
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_link::FaultRecord;
 

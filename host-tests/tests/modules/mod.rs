@@ -21,18 +21,29 @@ pub fn imports(source: &Path) -> Imports {
     read(source, &mut Vec::new(), &mut files);
     let modules: BTreeSet<&Module> = files.keys().collect();
     let of = |(module, file): (&Module, &syn::File)| {
-        let mut paths = Paths { module: module.clone(), found: Vec::new() };
+        let mut paths = Paths {
+            module: module.clone(),
+            found: Vec::new(),
+        };
         paths.visit_file(file);
         let led = paths.found.iter().filter_map(|path| {
-            (1..=path.len()).rev().map(|length| path[..length].to_vec()).find(|path| modules.contains(path))
+            (1..=path.len())
+                .rev()
+                .map(|length| path[..length].to_vec())
+                .find(|path| modules.contains(path))
         });
-        (module.clone(), led.filter(|to| !module.starts_with(to)).collect())
+        (
+            module.clone(),
+            led.filter(|to| !module.starts_with(to)).collect(),
+        )
     };
     files.iter().map(of).collect()
 }
 
 fn read(folder: &Path, module: &mut Module, files: &mut BTreeMap<Module, syn::File>) {
-    let Ok(entries) = fs::read_dir(folder) else { return };
+    let Ok(entries) = fs::read_dir(folder) else {
+        return;
+    };
     for path in entries.map(|entry| entry.unwrap().path()) {
         let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
         if path.is_dir() {
@@ -48,7 +59,15 @@ fn read(folder: &Path, module: &mut Module, files: &mut BTreeMap<Module, syn::Fi
             }
             let file = syn::parse_file(&fs::read_to_string(&path).unwrap()).unwrap();
             // A program and the library beside it begin at the same place.
-            files.entry(module).or_insert_with(|| syn::File { shebang: None, attrs: Vec::new(), items: Vec::new() }).items.extend(file.items);
+            files
+                .entry(module)
+                .or_insert_with(|| syn::File {
+                    shebang: None,
+                    attrs: Vec::new(),
+                    items: Vec::new(),
+                })
+                .items
+                .extend(file.items);
         }
     }
 }
@@ -87,8 +106,11 @@ impl Paths {
                 self.tree(before, &path.tree);
                 before.pop();
             }
-            syn::UseTree::Group(group) => group.items.iter().for_each(|tree| self.tree(before, tree)),
-            syn::UseTree::Name(syn::UseName { ident }) | syn::UseTree::Rename(syn::UseRename { ident, .. }) => {
+            syn::UseTree::Group(group) => {
+                group.items.iter().for_each(|tree| self.tree(before, tree))
+            }
+            syn::UseTree::Name(syn::UseName { ident })
+            | syn::UseTree::Rename(syn::UseRename { ident, .. }) => {
                 before.push(ident.to_string());
                 self.note(before);
                 before.pop();
@@ -102,7 +124,9 @@ impl Paths {
 fn is_test(attributes: &[syn::Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         attribute.path().is_ident("cfg")
-            && attribute.parse_args::<syn::Ident>().is_ok_and(|of| of == "test")
+            && attribute
+                .parse_args::<syn::Ident>()
+                .is_ok_and(|of| of == "test")
     })
 }
 
@@ -121,7 +145,11 @@ impl<'file> Visit<'file> for Paths {
     }
 
     fn visit_path(&mut self, path: &'file syn::Path) {
-        let names: Vec<String> = path.segments.iter().map(|segment| segment.ident.to_string()).collect();
+        let names: Vec<String> = path
+            .segments
+            .iter()
+            .map(|segment| segment.ident.to_string())
+            .collect();
         self.note(&names);
         syn::visit::visit_path(self, path);
     }
@@ -140,12 +168,19 @@ pub fn circles(imports: &Imports) -> Vec<Vec<String>> {
         }
         reached
     };
-    let reached: BTreeMap<&Module, BTreeSet<Module>> =
-        imports.keys().map(|module| (module, reached(module))).collect();
+    let reached: BTreeMap<&Module, BTreeSet<Module>> = imports
+        .keys()
+        .map(|module| (module, reached(module)))
+        .collect();
     let in_circle = |module: &&Module| reached[module].contains(*module);
     let circle = |module: &Module| -> Vec<String> {
-        let back = |other: &&Module| reached[module].contains(*other) && reached[other].contains(module);
-        imports.keys().filter(back).map(|module| module.join("::")).collect()
+        let back =
+            |other: &&Module| reached[module].contains(*other) && reached[other].contains(module);
+        imports
+            .keys()
+            .filter(back)
+            .map(|module| module.join("::"))
+            .collect()
     };
     let circles: BTreeSet<Vec<String>> = imports.keys().filter(in_circle).map(circle).collect();
     circles.into_iter().collect()

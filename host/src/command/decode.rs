@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::{aer_file, events_csv};
+use dtof::events::{aer_file, events_csv};
 use dtof_core::RangeScale;
 
 #[derive(Args)]

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use dtof::scene::{self, Scene};
-use dtof::source::Geometry;
+use dtof::input::source::Geometry;
+use dtof::simulate::scene::{self, Scene};
 
 use super::simulate::{Simulation, array};
 

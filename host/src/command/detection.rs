@@ -3,7 +3,7 @@
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use dtof::detection::{Estimator, Rule};
+use dtof::engine::detection::{Estimator, Rule};
 use dtof_core::WindowRule;
 use dtof_core::fixed::types::{U4F12, U8F8};
 

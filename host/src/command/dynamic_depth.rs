@@ -1,7 +1,7 @@
 //! The options of dynamic depth, the same for every command.
 
 use clap::{Args, ValueEnum};
-use dtof::dynamic_depth::DynamicDepth;
+use dtof::events::dynamic_depth::DynamicDepth;
 use dtof_core::fixed::types::U24F8;
 
 use super::operation::number;

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail, ensure};
 use clap::Args;
-use dtof::aer_file::EventKind;
+use dtof::events::aer_file::EventKind;
+use dtof::events::summary::grouped;
 use dtof::export::{Format, LaserClock, Optics, Options, export};
 use dtof::geometry::FieldOfView;
-use dtof::summary::grouped;
 
 use super::dynamic_depth;
 

@@ -9,10 +9,10 @@ use std::time::Duration;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use console::Term;
-use dtof::aer_file::Header;
+use dtof::device::monitor::map::{LiveMap, SHOW_CURSOR};
+use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::device::{self, Client};
-use dtof::monitor::map::{LiveMap, SHOW_CURSOR};
-use dtof::monitor::{Outputs, Recording, Task, array, monitor};
+use dtof::events::aer_file::Header;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_link::SensorRecord;
 

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::settings::{I24F8Number, Settings, U16F16Number};
+use dtof::engine::settings::{I24F8Number, Settings, U16F16Number};
 use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{HIGHEST_Z, RangeGate};

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use dtof::engine::host_engine;
-use dtof::output::Output;
-use dtof::photon_csv::PhotonCsv;
-use dtof::recorded::{Capture, RecordedHistograms, RecordingLength};
-use dtof::run::run;
-use dtof::source::{Geometry, PhotonSource};
-use dtof::{npy, tmf8820};
+use dtof::engine::host::host_engine;
+use dtof::engine::run::run;
+use dtof::events::output::Output;
+use dtof::input::photon_csv::PhotonCsv;
+use dtof::input::recorded::{Capture, RecordedHistograms, RecordingLength};
+use dtof::input::source::{Geometry, PhotonSource};
+use dtof::input::{npy, tmf8820};
 use dtof_core::fixed::types::{I24F8, U16F16};
 
 use super::operation::{Operation, number};

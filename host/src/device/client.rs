@@ -12,7 +12,7 @@ use dtof_link::message::{self, LINK_VERSION};
 use dtof_link::{Configuration, Refusal, Report};
 
 use super::port::Port;
-use crate::aer_file::Event;
+use crate::events::aer_file::Event;
 
 /// A device that says nothing for so long is gone.
 const SILENCE: Duration = Duration::from_secs(5);

@@ -2,6 +2,7 @@
 //! back.
 
 mod client;
+pub mod monitor;
 mod port;
 mod qemu;
 
@@ -14,12 +15,12 @@ use dtof_link::{Configuration, Report, Token};
 pub use client::Client;
 pub use port::{Port, open};
 
-use crate::aer_file::Event;
-use crate::detection::Rule;
-use crate::dynamic_depth::DynamicDepth;
 use crate::engine::Engine;
-use crate::settings::Settings;
-use crate::source::Slice;
+use crate::engine::detection::Rule;
+use crate::engine::settings::Settings;
+use crate::events::aer_file::Event;
+use crate::events::dynamic_depth::DynamicDepth;
+use crate::input::source::Slice;
 
 /// Photons into a device, events out.
 pub struct DeviceEngine {

@@ -6,8 +6,8 @@ use anyhow::Result;
 
 use super::projection::Projection;
 use super::{Finished, Out, Sink};
-use crate::aer_file::{Event, EventKind};
-use crate::events_csv;
+use crate::events::aer_file::{Event, EventKind};
+use crate::events::events_csv;
 
 /// The columns before those of `events.csv`.
 const COLUMNS: &str = "time_us,x_m,y_m,z_m";

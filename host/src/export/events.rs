@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::{Result, bail, ensure};
 
 use super::{Format, LaserClock};
-use crate::aer_file::{EventKind, Header, Reader};
+use crate::events::aer_file::{EventKind, Header, Reader};
 use crate::progress::Progress;
 
 /// The events of a file.

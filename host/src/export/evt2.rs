@@ -20,9 +20,9 @@ use dtof_core::{DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Polari
 
 use super::reorder::{Reorder, WAITING};
 use super::{Finished, LaserClock, Out, Sink};
-use crate::aer_file::Event;
-use crate::dynamic_depth::DynamicDepth;
-use crate::source::Geometry;
+use crate::events::aer_file::Event;
+use crate::events::dynamic_depth::DynamicDepth;
+use crate::input::source::Geometry;
 
 /// Columns and rows are sent in 11 bits.
 const MOST_SIDE: u32 = 1 << 11;

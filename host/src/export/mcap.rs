@@ -15,8 +15,8 @@ use super::points::{BYTES, Number, fields, record};
 use super::projection::Projection;
 use super::reorder::{Reorder, WAITING};
 use super::{Finished, Out, Sink};
-use crate::aer_file::{Event, EventKind};
-use crate::source::Geometry;
+use crate::events::aer_file::{Event, EventKind};
+use crate::input::source::Geometry;
 
 /// Points of a message, at most: a slice with more has more than one message.
 const MOST_POINTS: usize = 1 << 16;

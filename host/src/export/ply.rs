@@ -7,7 +7,7 @@ use anyhow::Result;
 use super::Out;
 use super::points::{Number, Points, fields};
 use super::projection::Projection;
-use crate::aer_file::EventKind;
+use crate::events::aer_file::EventKind;
 
 /// Begins a file of so many points.
 pub fn begin(out: Out, projection: Projection, kind: EventKind, points: u64) -> Result<Points> {

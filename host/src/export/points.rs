@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use super::projection::Projection;
 use super::{Finished, Out, Sink};
-use crate::aer_file::{Event, EventKind};
+use crate::events::aer_file::{Event, EventKind};
 
 /// What a field of a record holds, little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

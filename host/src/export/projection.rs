@@ -4,7 +4,7 @@ use anyhow::{Context, Result};
 use dtof_core::RangeScale;
 
 use super::LaserClock;
-use crate::aer_file::Event;
+use crate::events::aer_file::Event;
 use crate::geometry::Rays;
 
 /// What turns an event into a point in space and time.

@@ -5,10 +5,10 @@ use base64::Engine as _;
 use serde_json::json;
 
 use super::BASE64;
+use crate::events::sample::Sample;
+use crate::events::summary::grouped;
+use crate::input::source::Geometry;
 use crate::picture;
-use crate::sample::Sample;
-use crate::source::Geometry;
-use crate::summary::grouped;
 use dtof_core::PixelAddress;
 
 /// The events of a run.

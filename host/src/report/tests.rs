@@ -3,9 +3,9 @@ use dtof_core::{
     BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, RangeScale, SubBinOffset,
 };
 
-use crate::events_csv::range_mm;
-use crate::sample::Sample;
-use crate::source::Geometry;
+use crate::events::events_csv::range_mm;
+use crate::events::sample::Sample;
+use crate::input::source::Geometry;
 
 /// `count` events, one a laser cycle, of four pixels in turn.
 fn sample(limit: usize, count: u32) -> Sample {

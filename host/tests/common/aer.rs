@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use dtof::aer_file::{Event, Header, Writer};
+use dtof::events::aer_file::{Event, Header, Writer};
 use dtof::export::{Exported, Format, Options, export};
-use dtof::source::Geometry;
+use dtof::input::source::Geometry;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
     BinIndex, BinPosition, Count, DepthEvent, DynamicDepthEvent, Flags, LaserCycle, PixelAddress,

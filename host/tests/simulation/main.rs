@@ -8,8 +8,8 @@ mod light;
 mod motion;
 mod plain;
 
-use dtof::scene::Scene;
-use dtof::source::PhotonSource;
+use dtof::input::source::PhotonSource;
+use dtof::simulate::scene::Scene;
 
 /// Standard deviations on either side that leave 0.1 % of a normal distribution
 /// out.

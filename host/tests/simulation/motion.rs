@@ -1,7 +1,7 @@
 //! Motion: what a scene says is true, and where the photons are.
 
-use dtof::scene::{Scene, View};
-use dtof::source::Geometry;
+use dtof::input::source::Geometry;
+use dtof::simulate::scene::{Scene, View};
 use dtof_core::PixelAddress;
 
 use super::{array, float, mean, near, near_count, pixel};

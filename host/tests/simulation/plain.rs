@@ -1,8 +1,8 @@
 //! The plain model stays what it was, and effects that do nothing change
 //! nothing.
 
-use dtof::scene::{self, Scene};
-use dtof::source::{Geometry, PhotonSource};
+use dtof::input::source::{Geometry, PhotonSource};
+use dtof::simulate::scene::{self, Scene};
 use dtof_core::PixelAddress;
 use dtof_theory::random::pixel_rng;
 use rand_distr::{Bernoulli, Distribution, Normal, Poisson, Uniform};

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use dtof::summary::grouped;
+use dtof::events::summary::grouped;
 use dtof_lab::studies;
 use dtof_lab::sweep::{self, Part, SeedRange};
 use indicatif::{ProgressBar, ProgressStyle};

@@ -9,7 +9,7 @@ use rand_pcg::Pcg64;
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Share, Table, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::summary::grouped;
+use dtof::events::summary::grouped;
 use dtof_theory::gaussian::false_positive_rate;
 use dtof_theory::looks::repeated_looks::{
     self, ALPHA_STEPS, BINS, FalseEvents, MINIMUM_COUNT, alpha_bits,

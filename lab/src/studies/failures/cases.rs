@@ -7,11 +7,12 @@ use rand_core::Rng;
 use rand_pcg::Pcg64;
 
 use super::{BINS, L1, SIGMA};
-use dtof::simulation::SimulatedPixel;
-use dtof::simulation::dead_time::DeadTime;
-use dtof::simulation::effects::{Effects, Timing};
-use dtof::simulation::tail::Tail;
-use dtof::simulation::tdc::Tdc;
+use dtof::simulate::SimulatedPixel;
+use dtof::simulate::effects::Effects;
+use dtof::simulate::effects::dead_time::DeadTime;
+use dtof::simulate::effects::limits::Timing;
+use dtof::simulate::effects::tail::Tail;
+use dtof::simulate::effects::tdc::Tdc;
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 

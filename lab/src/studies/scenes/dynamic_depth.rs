@@ -14,10 +14,10 @@ use rand_pcg::Pcg64;
 use self::watched::{Watched, true_steps};
 use crate::sweep::mean::add;
 use crate::sweep::{Point, Study, Tally, point};
-use dtof::engine::host_engine;
-use dtof::scene::{self, Light, Scene, Shape};
-use dtof::settings::U16F16Number;
-use dtof::source::{Geometry, PhotonSource};
+use dtof::engine::host::host_engine;
+use dtof::engine::settings::U16F16Number;
+use dtof::input::source::{Geometry, PhotonSource};
+use dtof::simulate::scene::{self, Light, Scene, Shape};
 
 /// Laser cycles a trial lasts: half a metre of the car, four edges of the fan.
 const CYCLES: [u64; 4] = [120_000, 120_000, 400_000, 120_000];

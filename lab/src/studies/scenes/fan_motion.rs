@@ -15,9 +15,9 @@ use crate::sweep::mean::add;
 use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::scene::{Fan, Scene, Shape};
-use dtof::simulation::SimulatedPixel;
-use dtof::summary::grouped;
+use dtof::events::summary::grouped;
+use dtof::simulate::SimulatedPixel;
+use dtof::simulate::scene::{Fan, Scene, Shape};
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 

@@ -7,9 +7,9 @@ use dtof_core::{
     PixelConfig, RangeGate,
 };
 
-use dtof::frame::FramePixel;
-use dtof::scene;
-use dtof::settings::Settings;
+use dtof::engine::frame::FramePixel;
+use dtof::engine::settings::Settings;
+use dtof::simulate::scene;
 
 /// Bins of a histogram.
 pub const BINS: usize = CODES as usize;

@@ -13,9 +13,9 @@ use super::one_pixel::{self, PER_BIN, in_parts};
 use super::ranks::rank_correlation;
 use crate::sweep::mean::{add, add_error, add_value};
 use crate::sweep::{Point, Study, Tally, point};
-use dtof::engine::host_engine;
-use dtof::scene::{self, Light, Scene};
-use dtof::source::{Geometry, PhotonSource};
+use dtof::engine::host::host_engine;
+use dtof::input::source::{Geometry, PhotonSource};
+use dtof::simulate::scene::{self, Light, Scene};
 
 const CYCLES: u64 = 10_000;
 /// Laser cycles of a frame (L2).

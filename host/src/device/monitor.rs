@@ -1,0 +1,347 @@
+//! A device with a sensor: its events as they come, and once a second what it
+//! does.
+
+pub mod map;
+mod recording;
+
+use std::io::{self, ErrorKind, Write};
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use dtof_core::{RangeScale, Statistics};
+use dtof_link::FaultRecord;
+use dtof_link::Report;
+use dtof_link::endpoint::LinkCounters;
+
+use crate::device::{Client, configuration};
+use crate::engine::settings::Settings;
+use crate::events::aer_file::Event;
+use crate::events::dynamic_depth::DynamicDepth;
+use crate::events::events_csv;
+use crate::input::source::Geometry;
+use map::LiveMap;
+pub use recording::Recording;
+
+/// How often there are statistics.
+const EVERY: Duration = Duration::from_secs(1);
+
+/// What the device is to do.
+#[derive(Clone, Copy, Debug)]
+pub struct Task<'a> {
+    /// How its pixels operate.
+    pub settings: &'a Settings,
+    /// How many, addresses 0 up.
+    pub pixels: u16,
+    /// It is to send changes of depth in place of depth events.
+    pub dynamic_depth: Option<DynamicDepth>,
+}
+
+/// The array of so many `pixels`, to draw and to record: in so many `columns`, or else as
+/// high as wide, or the least bit wider.
+#[must_use]
+pub fn array(pixels: u16, columns: Option<u16>) -> Geometry {
+    let pixels = u32::from(pixels);
+    let squarest = || {
+        let rows = (1..=pixels).take_while(|rows| rows * rows <= pixels);
+        let rows = rows.filter(|rows| pixels.is_multiple_of(*rows)).last();
+        pixels / rows.unwrap_or(1)
+    };
+    let columns = columns.map_or_else(squarest, u32::from).max(1);
+    Geometry {
+        columns,
+        rows: pixels.div_ceil(columns),
+    }
+}
+
+/// Where what it does is written.
+pub struct Outputs<'a> {
+    /// Its events as CSV, as they come.
+    pub events: &'a mut dyn Write,
+    /// A line a second: rates, and of what was lost or went wrong all that did, counted
+    /// from the beginning.
+    pub statistics: &'a mut dyn Write,
+    /// The ranges as a picture, and then the lines of statistics below it.
+    pub map: Option<&'a mut LiveMap>,
+    /// All events once more.
+    pub recording: Option<&'a mut Recording>,
+}
+
+impl Outputs<'_> {
+    /// A line of statistics.
+    fn tell(&mut self, line: String, readers: &mut Readers) -> Result<()> {
+        if !readers.statistics {
+            return Ok(());
+        }
+        readers.statistics = still_open(match &mut self.map {
+            None => writeln!(self.statistics, "{line}"),
+            Some(map) => {
+                map.tell(line);
+                map.draw()
+            }
+        })?;
+        Ok(())
+    }
+
+    /// Events. They are recorded whether or not somebody reads them.
+    fn write(&mut self, events: &[Event], scale: &RangeScale, readers: &mut Readers) -> Result<()> {
+        if let Some(recording) = &mut self.recording {
+            recording.write(events)?;
+        }
+        if readers.events {
+            readers.events = still_open(write(self.events, events, scale))?;
+        }
+        if let Some(map) = &mut self.map
+            && readers.statistics
+        {
+            map.add(events, scale);
+            readers.statistics = still_open(map.draw_when_due())?;
+        }
+        Ok(())
+    }
+
+    /// The picture as it is at the end.
+    fn finish(&mut self, readers: &Readers) -> Result<()> {
+        if let Some(map) = &mut self.map
+            && readers.statistics
+        {
+            still_open(map.draw())?;
+        }
+        Ok(())
+    }
+}
+
+/// Which outputs somebody still reads.
+struct Readers {
+    events: bool,
+    /// Or the map in their place.
+    statistics: bool,
+}
+
+/// Has the device take photons from its sensor, and writes what it does to `outputs`.
+///
+/// Ends when `done`, asked again and again, says so of the time it has taken, or
+/// when the reader of an output is gone, unless there is a recording: it goes on, and
+/// what is read by nobody ends alone. The device takes no photons from its sensor then.
+/// Every event that has arrived is written, also if the device is gone.
+///
+/// # Errors
+/// If the device refuses the settings or is gone, or what is written cannot be.
+pub fn monitor(
+    client: &mut Client,
+    task: &Task,
+    done: impl Fn(Duration) -> bool,
+    outputs: &mut Outputs,
+) -> Result<()> {
+    let scale = task.settings.range_scale()?;
+    let mut readers = Readers {
+        events: true,
+        statistics: true,
+    };
+    let watched = watch(client, task, &scale, done, outputs, &mut readers);
+    let written = outputs.write(&client.take_events(), &scale, &mut readers);
+    watched.and(written).and(outputs.finish(&readers))
+}
+
+/// [`monitor`] but for the events that have arrived and are not yet written.
+fn watch(
+    client: &mut Client,
+    task: &Task,
+    scale: &RangeScale,
+    done: impl Fn(Duration) -> bool,
+    outputs: &mut Outputs,
+    readers: &mut Readers,
+) -> Result<()> {
+    let configuration =
+        |source| configuration(task.settings, task.pixels, source, task.dynamic_depth);
+    client.configure(&configuration(1)?)?;
+    let started = Instant::now();
+    let mut figures = Figures {
+        since: started,
+        here: *client.counters(),
+        first: client.report()?,
+        last: Statistics::default(),
+    };
+    let columns = match task.dynamic_depth {
+        None => events_csv::HEADER,
+        Some(_) => events_csv::DYNAMIC_DEPTH_HEADER,
+    };
+    readers.events = still_open(header(outputs.events, columns))?;
+    let recorded = outputs.recording.is_some();
+    let goes_on = |readers: &Readers| recorded || (readers.events && readers.statistics);
+    let mut asked = false;
+    while goes_on(readers) && !done(started.elapsed()) {
+        if !asked && figures.since.elapsed() >= EVERY {
+            client.request_report()?;
+            asked = true;
+        }
+        let report = client.poll_report()?;
+        outputs.write(&client.take_events(), scale, readers)?;
+        if let Some(report) = report {
+            outputs.tell(figures.line(client, &report), readers)?;
+            asked = false;
+        }
+    }
+    // The last second, unless it has only just begun.
+    if asked || (goes_on(readers) && figures.since.elapsed() >= EVERY / 2) {
+        if !asked {
+            client.request_report()?;
+        }
+        let report = loop {
+            if let Some(report) = client.poll_report()? {
+                break report;
+            }
+        };
+        outputs.tell(figures.line(client, &report), readers)?;
+    }
+    // After the answer there are no more events.
+    client.configure(&configuration(0)?)
+}
+
+fn header(out: &mut dyn Write, columns: &str) -> io::Result<()> {
+    writeln!(out, "{columns}")?;
+    out.flush()
+}
+
+fn write(out: &mut dyn Write, events: &[Event], scale: &RangeScale) -> io::Result<()> {
+    for event in events {
+        events_csv::write_event(&mut *out, event, scale)?;
+    }
+    if events.is_empty() {
+        return Ok(());
+    }
+    out.flush()
+}
+
+/// Whether somebody still reads what was written.
+fn still_open(written: io::Result<()>) -> io::Result<bool> {
+    match written {
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// What the lines of statistics are worked out from.
+struct Figures {
+    /// When the last line was.
+    since: Instant,
+    /// What this end had counted at the beginning.
+    here: LinkCounters,
+    /// What the device had counted at the beginning.
+    first: Report,
+    /// Events and photons at the last line.
+    last: Statistics,
+}
+
+impl Figures {
+    /// Rates since the last line.
+    #[allow(clippy::cast_precision_loss, reason = "rates to look at")]
+    fn line(&mut self, client: &Client, report: &Report) -> String {
+        let seconds = self.since.elapsed().as_secs_f64();
+        let rate = |now: u64, before: u64| now.saturating_sub(before) as f64 / seconds;
+        let (now, last) = (&report.statistics, &self.last);
+        let mut line = format!(
+            "events/s {:.0}, photons/s {:.0}",
+            rate(now.events, last.events),
+            rate(now.photons(), last.photons()),
+        );
+        line += &losses(report, &self.first, &since(client.counters(), &self.here));
+        self.since = Instant::now();
+        self.last = *now;
+        line
+    }
+}
+
+/// What went wrong since the device had counted `first`, each with a comma before
+/// it; what did not is left out. `here` is what this end of the link has counted.
+#[must_use]
+pub fn losses(report: &Report, first: &Report, here: &LinkCounters) -> String {
+    let Statistics {
+        saturated,
+        rejected,
+        gated_out,
+        deferred,
+        expired,
+        expired_deferred,
+        ..
+    } = report.statistics;
+    let there = since(&report.link, &first.link);
+    let both = |count: fn(&LinkCounters) -> u32| u64::from(count(&there)) + u64::from(count(here));
+    let sensor_errors = report.sensor_errors.wrapping_sub(first.sensor_errors);
+    let counts = [
+        ("saturated", saturated),
+        ("rejected", rejected),
+        ("gated out", gated_out),
+        ("unaddressed", report.unaddressed),
+        ("deferred", deferred),
+        ("expired", expired),
+        ("expired and deferred", expired_deferred),
+        (
+            "lost bytes",
+            report.overrun.wrapping_sub(first.overrun).into(),
+        ),
+        ("corrupt frames", both(|link| link.corrupt)),
+        ("oversized frames", both(|link| link.oversized)),
+        ("foreign frames", both(|link| link.foreign)),
+        ("out of order", both(|link| link.out_of_order)),
+        ("duplicates", both(|link| link.duplicate)),
+        ("retransmissions", both(|link| link.retransmitted)),
+        (
+            "unknown messages",
+            report.unknown.wrapping_sub(first.unknown).into(),
+        ),
+        ("sensor errors", sensor_errors.into()),
+    ];
+    let mut line = String::new();
+    for (name, count) in counts.into_iter().filter(|&(_, count)| count > 0) {
+        line += &format!(", {name} {count}");
+    }
+    if sensor_errors > 0 {
+        let number = report.last_sensor_error;
+        line += &match FaultRecord::from_number(number) {
+            Some(fault) => format!(" (last: {fault})"),
+            None => format!(" (last: number {number})"),
+        };
+    }
+    line
+}
+
+/// What was counted since `first`.
+fn since(now: &LinkCounters, first: &LinkCounters) -> LinkCounters {
+    LinkCounters {
+        frames: now.frames.wrapping_sub(first.frames),
+        corrupt: now.corrupt.wrapping_sub(first.corrupt),
+        oversized: now.oversized.wrapping_sub(first.oversized),
+        foreign: now.foreign.wrapping_sub(first.foreign),
+        out_of_order: now.out_of_order.wrapping_sub(first.out_of_order),
+        duplicate: now.duplicate.wrapping_sub(first.duplicate),
+        retransmitted: now.retransmitted.wrapping_sub(first.retransmitted),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrays_are_as_high_as_wide_if_they_can_be() {
+        let array = |pixels, columns| {
+            let Geometry { columns, rows } = array(pixels, columns);
+            (columns, rows)
+        };
+        let squarest = [1, 2, 4, 9, 64, 128, 2048, 7, 0].map(|pixels| array(pixels, None));
+        let expected = [
+            (1, 1),
+            (2, 1),
+            (2, 2),
+            (3, 3),
+            (8, 8),
+            (16, 8),
+            (64, 32),
+            (7, 1),
+            (1, 0),
+        ];
+        assert_eq!(squarest, expected);
+        assert_eq!(array(64, Some(10)), (10, 7));
+    }
+}

@@ -1,0 +1,198 @@
+//! The ranges of a device's pixels as a picture on a terminal, drawn in place.
+//!
+//! A character shows two pixels, one above the other: the upper half of a block in one
+//! colour, on the other colour. Colours are those of the maps, and span what is shown.
+
+use std::io::{self, Write};
+use std::time::{Duration, Instant};
+
+use dtof_core::RangeScale;
+
+use crate::events::aer_file::Event;
+use crate::picture::{colour, levels, span};
+
+/// How often it is drawn.
+const EVERY: Duration = Duration::from_millis(200);
+
+const HIDE_CURSOR: &str = "\x1b[?25l";
+/// What undoes it, also for who ends the program in another way.
+pub const SHOW_CURSOR: &str = "\x1b[?25h";
+const PLAIN: &str = "\x1b[0m";
+const CLEAR_REST: &str = "\x1b[K";
+/// Everything gone, and the cursor in the first line.
+const CLEAR_ALL: &str = "\x1b[2J\x1b[H";
+
+/// Lines and columns of a terminal, asked for each time: its window may change.
+pub type Room = Box<dyn Fn() -> (usize, usize)>;
+
+/// The picture and where it is drawn. The cursor is hidden as long as it lives.
+pub struct LiveMap {
+    out: Box<dyn Write>,
+    room: Room,
+    columns: usize,
+    ranges: Vec<Option<f64>>,
+    /// What stands below the picture.
+    line: String,
+    /// Lines that are there from the last time, and the room there was.
+    lines: usize,
+    before: (usize, usize),
+    drawn: Option<Instant>,
+}
+
+impl LiveMap {
+    /// A picture of so many `pixels` on `out`, a terminal with so much `room`. The array has so many `columns`.
+    #[must_use]
+    pub fn new(out: Box<dyn Write>, room: Room, pixels: u16, columns: usize) -> Self {
+        let pixels = usize::from(pixels);
+        Self {
+            out,
+            room,
+            columns,
+            ranges: vec![None; pixels],
+            line: String::new(),
+            lines: 0,
+            before: (0, 0),
+            drawn: None,
+        }
+    }
+
+    /// Takes events in.
+    pub fn add(&mut self, events: &[Event], scale: &RangeScale) {
+        for event in events {
+            if let Some(range) = self.ranges.get_mut(usize::from(event.pixel().0)) {
+                *range = Some(scale.range(event.position()).to_num());
+            }
+        }
+    }
+
+    /// What is to stand below the picture from now on.
+    pub fn tell(&mut self, line: String) {
+        self.line = line;
+    }
+
+    /// Draws if it is time to.
+    ///
+    /// # Errors
+    /// Those of the terminal.
+    pub fn draw_when_due(&mut self) -> io::Result<()> {
+        if self.drawn.is_some_and(|drawn| drawn.elapsed() < EVERY) {
+            return Ok(());
+        }
+        self.draw()
+    }
+
+    /// Draws over what was drawn before.
+    ///
+    /// # Errors
+    /// Those of the terminal.
+    pub fn draw(&mut self) -> io::Result<()> {
+        let room = (self.room)();
+        // Two lines below the picture, and the one of the cursor. The last column stays free:
+        // a line that fills it would clear it, or go on in the next.
+        let (lines, columns) = (room.0.saturating_sub(3), room.1.saturating_sub(1));
+        let mut text = picture(&self.ranges, self.columns, lines, columns);
+        text.push(legend(&self.ranges));
+        text.push(self.line.clone());
+        let back = match self.lines {
+            0 => HIDE_CURSOR.to_owned(),
+            // Lines may be broken in another way now.
+            _ if room != self.before => CLEAR_ALL.to_owned(),
+            lines => format!("\r\x1b[{lines}A"),
+        };
+        self.out.write_all(back.as_bytes())?;
+        for line in &text {
+            writeln!(self.out, "{}{CLEAR_REST}", cut(line, columns))?;
+        }
+        self.lines = text.len();
+        self.before = room;
+        self.drawn = Some(Instant::now());
+        self.out.flush()
+    }
+}
+
+impl Drop for LiveMap {
+    fn drop(&mut self) {
+        let _ = write!(self.out, "{PLAIN}{SHOW_CURSOR}");
+        let _ = self.out.flush();
+    }
+}
+
+/// `ranges`, `columns` in a row, as lines of text with colours, at most as many and as
+/// wide as there is room for: where there is too little, only every second pixel of
+/// every second row is shown, or every third, and so on. Pixels without a range are left
+/// empty.
+#[must_use]
+pub fn picture(
+    ranges: &[Option<f64>],
+    columns: usize,
+    most_lines: usize,
+    most_columns: usize,
+) -> Vec<String> {
+    let levels = levels(ranges);
+    let rows: Vec<&[Option<u8>]> = levels.chunks(columns.max(1)).collect();
+    let step = columns
+        .div_ceil(most_columns.max(1))
+        .max(rows.len().div_ceil(2 * most_lines.max(1)))
+        .max(1);
+    let rows: Vec<_> = rows.into_iter().step_by(step).collect();
+    let mut lines = Vec::new();
+    for pair in rows.chunks(2) {
+        let mut line = String::new();
+        for column in (0..columns).step_by(step) {
+            let level = |row: usize| pair.get(row)?.get(column).copied().flatten();
+            line += &block(level(0), level(1));
+        }
+        lines.push(line + PLAIN);
+    }
+    lines
+}
+
+/// The first `columns` characters of `line`, and all of its colours.
+fn cut(line: &str, columns: usize) -> String {
+    let (mut seen, mut in_code) = (0, false);
+    let kept = line.chars().filter(|&character| {
+        let visible = !in_code && character != '\x1b';
+        if visible {
+            seen += 1;
+        } else {
+            // A code ends with its first letter.
+            in_code = !character.is_ascii_alphabetic();
+        }
+        !visible || seen <= columns
+    });
+    kept.collect()
+}
+
+/// A character with the colours of an upper and a lower pixel.
+fn block(upper: Option<u8>, lower: Option<u8>) -> String {
+    let code = |ground: u8, level: u8| {
+        let (red, green, blue) = colour(level);
+        format!("\x1b[{ground};2;{red};{green};{blue}m")
+    };
+    let (fore, back) = (38, 48);
+    match (upper, lower) {
+        (None, None) => format!("{PLAIN} "),
+        (Some(upper), None) => format!("{PLAIN}{}▀", code(fore, upper)),
+        (None, Some(lower)) => format!("{PLAIN}{}▄", code(fore, lower)),
+        (Some(upper), Some(lower)) => format!("{}{}▀", code(fore, upper), code(back, lower)),
+    }
+}
+
+/// What the colours mean.
+fn legend(ranges: &[Option<f64>]) -> String {
+    let reporting = ranges.iter().flatten().count();
+    let pixels = ranges.len();
+    match span(ranges) {
+        None => format!("no event yet of {pixels} pixels"),
+        Some((low, high)) => {
+            let (purple, yellow) = (block(Some(0), Some(0)), block(Some(255), Some(255)));
+            format!(
+                "{purple}{PLAIN} {low:.0} mm to {yellow}{PLAIN} {high:.0} mm, \
+                 {reporting} of {pixels} pixels"
+            )
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,133 @@
+//! The events of a device as an AER file.
+
+use std::fs;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use tempfile::NamedTempFile;
+
+use crate::events::aer_file::{Event, Header, Writer};
+use crate::events::output::{aside, flushed, place_of};
+
+/// A file on its way: written aside, and at its place once [`Recording::finish`] has
+/// returned. What cannot be moved there stays aside: events do not come twice.
+pub struct Recording {
+    aer: Writer<BufWriter<NamedTempFile>>,
+    path: PathBuf,
+    aside: PathBuf,
+    is_empty: bool,
+}
+
+impl Recording {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// If nothing can be written in its folder, or what is at `path` is no file.
+    pub fn new(path: &Path, header: &Header) -> Result<Self> {
+        let place = place_of(path)?;
+        let name = || path.display().to_string();
+        let mut file = aside(&place.folder, ".dtof-recording-").with_context(name)?;
+        file.disable_cleanup(true);
+        Ok(Self {
+            aside: file.path().to_owned(),
+            aer: Writer::new(BufWriter::new(file), header).with_context(name)?,
+            path: place.file,
+            is_empty: true,
+        })
+    }
+
+    /// Writes events in the order they come.
+    ///
+    /// # Errors
+    /// If the disk does not take them.
+    pub fn write(&mut self, events: &[Event]) -> Result<()> {
+        for event in events {
+            let written = self.aer.write(event);
+            written.with_context(|| self.path.display().to_string())?;
+            self.is_empty = false;
+        }
+        Ok(())
+    }
+
+    /// Ends the file after a failure: what came before is kept, and if nothing came, so is
+    /// what was at its place.
+    ///
+    /// # Errors
+    /// Those of [`Recording::finish`], or if the file cannot be removed.
+    pub fn finish_after_failure(self) -> Result<()> {
+        if !self.is_empty {
+            return self.finish();
+        }
+        drop(self.aer);
+        fs::remove_file(&self.aside).with_context(|| self.aside.display().to_string())
+    }
+
+    /// Ends the file and moves it to its place.
+    ///
+    /// # Errors
+    /// If the disk does not take it; says where the events are then.
+    pub fn finish(self) -> Result<()> {
+        let Self {
+            aer, path, aside, ..
+        } = self;
+        let moved = || -> Result<()> {
+            let file = flushed(aer.finish()?)?;
+            file.persist(&path).map_err(|error| error.error)?;
+            Ok(())
+        };
+        moved().with_context(|| {
+            let (path, aside) = (path.display(), aside.display());
+            format!("{path}: cannot be written, {aside} has what was recorded")
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dtof_core::fixed::types::{I24F8, U16F16};
+
+    use super::*;
+    use crate::input::source::Geometry;
+
+    const HEADER: Header = Header {
+        bins: 128,
+        geometry: Geometry {
+            columns: 2,
+            rows: 2,
+        },
+        bin_width_ps: U16F16::lit("250"),
+        offset_mm: I24F8::ZERO,
+    };
+
+    #[test]
+    fn only_a_file_in_a_folder_that_is_there_is_begun() {
+        let folder = tempfile::tempdir().unwrap();
+        let gone = folder.path().join("gone").join("events.aer");
+        for (path, part) in [
+            (folder.path(), ": is there, and is no file"),
+            (&gone, ": there is no folder "),
+        ] {
+            let error = Recording::new(path, &HEADER).map(|_| ()).unwrap_err();
+            assert!(format!("{error:#}").contains(part), "{error:#}");
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn what_cannot_be_moved_to_its_place_stays_and_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("events.aer");
+        let recording = Recording::new(&path, &HEADER).unwrap();
+        let aside = recording.aside.clone();
+        fs::create_dir(&path).unwrap();
+        let error = format!("{:#}", recording.finish().unwrap_err());
+        assert!(
+            error.contains(&format!("{} has what was recorded", aside.display())),
+            "{error}"
+        );
+        assert_eq!(error.matches("os error").count(), 1, "{error}");
+        // The header and the end.
+        assert_eq!(fs::read(aside).unwrap().len(), 64 + 16);
+    }
+}

@@ -1,0 +1,26 @@
+//! The engine: photons in, depth events out.
+
+pub mod detection;
+pub mod frame;
+pub mod host;
+pub mod run;
+pub mod settings;
+
+use anyhow::Result;
+use dtof_core::{DepthEvent, Statistics};
+
+use crate::input::source::Slice;
+
+/// Turns photons into events. Whatever runs behind it, the same photons give
+/// the same events.
+pub trait Engine {
+    /// Runs one slice and gives the events of its laser cycles, in order of
+    /// laser cycle and then of pixel address.
+    ///
+    /// # Errors
+    /// If the engine could not be reached.
+    fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>>;
+
+    /// What all pixels together have done so far.
+    fn statistics(&self) -> Statistics;
+}

@@ -1,0 +1,351 @@
+//! AER files: a header, words, and an end word with their number and checksum.
+//! The format is `docs/aer-format.md`, section "Files".
+
+use std::io::{self, Read, Write};
+
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use crc::{CRC_32_ISO_HDLC, Crc, Digest};
+use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_core::{
+    AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord, BinPosition, DepthEvent,
+    DynamicDepthEvent, Flags, LaserCycle, PixelAddress,
+};
+
+use crate::input::source::Geometry;
+
+const MAGIC: [u8; 8] = *b"DTOF-AER";
+const HEADER_BYTES: u16 = 64;
+/// The oldest version that is read: it has depth events only.
+const OLDEST_VERSION: u16 = 1;
+static CRC_32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// An event of either kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A peak stood clear.
+    Depth(DepthEvent),
+    /// The mean depth has changed.
+    DynamicDepth(DynamicDepthEvent),
+}
+
+/// Which kind of event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum EventKind {
+    /// Depth events.
+    Depth,
+    /// Dynamic depth events.
+    DynamicDepth,
+}
+
+impl Event {
+    /// Which kind it is.
+    #[must_use]
+    pub fn kind(&self) -> EventKind {
+        match self {
+            Self::Depth(_) => EventKind::Depth,
+            Self::DynamicDepth(_) => EventKind::DynamicDepth,
+        }
+    }
+
+    /// Which macropixel.
+    #[must_use]
+    pub fn pixel(&self) -> PixelAddress {
+        match self {
+            Self::Depth(event) => event.pixel,
+            Self::DynamicDepth(event) => event.pixel,
+        }
+    }
+
+    /// When.
+    #[must_use]
+    pub fn cycle(&self) -> LaserCycle {
+        match self {
+            Self::Depth(event) => event.cycle,
+            Self::DynamicDepth(event) => event.cycle,
+        }
+    }
+
+    /// Where: the pulse, or the mean after the change.
+    #[must_use]
+    pub fn position(&self) -> BinPosition {
+        match self {
+            Self::Depth(event) => event.position(),
+            Self::DynamicDepth(event) => event.position,
+        }
+    }
+
+    /// What is to be said against it.
+    #[must_use]
+    pub fn flags(&self) -> Flags {
+        match self {
+            Self::Depth(event) => event.flags,
+            Self::DynamicDepth(event) => event.flags,
+        }
+    }
+}
+
+/// What a reader must know to turn words into ranges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Header {
+    /// Bins of a histogram.
+    pub bins: u32,
+    /// The array.
+    pub geometry: Geometry,
+    /// Picoseconds a bin.
+    pub bin_width_ps: U16F16,
+    /// Millimetres added to every range.
+    pub offset_mm: I24F8,
+}
+
+impl Header {
+    fn to_bytes(self) -> [u8; HEADER_BYTES as usize] {
+        let mut bytes = [0; HEADER_BYTES as usize];
+        let fields = [
+            &MAGIC[..],
+            &AER_VERSION.to_le_bytes(),
+            &HEADER_BYTES.to_le_bytes(),
+            &self.bins.to_le_bytes(),
+            &self.geometry.columns.to_le_bytes(),
+            &self.geometry.rows.to_le_bytes(),
+            &self.bin_width_ps.to_le_bytes(),
+            &self.offset_mm.to_le_bytes(),
+        ]
+        .concat();
+        bytes[..fields.len()].copy_from_slice(&fields);
+        bytes
+    }
+
+    fn from_bytes(bytes: &[u8; HEADER_BYTES as usize]) -> Result<Self> {
+        let u16_at = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        let four_at = |at: usize| [bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]];
+        let u32_at = |at: usize| u32::from_le_bytes(four_at(at));
+        ensure!(bytes[..8] == MAGIC, "not an AER file");
+        let version = u16_at(8);
+        ensure!(
+            (OLDEST_VERSION..=AER_VERSION).contains(&version),
+            "AER version {version}; this program reads {OLDEST_VERSION} to {AER_VERSION}"
+        );
+        ensure!(
+            u16_at(10) == HEADER_BYTES && bytes[32..].iter().all(|&byte| byte == 0),
+            "the header is damaged"
+        );
+        let geometry = Geometry {
+            columns: u32_at(16),
+            rows: u32_at(20),
+        };
+        ensure!(
+            (1..=1 << 16).contains(&addresses(geometry)),
+            "the header says {}x{} pixels: must be 1 to 65,536",
+            geometry.columns,
+            geometry.rows
+        );
+        Ok(Self {
+            bins: u32_at(12),
+            geometry,
+            bin_width_ps: U16F16::from_le_bytes(four_at(24)),
+            offset_mm: I24F8::from_le_bytes(four_at(28)),
+        })
+    }
+
+    /// Can an array with this header have sent the event?
+    fn check(&self, event: &Event) -> Result<()> {
+        let (pixel, pixels) = (event.pixel().0, addresses(self.geometry));
+        ensure!(u64::from(pixel) < pixels, "pixel {pixel} of {pixels}");
+        let (bin, beyond) = match event {
+            Event::Depth(event) => (event.peak_bin.raw().into(), self.bins.into()),
+            // A position lies up to one bin beyond that of the peak.
+            Event::DynamicDepth(event) => (
+                i64::from(event.position.raw() >> BinPosition::FRACTIONAL_BITS),
+                i64::from(self.bins) + 1,
+            ),
+        };
+        ensure!(bin < beyond, "bin {bin} of {}", self.bins);
+        Ok(())
+    }
+}
+
+/// Pixels of an array of any size.
+fn addresses(array: Geometry) -> u64 {
+    u64::from(array.columns) * u64::from(array.rows)
+}
+
+/// Writes a file; it is complete once [`Writer::finish`] has returned.
+pub struct Writer<W: Write> {
+    out: W,
+    digest: Digest<'static, u32>,
+    encoder: AerEncoder,
+    events: u64,
+}
+
+impl<W: Write> Writer<W> {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn new(out: W, header: &Header) -> io::Result<Self> {
+        let mut writer = Self {
+            out,
+            digest: CRC_32.digest(),
+            encoder: AerEncoder::new(),
+            events: 0,
+        };
+        writer.put(&header.to_bytes())?;
+        Ok(writer)
+    }
+
+    /// Writes one event, and the time word before it if one is due.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write(&mut self, event: &Event) -> io::Result<()> {
+        let (time, word) = match event {
+            Event::Depth(event) => self.encoder.encode(event),
+            Event::DynamicDepth(event) => self.encoder.encode_dynamic_depth(event),
+        };
+        if let Some(time) = time {
+            self.put(&time.to_le_bytes())?;
+        }
+        self.events += 1;
+        self.put(&word.to_le_bytes())
+    }
+
+    /// Ends the file and gives the writer back.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn finish(mut self) -> io::Result<W> {
+        let end = AerWord::end(self.events, self.digest.finalize());
+        self.out.write_all(&end.to_le_bytes())?;
+        Ok(self.out)
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.digest.update(bytes);
+        self.out.write_all(bytes)
+    }
+}
+
+/// Reads a file, event by event.
+pub struct Reader<R: Read> {
+    input: R,
+    version: u16,
+    digest: Digest<'static, u32>,
+    decoder: AerDecoder,
+    header: Header,
+    offset: u64,
+    events: u64,
+    ended: bool,
+}
+
+impl<R: Read> Reader<R> {
+    /// Reads the header.
+    ///
+    /// # Errors
+    /// If there is none, or one of another format.
+    pub fn new(mut input: R) -> Result<Self> {
+        let mut bytes = [0; HEADER_BYTES as usize];
+        input
+            .read_exact(&mut bytes)
+            .map_err(|error| match error.kind() {
+                io::ErrorKind::UnexpectedEof => anyhow!("not an AER file: shorter than its header"),
+                _ => error.into(),
+            })?;
+        let mut digest = CRC_32.digest();
+        digest.update(&bytes);
+        Ok(Self {
+            input,
+            digest,
+            decoder: AerDecoder::new(),
+            version: u16::from_le_bytes([bytes[8], bytes[9]]),
+            header: Header::from_bytes(&bytes)?,
+            offset: HEADER_BYTES.into(),
+            events: 0,
+            ended: false,
+        })
+    }
+
+    /// The header.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The byte of the file at which the next word begins.
+    pub fn offset(&self) -> u64 {
+        self.offset
+    }
+
+    /// The next event, or `None` after the end word.
+    ///
+    /// # Errors
+    /// What is wrong and at which byte of the file.
+    pub fn next_event(&mut self) -> Result<Option<Event>> {
+        while !self.ended {
+            let word = self.next_word();
+            // Nothing that is wrong has been passed.
+            if let Some(event) = word.with_context(|| format!("byte {}", self.offset))? {
+                return Ok(Some(event));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Reads one word; gives the event if it is one.
+    fn next_word(&mut self) -> Result<Option<Event>> {
+        let Some(bytes) = self.read_word()? else {
+            bail!("the file ends without an end word");
+        };
+        match self.decoder.decode(AerWord::from_le_bytes(bytes))? {
+            AerRecord::Event(event) => self.counted(&bytes, Event::Depth(event)).map(Some),
+            AerRecord::DynamicDepth(event) => {
+                ensure!(self.version > OLDEST_VERSION, AerError::UnknownKind);
+                self.counted(&bytes, Event::DynamicDepth(event)).map(Some)
+            }
+            AerRecord::Time(_) => {
+                self.accept(&bytes);
+                Ok(None)
+            }
+            AerRecord::End { events, checksum } => {
+                self.ended = true;
+                ensure!(
+                    events == self.events,
+                    "the end word counts {events} events, the file holds {}",
+                    self.events
+                );
+                ensure!(
+                    checksum == self.digest.clone().finalize(),
+                    "the checksum does not match: a word before this one is damaged"
+                );
+                self.offset += AerWord::BYTES as u64;
+                ensure!(self.input.read(&mut [0])? == 0, "bytes follow the end word");
+                Ok(None)
+            }
+        }
+    }
+
+    /// The bytes of the next word, or `None` at the end of the file.
+    fn read_word(&mut self) -> Result<Option<[u8; AerWord::BYTES]>> {
+        let mut bytes = Vec::with_capacity(AerWord::BYTES);
+        self.input
+            .by_ref()
+            .take(AerWord::BYTES as u64)
+            .read_to_end(&mut bytes)?;
+        if bytes.is_empty() {
+            return Ok(None);
+        }
+        let word = <[u8; AerWord::BYTES]>::try_from(bytes);
+        word.map(Some)
+            .map_err(|_| anyhow!("the file ends inside a word"))
+    }
+
+    fn counted(&mut self, bytes: &[u8; AerWord::BYTES], event: Event) -> Result<Event> {
+        self.header.check(&event)?;
+        self.accept(bytes);
+        self.events += 1;
+        Ok(event)
+    }
+
+    fn accept(&mut self, bytes: &[u8; AerWord::BYTES]) {
+        self.digest.update(bytes);
+        self.offset += AerWord::BYTES as u64;
+    }
+}

@@ -1,0 +1,166 @@
+//! What the events of a run look like, pixel by pixel.
+
+use std::collections::VecDeque;
+
+use dtof_core::fixed::types::I24F8;
+use dtof_core::{DepthEvent, PixelAddress, RangeScale, Reflectivity};
+
+use crate::events::events_csv::range_mm;
+use crate::input::source::Geometry;
+
+/// How many events the mean map averages, as in the paper's figure.
+pub const MEAN_OF: usize = 10;
+
+/// The ranges of one pixel.
+#[derive(Clone, Debug, Default)]
+pub struct PixelHistory {
+    /// Laser cycle and range in millimetres of the last [`MEAN_OF`] events, or
+    /// fewer, oldest first.
+    recent: VecDeque<(u64, f64)>,
+    /// How bright the surface is.
+    reflectivity: Reflectivity,
+    /// All events.
+    pub events: u64,
+    /// The laser cycle of the first.
+    pub first_cycle: Option<u64>,
+}
+
+impl PixelHistory {
+    fn push(&mut self, cycle: u64, range_mm: f64) {
+        if self.recent.len() == MEAN_OF {
+            self.recent.pop_front();
+        }
+        self.recent.push_back((cycle, range_mm));
+    }
+
+    /// The range of the last event.
+    #[must_use]
+    pub fn last_mm(&self) -> Option<f64> {
+        self.recent.back().map(|(_, range_mm)| *range_mm)
+    }
+
+    /// The laser cycle of the last event.
+    #[must_use]
+    pub fn last_cycle(&self) -> Option<u64> {
+        self.recent.back().map(|(cycle, _)| *cycle)
+    }
+
+    /// Laser cycle and range in millimetres of the last [`MEAN_OF`] events, or
+    /// of as many as there are, oldest first.
+    pub fn recent(&self) -> impl Iterator<Item = (u64, f64)> {
+        self.recent.iter().copied()
+    }
+
+    /// The mean range of the last [`MEAN_OF`] events, or of as many as there
+    /// are.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss, reason = "at most ten")]
+    pub fn mean_mm(&self) -> Option<f64> {
+        let count = self.recent.len();
+        (count > 0).then(|| self.recent().map(|(_, range_mm)| range_mm).sum::<f64>() / count as f64)
+    }
+
+    /// Relative reflectivity as the paper has it, events × range², at the mean range.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss, reason = "to look at")]
+    pub fn reflectivity_of_events(&self) -> Option<f64> {
+        let range = I24F8::saturating_from_num(self.mean_mm()?);
+        Some(self.reflectivity.of_events(range) as f64)
+    }
+
+    /// Relative reflectivity from the signal photons a laser cycle, × range², at the
+    /// mean range.
+    #[must_use]
+    pub fn reflectivity_of_signal(&self) -> Option<f64> {
+        let range = I24F8::saturating_from_num(self.mean_mm()?);
+        Some(self.reflectivity.of_signal(range).to_num())
+    }
+}
+
+/// All pixels of an array, row by row.
+#[derive(Clone, Debug)]
+pub struct Maps {
+    /// The array.
+    pub geometry: Geometry,
+    /// One for each address.
+    pub pixels: Vec<PixelHistory>,
+}
+
+impl Maps {
+    /// Nothing yet.
+    #[must_use]
+    pub fn new(geometry: Geometry) -> Self {
+        Self {
+            geometry,
+            pixels: vec![PixelHistory::default(); geometry.addresses()],
+        }
+    }
+
+    /// Takes one event into account.
+    pub fn add(&mut self, event: &DepthEvent, scale: &RangeScale) {
+        let pixel = &mut self.pixels[usize::from(event.pixel.0)];
+        pixel.push(event.cycle.0, range_mm(event, scale));
+        pixel.reflectivity.add(event);
+        pixel.events += 1;
+        pixel.first_cycle.get_or_insert(event.cycle.0);
+    }
+
+    /// Pixels with at least one event.
+    #[must_use]
+    pub fn reporting(&self) -> usize {
+        self.pixels.iter().filter(|pixel| pixel.events > 0).count()
+    }
+
+    /// Of the pixels with an event, those with the most, the median number and the
+    /// fewest, and the two halfway between; fewer if there are fewer. The lower address
+    /// comes first where two have as many.
+    #[must_use]
+    pub fn spread(&self) -> Vec<PixelAddress> {
+        let all = (0..=u16::MAX).map(PixelAddress).zip(&self.pixels);
+        let mut pixels: Vec<_> = all.filter(|(_, pixel)| pixel.events > 0).collect();
+        pixels.sort_by_key(|(_, pixel)| std::cmp::Reverse(pixel.events));
+        let Some(last) = pixels.len().checked_sub(1) else {
+            return Vec::new();
+        };
+        let mut places: Vec<usize> = (0..=4).map(|quarter| last * quarter / 4).collect();
+        places.dedup();
+        places.into_iter().map(|place| pixels[place].0).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_range_is_the_newest_and_the_mean_that_of_the_last_ten() {
+        let mut pixel = PixelHistory::default();
+        assert_eq!((pixel.last_mm(), pixel.mean_mm()), (None, None));
+        for range in 1..=12u32 {
+            pixel.push(range.into(), range.into());
+        }
+        assert_eq!(pixel.last_mm(), Some(12.0));
+        assert_eq!(pixel.mean_mm(), Some(7.5)); // of 3 to 12
+    }
+
+    #[test]
+    fn the_spread_goes_from_most_to_fewest_events() {
+        let with = |events: &[u64]| {
+            let mut maps = Maps::new(Geometry {
+                columns: u32::try_from(events.len()).unwrap(),
+                rows: 1,
+            });
+            for (pixel, events) in maps.pixels.iter_mut().zip(events) {
+                pixel.events = *events;
+            }
+            maps.spread()
+        };
+        assert_eq!(with(&[0, 0]), []);
+        assert_eq!(with(&[0, 3]), [PixelAddress(1)]);
+        assert_eq!(with(&[3, 3]), [0, 1].map(PixelAddress));
+        assert_eq!(
+            with(&[5, 0, 9, 1, 3, 7, 2, 8, 4, 6]),
+            [2, 5, 0, 4, 3].map(PixelAddress)
+        );
+    }
+}

@@ -1,0 +1,238 @@
+//! What came out of a run: `summary.json`, and the same on the terminal and in
+//! the report.
+
+use dtof_core::Statistics;
+use serde::Serialize;
+
+use crate::engine::settings::Settings;
+use crate::input::source::PhotonSource;
+
+/// What came out, as `summary.json` has it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// The recording or the scene, if it was a file.
+    pub input: Option<String>,
+    /// Laser cycles a second of a simulated scene.
+    pub laser_hz: Option<u64>,
+    /// What the array sees of a simulated scene: horizontal and vertical angle.
+    pub field_of_view_degrees: Option<[f64; 2]>,
+    /// The options that `dtof export` needs for the scene, if any.
+    pub export_with: Option<String>,
+    /// Laser cycles that recorded histograms were taken to have lasted: the
+    /// shortest and the longest capture.
+    pub recorded_cycles: Option<(u64, u64)>,
+    /// Laser cycles.
+    pub cycles: u64,
+    /// Photons offered to the pixels: counted, saturated, rejected or gated out.
+    pub photons: u64,
+    /// Depth events.
+    pub events: u64,
+    /// Pixels that were there.
+    pub pixels: usize,
+    /// Pixels with at least one event.
+    pub pixels_reporting: usize,
+    /// Photons with a TDC code past the last bin.
+    pub rejected: u64,
+    /// Photons that met a full counter.
+    pub saturated: u64,
+    /// Photons outside the range gate.
+    pub gated_out: u64,
+    /// Decisions put off because the event before was not taken yet.
+    pub deferred: u64,
+    /// Exposures that reached L2 without an event.
+    pub expired: u64,
+    /// Of these, exposures with a decision put off.
+    pub expired_deferred: u64,
+    /// Recorded photons that were not replayed, as they lie after the last
+    /// laser cycle.
+    pub not_replayed: u64,
+    /// How the pixels operated.
+    pub settings: Settings,
+}
+
+/// A name and a value, for people.
+pub type Row = (String, String);
+
+impl Summary {
+    /// Puts together what the pixels counted and where it came from.
+    #[must_use]
+    pub fn new(
+        statistics: &Statistics,
+        source: &dyn PhotonSource,
+        pixels_reporting: usize,
+        settings: &Settings,
+    ) -> Self {
+        let Statistics {
+            saturated,
+            rejected,
+            gated_out,
+            events,
+            deferred,
+            expired,
+            expired_deferred,
+            ..
+        } = *statistics;
+        Self {
+            input: None,
+            laser_hz: None,
+            field_of_view_degrees: None,
+            export_with: None,
+            recorded_cycles: source.recorded_cycles(),
+            cycles: source.cycles(),
+            photons: statistics.photons(),
+            events,
+            pixels: source.addresses().len(),
+            pixels_reporting,
+            rejected,
+            saturated,
+            gated_out,
+            deferred,
+            expired,
+            expired_deferred,
+            not_replayed: source.not_replayed(),
+            settings: settings.clone(),
+        }
+    }
+
+    /// The totals.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Row> {
+        let row = |name: &str, value: u64| (name.to_owned(), grouped(value));
+        let mut rows = Vec::new();
+        if let Some(input) = &self.input {
+            rows.push(("input".to_owned(), input.clone()));
+        }
+        if let Some((shortest, longest)) = self.recorded_cycles {
+            let cycles = if shortest == longest {
+                grouped(longest)
+            } else {
+                format!("{} to {}, by capture", grouped(shortest), grouped(longest))
+            };
+            rows.push((
+                "taken to have lasted".to_owned(),
+                format!("{cycles} laser cycles"),
+            ));
+        }
+        rows.extend([
+            row("laser cycles", self.cycles),
+            row("photons", self.photons),
+            row("depth events", self.events),
+            (
+                "pixels reporting".to_owned(),
+                format!("{} of {}", self.pixels_reporting, self.pixels),
+            ),
+            row("exposures without an event", self.expired),
+        ]);
+        let first_decision = self.settings.first_decision();
+        if self.cycles < first_decision {
+            rows.push((
+                "too short for an event".to_owned(),
+                format!("the first decision comes after {first_decision} laser cycles"),
+            ));
+        }
+        // Losses are named where there are any.
+        let losses = [
+            ("photons outside the range gate", self.gated_out),
+            ("photons lost to full counters", self.saturated),
+            ("photons with a code past the last bin", self.rejected),
+            ("decisions put off", self.deferred),
+            ("recorded photons not replayed", self.not_replayed),
+        ];
+        rows.extend(
+            losses
+                .iter()
+                .filter(|loss| loss.1 > 0)
+                .map(|&(name, value)| row(name, value)),
+        );
+        if let Some(options) = &self.export_with {
+            rows.push(("export with".to_owned(), options.clone()));
+        }
+        rows
+    }
+}
+
+impl Settings {
+    /// The settings.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Row> {
+        let row = |name: &str, value: String| (name.to_owned(), value);
+        let gate = self.gate.map_or("none".to_owned(), |(first, last)| {
+            format!("{first}..{last}")
+        });
+        let mut rows = vec![
+            row(
+                "bins",
+                format!("{} of {} ps", self.bins, self.bin_width_ps.0),
+            ),
+            row("range offset", format!("{} mm", self.offset_mm.0)),
+            row("range gate", gate),
+        ];
+        rows.extend(self.detection_rows());
+        if self.frame.is_none() {
+            rows.push(row(
+                "decisions",
+                format!(
+                    "every {} laser cycles (X), in exposures longer than {} (L1) and shorter than {} (L2)",
+                    self.x, self.l1, self.l2
+                ),
+            ));
+        }
+        rows.push(row("seed", self.seed.to_string()));
+        rows
+    }
+
+    /// What the report is of.
+    #[must_use]
+    pub fn title(&self) -> &'static str {
+        match self.frame {
+            None => "Asynchronous depth events",
+            Some(_) => "Frames, as a frame-based sensor reads them",
+        }
+    }
+
+    /// Laser cycles until the first.
+    fn first_decision(&self) -> u64 {
+        let (x, l1) = (u64::from(self.x), u64::from(self.l1));
+        self.frame.map_or((l1 / x + 1) * x, u64::from)
+    }
+
+    /// Rule, or frame, and estimator.
+    #[must_use]
+    pub fn detection_rows(&self) -> [Row; 2] {
+        let decision = match self.frame {
+            None => self.rule.row(self.min_count),
+            Some(length) => (
+                "frames".to_owned(),
+                format!("the highest bin of each {length} laser cycles"),
+            ),
+        };
+        [decision, self.estimator.row()]
+    }
+}
+
+/// A number with its thousands apart: 12,345.
+#[must_use]
+pub fn grouped(value: u64) -> String {
+    let digits = value.to_string();
+    let mut text = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// Rows as lines of text, names to the left, values aligned.
+#[must_use]
+pub fn aligned(rows: &[Row]) -> String {
+    let width = rows
+        .iter()
+        .map(|(name, _)| name.chars().count())
+        .max()
+        .unwrap_or(0);
+    rows.iter()
+        .map(|(name, value)| format!("  {name:width$}  {value}\n"))
+        .collect()
+}

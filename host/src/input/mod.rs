@@ -1,0 +1,7 @@
+//! Where photons come from.
+
+pub mod npy;
+pub mod photon_csv;
+pub mod recorded;
+pub mod source;
+pub mod tmf8820;

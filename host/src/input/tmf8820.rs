@@ -1,0 +1,85 @@
+//! Recorded histograms from the public TMF8820 capture log, as it is: a JSON
+//! list of captures of the 3×3-zone sensor, each with nine histograms of 128
+//! bins. Pixel address = capture × 9 + zone; zone 4 is the centre.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow, ensure};
+use dtof_core::fixed::types::{I24F8, U16F16};
+use serde::Deserialize;
+
+use crate::input::recorded::Capture;
+use crate::input::source::Geometry;
+
+/// Zones of the sensor.
+pub const ZONES: u32 = 9;
+/// Bins of its histograms.
+pub const BINS: usize = 128;
+/// Its bin width: a fit of pulse positions to distances from 30 to 400 mm gives
+/// 13.80 mm a bin; the log's authors state 91 ps.
+pub const BIN_WIDTH_PS: U16F16 = U16F16::lit("92.1");
+/// Brings the centre zone of the public log to its ground truth from 30 to 400 mm.
+pub const OFFSET_MM: I24F8 = I24F8::lit("-179.5");
+
+/// The log: rows are captures, columns zones.
+#[derive(Clone, Debug)]
+pub struct Tmf8820Log {
+    /// Nine columns.
+    pub geometry: Geometry,
+    /// Nine histograms each.
+    pub captures: Vec<Capture>,
+}
+
+/// What is read of a capture. The ground truth and the sensor's own results stand
+/// beside it in the log.
+#[derive(Deserialize)]
+struct LogEntry {
+    hists: Vec<Vec<u64>>,
+}
+
+/// Reads `path`.
+///
+/// # Errors
+/// What is wrong with the file; its name, and the line where there is one,
+/// first.
+pub fn read(path: &Path) -> Result<Tmf8820Log> {
+    let name = path.display();
+    let file = File::open(path).with_context(|| name.to_string())?;
+    let entries: Vec<LogEntry> =
+        serde_json::from_reader(BufReader::new(file)).map_err(|error| {
+            anyhow!(
+                "{name}:{}: not a TMF8820 capture log: {error}",
+                error.line()
+            )
+        })?;
+    ensure!(!entries.is_empty(), "{name}: no captures");
+    for (index, entry) in entries.iter().enumerate() {
+        let zones = entry.hists.len();
+        ensure!(
+            zones == ZONES as usize,
+            "{name}: capture {index} has {zones} zones, not 9"
+        );
+        for (zone, histogram) in entry.hists.iter().enumerate() {
+            let bins = histogram.len();
+            ensure!(
+                bins == BINS,
+                "{name}: capture {index}, zone {zone} has {bins} bins, not 128"
+            );
+        }
+    }
+    let rows = u32::try_from(entries.len())?;
+    Ok(Tmf8820Log {
+        geometry: Geometry {
+            columns: ZONES,
+            rows,
+        },
+        captures: entries
+            .into_iter()
+            .map(|entry| Capture {
+                histograms: entry.hists,
+            })
+            .collect(),
+    })
+}

@@ -1,0 +1,82 @@
+//! An array of simulated pixels.
+
+use anyhow::{Context, Result};
+use dtof_core::PixelAddress;
+use dtof_theory::rates::Rates;
+use rayon::prelude::*;
+
+use super::pixel::SimulatedPixel;
+use crate::input::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
+
+/// What a pixel receives in a laser cycle, if that changes.
+pub type RatesAt = Box<dyn Fn(PixelAddress, u64) -> Rates + Send + Sync>;
+
+/// An array of simulated pixels.
+pub struct SimulatedArray {
+    geometry: Geometry,
+    cycles: u64,
+    next_cycle: u64,
+    pixels: Vec<SimulatedPixel>,
+    rates_at: Option<RatesAt>,
+}
+
+impl SimulatedArray {
+    /// `pixels` row by row for `cycles` laser cycles, at the rates they have or
+    /// at those of `rates_at`.
+    #[must_use]
+    pub fn new(
+        geometry: Geometry,
+        pixels: Vec<SimulatedPixel>,
+        cycles: u64,
+        rates_at: Option<RatesAt>,
+    ) -> Self {
+        assert_eq!(pixels.len(), geometry.addresses(), "one for each address");
+        Self {
+            geometry,
+            cycles,
+            next_cycle: 0,
+            pixels,
+            rates_at,
+        }
+    }
+}
+
+impl PhotonSource for SimulatedArray {
+    fn geometry(&self) -> Geometry {
+        self.geometry
+    }
+
+    fn cycles(&self) -> u64 {
+        self.cycles
+    }
+
+    fn photons_per_cycle(&self) -> f64 {
+        self.pixels
+            .iter()
+            .map(SimulatedPixel::photons_per_cycle)
+            .sum()
+    }
+
+    fn next_slice(&mut self, cycles: u16) -> Result<Slice> {
+        let first_cycle = self.next_cycle;
+        self.next_cycle += u64::from(cycles);
+        let rates_at = self.rates_at.as_ref();
+        let received = |(index, pixel): (usize, &mut SimulatedPixel)| {
+            let address = u16::try_from(index).context("more than 65,536 pixels")?;
+            let mut photons = Vec::new();
+            for cycle in 0..cycles {
+                if let Some(rates_at) = rates_at {
+                    let at = first_cycle + u64::from(cycle);
+                    pixel.set_rates(&rates_at(PixelAddress(address), at))?;
+                }
+                pixel.next_cycle(|code| photons.push(Photon { cycle, code }));
+            }
+            Ok(PixelPhotons { cycles, photons })
+        };
+        let pixels = self.pixels.par_iter_mut().enumerate().map(received);
+        Ok(Slice {
+            first_cycle,
+            pixels: pixels.collect::<Result<_>>()?,
+        })
+    }
+}

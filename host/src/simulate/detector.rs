@@ -1,0 +1,249 @@
+//! The way of a pixel's photons through all effects that are on.
+
+use anyhow::Result;
+use dtof_core::PixelAddress;
+use rand_distr::{Distribution, Poisson, StandardUniform};
+use rand_pcg::Pcg64;
+
+use super::effects::Effects;
+use super::effects::afterpulsing::Trap;
+use super::effects::cover_glass::Crosstalk;
+use super::effects::dead_time::Recharge;
+use super::effects::jitter::TimingError;
+use super::effects::limits::Timing;
+use super::effects::second_echo::Echo;
+use super::effects::tail::Late;
+use super::pixel::{Arrival, code};
+use super::stream::Stream;
+use dtof_theory::rates::Rates;
+
+/// One pixel's light and SPAD and TDC. All times are in bins from the start of
+/// the laser cycle.
+///
+/// The background goes on between the histogram and the next laser pulse, where
+/// it has no TDC code but blinds the SPAD. Signal photons before time 0 or after
+/// the next laser pulse do not arrive.
+#[derive(Clone, Debug)]
+pub(super) struct Detector {
+    end: f64,
+    period: f64,
+    within_bin: Pcg64,
+    second_echo: Option<Echo>,
+    cover_glass: Option<Crosstalk>,
+    tail: Option<Late>,
+    /// What a hot pixel has more than others.
+    hot: Option<Background>,
+    /// Only if it can change what is in the histogram.
+    gap: Option<Background>,
+    recharge: Recharge,
+    trap: Option<Trap>,
+    jitter: Option<TimingError>,
+    hits: usize,
+    /// Photons of the effects in a laser cycle.
+    added: f64,
+    /// Avalanches a photon, at most.
+    avalanches_each: f64,
+    /// Of this laser cycle: arrivals, then avalanches, then measured times.
+    times: Vec<f64>,
+    avalanches: Vec<f64>,
+}
+
+impl Detector {
+    pub(super) fn new(
+        effects: &Effects,
+        rates: &Rates,
+        timing: &Timing,
+        seed: u64,
+        pixel: PixelAddress,
+    ) -> Result<Self> {
+        effects.check()?;
+        let rng = |stream: Stream| stream.rng(seed, pixel);
+        let end = f64::from(timing.bins);
+
+        let mut hot_rng = rng(Stream::HotPixels);
+        let multiple = match &effects.hot_pixels {
+            Some(hot) if hot.is_hot(pixel, &mut hot_rng)? => hot.multiple,
+            _ => 1.0,
+        };
+        let hot = Background::new((multiple - 1.0) * rates.background, 0.0, end, hot_rng)?;
+        let timed = effects.dead_time.is_some()
+            || effects.afterpulsing.is_some()
+            || effects.jitter.is_some();
+        let gap_rate = if timed {
+            multiple * rates.background
+        } else {
+            0.0
+        };
+        let gap = Background::new(gap_rate, end, timing.period, rng(Stream::Gap))?;
+
+        let second_echo = effects.second_echo.as_ref();
+        let cover_glass = effects.cover_glass.as_ref();
+        let tail = effects.tail.as_ref();
+        let afterpulsing = effects.afterpulsing.as_ref();
+        let jitter = effects.jitter.as_ref();
+        let rate = |part: &Option<Background>| part.as_ref().map_or(0.0, |part| part.mean);
+        let glass_rate = cover_glass.map_or(0.0, |glass| glass.signal);
+        Ok(Self {
+            end,
+            period: timing.period,
+            added: rate(&hot) + rate(&gap) + glass_rate,
+            avalanches_each: afterpulsing.map_or(1.0, |after| 1.0 / (1.0 - after.probability)),
+            within_bin: rng(Stream::WithinBin),
+            second_echo: second_echo
+                .map(|echo| Echo::new(echo, timing, rng(Stream::SecondEcho)))
+                .transpose()?,
+            cover_glass: cover_glass
+                .map(|glass| Crosstalk::new(glass, rates.sigma, rng(Stream::CoverGlass)))
+                .transpose()?,
+            tail: tail
+                .map(|tail| Late::new(tail, rng(Stream::Tail)))
+                .transpose()?,
+            hot,
+            gap,
+            recharge: Recharge::new(effects.dead_time.as_ref(), timing),
+            trap: afterpulsing
+                .map(|after| Trap::new(after, timing, rng(Stream::Afterpulsing)))
+                .transpose()?,
+            jitter: jitter
+                .map(|jitter| TimingError::new(jitter, timing, rng(Stream::Jitter)))
+                .transpose()?,
+            hits: effects
+                .tdc
+                .as_ref()
+                .map_or(usize::MAX, |tdc| tdc.hits_per_cycle),
+            times: Vec::new(),
+            avalanches: Vec::new(),
+        })
+    }
+
+    /// Photons and afterpulses in a laser cycle, at most, if the plain model has
+    /// `plain` photons.
+    pub(super) fn photons_per_cycle(&self, plain: f64) -> f64 {
+        (plain + self.added) * self.avalanches_each
+    }
+
+    /// A laser cycle starts.
+    pub(super) fn begin(&mut self) {
+        let Self { times, tail, .. } = self;
+        times.clear();
+        if let Some(glass) = &mut self.cover_glass {
+            glass.draw(|time| times.push(time + tail.as_mut().map_or(0.0, Late::delay)));
+        }
+        for background in [&mut self.hot, &mut self.gap].into_iter().flatten() {
+            background.draw(|time| times.push(time));
+        }
+    }
+
+    /// A photon of the plain model, in any order.
+    pub(super) fn arrive(&mut self, arrival: &Arrival) {
+        self.times.push(match arrival {
+            Arrival::Background(bin) => {
+                let within: f64 = StandardUniform.sample(&mut self.within_bin);
+                f64::from(*bin) + within
+            }
+            Arrival::Signal(position) => {
+                let echo = self.second_echo.as_mut().map_or(0.0, Echo::delay);
+                position + echo + self.tail.as_mut().map_or(0.0, Late::delay)
+            }
+        });
+    }
+
+    /// All photons have arrived: gives `photon` the TDC codes of this laser
+    /// cycle, ascending.
+    pub(super) fn finish(&mut self, photon: impl FnMut(u16)) {
+        self.detect();
+        if let Some(jitter) = &mut self.jitter {
+            for time in &mut self.avalanches {
+                *time = jitter.measured(*time, self.period);
+            }
+            self.avalanches.sort_unstable_by(f64::total_cmp);
+        }
+        let inside = self.avalanches.iter().filter(|time| **time < self.end);
+        inside
+            .take(self.hits)
+            .map(|time| code(*time))
+            .for_each(photon);
+    }
+
+    /// Which photons and which trapped charges start an avalanche.
+    fn detect(&mut self) {
+        let period = self.period;
+        self.times.retain(|time| (0.0..period).contains(time));
+        self.times.sort_unstable_by(f64::total_cmp);
+        self.avalanches.clear();
+        for arrival in self.times.iter().copied().chain([period]) {
+            while let Some(release) = self
+                .trap
+                .as_mut()
+                .and_then(|trap| trap.release_before(arrival))
+            {
+                avalanche(
+                    release,
+                    &mut self.recharge,
+                    &mut self.trap,
+                    &mut self.avalanches,
+                );
+            }
+            if arrival < period {
+                avalanche(
+                    arrival,
+                    &mut self.recharge,
+                    &mut self.trap,
+                    &mut self.avalanches,
+                );
+            }
+        }
+        self.recharge.end_laser_cycle(period);
+        if let Some(trap) = &mut self.trap {
+            trap.end_laser_cycle(period);
+        }
+    }
+}
+
+/// A photon or a trapped charge at `time`: an avalanche, unless the SPAD is
+/// blind.
+fn avalanche(time: f64, recharge: &mut Recharge, trap: &mut Option<Trap>, all: &mut Vec<f64>) {
+    if let Some(recharged) = recharge.avalanche(time) {
+        all.push(time);
+        if let Some(trap) = trap {
+            trap.fill(recharged);
+        }
+    }
+}
+
+/// Photons spread evenly over a part of the laser cycle.
+#[derive(Clone, Debug)]
+struct Background {
+    photons: Poisson<f64>,
+    /// Photons a laser cycle.
+    mean: f64,
+    from: f64,
+    length: f64,
+    rng: Pcg64,
+}
+
+impl Background {
+    /// `rate` photons a bin; none at all if there is nothing to draw.
+    fn new(rate: f64, from: f64, to: f64, rng: Pcg64) -> Result<Option<Self>> {
+        let length = to - from;
+        if rate * length <= 0.0 {
+            return Ok(None);
+        }
+        Ok(Some(Self {
+            photons: Poisson::new(rate * length)?,
+            mean: rate * length,
+            from,
+            length,
+            rng,
+        }))
+    }
+
+    fn draw(&mut self, mut photon: impl FnMut(f64)) {
+        let mut left = self.photons.sample(&mut self.rng);
+        while left > 0.0 {
+            left -= 1.0;
+            let part: f64 = StandardUniform.sample(&mut self.rng);
+            photon(self.from + part * self.length);
+        }
+    }
+}

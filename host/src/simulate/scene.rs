@@ -1,0 +1,294 @@
+//! Scenes: what an array of simulated pixels looks at, read from a TOML file.
+//!
+//! Each pixel sees one surface, the nearest at its place. Signal photons follow
+//! the reflectivity and the inverse square of the range; the background is the
+//! same everywhere. `docs/scenes.md` lists all keys.
+
+mod comparison;
+mod file;
+mod surface;
+
+use anyhow::{Result, ensure};
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+
+use crate::engine::detection::{Estimator, Rule};
+use crate::engine::settings::{I24F8Number, Settings, U16F16Number};
+use crate::geometry::FieldOfView;
+use crate::input::source::{Geometry, PhotonSource};
+use crate::simulate::effects::Effects;
+use crate::simulate::effects::limits::Timing;
+use crate::simulate::{MM_PER_PS, RatesAt, SimulatedArray, SimulatedPixel};
+use dtof_theory::random::pixel_rng;
+use dtof_theory::rates::Rates;
+
+pub use surface::{Ball, Fan, Light, Plane, Rectangle, Shape, Surface};
+
+/// Signal photons a laser cycle that a pixel may have.
+const MOST_SIGNAL: f64 = 10_000.0;
+
+/// Photons a laser cycle that all pixels together may have.
+const MOST_PHOTONS: f64 = 1e7;
+
+/// Surfaces are this far away, at least, at all times.
+const NEAREST_MM: f64 = 1.0;
+
+/// A scene on an array.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// The array that looks at it, that of the file unless changed. A pixel's
+    /// place in the scene is its upper left corner.
+    pub geometry: Geometry,
+    /// The array that the places in `surfaces` are given in.
+    pub layout: Geometry,
+    /// What the array sees; [`FieldOfView::of`] the layout unless given. Planes need it.
+    pub field_of_view: Option<FieldOfView>,
+    /// Laser cycles.
+    pub cycles: u64,
+    /// Bins of a histogram.
+    pub bins: u16,
+    /// Picoseconds a bin.
+    pub bin_width_ps: f64,
+    /// Laser pulses a microsecond.
+    pub laser_rate_mhz: f64,
+    /// Background photons a bin and laser cycle.
+    pub background: f64,
+    /// Standard deviation of the pulse in bins.
+    pub pulse_sigma_bins: f64,
+    /// Signal photons a laser cycle from a white surface at one metre.
+    pub signal_at_one_metre: f64,
+    /// In the order of the file.
+    pub surfaces: Vec<Surface>,
+    /// What is not plain.
+    pub effects: Effects,
+}
+
+/// What a pixel sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Which of [`Scene::surfaces`].
+    pub surface: usize,
+    /// How far away it is.
+    pub range_mm: f64,
+}
+
+impl Scene {
+    /// The scene of the demo, `scenes/demo.toml`.
+    ///
+    /// # Errors
+    /// Never: it is a part of the program.
+    pub fn demo() -> Result<Self> {
+        Self::parse(include_str!("../../../scenes/demo.toml"))
+    }
+
+    /// What `pixel` sees in laser cycle `cycle`: the truth its events are
+    /// compared with. None if there is nothing at its place.
+    #[must_use]
+    pub fn truth(&self, pixel: PixelAddress, cycle: u64) -> Option<View> {
+        let (place, ray) = (self.place(pixel), self.ray(pixel));
+        let seconds = self.seconds(cycle);
+        let mut nearest: Option<View> = None;
+        for (index, surface) in self.surfaces.iter().enumerate() {
+            let Some(range_mm) = surface.range_mm(place, ray, seconds, self.layout) else {
+                continue;
+            };
+            if nearest.is_none_or(|other| range_mm < other.range_mm) {
+                nearest = Some(View {
+                    surface: index,
+                    range_mm,
+                });
+            }
+        }
+        nearest
+    }
+
+    /// What `pixel` receives in laser cycle `cycle`.
+    #[must_use]
+    pub fn rates(&self, pixel: PixelAddress, cycle: u64) -> Rates {
+        let view = self.truth(pixel, cycle);
+        Rates {
+            background: self.background,
+            signal: view.map_or(0.0, |view| {
+                self.signal(self.surfaces[view.surface].light, view.range_mm)
+            }),
+            position: view.map_or(0.0, |view| view.range_mm / self.mm_per_bin()),
+            sigma: self.pulse_sigma_bins,
+        }
+    }
+
+    /// The photons of `cycles` laser cycles.
+    ///
+    /// # Errors
+    /// If a surface comes too near in that time, or there are too many photons
+    /// or pixels.
+    pub fn photons(&self, seed: u64, cycles: u64) -> Result<SimulatedArray> {
+        self.check_motion(cycles)?;
+        self.check_hot_pixels()?;
+        let timing = self.timing();
+        let pixels = self.addresses()?.map(|address| {
+            SimulatedPixel::new(&self.rates(address, 0), self.bins, pixel_rng(seed, address))?
+                .with_effects(&self.effects, &timing, seed, address)
+        });
+        let pixels = pixels.collect::<Result<_>>()?;
+        let rates_at = self.surfaces.iter().any(Surface::moves).then(|| {
+            let scene = self.clone();
+            Box::new(move |pixel, cycle| scene.rates(pixel, cycle)) as RatesAt
+        });
+        let photons = SimulatedArray::new(self.geometry, pixels, cycles, rates_at);
+        let each_cycle = photons.photons_per_cycle();
+        ensure!(
+            each_cycle <= MOST_PHOTONS,
+            "{each_cycle:.0} photons a laser cycle: more than {MOST_PHOTONS:.0}"
+        );
+        Ok(photons)
+    }
+
+    /// Millimetres of range a bin.
+    #[must_use]
+    pub fn mm_per_bin(&self) -> f64 {
+        self.bin_width_ps * MM_PER_PS
+    }
+
+    /// Laser cycles a second, rounded.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the file is checked: more than 0 MHz, and the histogram fits"
+    )]
+    #[must_use]
+    pub fn laser_hz(&self) -> u64 {
+        (self.laser_rate_mhz * 1e6).round() as u64
+    }
+
+    /// Picoseconds as bins.
+    fn timing(&self) -> Timing {
+        Timing {
+            bins: self.bins,
+            bin_width_ps: self.bin_width_ps,
+            period: 1e6 / self.laser_rate_mhz / self.bin_width_ps,
+        }
+    }
+
+    /// Every pixel of the array.
+    fn addresses(&self) -> Result<impl Iterator<Item = PixelAddress>> {
+        let pixels = self.geometry.addresses();
+        ensure!(pixels <= 65_536, "{pixels} pixels: more than 65,536");
+        Ok((0..=u16::MAX).take(pixels).map(PixelAddress))
+    }
+
+    /// Column and row in the layout.
+    fn place(&self, pixel: PixelAddress) -> [f64; 2] {
+        let Geometry { columns, rows } = self.geometry;
+        let across = f64::from(self.layout.columns) / f64::from(columns);
+        let down = f64::from(self.layout.rows) / f64::from(rows);
+        let [column, row] = self.column_and_row(pixel);
+        [column * across, row * down]
+    }
+
+    /// What the array sees, whichever it is.
+    #[must_use]
+    pub fn view(&self) -> FieldOfView {
+        let view = self.field_of_view;
+        view.unwrap_or_else(|| FieldOfView::of(self.layout))
+    }
+
+    /// The unit ray through the middle of a pixel, as `dtof export` has it.
+    fn ray(&self, pixel: PixelAddress) -> [f64; 3] {
+        let view = self.view();
+        let Geometry { columns, rows } = self.geometry;
+        let [column, row] = self.column_and_row(pixel);
+        view.ray(
+            (column + 0.5) / f64::from(columns),
+            (row + 0.5) / f64::from(rows),
+        )
+    }
+
+    fn column_and_row(&self, pixel: PixelAddress) -> [f64; 2] {
+        let columns = self.geometry.columns;
+        let pixel = u32::from(pixel.0);
+        [f64::from(pixel % columns), f64::from(pixel / columns)]
+    }
+
+    #[allow(clippy::cast_precision_loss, reason = "2^53 laser cycles are years")]
+    fn seconds(&self, cycle: u64) -> f64 {
+        cycle as f64 / (self.laser_rate_mhz * 1e6)
+    }
+
+    /// Signal photons a laser cycle from a range.
+    fn signal(&self, light: Light, range_mm: f64) -> f64 {
+        match light {
+            Light::Signal(signal) => signal,
+            Light::Reflectivity(reflectivity) => {
+                self.signal_at_one_metre * reflectivity / (range_mm / 1000.0).powi(2)
+            }
+        }
+    }
+
+    /// Are the listed hot pixels there?
+    fn check_hot_pixels(&self) -> Result<()> {
+        let listed = self.effects.hot_pixels.iter().flat_map(|hot| &hot.pixels);
+        for pixel in listed {
+            ensure!(
+                usize::from(*pixel) < self.geometry.addresses(),
+                "[hot_pixels]: pixel {pixel} of {}",
+                self.geometry.addresses()
+            );
+        }
+        Ok(())
+    }
+
+    /// Does every surface stay where a target can be, and is none too bright?
+    fn check_motion(&self, cycles: u64) -> Result<()> {
+        for surface in &self.surfaces {
+            let ends = [0.0, self.seconds(cycles)];
+            let nearest = ends.map(|seconds| surface.nearest_mm(seconds, self.layout));
+            let nearest = nearest[0].min(nearest[1]);
+            ensure!(
+                nearest >= NEAREST_MM,
+                "{}: comes as near as {nearest:.1} mm; must stay {NEAREST_MM} mm away",
+                surface.name
+            );
+            let signal = self.signal(surface.light, nearest);
+            ensure!(
+                signal <= MOST_SIGNAL,
+                "{}: {signal:.0} signal photons a laser cycle from {nearest:.1} mm; must be at most \
+                 {MOST_SIGNAL:.0}",
+                surface.name
+            );
+        }
+        Ok(())
+    }
+}
+
+/// The paper's settings for its static scene (section III-B), on 128 bins of
+/// 250 ps.
+#[must_use]
+pub fn settings(seed: u64) -> Settings {
+    Settings {
+        bins: 128,
+        bin_width_ps: U16F16Number(U16F16::lit("250")),
+        offset_mm: I24F8Number(I24F8::ZERO),
+        gate: None,
+        rule: Rule::paper(U8F8::lit("8")),
+        estimator: Estimator::default(),
+        min_count: 5,
+        l1: 100,
+        l2: 2000,
+        x: 10,
+        one_hit_tdc: false,
+        frame: None,
+        seed,
+    }
+}
+
+/// The photons of the demo's scene on an array, `cycles` laser cycles of them.
+///
+/// # Errors
+/// If there are more pixels than addresses.
+pub fn photons(geometry: Geometry, settings: &Settings, cycles: u64) -> Result<SimulatedArray> {
+    let scene = Scene {
+        geometry,
+        ..Scene::demo()?
+    };
+    scene.photons(settings.seed, cycles)
+}
