@@ -19,6 +19,7 @@ pub mod events_csv;
 pub mod export;
 pub mod failures;
 pub mod figures;
+pub mod files;
 pub mod frame;
 pub mod geometry;
 pub mod maps;

@@ -20,6 +20,9 @@ use plotters::prelude::{RGBColor, ViridisRGB};
 use layout::Layout;
 use scale::Scale;
 
+/// Every document has it near its start.
+pub(crate) const MARK: &str = "class=\"heat-map\"";
+
 /// One value a pixel, row by row from the top.
 ///
 /// `None` stands for a pixel that never reported; a value that is not finite is

@@ -7,9 +7,14 @@ use serde::Serialize;
 use crate::settings::Settings;
 use crate::source::PhotonSource;
 
+/// Every `summary.json` begins with it, less the version.
+pub(crate) const MARK: &str = "\"program\": \"dtof ";
+
 /// What came out, as `summary.json` has it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
+    /// This program and its version.
+    pub program: &'static str,
     /// The recording or the scene, if it was a file.
     pub input: Option<String>,
     /// Laser cycles a second of a simulated scene.
@@ -73,6 +78,7 @@ impl Summary {
             ..
         } = *statistics;
         Self {
+            program: concat!("dtof ", env!("CARGO_PKG_VERSION")),
             input: None,
             laser_hz: None,
             field_of_view_degrees: None,

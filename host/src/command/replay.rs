@@ -79,7 +79,7 @@ impl Replay {
             self.seed,
         )?;
         let mut engine = host_engine(&settings, &photons.addresses())?;
-        let mut output = Output::create(&self.out, &settings, photons.geometry())?;
+        let mut output = Output::create(&self.out, &settings, photons.geometry(), Some(&self.input))?;
         let mut summary = run(
             photons.as_mut(),
             engine.as_mut(),

@@ -65,7 +65,7 @@ impl Simulate {
         let lead = format!("Simulated photons of {file}, {columns}×{rows} macropixels.");
         Simulation {
             scene: &scene,
-            file: Some(file),
+            file: Some(&self.scene),
             cycles: self.cycles.unwrap_or(scene.cycles),
             settings: &settings,
             device: self.device.as_deref(),
@@ -81,7 +81,7 @@ impl Simulate {
 pub struct Simulation<'a> {
     pub scene: &'a Scene,
     /// The scene's, if it has one.
-    pub file: Option<String>,
+    pub file: Option<&'a Path>,
     pub cycles: u64,
     pub settings: &'a Settings,
     pub device: Option<&'a str>,
@@ -94,12 +94,13 @@ pub struct Simulation<'a> {
 impl Simulation<'_> {
     pub fn run(self) -> Result<()> {
         let photons = self.scene.photons(self.settings.seed, self.cycles);
-        let mut photons = match &self.file {
-            Some(file) => photons.with_context(|| file.clone())?,
+        let mut photons = match self.file {
+            Some(file) => photons.with_context(|| file.display().to_string())?,
             None => photons?,
         };
         let mut engine = engine(self.device, self.settings, &photons.addresses())?;
-        let mut output = Output::create(self.out, self.settings, photons.geometry())?;
+        let mut output =
+            Output::create(self.out, self.settings, photons.geometry(), self.file)?;
         let mut summary = run(
             &mut photons,
             engine.as_mut(),
@@ -107,7 +108,7 @@ impl Simulation<'_> {
             self.settings,
             self.quiet,
         )?;
-        summary.input = self.file;
+        summary.input = self.file.map(|file| file.display().to_string());
         summary.laser_hz = Some(self.scene.laser_hz());
         summary.field_of_view_degrees = Some(self.scene.view().degrees());
         summary.export_with = export_with(self.scene);

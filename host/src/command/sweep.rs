@@ -100,13 +100,18 @@ pub struct Merge {
     /// Parts of one study without a seed in common
     #[arg(required = true, value_name = "PART")]
     parts: Vec<PathBuf>,
-    /// The part that holds all of them
+    /// The part that holds all of them, a new file
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }
 
 impl Merge {
     pub fn run(&self) -> Result<()> {
+        ensure!(
+            !self.out.exists(),
+            "{}: is there already; --out is a new file",
+            self.out.display()
+        );
         let part = sweep::merge(&self.parts)?;
         part.save(&self.out)?;
         show(&part)

@@ -6,6 +6,16 @@ use crate::maps::{Maps, PixelHistory};
 use crate::picture::{Map, heat_map};
 use crate::source::Geometry;
 
+/// The files, in the order of [`pictures`].
+pub const NAMES: [&str; 6] = [
+    "depth-last.svg",
+    "depth-mean.svg",
+    "event-counts.svg",
+    "event-rate.svg",
+    "reflectivity-events.svg",
+    "reflectivity-signal.svg",
+];
+
 /// A picture and the file it becomes.
 pub struct Picture {
     pub name: &'static str,
@@ -92,6 +102,19 @@ fn relative(mut values: Vec<Option<f64>>) -> Vec<Option<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_picture_has_its_name_and_mark() {
+        let maps = Maps::new(Geometry {
+            columns: 1,
+            rows: 1,
+        });
+        let pictures = pictures(&maps, 1).unwrap();
+        assert_eq!(pictures.each_ref().map(|picture| picture.name), NAMES);
+        for picture in pictures {
+            assert!(picture.svg[..1024].contains(crate::picture::MARK));
+        }
+    }
 
     #[test]
     fn shares_are_those_of_the_highest() {
