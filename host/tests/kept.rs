@@ -7,6 +7,12 @@ use std::path::Path;
 
 use common::Scratch;
 use common::aer::{HEADER, events, file};
+use dtof::output::Output;
+use dtof::photon_csv::PhotonCsv;
+use dtof::scene;
+use dtof::source::PhotonSource;
+use dtof::summary::Summary;
+use dtof_core::Statistics;
 
 const PHOTONS: &str = "pixel,cycle,bin\n0,0,0\n";
 const SCENE: &str = "cycles = 100\n[[surface]]\nrange_mm = 1000\nsignal = 1\n";
@@ -76,10 +82,10 @@ fn links_hide_no_input() {
     scratch.file("photons.csv", PHOTONS);
     scratch.file("scene.toml", SCENE);
     std::os::unix::fs::symlink("../photons.csv", scratch.path("out/summary.json")).unwrap();
-    std::os::unix::fs::symlink("../scene.toml", scratch.path("out/report.html")).unwrap();
     let arguments = ["replay", "--input", "photons.csv", "--out", "out"];
     kept(&scratch, &arguments, "out/summary.json", READ);
     fs::remove_file(scratch.path("out/summary.json")).unwrap();
+    std::os::unix::fs::symlink("../scene.toml", scratch.path("out/report.html")).unwrap();
     let arguments = ["simulate", "--scene", "scene.toml", "--out", "out"];
     kept(&scratch, &arguments, "out/report.html", READ);
     assert_eq!(scratch.read("photons.csv") + &scratch.read("scene.toml"), PHOTONS.to_owned() + SCENE);
@@ -133,6 +139,25 @@ fn results_of_an_earlier_run_are_replaced() {
     // Another command's, too: they are of this program.
     let scene = scratch.file("scene.toml", SCENE);
     assert!(scratch.simulate(&scene, &["--quiet"]).status.success());
+}
+
+/// What cannot be moved to its place leaves a folder that does not look complete.
+#[test]
+fn a_folder_that_cannot_be_completed_has_no_summary() {
+    let scratch = Scratch::new();
+    let photons = scratch.file("photons.csv", PHOTONS);
+    scratch.replayed(&photons, &[]);
+    let source = PhotonCsv::open(&photons, 128, None, 1).unwrap();
+    let settings = scene::settings(1);
+    let out = scratch.path("out");
+    let output = Output::create(&out, &settings, source.geometry(), None).unwrap();
+    fs::remove_file(out.join("report.html")).unwrap();
+    fs::create_dir(out.join("report.html")).unwrap();
+    let summary = Summary::new(&Statistics::default(), &source, 0, &settings);
+    let error = output.finish(&summary, "", "", &[]).unwrap_err();
+    assert!(format!("{error:#}").contains("report.html: "), "{error:#}");
+    assert!(!out.join("summary.json").exists());
+    assert!(names(&out).iter().all(|name| !name.starts_with('.')));
 }
 
 #[test]
