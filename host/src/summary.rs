@@ -1,11 +1,14 @@
 //! What came out of a run: `summary.json`, and the same on the terminal and in
 //! the report.
 
+pub mod truth;
+
 use dtof_core::Statistics;
 use serde::Serialize;
 
 use crate::settings::Settings;
 use crate::source::PhotonSource;
+use truth::AgainstTruth;
 
 /// Every `summary.json` begins with it, less the version.
 pub(crate) const MARK: &str = "\"program\": \"dtof ";
@@ -51,6 +54,8 @@ pub struct Summary {
     /// Recorded photons that were not replayed, as they lie after the last
     /// laser cycle.
     pub not_replayed: u64,
+    /// How the events of a simulated scene compare with it.
+    pub against_truth: Option<AgainstTruth>,
     /// How the pixels operated.
     pub settings: Settings,
 }
@@ -96,6 +101,7 @@ impl Summary {
             expired,
             expired_deferred,
             not_replayed: source.not_replayed(),
+            against_truth: None,
             settings: settings.clone(),
         }
     }

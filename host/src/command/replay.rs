@@ -86,6 +86,7 @@ impl Replay {
             &mut output,
             &settings,
             self.quiet,
+            |_| (),
         )?;
         let input = self.input.display().to_string();
         let lead = format!("Recorded photons of {input}.");

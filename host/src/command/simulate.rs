@@ -101,18 +101,22 @@ impl Simulation<'_> {
         let mut engine = engine(self.device, self.settings, &photons.addresses())?;
         let mut output =
             Output::create(self.out, self.settings, photons.geometry(), self.file)?;
+        let mut comparison = self.scene.comparison(self.settings, self.cycles)?;
         let mut summary = run(
             &mut photons,
             engine.as_mut(),
             &mut output,
             self.settings,
             self.quiet,
+            |events| comparison.add(events),
         )?;
         summary.input = self.file.map(|file| file.display().to_string());
         summary.laser_hz = Some(self.scene.laser_hz());
         summary.field_of_view_degrees = Some(self.scene.view().degrees());
         summary.export_with = export_with(self.scene);
-        let surfaces = self.scene.against_truth(output.maps(), self.cycles);
+        let against_truth = comparison.finish();
+        let surfaces = against_truth.rows();
+        summary.against_truth = Some(against_truth);
         let sections = [Section {
             heading: "Surfaces",
             rows: &surfaces,
