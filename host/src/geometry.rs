@@ -18,6 +18,7 @@ use std::str::FromStr;
 
 use dtof_core::PixelAddress;
 
+use crate::arguments::real;
 use crate::source::Geometry;
 
 /// Degrees across the longer side of an array unless said otherwise.
@@ -103,7 +104,7 @@ impl FromStr for FieldOfView {
 
     fn from_str(text: &str) -> Result<Self, FieldOfViewError> {
         let angles = text.split_once('x').and_then(|(horizontal, vertical)| {
-            Some([horizontal.parse().ok()?, vertical.parse().ok()?])
+            Some([real(horizontal)?, real(vertical)?])
         });
         Self::new(angles.ok_or(FieldOfViewError)?)
     }

@@ -10,6 +10,7 @@
 //! ```
 
 pub mod aer_file;
+pub mod arguments;
 pub mod chart;
 pub mod detection;
 pub mod device;

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
+use dtof::arguments::{path, whole};
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::{Engine, host_engine};
 use dtof::export::LaserClock;
@@ -23,10 +24,10 @@ use super::print_summary;
 #[derive(Args)]
 pub struct Simulate {
     /// The scene, a TOML file; docs/scenes.md lists its keys
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = path())]
     scene: PathBuf,
     /// Where the results go
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = path())]
     out: PathBuf,
     /// Macropixels of the array that looks at the scene [default: the file's]
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = array)]
@@ -38,10 +39,10 @@ pub struct Simulate {
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
     /// Laser cycles [default: the file's]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=u64::MAX))]
     cycles: Option<u64>,
     /// Seed of the simulated photons
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=u64::MAX))]
     seed: u64,
     /// Print nothing but errors
     #[arg(long)]
@@ -163,8 +164,8 @@ fn engine(
 /// As `64x32`.
 pub fn array(text: &str) -> Result<Geometry, String> {
     let sides = text.split_once('x').and_then(|(columns, rows)| {
-        let sides = (columns.parse::<u16>().ok()?, rows.parse::<u16>().ok()?);
-        (sides.0 > 0 && sides.1 > 0).then_some(sides)
+        let side = whole(1..=u16::MAX);
+        Some((side(columns).ok()?, side(rows).ok()?))
     });
     let (columns, rows) = sides.ok_or("must be COLUMNSxROWS, as 64x32")?;
     Ok(Geometry {

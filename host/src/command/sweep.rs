@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
+use dtof::arguments::{path, whole};
 use dtof::summary::grouped;
 use dtof::sweep::{self, Part, SeedRange, studies};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -18,10 +19,10 @@ pub struct Sweep {
     #[arg(long, value_name = "A..B", value_parser = seeds, requires = "out")]
     seeds: Option<SeedRange>,
     /// The part: a new file, or one that an earlier run with the same seeds left
-    #[arg(long, value_name = "FILE", requires = "seeds")]
+    #[arg(long, value_name = "FILE", requires = "seeds", value_parser = path())]
     out: Option<PathBuf>,
     /// Save the part after so many seconds, for a run that is ended early
-    #[arg(long, value_name = "S", default_value_t = 10)]
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = whole(0..=u64::MAX))]
     save_every: u64,
     /// Show no progress
     #[arg(long)]
@@ -30,9 +31,10 @@ pub struct Sweep {
 
 fn seeds(text: &str) -> Result<SeedRange> {
     let (first, end) = text.split_once("..").context("not A..B")?;
+    let seed = |text: &str| whole(0..=u64::MAX)(text).ok();
     let range = SeedRange {
-        first: first.parse().context("the first is no seed")?,
-        end: end.parse().context("the last is no seed")?,
+        first: seed(first).context("the first is no seed")?,
+        end: seed(end).context("the last is no seed")?,
     };
     ensure!(range.first < range.end, "no seed lies between them");
     Ok(range)
@@ -98,10 +100,10 @@ fn show(part: &Part) -> Result<()> {
 #[derive(Args)]
 pub struct Merge {
     /// Parts of one study without a seed in common
-    #[arg(required = true, value_name = "PART")]
+    #[arg(required = true, value_name = "PART", value_parser = path())]
     parts: Vec<PathBuf>,
     /// The part that holds all of them, a new file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = path())]
     out: PathBuf,
 }
 
