@@ -74,10 +74,6 @@ impl Monitor {
             self.columns.is_none() || self.map || self.record.is_some(),
             "--columns is of --map and --record"
         );
-        ensure!(
-            !self.operation.reads_frames(),
-            "--frame is not for monitor: a device reports events"
-        );
         let name = || self.device.clone();
         let mut client = Client::new(device::open(&self.device)?).with_context(name)?;
         ctrlc::set_handler(|| {

@@ -28,19 +28,19 @@ pub struct Operation {
     /// Laser cycles between looks
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = whole(0..=u16::MAX))]
     x: u16,
+}
+
+/// The option of what is no device: a device reports events.
+#[derive(Args)]
+pub struct Frames {
     /// A frame-based sensor instead, to compare with: every pixel reads its highest bin every N
     /// laser cycles, if that stands above the background at all
     #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX),
         conflicts_with_all = ["rule", "alpha", "window", "z", "false_one_in", "min_count", "l1", "l2", "x"])]
-    frame: Option<u16>,
+    pub frame: Option<u16>,
 }
 
 impl Operation {
-    /// Whether frames are wanted, which a device does not read.
-    pub fn reads_frames(&self) -> bool {
-        self.frame.is_some()
-    }
-
     /// With what the options do not say.
     ///
     /// # Errors
@@ -79,7 +79,7 @@ impl Operation {
             l2: self.l2,
             x: self.x,
             one_hit_tdc: false,
-            frame: self.frame,
+            frame: None,
             seed,
         })
     }

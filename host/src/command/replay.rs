@@ -10,11 +10,12 @@ use dtof::output::Output;
 use dtof::photon_csv::PhotonCsv;
 use dtof::recorded::{Capture, RecordedHistograms, RecordingLength};
 use dtof::run::run;
+use dtof::settings::Settings;
 use dtof::source::{Geometry, PhotonSource};
 use dtof::{npy, tmf8820};
 use dtof_core::fixed::types::{I24F8, U16F16};
 
-use super::operation::Operation;
+use super::operation::{Frames, Operation};
 use super::print_summary;
 
 #[derive(Args)]
@@ -40,6 +41,8 @@ pub struct Replay {
     offset_mm: Option<I24F8>,
     #[command(flatten)]
     operation: Operation,
+    #[command(flatten)]
+    frames: Frames,
     /// Histograms: photons a laser cycle in the brightest pixel of each capture [default: 1]
     #[arg(long, value_name = "R", value_parser = positive, conflicts_with = "recorded_cycles")]
     photons_per_cycle: Option<f64>,
@@ -73,12 +76,15 @@ impl Replay {
             bin_width_ps,
             offset_mm,
         } = self.open()?;
-        let settings = self.operation.settings(
-            bins,
-            self.bin_width_ps.unwrap_or(bin_width_ps),
-            self.offset_mm.unwrap_or(offset_mm),
-            self.seed,
-        )?;
+        let settings = Settings {
+            frame: self.frames.frame,
+            ..self.operation.settings(
+                bins,
+                self.bin_width_ps.unwrap_or(bin_width_ps),
+                self.offset_mm.unwrap_or(offset_mm),
+                self.seed,
+            )?
+        };
         let mut engine = host_engine(&settings, &photons.addresses())?;
         let mut output = Output::create(&self.out, &settings, photons.geometry(), Some(&self.input))?;
         let mut summary = run(

@@ -18,7 +18,7 @@ use dtof::source::{Geometry, PhotonSource};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
 
-use super::operation::Operation;
+use super::operation::{Frames, Operation};
 use super::print_summary;
 
 #[derive(Args)]
@@ -34,6 +34,8 @@ pub struct Simulate {
     array: Option<Geometry>,
     #[command(flatten)]
     operation: Operation,
+    #[command(flatten)]
+    frames: Frames,
     /// Decide on a device, not on this computer: `qemu` starts an emulated one, else
     /// tcp:HOST:PORT or a serial port
     #[arg(long, value_name = "DEVICE")]
@@ -57,6 +59,7 @@ impl Simulate {
         let bins = scene.bins.into();
         let settings = Settings {
             one_hit_tdc: scene.effects.one_hit_tdc(),
+            frame: self.frames.frame,
             ..self
                 .operation
                 .settings(bins, bin_width_ps, I24F8::ZERO, self.seed)?
