@@ -4,7 +4,7 @@
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use dtof::arguments::{fixed, whole};
-use dtof::detection::{Estimator, Rule};
+use dtof::detection::{Estimator, Rule, WIDEST_PULSE};
 use dtof_core::WindowRule;
 use dtof_core::fixed::types::{U4F12, U8F8};
 
@@ -29,7 +29,7 @@ pub struct Detection {
     /// event, 10 or more [default: 100]
     #[arg(long, value_name = "N", value_parser = whole(10..=u32::MAX))]
     false_one_in: Option<u32>,
-    /// Standard deviation of the pulse in bins, rounded to 1/256: takes the depth from a window that
+    /// Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256: takes the depth from a window that
     /// suits it [default: depth from three bins, whatever the pulse]
     #[arg(long, value_name = "S", value_parser = sigma, allow_hyphen_values = true)]
     sigma_bins: Option<U8F8>,
@@ -85,8 +85,8 @@ impl Detection {
 
 fn sigma(text: &str) -> Result<U8F8, String> {
     let sigma = fixed::<U8F8>(text)?;
-    if sigma == U8F8::ZERO {
-        return Err("must be above 0".to_owned());
+    if sigma == U8F8::ZERO || sigma > WIDEST_PULSE {
+        return Err(format!("must be above 0 and at most {WIDEST_PULSE}"));
     }
     Ok(sigma)
 }
