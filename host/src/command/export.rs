@@ -43,7 +43,7 @@ pub struct Export {
     #[arg(long, value_enum)]
     events: Option<EventKind>,
     /// MCAP: microseconds of a point cloud [default: 1/100 of the run, 10 to 10,000]
-    #[arg(long, value_name = "N", value_parser = whole(1..=1_000_000_000))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=1_000_000_000_u64))]
     slice_us: Option<u64>,
     #[command(flatten)]
     dynamic_depth: dynamic_depth::Options,

@@ -17,7 +17,7 @@ pub struct Operation {
     #[command(flatten)]
     detection: Detection,
     /// Photons a reported peak, or the window around it, holds at least
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = whole(1..=1023))]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = whole(1..=1023_u16))]
     min_count: u16,
     /// The exposure a decision must exceed, in laser cycles
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = whole(0..=u16::MAX))]

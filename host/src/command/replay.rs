@@ -28,7 +28,7 @@ pub struct Replay {
     #[arg(long, value_name = "DIR", value_parser = path())]
     out: PathBuf,
     /// Photon lists: columns of the array, pixel = row × columns + column [default: one row]
-    #[arg(long, value_name = "N", value_parser = whole(1..=65_536))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=65_536_u32))]
     columns: Option<u32>,
     /// Bins of a histogram, a power of two from 8 to 1024 [default: the file's; 128 for .csv]
     #[arg(long, value_name = "N", value_parser = bins)]

@@ -64,7 +64,7 @@ pub struct Tune {
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = whole(1..=u16::MAX))]
     x: u16,
     /// Photons a reported peak holds at least
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = whole(1..=1023))]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = whole(1..=1023_u16))]
     min_count: u16,
     /// Seed of the simulated exposures
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=u64::MAX))]
