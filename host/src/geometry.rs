@@ -103,9 +103,9 @@ impl FromStr for FieldOfView {
     type Err = FieldOfViewError;
 
     fn from_str(text: &str) -> Result<Self, FieldOfViewError> {
-        let angles = text.split_once('x').and_then(|(horizontal, vertical)| {
-            Some([real(horizontal)?, real(vertical)?])
-        });
+        let angles = text
+            .split_once('x')
+            .and_then(|(horizontal, vertical)| Some([real(horizontal)?, real(vertical)?]));
         Self::new(angles.ok_or(FieldOfViewError)?)
     }
 }

@@ -20,7 +20,7 @@ use crate::maps::Maps;
 use crate::report::{self, Cloud, Figure, Section};
 use crate::sample::Sample;
 use crate::settings::Settings;
-use crate::source::Geometry;
+use crate::source::PhotonSource;
 use crate::summary::{self, Summary};
 use crate::{aer_file, picture};
 use pictures::pictures;
@@ -40,11 +40,13 @@ pub struct Output {
     aer: aer_file::Writer<BufWriter<NamedTempFile>>,
     scale: RangeScale,
     maps: Maps,
+    sides: [&'static str; 2],
     sample: Sample,
 }
 
 impl Output {
-    /// Makes the folder if it is not there and begins the event files.
+    /// Makes the folder if it is not there and begins the event files for the array of
+    /// `source`.
     ///
     /// # Errors
     /// If nothing can be written there, or the settings do not give a range. Or if a result
@@ -52,7 +54,7 @@ impl Output {
     pub fn create(
         folder: &Path,
         settings: &Settings,
-        geometry: Geometry,
+        source: &dyn PhotonSource,
         input: Option<&Path>,
     ) -> Result<Self> {
         let scale = settings.range_scale()?;
@@ -62,6 +64,7 @@ impl Output {
             may_replace(&folder.join(name), mark, input.as_slice())?;
         }
         remove_leftovers(folder);
+        let geometry = source.geometry();
         let mut csv = BufWriter::new(aside(folder, OF_A_RUN)?);
         writeln!(csv, "{}", events_csv::HEADER)?;
         let header = aer_file::Header {
@@ -77,6 +80,7 @@ impl Output {
             aer,
             scale,
             maps: Maps::new(geometry),
+            sides: source.sides(),
             sample: Sample::new(Sample::LIMIT),
         })
     }
@@ -114,7 +118,7 @@ impl Output {
         lead: &str,
         sections: &[Section],
     ) -> Result<()> {
-        let pictures = pictures(&self.maps, summary.cycles)?;
+        let pictures = pictures(&self.maps, self.sides, summary.cycles)?;
         let bytes = pictures.iter().map(|picture| picture.svg.len()).sum();
         self.sample.limit(report::room_for_events(bytes));
         let figures: Vec<Figure> = pictures
@@ -140,6 +144,7 @@ impl Output {
         });
         let cloud = Cloud {
             geometry: self.maps.geometry,
+            sides: self.sides,
             cycles: summary.cycles,
             sample: &self.sample,
             pixels: &self.maps.spread(),

@@ -33,6 +33,8 @@ pub struct Map<'a> {
     pub title: &'a str,
     /// Unit of the values; drawn above the colour bar.
     pub unit: &'a str,
+    /// What columns and rows are; written along the sides.
+    pub sides: [&'a str; 2],
     /// Number of pixels in a row.
     pub columns: usize,
     /// Number of rows.

@@ -10,7 +10,6 @@ use common::aer::{HEADER, events, file};
 use dtof::output::Output;
 use dtof::photon_csv::PhotonCsv;
 use dtof::scene;
-use dtof::source::PhotonSource;
 use dtof::summary::Summary;
 use dtof_core::Statistics;
 
@@ -60,7 +59,11 @@ fn a_recording_in_the_output_folder_is_kept() {
         // Photon lists end in .csv; other names are reached through a link.
         let arguments = |input| ["replay", "--input", input, "--out", "out"];
         scratch.file("out/photons.csv", PHOTONS);
-        fs::hard_link(scratch.path("out/photons.csv"), scratch.path("out").join(name)).unwrap();
+        fs::hard_link(
+            scratch.path("out/photons.csv"),
+            scratch.path("out").join(name),
+        )
+        .unwrap();
         let result = format!("out/{name}");
         kept(&scratch, &arguments("out/photons.csv"), &result, READ);
         assert_eq!(names(&scratch.path("out")).len(), 2);
@@ -88,7 +91,10 @@ fn links_hide_no_input() {
     std::os::unix::fs::symlink("../scene.toml", scratch.path("out/report.html")).unwrap();
     let arguments = ["simulate", "--scene", "scene.toml", "--out", "out"];
     kept(&scratch, &arguments, "out/report.html", READ);
-    assert_eq!(scratch.read("photons.csv") + &scratch.read("scene.toml"), PHOTONS.to_owned() + SCENE);
+    assert_eq!(
+        scratch.read("photons.csv") + &scratch.read("scene.toml"),
+        PHOTONS.to_owned() + SCENE
+    );
 }
 
 #[test]
@@ -111,7 +117,12 @@ fn a_file_of_somebody_else_is_kept() {
             scratch.file(&result, text);
             scratch.file("photons.csv", PHOTONS);
             let arguments = ["replay", "--input", "photons.csv", "--out", "out"];
-            kept(&scratch, &arguments, &result, "was not written by this program");
+            kept(
+                &scratch,
+                &arguments,
+                &result,
+                "was not written by this program",
+            );
             assert_eq!(names(&scratch.path("out")), [name]);
         }
     }
@@ -119,7 +130,12 @@ fn a_file_of_somebody_else_is_kept() {
     fs::create_dir_all(scratch.path("out/demo")).unwrap();
     scratch.file("out/demo/report.html", "mine\n");
     let arguments = ["demo", "--cycles", "200"];
-    kept(&scratch, &arguments, "out/demo/report.html", "was not written");
+    kept(
+        &scratch,
+        &arguments,
+        "out/demo/report.html",
+        "was not written",
+    );
 }
 
 /// Also after one that was ended between any two of its files.
@@ -131,7 +147,12 @@ fn results_of_an_earlier_run_are_replaced() {
     assert_eq!(names(&scratch.path("out")), RESULTS);
     scratch.file("out/notes.txt", "mine\n");
     scratch.replayed(&photons, &["--alpha", "8"]);
-    for name in ["summary.json", "report.html", "events.aer", "depth-last.svg"] {
+    for name in [
+        "summary.json",
+        "report.html",
+        "events.aer",
+        "depth-last.svg",
+    ] {
         fs::remove_file(scratch.path("out").join(name)).unwrap();
         scratch.replayed(&photons, &[]);
     }
@@ -150,7 +171,7 @@ fn a_folder_that_cannot_be_completed_has_no_summary() {
     let source = PhotonCsv::open(&photons, 128, None, 1).unwrap();
     let settings = scene::settings(1);
     let out = scratch.path("out");
-    let output = Output::create(&out, &settings, source.geometry(), None).unwrap();
+    let output = Output::create(&out, &settings, &source, None).unwrap();
     fs::remove_file(out.join("report.html")).unwrap();
     fs::create_dir(out.join("report.html")).unwrap();
     let summary = Summary::new(&Statistics::default(), &source, 0, &settings);
@@ -168,7 +189,8 @@ fn what_an_export_reads_is_kept() {
     fs::hard_link(scratch.path("events.aer"), scratch.path("same.aer")).unwrap();
     let export = |out| {
         let arguments = ["export", "events.aer", "--format", "ply", "--out", out];
-        let output = scratch.dtof(&[&arguments[..], &["--calibration", "calibration.toml"]].concat());
+        let output =
+            scratch.dtof(&[&arguments[..], &["--calibration", "calibration.toml"]].concat());
         String::from_utf8(output.stderr).unwrap()
     };
     for out in ["events.aer", "./events.aer", "same.aer", "calibration.toml"] {

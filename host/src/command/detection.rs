@@ -8,7 +8,6 @@ use dtof::detection::{Estimator, Rule, WIDEST_PULSE};
 use dtof_core::WindowRule;
 use dtof_core::fixed::types::{U4F12, U8F8};
 
-
 #[derive(Args)]
 pub struct Detection {
     /// What decides whether a peak stands clear of the background

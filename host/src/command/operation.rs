@@ -86,11 +86,9 @@ impl Operation {
 }
 
 fn gate(text: &str) -> Result<(u16, u16), String> {
-    let bins = text
-        .split_once("..")
-        .and_then(|(first, last)| {
-            let bin = whole(0..=u16::MAX);
-            Some((bin(first).ok()?, bin(last).ok()?))
-        });
+    let bins = text.split_once("..").and_then(|(first, last)| {
+        let bin = whole(0..=u16::MAX);
+        Some((bin(first).ok()?, bin(last).ok()?))
+    });
     bins.ok_or("must be FIRST..LAST, as 20..119".to_owned())
 }

@@ -86,7 +86,7 @@ impl Replay {
             )?
         };
         let mut engine = host_engine(&settings, &photons.addresses())?;
-        let mut output = Output::create(&self.out, &settings, photons.geometry(), Some(&self.input))?;
+        let mut output = Output::create(&self.out, &settings, photons.as_ref(), Some(&self.input))?;
         let mut summary = run(
             photons.as_mut(),
             engine.as_mut(),
@@ -125,7 +125,9 @@ impl Replay {
             Some("json") => {
                 let log = tmf8820::read(path)?;
                 self.expect_bins(tmf8820::BINS)?;
-                let photons = self.histograms(log.geometry, &log.captures)?;
+                let photons = self
+                    .histograms(log.geometry, &log.captures)?
+                    .with_sides(tmf8820::SIDES);
                 Ok(Recording {
                     bin_width_ps: tmf8820::BIN_WIDTH_PS,
                     offset_mm: tmf8820::OFFSET_MM,

@@ -103,8 +103,7 @@ impl Simulation<'_> {
             None => photons?,
         };
         let mut engine = engine(self.device, self.settings, &photons.addresses())?;
-        let mut output =
-            Output::create(self.out, self.settings, photons.geometry(), self.file)?;
+        let mut output = Output::create(self.out, self.settings, &photons, self.file)?;
         let mut comparison = self.scene.comparison(self.settings, self.cycles)?;
         let mut summary = run(
             &mut photons,

@@ -23,14 +23,15 @@ pub struct Picture {
     pub caption: &'static str,
 }
 
-/// The maps of a run of `cycles` laser cycles.
+/// The maps of a run of `cycles` laser cycles, on an array with these `sides`.
 #[allow(clippy::cast_precision_loss, reason = "a picture")]
-pub fn pictures(maps: &Maps, cycles: u64) -> Result<[Picture; 6]> {
+pub fn pictures(maps: &Maps, sides: [&str; 2], cycles: u64) -> Result<[Picture; 6]> {
     let draw = |name, title, unit, caption, values: Vec<Option<f64>>| -> Result<Picture> {
         let Geometry { columns, rows } = maps.geometry;
         let svg = heat_map(&Map {
             title,
             unit,
+            sides,
             columns: columns as usize,
             rows: rows as usize,
             values: &values,
@@ -109,7 +110,7 @@ mod tests {
             columns: 1,
             rows: 1,
         });
-        let pictures = pictures(&maps, 1).unwrap();
+        let pictures = pictures(&maps, ["column", "row"], 1).unwrap();
         assert_eq!(pictures.each_ref().map(|picture| picture.name), NAMES);
         for picture in pictures {
             assert!(picture.svg[..1024].contains(crate::picture::MARK));

@@ -170,7 +170,8 @@ impl Comparison<'_> {
         let ends = [0.0, self.scene.seconds(self.cycles)];
         let nearest = |seconds| {
             let surfaces = self.scene.surfaces.iter();
-            let ranges = surfaces.map(move |surface| surface.nearest_mm(seconds, self.scene.layout));
+            let ranges =
+                surfaces.map(move |surface| surface.nearest_mm(seconds, self.scene.layout));
             ranges.fold(f64::INFINITY, f64::min)
         };
         nearest(ends[0]).min(nearest(ends[1]))
@@ -207,7 +208,10 @@ impl Tally {
         }
     }
 
-    #[allow(clippy::cast_precision_loss, reason = "2^53 events are more than any run has")]
+    #[allow(
+        clippy::cast_precision_loss,
+        reason = "2^53 events are more than any run has"
+    )]
     fn errors(&self, step_mm: f64) -> Errors {
         let right: u64 = self.sizes.iter().sum();
         let false_alarms = self.events - right;
