@@ -17,18 +17,17 @@ mod projection;
 mod reorder;
 
 use std::fmt::Write;
-use std::fs;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use clap::ValueEnum;
 use dtof_core::RangeScale;
 use tempfile::NamedTempFile;
 
 use crate::events::aer_file::{Event, EventKind};
 use crate::events::dynamic_depth::DynamicDepth;
-use crate::events::output::{aside, flushed, place_of};
+use crate::files::{aside, flushed, place_of};
 use crate::geometry::{FieldOfView, Rays};
 use crate::input::source::Geometry;
 use crate::progress::Progress;
@@ -146,9 +145,11 @@ pub fn export(
     quiet: bool,
 ) -> Result<Exported> {
     let name = || input.display().to_string();
-    let place = place_of(out)?;
-    let same = fs::canonicalize(input).is_ok_and(|input| input == place.file);
-    ensure!(!same, "{}: is the file that is read", out.display());
+    let inputs = match &options.optics {
+        Optics::Pinhole(_) => vec![input],
+        Optics::Calibration(calibration) => vec![input, calibration],
+    };
+    let place = place_of(out, &inputs)?;
     let survey = Survey::of(input, format, options.clock, quiet).with_context(name)?;
     let kind = survey.kind(options.kind).with_context(name)?;
     let header = survey.header;

@@ -18,6 +18,7 @@ use std::str::FromStr;
 
 use dtof_core::PixelAddress;
 
+use crate::arguments::real;
 use crate::input::source::Geometry;
 
 /// Degrees across the longer side of an array unless said otherwise.
@@ -102,9 +103,9 @@ impl FromStr for FieldOfView {
     type Err = FieldOfViewError;
 
     fn from_str(text: &str) -> Result<Self, FieldOfViewError> {
-        let angles = text.split_once('x').and_then(|(horizontal, vertical)| {
-            Some([horizontal.parse().ok()?, vertical.parse().ok()?])
-        });
+        let angles = text
+            .split_once('x')
+            .and_then(|(horizontal, vertical)| Some([real(horizontal)?, real(vertical)?]));
         Self::new(angles.ok_or(FieldOfViewError)?)
     }
 }

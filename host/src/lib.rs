@@ -9,12 +9,14 @@
 //!   → Output         events.csv, events.aer, summary.json, pictures, report
 //! ```
 
+pub mod arguments;
 pub mod chart;
 pub mod cli;
 pub mod device;
 pub mod engine;
 pub mod events;
 pub mod export;
+pub mod files;
 pub mod geometry;
 pub mod input;
 pub mod picture;

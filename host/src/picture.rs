@@ -20,6 +20,9 @@ use plotters::prelude::{RGBColor, ViridisRGB};
 use layout::Layout;
 use scale::Scale;
 
+/// Every document has it near its start.
+pub(crate) const MARK: &str = "class=\"heat-map\"";
+
 /// One value a pixel, row by row from the top.
 ///
 /// `None` stands for a pixel that never reported; a value that is not finite is
@@ -30,6 +33,8 @@ pub struct Map<'a> {
     pub title: &'a str,
     /// Unit of the values; drawn above the colour bar.
     pub unit: &'a str,
+    /// What columns and rows are; written along the sides.
+    pub sides: [&'a str; 2],
     /// Number of pixels in a row.
     pub columns: usize,
     /// Number of rows.

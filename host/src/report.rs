@@ -32,6 +32,9 @@ pub struct Section<'a> {
     pub rows: &'a [(String, String)],
 }
 
+/// Every page has it near its start.
+pub(crate) const MARK: &str = "<meta name=\"generator\" content=\"dtof\">";
+
 /// Bytes of a page. Larger ones are slow to open, and to send.
 const PAGE: usize = 5_000_000;
 /// Bytes of a page for all but events and figures, at most.
@@ -69,7 +72,7 @@ pub fn html(
     let lead = text(lead);
     let hash = BASE64.encode(Sha256::digest(cloud::SCRIPT));
     let mut page = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{MARK}\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n\
          <meta http-equiv=\"Content-Security-Policy\" \

@@ -294,12 +294,23 @@ fn an_output_folder_that_cannot_be_written_is_refused() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_completed_has_no_summary() {
+fn a_folder_in_the_place_of_a_result_is_refused() {
     let scratch = Scratch::new();
-    let first = scratch.file("first.csv", format!("{CSV_HEADER}0,0,0\n"));
-    scratch.replayed(&first, &[]);
-    std::fs::remove_file(scratch.path("out/report.html")).unwrap();
-    std::fs::create_dir(scratch.path("out/report.html")).unwrap();
+    std::fs::create_dir_all(scratch.path("out/report.html")).unwrap();
+    let input = scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
+    let output = scratch.replay(&input, &[]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        !output.status.success() && message.contains("report.html: is there, and is no file"),
+        "{message}"
+    );
+}
+
+#[test]
+fn what_a_run_that_was_killed_has_left_is_removed() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
+    scratch.replayed(&input, &[]);
     scratch.file("out/.dtof-run-left.partial", "from a run that was killed");
     let of_others = [
         "out/.dtof-export-a.partial",
@@ -308,14 +319,7 @@ fn a_folder_that_cannot_be_completed_has_no_summary() {
     for name in of_others {
         scratch.file(name, "of an export or a recording under way");
     }
-    let second = scratch.file("second.csv", format!("{CSV_HEADER}0,0,1\n"));
-    let output = scratch.replay(&second, &[]);
-    let message = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        !output.status.success() && message.contains("report.html"),
-        "{message}"
-    );
-    assert!(!scratch.path("out/summary.json").exists());
+    scratch.replayed(&input, &[]);
     assert!(!scratch.path("out/.dtof-run-left.partial").exists());
     assert!(of_others.iter().all(|name| scratch.path(name).exists()));
 }

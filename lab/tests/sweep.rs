@@ -43,13 +43,39 @@ fn parts_in_any_order_merge_into_the_single_run() {
     assert_eq!(scratch.merged(&["c", "a", "b"], "abc"), single);
     // Also by way of a part that has a gap.
     scratch.merged(&["c", "a"], "ac");
-    assert_eq!(scratch.merged(&["b", "ac"], "abc"), single);
+    assert_eq!(scratch.merged(&["b", "ac"], "bac"), single);
     assert_eq!(scratch.merged(&["single"], "same"), single);
     // Other seeds are other photons.
     assert_ne!(
         scratch.swept("7..14", "other").replace("7", "0"),
         single.replace("7", "0")
     );
+}
+
+/// Nor is a part that is merged taken for the result.
+#[test]
+fn a_merge_replaces_nothing() {
+    let scratch = Scratch::new();
+    let part = scratch.swept("0..1", "a");
+    scratch.swept("1..2", "b");
+    for parts in [&["a", "b"][..], &["b"]] {
+        let output = scratch.lab(&[&["merge", "--out", "a"], parts].concat());
+        Scratch::refused(&output, &["a: is there already"]);
+        assert_eq!(scratch.read("a"), part);
+    }
+}
+
+/// A part may be read by whoever may read any other new file.
+#[cfg(unix)]
+#[test]
+fn a_part_has_ordinary_permissions() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let scratch = Scratch::new();
+    let mode = |path| std::fs::metadata(path).unwrap().permissions().mode();
+    scratch.swept("0..1", "part");
+    let other = scratch.file("other", "");
+    assert_eq!(mode(scratch.path("part")), mode(other));
 }
 
 #[test]

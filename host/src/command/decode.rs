@@ -1,7 +1,7 @@
 //! `dtof decode`: the events of an AER file as CSV.
 
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Write};
+use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
@@ -11,7 +11,7 @@ use dtof_core::RangeScale;
 
 #[derive(Args)]
 pub struct Decode {
-    /// The file.
+    /// The file; `-` for standard input
     file: PathBuf,
 }
 
@@ -25,9 +25,17 @@ impl Decode {
     }
 
     fn print(&self, out: &mut impl Write) -> Result<()> {
-        let name = || self.file.display().to_string();
-        let file = File::open(&self.file).with_context(name)?;
-        let mut reader = aer_file::Reader::new(BufReader::new(file)).with_context(name)?;
+        let is_standard_input = self.file.as_os_str() == "-";
+        let name = || match is_standard_input {
+            true => "standard input".to_owned(),
+            false => self.file.display().to_string(),
+        };
+        let input: Box<dyn Read> = if is_standard_input {
+            Box::new(io::stdin())
+        } else {
+            Box::new(File::open(&self.file).with_context(name)?)
+        };
+        let mut reader = aer_file::Reader::new(BufReader::new(input)).with_context(name)?;
         let header = *reader.header();
         let scale = RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?;
         let first = reader.next_event();

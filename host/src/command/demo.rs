@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use dtof::arguments::{path, whole};
 use dtof::input::source::Geometry;
 use dtof::simulate::scene::{self, Scene};
 
@@ -13,7 +14,7 @@ use super::simulate::{Simulation, array};
 #[derive(Args)]
 pub struct Demo {
     /// Where the results go.
-    #[arg(long, default_value = Demo::OUT)]
+    #[arg(long, default_value = Demo::OUT, value_parser = path())]
     out: PathBuf,
     /// Macropixels of the array [default: 64x32; 8x8 with --device]
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = array)]
@@ -23,10 +24,10 @@ pub struct Demo {
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
     /// Laser cycles of the scene
-    #[arg(long, value_name = "N", default_value_t = Demo::CYCLES, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = Demo::CYCLES, value_parser = whole(1..=u64::MAX))]
     cycles: u64,
     /// Seed of the simulated photons.
-    #[arg(long, default_value_t = Demo::SEED)]
+    #[arg(long, default_value_t = Demo::SEED, value_parser = whole(0..=u64::MAX))]
     seed: u64,
     /// Print nothing but errors.
     #[arg(long)]

@@ -3,11 +3,10 @@
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use dtof::engine::detection::{Estimator, Rule};
+use dtof::arguments::{fixed, whole};
+use dtof::engine::detection::{Estimator, Rule, WIDEST_PULSE};
 use dtof_core::WindowRule;
 use dtof_core::fixed::types::{U4F12, U8F8};
-
-use super::operation::number;
 
 #[derive(Args)]
 pub struct Detection {
@@ -16,20 +15,20 @@ pub struct Detection {
     rule: RuleName,
     /// Paper's rule: standard deviations of the background a peak must exceed it by, 0 to 255.996,
     /// rounded to 1/256 [default: 4]
-    #[arg(long, value_parser = number::<U8F8>, allow_hyphen_values = true)]
+    #[arg(long, value_parser = fixed::<U8F8>, allow_hyphen_values = true)]
     alpha: Option<U8F8>,
     /// Window rule: bins in the window, 1 to 7 [default: as suits --sigma-bins]
-    #[arg(long, value_name = "BINS", value_parser = window, allow_hyphen_values = true)]
+    #[arg(long, value_name = "BINS", value_parser = whole(1..=WindowRule::MAX_WIDTH), allow_hyphen_values = true)]
     window: Option<u8>,
     /// Window rule: standard deviations of the background the photons in the window must exceed it
     /// by, 0 to 15.9998, rounded to 1/4096
-    #[arg(long, value_parser = number::<U4F12>, conflicts_with = "false_one_in", allow_hyphen_values = true)]
+    #[arg(long, value_parser = fixed::<U4F12>, conflicts_with = "false_one_in", allow_hyphen_values = true)]
     z: Option<U4F12>,
     /// Window rule, instead: the z with which one in N exposures without a target brings a false
     /// event, 10 or more [default: 100]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(10..))]
+    #[arg(long, value_name = "N", value_parser = whole(10..=u32::MAX))]
     false_one_in: Option<u32>,
-    /// Standard deviation of the pulse in bins, rounded to 1/256: takes the depth from a window that
+    /// Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256: takes the depth from a window that
     /// suits it [default: depth from three bins, whatever the pulse]
     #[arg(long, value_name = "S", value_parser = sigma, allow_hyphen_values = true)]
     sigma_bins: Option<U8F8>,
@@ -83,17 +82,10 @@ impl Detection {
     }
 }
 
-fn window(text: &str) -> Result<u8, String> {
-    let width = text.parse().ok();
-    width
-        .filter(|width| (1..=WindowRule::MAX_WIDTH).contains(width))
-        .ok_or(format!("must be 1 to {}", WindowRule::MAX_WIDTH))
-}
-
 fn sigma(text: &str) -> Result<U8F8, String> {
-    let sigma = number::<U8F8>(text)?;
-    if sigma == U8F8::ZERO {
-        return Err("must be above 0".to_owned());
+    let sigma = fixed::<U8F8>(text)?;
+    if sigma == U8F8::ZERO || sigma > WIDEST_PULSE {
+        return Err(format!("must be above 0 and at most {WIDEST_PULSE}"));
     }
     Ok(sigma)
 }

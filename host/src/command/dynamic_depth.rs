@@ -1,16 +1,15 @@
 //! The options of dynamic depth, the same for every command.
 
 use clap::{Args, ValueEnum};
+use dtof::arguments::fixed;
 use dtof::events::dynamic_depth::DynamicDepth;
 use dtof_core::fixed::types::U24F8;
-
-use super::operation::number;
 
 #[derive(Args)]
 pub struct Options {
     /// How far the mean depth of three events of a pixel has to move to be reported, in
     /// millimetres, rounded to 1/256 [default: 100]
-    #[arg(long, value_name = "MM", value_parser = number::<U24F8>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM", value_parser = fixed::<U24F8>, allow_hyphen_values = true)]
     threshold_mm: Option<U24F8>,
     /// From what: the mean at the event before, as in the paper, which sees steps; or the
     /// mean that was reported last, which sees slow motion, too [default: previous]

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail, ensure};
 use clap::Args;
+use dtof::arguments::{path, whole};
 use dtof::events::aer_file::EventKind;
-use dtof::events::summary::grouped;
 use dtof::export::{Format, LaserClock, Optics, Options, export};
 use dtof::geometry::FieldOfView;
 
@@ -15,12 +15,13 @@ use super::dynamic_depth;
 #[derive(Args)]
 pub struct Export {
     /// The AER file
+    #[arg(value_parser = path())]
     file: PathBuf,
     /// What to write; docs/export.md says what is in it
     #[arg(long, value_enum)]
     format: Format,
     /// Where to
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = path())]
     out: PathBuf,
     /// What the array sees, in degrees from edge to edge [default: 60 across the longer side,
     /// square pixels]
@@ -32,16 +33,16 @@ pub struct Export {
     )]
     fov: Option<FieldOfView>,
     /// A direction and a range bias for each pixel, a TOML file; docs/export.md has its keys
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = path())]
     calibration: Option<PathBuf>,
     /// Laser cycles a second
-    #[arg(long, value_name = "HZ", default_value_t = LaserClock::PAPER_HZ, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "HZ", default_value_t = LaserClock::PAPER_HZ, value_parser = whole(1..=u64::MAX))]
     laser_hz: u64,
     /// Which events of a file that holds both kinds
     #[arg(long, value_enum)]
     events: Option<EventKind>,
     /// MCAP: microseconds of a point cloud [default: 1/100 of the run, 10 to 10,000]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=1_000_000_000_u64))]
     slice_us: Option<u64>,
     #[command(flatten)]
     dynamic_depth: dynamic_depth::Options,

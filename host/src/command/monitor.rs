@@ -9,15 +9,15 @@ use std::time::Duration;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use console::Term;
-use dtof::device::monitor::map::{LiveMap, SHOW_CURSOR};
-use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
+use dtof::arguments::{fixed, path, whole};
 use dtof::device::{self, Client};
+use dtof::events::aer_file::Header;
 use dtof::events::aer_file::Header;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_link::SensorRecord;
 
 use super::dynamic_depth;
-use super::operation::{Operation, number};
+use super::operation::Operation;
 
 /// Ctrl-C was pressed, or the program is asked to end in another way.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
@@ -28,16 +28,16 @@ pub struct Monitor {
     #[arg(long, value_name = "DEVICE")]
     device: String,
     /// Pixels of the sensor, with addresses from 0 [default: as the device says]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX))]
     pixels: Option<u16>,
     /// End after so many seconds [default: at Ctrl-C]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = whole(0..=u32::MAX))]
     seconds: Option<u32>,
     /// Picoseconds a bin, rounded to 1/65536 [default: as the device says, 250 if any will do]
-    #[arg(long, value_name = "PS", value_parser = number::<U16F16>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "PS", value_parser = fixed::<U16F16>, allow_hyphen_values = true)]
     bin_width_ps: Option<U16F16>,
     /// Millimetres added to every range, rounded to 1/256 [default: as the device says]
-    #[arg(long, value_name = "MM", value_parser = number::<I24F8>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM", value_parser = fixed::<I24F8>, allow_hyphen_values = true)]
     offset_mm: Option<I24F8>,
     /// Have the device send changes of depth only, with a polarity
     #[arg(long)]
@@ -49,11 +49,11 @@ pub struct Monitor {
     #[arg(long)]
     map: bool,
     /// Write the events into an AER file as well, for `dtof decode` and `dtof export`
-    #[arg(long, value_name = "FILE.aer")]
+    #[arg(long, value_name = "FILE.aer", value_parser = path())]
     record: Option<PathBuf>,
     /// Columns of the array that is drawn or recorded, pixel = row × columns + column [default: as
     /// high as wide]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX))]
     columns: Option<u16>,
     #[command(flatten)]
     operation: Operation,
@@ -72,10 +72,6 @@ impl Monitor {
         ensure!(
             self.columns.is_none() || self.map || self.record.is_some(),
             "--columns is of --map and --record"
-        );
-        ensure!(
-            !self.operation.reads_frames(),
-            "--frame is not for monitor: a device reports events"
         );
         let name = || self.device.clone();
         let mut client = Client::new(device::open(&self.device)?).with_context(name)?;

@@ -1,11 +1,9 @@
 //! The options that say how pixels operate, the same for every command.
 
-use std::str::FromStr;
-
 use anyhow::{Context, Result, ensure};
 use clap::Args;
+use dtof::arguments::whole;
 use dtof::engine::settings::{I24F8Number, Settings, U16F16Number};
-use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{HIGHEST_Z, RangeGate};
 
@@ -19,30 +17,30 @@ pub struct Operation {
     #[command(flatten)]
     detection: Detection,
     /// Photons a reported peak, or the window around it, holds at least
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1023))]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = whole(1..=1023_u16))]
     min_count: u16,
     /// The exposure a decision must exceed, in laser cycles
-    #[arg(long, value_name = "N", default_value_t = 40)]
+    #[arg(long, value_name = "N", default_value_t = 40, value_parser = whole(0..=u16::MAX))]
     l1: u16,
     /// The exposure at which a pixel starts over without an event, in laser cycles
-    #[arg(long, value_name = "N", default_value_t = 2000)]
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = whole(0..=u16::MAX))]
     l2: u16,
     /// Laser cycles between looks
-    #[arg(long, value_name = "N", default_value_t = 4)]
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = whole(0..=u16::MAX))]
     x: u16,
+}
+
+/// The option of what is no device: a device reports events.
+#[derive(Args)]
+pub struct Frames {
     /// A frame-based sensor instead, to compare with: every pixel reads its highest bin every N
     /// laser cycles, if that stands above the background at all
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..),
+    #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX),
         conflicts_with_all = ["rule", "alpha", "window", "z", "false_one_in", "min_count", "l1", "l2", "x"])]
-    frame: Option<u16>,
+    pub frame: Option<u16>,
 }
 
 impl Operation {
-    /// Whether frames are wanted, which a device does not read.
-    pub fn reads_frames(&self) -> bool {
-        self.frame.is_some()
-    }
-
     /// With what the options do not say.
     ///
     /// # Errors
@@ -81,33 +79,16 @@ impl Operation {
             l2: self.l2,
             x: self.x,
             one_hit_tdc: false,
-            frame: self.frame,
+            frame: None,
             seed,
         })
     }
 }
 
-/// A fixed-point number, rounded to the nearest.
-pub fn number<T: FromStr + Fixed>(text: &str) -> Result<T, String> {
-    let number = parsed::<T>(text)?;
-    // Zero is meant only where zero is written.
-    if number == T::ZERO && text.contains(|digit| matches!(digit, '1'..='9')) {
-        return Err(format!(
-            "is less than half of {}, the smallest step",
-            T::DELTA
-        ));
-    }
-    Ok(number)
-}
-
-fn parsed<T: FromStr + Fixed>(text: &str) -> Result<T, String> {
-    text.parse()
-        .map_err(|_| format!("must be a number from {} to {}", T::MIN, T::MAX))
-}
-
 fn gate(text: &str) -> Result<(u16, u16), String> {
-    let bins = text
-        .split_once("..")
-        .and_then(|(first, last)| Some((first.parse().ok()?, last.parse().ok()?)));
+    let bins = text.split_once("..").and_then(|(first, last)| {
+        let bin = whole(0..=u16::MAX);
+        Some((bin(first).ok()?, bin(last).ok()?))
+    });
     bins.ok_or("must be FIRST..LAST, as 20..119".to_owned())
 }

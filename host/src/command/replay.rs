@@ -4,52 +4,56 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
+use dtof::arguments::{bins, fixed, path, positive, whole};
 use dtof::engine::host::host_engine;
 use dtof::engine::run::run;
+use dtof::engine::settings::Settings;
 use dtof::events::output::Output;
 use dtof::input::photon_csv::PhotonCsv;
 use dtof::input::recorded::{Capture, RecordedHistograms, RecordingLength};
 use dtof::input::source::{Geometry, PhotonSource};
-use dtof::input::{npy, tmf8820};
+use dtof::{npy, tmf8820};
 use dtof_core::fixed::types::{I24F8, U16F16};
 
-use super::operation::{Operation, number};
+use super::operation::{Frames, Operation};
 use super::print_summary;
 
 #[derive(Args)]
 pub struct Replay {
     /// Histograms (.npy, or a TMF8820 capture log .json) or photons (.csv with the header
     /// pixel,cycle,bin)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = path())]
     input: PathBuf,
     /// Where the results go
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = path())]
     out: PathBuf,
     /// Photon lists: columns of the array, pixel = row × columns + column [default: one row]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=65_536_u32))]
     columns: Option<u32>,
     /// Bins of a histogram, a power of two from 8 to 1024 [default: the file's; 128 for .csv]
-    #[arg(long, value_name = "N")]
-    bins: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = bins)]
+    bins: Option<u16>,
     /// Picoseconds a bin, rounded to 1/65536 [default: 250; 92.1 for .json]
-    #[arg(long, value_name = "PS", value_parser = number::<U16F16>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "PS", value_parser = fixed::<U16F16>, allow_hyphen_values = true)]
     bin_width_ps: Option<U16F16>,
     /// Millimetres added to every range, rounded to 1/256 [default: 0; -179.5 for .json]
-    #[arg(long, value_name = "MM", value_parser = number::<I24F8>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM", value_parser = fixed::<I24F8>, allow_hyphen_values = true)]
     offset_mm: Option<I24F8>,
     #[command(flatten)]
     operation: Operation,
+    #[command(flatten)]
+    frames: Frames,
     /// Histograms: photons a laser cycle in the brightest pixel of each capture [default: 1]
-    #[arg(long, value_name = "R", value_parser = rate, conflicts_with = "recorded_cycles")]
+    #[arg(long, value_name = "R", value_parser = positive, conflicts_with = "recorded_cycles")]
     photons_per_cycle: Option<f64>,
     /// Histograms: laser cycles the recording lasted
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=u64::MAX))]
     recorded_cycles: Option<u64>,
     /// Replay only the first N laser cycles
-    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = whole(1..=u64::MAX))]
     cycles: u64,
     /// Seed of the laser cycles that recorded photons are given
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=u64::MAX))]
     seed: u64,
     /// Print nothing but errors
     #[arg(long)]
@@ -72,20 +76,24 @@ impl Replay {
             bin_width_ps,
             offset_mm,
         } = self.open()?;
-        let settings = self.operation.settings(
-            bins,
-            self.bin_width_ps.unwrap_or(bin_width_ps),
-            self.offset_mm.unwrap_or(offset_mm),
-            self.seed,
-        )?;
+        let settings = Settings {
+            frame: self.frames.frame,
+            ..self.operation.settings(
+                bins,
+                self.bin_width_ps.unwrap_or(bin_width_ps),
+                self.offset_mm.unwrap_or(offset_mm),
+                self.seed,
+            )?
+        };
         let mut engine = host_engine(&settings, &photons.addresses())?;
-        let mut output = Output::create(&self.out, &settings, photons.geometry())?;
+        let mut output = Output::create(&self.out, &settings, photons.as_ref(), Some(&self.input))?;
         let mut summary = run(
             photons.as_mut(),
             engine.as_mut(),
             &mut output,
             &settings,
             self.quiet,
+            |_| (),
         )?;
         let input = self.input.display().to_string();
         let lead = format!("Recorded photons of {input}.");
@@ -117,7 +125,9 @@ impl Replay {
             Some("json") => {
                 let log = tmf8820::read(path)?;
                 self.expect_bins(tmf8820::BINS)?;
-                let photons = self.histograms(log.geometry, &log.captures)?;
+                let photons = self
+                    .histograms(log.geometry, &log.captures)?
+                    .with_sides(tmf8820::SIDES);
                 Ok(Recording {
                     bin_width_ps: tmf8820::BIN_WIDTH_PS,
                     offset_mm: tmf8820::OFFSET_MM,
@@ -130,11 +140,7 @@ impl Replay {
                     "--photons-per-cycle and --recorded-cycles are for histograms; {} holds photons",
                     path.display()
                 );
-                let bins = self.bins.unwrap_or(128);
-                ensure!(
-                    (8..=1024).contains(&bins) && bins.is_power_of_two(),
-                    "--bins {bins}: must be a power of two from 8 to 1024"
-                );
+                let bins = self.bins.unwrap_or(128).into();
                 Ok(Recording::new(
                     PhotonCsv::open(path, bins, self.columns, self.cycles)?,
                     bins,
@@ -160,7 +166,7 @@ impl Replay {
     /// A file that says how many bins it has is not read as another.
     fn expect_bins(&self, bins: usize) -> Result<()> {
         let name = self.input.display();
-        let wanted = self.bins.unwrap_or(bins);
+        let wanted = self.bins.map_or(bins, usize::from);
         ensure!(
             wanted == bins,
             "{name}: --bins {wanted}, but the file has {bins}; leave --bins out"
@@ -178,10 +184,4 @@ impl Recording {
             offset_mm: I24F8::ZERO,
         }
     }
-}
-
-fn rate(text: &str) -> Result<f64, String> {
-    let rate = text.parse::<f64>().ok();
-    rate.filter(|rate| rate.is_finite() && *rate > 0.0)
-        .ok_or("must be a number above 0".to_owned())
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
+use dtof::arguments::{path, whole};
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::run::run;
 use dtof::engine::settings::Settings;
@@ -17,31 +18,33 @@ use dtof::simulate::scene::Scene;
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
 
-use super::operation::Operation;
+use super::operation::{Frames, Operation};
 use super::print_summary;
 
 #[derive(Args)]
 pub struct Simulate {
     /// The scene, a TOML file; docs/scenes.md lists its keys
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = path())]
     scene: PathBuf,
     /// Where the results go
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = path())]
     out: PathBuf,
     /// Macropixels of the array that looks at the scene [default: the file's]
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = array)]
     array: Option<Geometry>,
     #[command(flatten)]
     operation: Operation,
+    #[command(flatten)]
+    frames: Frames,
     /// Decide on a device, not on this computer: `qemu` starts an emulated one, else
     /// tcp:HOST:PORT or a serial port
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
     /// Laser cycles [default: the file's]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=u64::MAX))]
     cycles: Option<u64>,
     /// Seed of the simulated photons
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=u64::MAX))]
     seed: u64,
     /// Print nothing but errors
     #[arg(long)]
@@ -56,6 +59,7 @@ impl Simulate {
         let bins = scene.bins.into();
         let settings = Settings {
             one_hit_tdc: scene.effects.one_hit_tdc(),
+            frame: self.frames.frame,
             ..self
                 .operation
                 .settings(bins, bin_width_ps, I24F8::ZERO, self.seed)?
@@ -65,7 +69,7 @@ impl Simulate {
         let lead = format!("Simulated photons of {file}, {columns}×{rows} macropixels.");
         Simulation {
             scene: &scene,
-            file: Some(file),
+            file: Some(&self.scene),
             cycles: self.cycles.unwrap_or(scene.cycles),
             settings: &settings,
             device: self.device.as_deref(),
@@ -81,7 +85,7 @@ impl Simulate {
 pub struct Simulation<'a> {
     pub scene: &'a Scene,
     /// The scene's, if it has one.
-    pub file: Option<String>,
+    pub file: Option<&'a Path>,
     pub cycles: u64,
     pub settings: &'a Settings,
     pub device: Option<&'a str>,
@@ -94,24 +98,28 @@ pub struct Simulation<'a> {
 impl Simulation<'_> {
     pub fn run(self) -> Result<()> {
         let photons = self.scene.photons(self.settings.seed, self.cycles);
-        let mut photons = match &self.file {
-            Some(file) => photons.with_context(|| file.clone())?,
+        let mut photons = match self.file {
+            Some(file) => photons.with_context(|| file.display().to_string())?,
             None => photons?,
         };
         let mut engine = engine(self.device, self.settings, &photons.addresses())?;
-        let mut output = Output::create(self.out, self.settings, photons.geometry())?;
+        let mut output = Output::create(self.out, self.settings, &photons, self.file)?;
+        let mut comparison = self.scene.comparison(self.settings, self.cycles)?;
         let mut summary = run(
             &mut photons,
             engine.as_mut(),
             &mut output,
             self.settings,
             self.quiet,
+            |events| comparison.add(events),
         )?;
-        summary.input = self.file;
+        summary.input = self.file.map(|file| file.display().to_string());
         summary.laser_hz = Some(self.scene.laser_hz());
         summary.field_of_view_degrees = Some(self.scene.view().degrees());
         summary.export_with = export_with(self.scene);
-        let surfaces = self.scene.against_truth(output.maps(), self.cycles);
+        let against_truth = comparison.finish();
+        let surfaces = against_truth.rows();
+        summary.against_truth = Some(against_truth);
         let sections = [Section {
             heading: "Surfaces",
             rows: &surfaces,
@@ -158,8 +166,8 @@ fn engine(
 /// As `64x32`.
 pub fn array(text: &str) -> Result<Geometry, String> {
     let sides = text.split_once('x').and_then(|(columns, rows)| {
-        let sides = (columns.parse::<u16>().ok()?, rows.parse::<u16>().ok()?);
-        (sides.0 > 0 && sides.1 > 0).then_some(sides)
+        let side = whole(1..=u16::MAX);
+        Some((side(columns).ok()?, side(rows).ok()?))
     });
     let (columns, rows) = sides.ok_or("must be COLUMNSxROWS, as 64x32")?;
     Ok(Geometry {

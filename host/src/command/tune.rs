@@ -7,6 +7,7 @@ use std::io::{self, Write};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
+use dtof::arguments::{bins, positive, whole};
 use dtof::simulate::MM_PER_PS;
 use dtof_theory::gaussian;
 use dtof_theory::looks::detections::Detections;
@@ -38,7 +39,7 @@ pub struct Tune {
     #[arg(long, value_name = "PS", value_parser = positive, conflicts_with = "sigma_bins")]
     sigma_ps: Option<f64>,
     /// Bins of a histogram, a power of two from 8 to 1024
-    #[arg(long, value_name = "N", default_value_t = 128)]
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = bins)]
     bins: u16,
     /// Picoseconds a bin
     #[arg(long, value_name = "PS", default_value_t = 250.0, value_parser = positive)]
@@ -54,19 +55,19 @@ pub struct Tune {
     laser_hz: Option<f64>,
     /// The exposure a decision must exceed, in laser cycles [default: the one with the shortest
     /// time to an event]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole(0..=u16::MAX))]
     l1: Option<u16>,
     /// The exposure at which a pixel starts over without an event, in laser cycles
-    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = whole(1..=u16::MAX))]
     l2: u16,
     /// Laser cycles between looks
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = whole(1..=u16::MAX))]
     x: u16,
     /// Photons a reported peak holds at least
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1023))]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = whole(1..=1023_u16))]
     min_count: u16,
     /// Seed of the simulated exposures
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=u64::MAX))]
     seed: u64,
     /// Print JSON
     #[arg(long)]
@@ -278,11 +279,4 @@ fn number(value: f64) -> String {
     } else {
         format!("{value:.3e}")
     }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let value = text.parse::<f64>().ok();
-    value
-        .filter(|value| value.is_finite() && *value > 0.0)
-        .ok_or("must be a number above 0".to_owned())
 }

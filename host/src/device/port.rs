@@ -100,8 +100,22 @@ pub fn open(name: &str) -> Result<Box<dyn Port>> {
     let port = serialport::new(name, BAUD).timeout(PATIENCE).open();
     match port {
         Ok(port) => Ok(Box::new(port)),
+        Err(error) if error.kind == serialport::ErrorKind::Io(ErrorKind::NotFound) => {
+            bail!("{name}: {error}; {}", serial_ports())
+        }
         Err(error) => bail!("{name}: {error}"),
     }
+}
+
+/// The serial ports there are, for people.
+fn serial_ports() -> String {
+    let ports = serialport::available_ports().unwrap_or_default();
+    let mut names: Vec<String> = ports.into_iter().map(|port| port.port_name).collect();
+    names.sort();
+    if names.is_empty() {
+        return "no serial port is here".to_owned();
+    }
+    format!("serial ports here: {}", names.join(", "))
 }
 
 /// A connection that waits no longer than a port should.

@@ -77,6 +77,9 @@ impl Rule {
     }
 }
 
+/// The widest pulse that a window for its depth suits, as a standard deviation in bins.
+pub const WIDEST_PULSE: U8F8 = U8F8::lit("1.75");
+
 /// What finds the depth of a peak.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[serde(tag = "estimator", rename_all = "kebab-case")]
@@ -120,5 +123,19 @@ impl Estimator {
             }
         };
         ("depth".to_owned(), depth)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dtof_core::CentredWindow;
+
+    use super::*;
+
+    #[test]
+    fn the_widest_pulse_has_the_widest_window() {
+        let width = |sigma| CentredWindow::for_pulse(sigma).half_width();
+        assert_eq!(width(WIDEST_PULSE), CentredWindow::MAX);
+        assert!(width(WIDEST_PULSE - U8F8::DELTA) < CentredWindow::MAX);
     }
 }

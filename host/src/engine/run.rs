@@ -1,6 +1,7 @@
 //! One run: photons through an engine into an output folder.
 
 use anyhow::Result;
+use dtof_core::DepthEvent;
 
 use crate::engine::Engine;
 use crate::engine::settings::Settings;
@@ -15,7 +16,8 @@ const SLICE: u16 = 256;
 const SLICE_PHOTONS: f64 = 1e7;
 
 /// Runs all of `source` and writes its events into `output`. A progress bar
-/// shows after a second, unless `quiet`, and only on a terminal.
+/// shows after a second, unless `quiet`, and only on a terminal. `watch` is given all
+/// events, too.
 ///
 /// # Errors
 /// What is wrong with the recording, the engine or the folder.
@@ -25,6 +27,7 @@ pub fn run(
     output: &mut Output,
     settings: &Settings,
     quiet: bool,
+    mut watch: impl FnMut(&[DepthEvent]),
 ) -> Result<Summary> {
     let cycles = source.cycles();
     let progress = Progress::new(cycles, "laser cycles", quiet);
@@ -38,7 +41,9 @@ pub fn run(
         let most = (SLICE_PHOTONS / source.photons_per_cycle()).clamp(1.0, SLICE.into()) as u16;
         let next = u16::try_from(cycles - done).map_or(most, |left| left.min(most));
         let slice = source.next_slice(next)?;
-        output.write(&engine.run(&slice)?)?;
+        let events = engine.run(&slice)?;
+        output.write(&events)?;
+        watch(&events);
         done += u64::from(next);
         progress.at(done);
     }

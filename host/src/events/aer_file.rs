@@ -13,7 +13,7 @@ use dtof_core::{
 
 use crate::input::source::Geometry;
 
-const MAGIC: [u8; 8] = *b"DTOF-AER";
+pub(crate) const MAGIC: &str = "DTOF-AER";
 const HEADER_BYTES: u16 = 64;
 /// The oldest version that is read: it has depth events only.
 const OLDEST_VERSION: u16 = 1;
@@ -101,7 +101,7 @@ impl Header {
     fn to_bytes(self) -> [u8; HEADER_BYTES as usize] {
         let mut bytes = [0; HEADER_BYTES as usize];
         let fields = [
-            &MAGIC[..],
+            MAGIC.as_bytes(),
             &AER_VERSION.to_le_bytes(),
             &HEADER_BYTES.to_le_bytes(),
             &self.bins.to_le_bytes(),
@@ -119,7 +119,7 @@ impl Header {
         let u16_at = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
         let four_at = |at: usize| [bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]];
         let u32_at = |at: usize| u32::from_le_bytes(four_at(at));
-        ensure!(bytes[..8] == MAGIC, "not an AER file");
+        ensure!(bytes[..8] == *MAGIC.as_bytes(), "not an AER file");
         let version = u16_at(8);
         ensure!(
             (OLDEST_VERSION..=AER_VERSION).contains(&version),

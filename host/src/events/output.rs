@@ -10,26 +10,29 @@ use std::fs;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use dtof_core::{DepthEvent, RangeScale};
 use tempfile::NamedTempFile;
 
+use super::aer_file;
 use crate::engine::settings::Settings;
-use crate::events::aer_file;
 use crate::events::events_csv::{self, range_mm};
 use crate::events::maps::Maps;
 use crate::events::sample::Sample;
-use crate::events::summary::Summary;
-use crate::input::source::Geometry;
+use crate::events::summary::{self, Summary};
+use crate::files::{ASIDE, aside, flushed, may_replace};
+use crate::input::source::PhotonSource;
+use crate::picture;
 use crate::report::{self, Cloud, Figure, Section};
 use pictures::pictures;
 
+const CSV: &str = "events.csv";
+const AER: &str = "events.aer";
+const REPORT: &str = "report.html";
 /// What makes a folder complete: moved to its place last.
 const SUMMARY: &str = "summary.json";
 /// Names of files of a run that are not complete begin so.
 const OF_A_RUN: &str = ".dtof-run-";
-/// Names of files that are not complete end so.
-const ASIDE: &str = ".partial";
 
 /// Files on their way into the output folder.
 pub struct Output {
@@ -38,19 +41,31 @@ pub struct Output {
     aer: aer_file::Writer<BufWriter<NamedTempFile>>,
     scale: RangeScale,
     maps: Maps,
+    sides: [&'static str; 2],
     sample: Sample,
 }
 
 impl Output {
-    /// Makes the folder if it is not there and begins the event files.
+    /// Makes the folder if it is not there and begins the event files for the array of
+    /// `source`.
     ///
     /// # Errors
-    /// If nothing can be written there, or the settings do not give a range.
-    pub fn create(folder: &Path, settings: &Settings, geometry: Geometry) -> Result<Self> {
+    /// If nothing can be written there, or the settings do not give a range. Or if a result
+    /// would replace `input`, or a file that no run of this program has written.
+    pub fn create(
+        folder: &Path,
+        settings: &Settings,
+        source: &dyn PhotonSource,
+        input: Option<&Path>,
+    ) -> Result<Self> {
         let scale = settings.range_scale()?;
         fs::create_dir_all(folder)
             .with_context(|| format!("{}: cannot be the output folder", folder.display()))?;
+        for (name, mark) in results() {
+            may_replace(&folder.join(name), mark, input.as_slice())?;
+        }
         remove_leftovers(folder);
+        let geometry = source.geometry();
         let mut csv = BufWriter::new(aside(folder, OF_A_RUN)?);
         writeln!(csv, "{}", events_csv::HEADER)?;
         let header = aer_file::Header {
@@ -66,6 +81,7 @@ impl Output {
             aer,
             scale,
             maps: Maps::new(geometry),
+            sides: source.sides(),
             sample: Sample::new(Sample::LIMIT),
         })
     }
@@ -103,7 +119,7 @@ impl Output {
         lead: &str,
         sections: &[Section],
     ) -> Result<()> {
-        let pictures = pictures(&self.maps, summary.cycles)?;
+        let pictures = pictures(&self.maps, self.sides, summary.cycles)?;
         let bytes = pictures.iter().map(|picture| picture.svg.len()).sum();
         self.sample.limit(report::room_for_events(bytes));
         let figures: Vec<Figure> = pictures
@@ -129,6 +145,7 @@ impl Output {
         });
         let cloud = Cloud {
             geometry: self.maps.geometry,
+            sides: self.sides,
             cycles: summary.cycles,
             sample: &self.sample,
             pixels: &self.maps.spread(),
@@ -143,13 +160,13 @@ impl Output {
         };
         // Everything is written before anything is moved to its place.
         let mut files = vec![
-            (flushed(self.csv)?, "events.csv"),
-            (flushed(self.aer.finish()?)?, "events.aer"),
+            (flushed(self.csv)?, CSV),
+            (flushed(self.aer.finish()?)?, AER),
         ];
         for picture in &pictures {
             files.push((aside(&picture.svg)?, picture.name));
         }
-        files.push((aside(&report)?, "report.html"));
+        files.push((aside(&report)?, REPORT));
         files.push((
             aside(&(serde_json::to_string_pretty(summary)? + "\n"))?,
             SUMMARY,
@@ -172,6 +189,17 @@ impl Output {
     }
 }
 
+/// Names of results, and what stands near the start of each.
+fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let pictures = pictures::NAMES.map(|name| (name, picture::MARK));
+    pictures.into_iter().chain([
+        (CSV, events_csv::HEADER),
+        (AER, aer_file::MAGIC),
+        (REPORT, report::MARK),
+        (SUMMARY, summary::MARK),
+    ])
+}
+
 /// What a run that was killed has left, and nothing of an export or a recording, which
 /// may be under way. None of it is worth an error.
 fn remove_leftovers(folder: &Path) {
@@ -182,69 +210,4 @@ fn remove_leftovers(folder: &Path) {
             let _ = fs::remove_file(entry.path());
         }
     }
-}
-
-/// Where a file is to be.
-pub(crate) struct Place {
-    /// The folder it is written in.
-    pub folder: PathBuf,
-    /// The file.
-    pub file: PathBuf,
-}
-
-/// Where `out` is: what it leads to, if it is a link. Only a file is ever replaced.
-///
-/// # Errors
-/// If something else is there, or there is no folder for it.
-pub(crate) fn place_of(out: &Path) -> Result<Place> {
-    let name = || out.display().to_string();
-    let mut file = out.to_owned();
-    if let Ok(there) = fs::canonicalize(out) {
-        ensure!(there.is_file(), "{}: is there, and is no file", name());
-        file = there;
-    } else {
-        ensure!(
-            !out.is_symlink(),
-            "{}: is a link to what is not there",
-            name()
-        );
-    }
-    let folder = match file.parent() {
-        Some(folder) if folder == Path::new("") => Path::new("."),
-        Some(folder) => folder,
-        None => Path::new("/"),
-    };
-    ensure!(
-        folder.is_dir(),
-        "{}: there is no folder {}",
-        name(),
-        folder.display()
-    );
-    let folder = folder.to_owned();
-    Ok(Place { folder, file })
-}
-
-/// A file in `folder` that vanishes unless it is moved to its place. Its name begins
-/// with `prefix`, which says whose it is.
-pub(crate) fn aside(folder: &Path, prefix: &str) -> Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(prefix).suffix(ASIDE);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // As any other new file: the umask takes away what it should.
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    builder
-        .tempfile_in(folder)
-        .with_context(|| folder.display().to_string())
-}
-
-/// What was buffered is on disk, or an error says that it is not.
-pub(crate) fn flushed(file: BufWriter<NamedTempFile>) -> Result<NamedTempFile> {
-    let file = file
-        .into_inner()
-        .map_err(std::io::IntoInnerError::into_error)?;
-    file.as_file().sync_all()?;
-    Ok(file)
 }

@@ -1,15 +1,23 @@
 //! What came out of a run: `summary.json`, and the same on the terminal and in
 //! the report.
 
+pub mod truth;
+
 use dtof_core::Statistics;
 use serde::Serialize;
 
 use crate::engine::settings::Settings;
 use crate::input::source::PhotonSource;
+use truth::AgainstTruth;
+
+/// Every `summary.json` begins with it, less the version.
+pub(crate) const MARK: &str = "\"program\": \"dtof ";
 
 /// What came out, as `summary.json` has it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
+    /// This program and its version.
+    pub program: &'static str,
     /// The recording or the scene, if it was a file.
     pub input: Option<String>,
     /// Laser cycles a second of a simulated scene.
@@ -46,6 +54,8 @@ pub struct Summary {
     /// Recorded photons that were not replayed, as they lie after the last
     /// laser cycle.
     pub not_replayed: u64,
+    /// How the events of a simulated scene compare with it.
+    pub against_truth: Option<AgainstTruth>,
     /// How the pixels operated.
     pub settings: Settings,
 }
@@ -73,6 +83,7 @@ impl Summary {
             ..
         } = *statistics;
         Self {
+            program: concat!("dtof ", env!("CARGO_PKG_VERSION")),
             input: None,
             laser_hz: None,
             field_of_view_degrees: None,
@@ -90,6 +101,7 @@ impl Summary {
             expired,
             expired_deferred,
             not_replayed: source.not_replayed(),
+            against_truth: None,
             settings: settings.clone(),
         }
     }

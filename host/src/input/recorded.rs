@@ -43,6 +43,7 @@ pub struct Capture {
 #[derive(Clone, Debug)]
 pub struct RecordedHistograms {
     geometry: Geometry,
+    sides: [&'static str; 2],
     cycles: u64,
     photons_per_cycle: f64,
     /// Laser cycles of the shortest and the longest capture.
@@ -102,12 +103,19 @@ impl RecordedHistograms {
         );
         Ok(Self {
             geometry,
+            sides: ["column", "row"],
             photons_per_cycle,
             cycles: cycles.min(longest),
             recorded: (shortest, longest),
             next_cycle: 0,
             pixels,
         })
+    }
+
+    /// With other names for columns and rows.
+    #[must_use]
+    pub fn with_sides(self, sides: [&'static str; 2]) -> Self {
+        Self { sides, ..self }
     }
 }
 
@@ -142,6 +150,10 @@ fn recorded_cycles(length: RecordingLength, brightest: u64, wanted: u64) -> Resu
 impl PhotonSource for RecordedHistograms {
     fn geometry(&self) -> Geometry {
         self.geometry
+    }
+
+    fn sides(&self) -> [&'static str; 2] {
+        self.sides
     }
 
     fn cycles(&self) -> u64 {

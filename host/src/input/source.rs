@@ -54,6 +54,11 @@ pub trait PhotonSource {
     /// The array.
     fn geometry(&self) -> Geometry;
 
+    /// What its columns and its rows are.
+    fn sides(&self) -> [&'static str; 2] {
+        ["column", "row"]
+    }
+
     /// The pixels that are there, ascending: all of the array unless said
     /// otherwise.
     fn addresses(&self) -> Vec<PixelAddress> {

@@ -15,6 +15,8 @@ use crate::input::source::Geometry;
 
 /// Zones of the sensor.
 pub const ZONES: u32 = 9;
+/// What the columns and the rows of a log are.
+pub const SIDES: [&str; 2] = ["zone", "capture"];
 /// Bins of its histograms.
 pub const BINS: usize = 128;
 /// Its bin width: a fit of pulse positions to distances from 30 to 400 mm gives

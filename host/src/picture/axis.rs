@@ -29,15 +29,15 @@ pub(super) struct Lines {
 }
 
 impl Lines {
-    /// The lines of a map of `columns` and `rows`.
-    pub fn new(columns: usize, rows: usize) -> Self {
+    /// The lines of a map of `columns` and `rows`, each called so.
+    pub fn new(columns: usize, rows: usize, [column, row]: [&str; 2]) -> Self {
         let long = columns.max(rows);
         if columns.min(rows) > 1 || long <= MOST_IN_LINE {
             return Self {
                 columns,
                 rows,
-                across: "column".into(),
-                down: "row".into(),
+                across: column.into(),
+                down: row.into(),
                 row_unit: 1,
             };
         }
@@ -47,7 +47,7 @@ impl Lines {
         while in_line * in_line < long {
             in_line *= 2;
         }
-        let name = if rows == 1 { "column" } else { "row" };
+        let name = if rows == 1 { column } else { row };
         Self {
             columns: in_line,
             rows: long.div_ceil(in_line),

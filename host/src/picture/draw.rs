@@ -12,8 +12,8 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::axis::Axis;
 use super::cells::write_cells;
-use super::escape;
 use super::layout::{Bar, Frame, LINE_HEIGHT, Layout};
+use super::{MARK, escape};
 
 /// Background, text, lines, pixels without a value.
 const PAPER: RGBColor = RGBColor(0xff, 0xff, 0xff);
@@ -56,7 +56,7 @@ pub(super) fn document(layout: &Layout, levels: &[Option<u8>]) -> Result<String>
     let mut document = drawn[..head].to_owned();
     write!(
         document,
-        " class=\"heat-map\" role=\"img\"><title>{title}</title><style>{DARK}\
+        " {MARK} role=\"img\"><title>{title}</title><style>{DARK}\
          @media (max-width:{narrow}px){{.heat-map>text{{font-size:{TITLE_SIZE}px}}}}</style>"
     )?;
     document.push_str(&drawn[head + 1..tail]);

@@ -71,7 +71,7 @@ impl Layout {
     /// The picture of `map`, of which `silent` pixels have no value.
     pub fn new(map: &Map, scale: Option<&Scale>, silent: usize) -> Self {
         let pixels = map.columns * map.rows;
-        let lines = Lines::new(map.columns, map.rows);
+        let lines = Lines::new(map.columns, map.rows, map.sides);
         let (columns, rows) = (lines.columns, lines.rows);
 
         let side = (MOST_WIDTH / columns as f64).min(MOST_HEIGHT / rows as f64);

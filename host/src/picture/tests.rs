@@ -5,6 +5,7 @@ fn picture(columns: usize, rows: usize, values: &[Option<f64>]) -> String {
     let map = Map {
         title: "Range",
         unit: "mm",
+        sides: ["column", "row"],
         columns,
         rows,
         values,
@@ -65,6 +66,7 @@ fn texts_are_escaped() {
     let map = Map {
         title: "a <b> & \"c\" 'd' ]]>\u{1}\u{fffe}",
         unit: "<&\0>",
+        sides: ["column", "row"],
         columns: 1,
         rows: 1,
         values: &[Some(1.0)],
@@ -211,6 +213,7 @@ fn impossible_maps_are_refused() {
         let map = Map {
             title: "",
             unit: "",
+            sides: ["column", "row"],
             columns,
             rows,
             values,

@@ -16,6 +16,8 @@ use dtof_core::PixelAddress;
 pub struct Cloud<'a> {
     /// The array.
     pub geometry: Geometry,
+    /// What its columns and rows are.
+    pub sides: [&'a str; 2],
     /// Laser cycles of the run.
     pub cycles: u64,
     /// The events, or evenly some of them.
@@ -101,6 +103,7 @@ impl Cloud<'_> {
         json!({
             "columns": self.geometry.columns,
             "rows": self.geometry.rows,
+            "sides": self.sides,
             "cycles": self.cycles,
             "unit": unit,
             "oneOf": self.sample.one_of(),

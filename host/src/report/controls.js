@@ -163,14 +163,20 @@ function chooseFar() {
   redraw();
 }
 far.addEventListener("input", chooseFar);
-element("third").addEventListener("input", (event) => {
-  view.third = event.target.value;
+function chooseThird() {
+  view.third = element("third").value;
   const third = view.third === "range" ? "range" : "laser cycle";
-  cloud.setAttribute("aria-label", `Events by column, row and ${third}, coloured by range`);
+  const by = [...data.sides, third].join(", ");
+  cloud.setAttribute("aria-label", `Events by ${by}, coloured by range`);
   redraw();
-});
+}
+element("third").addEventListener("input", chooseThird);
 
 // Pixels by their place.
+for (const [at, id] of ["across", "down"].entries()) {
+  const name = data.sides[at];
+  element(id).textContent = name[0].toUpperCase() + name.slice(1);
+}
 element("column").max = data.columns - 1;
 element("line").max = data.rows - 1;
 element("add").addEventListener("submit", (event) => {
@@ -190,5 +196,6 @@ addScale();
 data.spikes.forEach((pixel) => addLane(pixel));
 chooseWindow();
 chooseFar();
+chooseThird();
 new ResizeObserver(redraw).observe(cloud);
 dark.addEventListener("change", redraw);

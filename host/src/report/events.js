@@ -79,7 +79,8 @@ function number(value, digits = 0) {
 }
 
 function pixelName(pixel) {
-  return `column ${pixel % data.columns}, row ${Math.floor(pixel / data.columns)}`;
+  const [column, row] = data.sides;
+  return `${column} ${pixel % data.columns}, ${row} ${Math.floor(pixel / data.columns)}`;
 }
 
 /** The context of a canvas that has as many pixels as the screen shows of it. */

@@ -25,8 +25,8 @@ function axes() {
     ? { name: "range, mm", ...spanOfRange(), length: 1 }
     : { name: "laser cycle", low: shown.start, high: shown.end, length: 1.3 };
   return [
-    { name: "column", low: -0.5, high: data.columns - 0.5, length: side(data.columns), whole: true },
-    { name: "row", low: -0.5, high: data.rows - 0.5, length: side(data.rows), whole: true },
+    { name: data.sides[0], low: -0.5, high: data.columns - 0.5, length: side(data.columns), whole: true },
+    { name: data.sides[1], low: -0.5, high: data.rows - 0.5, length: side(data.rows), whole: true },
     third,
   ];
 }

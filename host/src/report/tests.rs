@@ -35,6 +35,7 @@ fn sample(limit: usize, count: u32) -> Sample {
 /// A page with the events of `sample`, nothing else that varies.
 fn page(sample: &Sample, cycles: u64, sections: &[Section], figures: &[Figure]) -> String {
     let events = Cloud {
+        sides: ["zone", "capture"],
         geometry: Geometry {
             columns: 2,
             rows: 2,
@@ -66,6 +67,7 @@ fn all_texts_are_escaped() {
     }];
     let none = Sample::new(1);
     let events = Cloud {
+        sides: ["zone", "capture"],
         geometry: Geometry {
             columns: 1,
             rows: 1,
@@ -91,6 +93,7 @@ fn page_loads_nothing() {
     let map = crate::picture::Map {
         title: "t",
         unit: "m",
+        sides: ["column", "row"],
         columns: 2,
         rows: 1,
         values: &values,

@@ -57,6 +57,11 @@ impl Scratch {
             "{}",
             String::from_utf8_lossy(&output.stderr)
         );
+        self.summary()
+    }
+
+    /// What the last run into `out` came to.
+    pub fn summary(&self) -> serde_json::Value {
         serde_json::from_str(&self.read("out/summary.json")).unwrap()
     }
 

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
+use dtof::arguments::path;
 use dtof_lab::pages::{self, Anew};
 
 #[derive(Args)]
 pub struct Figures {
     /// The folder of the documentation
-    #[arg(long, value_name = "DIR", default_value = "docs")]
+    #[arg(long, value_name = "DIR", default_value = "docs", value_parser = path())]
     docs: PathBuf,
     /// Work out all seeds, not only those of a quick look
     #[arg(long)]

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
+use dtof::arguments::{path, whole};
 use dtof::events::summary::grouped;
 use dtof_lab::studies;
 use dtof_lab::sweep::{self, Part, SeedRange};
@@ -19,10 +20,10 @@ pub struct Sweep {
     #[arg(long, value_name = "A..B", value_parser = seeds, requires = "out")]
     seeds: Option<SeedRange>,
     /// The part: a new file, or one that an earlier run with the same seeds left
-    #[arg(long, value_name = "FILE", requires = "seeds")]
+    #[arg(long, value_name = "FILE", requires = "seeds", value_parser = path())]
     out: Option<PathBuf>,
     /// Save the part after so many seconds, for a run that is ended early
-    #[arg(long, value_name = "S", default_value_t = 10)]
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = whole(0..=u64::MAX))]
     save_every: u64,
     /// Show no progress
     #[arg(long)]
@@ -31,9 +32,10 @@ pub struct Sweep {
 
 fn seeds(text: &str) -> Result<SeedRange> {
     let (first, end) = text.split_once("..").context("not A..B")?;
+    let seed = |text: &str| whole(0..=u64::MAX)(text).ok();
     let range = SeedRange {
-        first: first.parse().context("the first is no seed")?,
-        end: end.parse().context("the last is no seed")?,
+        first: seed(first).context("the first is no seed")?,
+        end: seed(end).context("the last is no seed")?,
     };
     ensure!(range.first < range.end, "no seed lies between them");
     Ok(range)
@@ -99,15 +101,20 @@ fn show(part: &Part) -> Result<()> {
 #[derive(Args)]
 pub struct Merge {
     /// Parts of one study without a seed in common
-    #[arg(required = true, value_name = "PART")]
+    #[arg(required = true, value_name = "PART", value_parser = path())]
     parts: Vec<PathBuf>,
-    /// The part that holds all of them
-    #[arg(long, value_name = "FILE")]
+    /// The part that holds all of them, a new file
+    #[arg(long, value_name = "FILE", value_parser = path())]
     out: PathBuf,
 }
 
 impl Merge {
     pub fn run(&self) -> Result<()> {
+        ensure!(
+            !self.out.exists(),
+            "{}: is there already; --out is a new file",
+            self.out.display()
+        );
         let part = sweep::merge(&self.parts, studies::named)?;
         part.save(&self.out)?;
         show(&part)

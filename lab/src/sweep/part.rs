@@ -6,9 +6,9 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
-use tempfile::NamedTempFile;
 
 use super::{Point, Study, Tally};
+use dtof::files::{aside, place_of};
 
 /// Seeds `first` to `end - 1`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -224,14 +224,11 @@ impl Part {
     /// If the folder cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         let name = || path.display().to_string();
-        let folder = match path.parent() {
-            Some(folder) if folder != Path::new("") => folder,
-            _ => Path::new("."),
-        };
-        let mut file = NamedTempFile::new_in(folder).with_context(name)?;
+        let place = place_of(path, &[])?;
+        let mut file = aside(&place.folder, ".dtof-part-").with_context(name)?;
         let text = self.to_json().with_context(name)?;
         file.write_all(text.as_bytes()).with_context(name)?;
-        file.persist(path).with_context(name)?;
+        file.persist(&place.file).with_context(name)?;
         Ok(())
     }
 }

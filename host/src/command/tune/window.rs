@@ -1,15 +1,23 @@
 //! The window rule.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
+use dtof::engine::detection::WIDEST_PULSE;
 use dtof_core::DepthEstimator;
 use dtof_theory::tune::{Request, window};
+use dtof_theory::tune::{Request, window};
 
-use super::{Line, Tune};
+use super::{Line, Tune, number};
 
 impl Tune {
     /// z, L1 and what to expect of them; the options for it.
     #[allow(clippy::cast_precision_loss)]
     pub(super) fn window(&self, request: &Request) -> Result<(Vec<Line>, String)> {
+        ensure!(
+            request.sigma <= WIDEST_PULSE.to_num::<f64>(),
+            "a pulse of σ = {} bins is too wide for a window, which suits up to {WIDEST_PULSE}; take \
+             wider bins, or --rule paper",
+            number(request.sigma)
+        );
         let tuned = window::tune(request)?;
         let (exposures, events) = tuned.false_events;
         let mut lines = vec![

@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use tempfile::NamedTempFile;
 
 use crate::events::aer_file::{Event, Header, Writer};
-use crate::events::output::{aside, flushed, place_of};
+use crate::files::{aside, flushed, place_of};
 
 /// A file on its way: written aside, and at its place once [`Recording::finish`] has
 /// returned. What cannot be moved there stays aside: events do not come twice.
@@ -25,7 +25,7 @@ impl Recording {
     /// # Errors
     /// If nothing can be written in its folder, or what is at `path` is no file.
     pub fn new(path: &Path, header: &Header) -> Result<Self> {
-        let place = place_of(path)?;
+        let place = place_of(path, &[])?;
         let name = || path.display().to_string();
         let mut file = aside(&place.folder, ".dtof-recording-").with_context(name)?;
         file.disable_cleanup(true);

@@ -6,6 +6,16 @@ use crate::events::maps::{Maps, PixelHistory};
 use crate::input::source::Geometry;
 use crate::picture::{Map, heat_map};
 
+/// The files, in the order of [`pictures`].
+pub const NAMES: [&str; 6] = [
+    "depth-last.svg",
+    "depth-mean.svg",
+    "event-counts.svg",
+    "event-rate.svg",
+    "reflectivity-events.svg",
+    "reflectivity-signal.svg",
+];
+
 /// A picture and the file it becomes.
 pub struct Picture {
     pub name: &'static str,
@@ -13,14 +23,15 @@ pub struct Picture {
     pub caption: &'static str,
 }
 
-/// The maps of a run of `cycles` laser cycles.
+/// The maps of a run of `cycles` laser cycles, on an array with these `sides`.
 #[allow(clippy::cast_precision_loss, reason = "a picture")]
-pub fn pictures(maps: &Maps, cycles: u64) -> Result<[Picture; 6]> {
+pub fn pictures(maps: &Maps, sides: [&str; 2], cycles: u64) -> Result<[Picture; 6]> {
     let draw = |name, title, unit, caption, values: Vec<Option<f64>>| -> Result<Picture> {
         let Geometry { columns, rows } = maps.geometry;
         let svg = heat_map(&Map {
             title,
             unit,
+            sides,
             columns: columns as usize,
             rows: rows as usize,
             values: &values,
@@ -92,6 +103,19 @@ fn relative(mut values: Vec<Option<f64>>) -> Vec<Option<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_picture_has_its_name_and_mark() {
+        let maps = Maps::new(Geometry {
+            columns: 1,
+            rows: 1,
+        });
+        let pictures = pictures(&maps, ["column", "row"], 1).unwrap();
+        assert_eq!(pictures.each_ref().map(|picture| picture.name), NAMES);
+        for picture in pictures {
+            assert!(picture.svg[..1024].contains(crate::picture::MARK));
+        }
+    }
 
     #[test]
     fn shares_are_those_of_the_highest() {

@@ -1,93 +1,72 @@
-//! How events compare with the scene.
+//! How the events of a run compare with the scene, each with what its pixel saw in its
+//! laser cycle. Memory does not grow with their number.
 
-use dtof_core::PixelAddress;
+use dtof_core::{DepthEvent, PixelAddress, RangeScale};
 
 use super::Scene;
-use crate::events::maps::{Maps, PixelHistory};
-use crate::events::summary::{Row, grouped};
+use crate::engine::settings::Settings;
+use crate::events::events_csv::range_mm;
+use crate::events::summary::truth::{
+    AgainstTruth, CoverGlass, Errors, FALSE_BEYOND_BINS, OfSurface,
+};
 
-/// An event is false if its range lies farther from the truth than this many
-/// bins.
-const FALSE_BEYOND_BINS: f64 = 3.0;
+/// Errors are counted in so many steps from 0 to [`FALSE_BEYOND_BINS`]: 1024 a bin.
+const STEPS: usize = 3 * 1024;
+
+/// False alarms look like a cover glass if there are at least so many in one place.
+const GLASS_AT_LEAST: u64 = 10;
+/// And if that is at least one of so many events.
+const GLASS_ONE_IN: u64 = 100;
+/// And so many times what the same bins would hold if all false alarms lay evenly.
+const GLASS_TIMES_EVEN: u64 = 4;
+/// Beyond so many standard deviations of the pulse nothing of the glass is left.
+const GLASS_ENDS_SIGMA: f64 = 6.0;
+/// A range gate has so many bins at least.
+const LEAST_GATE: usize = 8;
+
+/// What is known of the events so far.
+pub struct Comparison<'a> {
+    scene: &'a Scene,
+    scale: RangeScale,
+    /// Laser cycles of the run.
+    cycles: u64,
+    /// The last bin of the range gate.
+    last_bin: usize,
+    /// One a surface, and one for pixels that see none.
+    tallies: Vec<Tally>,
+    /// False alarms by the bin of their peak.
+    false_peaks: Vec<u64>,
+}
+
+/// Events of pixels that saw the same surface.
+#[derive(Clone)]
+struct Tally {
+    /// For each address whether it has sent one.
+    has_sent: Vec<bool>,
+    first_cycle: Option<u64>,
+    events: u64,
+    /// Sums over those that are no false alarms: errors in millimetres, their squares, and how
+    /// many there are by size.
+    sum: f64,
+    squares: f64,
+    sizes: Vec<u64>,
+}
 
 impl Scene {
-    /// How the events of `cycles` laser cycles compare with the scene, surface by
-    /// surface. A pixel counts for the surface it saw at its last event. False events
-    /// are counted, and left out of the errors.
-    #[must_use]
-    pub fn against_truth(&self, maps: &Maps, cycles: u64) -> Vec<Row> {
-        let mut rows = Vec::new();
-        let pixels: Vec<(PixelAddress, &PixelHistory)> =
-            (0..=u16::MAX).map(PixelAddress).zip(&maps.pixels).collect();
-        for (index, surface) in self.surfaces.iter().enumerate() {
-            let on_surface = |(address, pixel): &&(PixelAddress, &PixelHistory)| {
-                let view = self.truth(*address, pixel.last_cycle().unwrap_or(0));
-                view.is_some_and(|view| view.surface == index)
-            };
-            let seen: Vec<_> = pixels.iter().filter(on_surface).collect();
-            let events: u64 = seen.iter().map(|(_, pixel)| pixel.events).sum();
-            let first = seen.iter().filter_map(|(_, pixel)| pixel.first_cycle);
-            rows.push((
-                surface.name.clone(),
-                format!(
-                    "{} events of {} pixels, the first in laser cycle {}",
-                    grouped(events),
-                    seen.len(),
-                    first.min().map_or("-".to_owned(), grouped),
-                ),
-            ));
-            let lost = self.pixels_beyond(index, cycles);
-            if lost > 0 {
-                rows.push((
-                    format!("{}, beyond the last bin", surface.name),
-                    format!(
-                        "at the start or the end in {lost} of {} pixels: no photons from {:.0} mm on",
-                        pixels.len(),
-                        self.end_mm()
-                    ),
-                ));
-            }
-            let limit_mm = FALSE_BEYOND_BINS * self.mm_per_bin();
-            let errors: Vec<Vec<f64>> = seen
-                .iter()
-                .map(|(address, pixel)| self.errors(*address, pixel))
-                .filter(|errors| !errors.is_empty())
-                .collect();
-            if errors.is_empty() {
-                continue; // no event, no error
-            }
-            let right = |error: &f64| error.abs() <= limit_mm;
-            let last: Vec<f64> = errors
-                .iter()
-                .filter_map(|errors| errors.last().copied())
-                .filter(right)
-                .collect();
-            let mean: Vec<f64> = errors
-                .iter()
-                .map(|errors| errors.iter().copied().filter(right).collect::<Vec<f64>>())
-                .filter(|errors| !errors.is_empty())
-                .map(|errors| mean(&errors))
-                .collect();
-            rows.push((
-                format!("{}, false events", surface.name),
-                format!(
-                    "{} of {} last events of a pixel, beyond {FALSE_BEYOND_BINS} bins",
-                    grouped((errors.len() - last.len()) as u64),
-                    grouped(errors.len() as u64),
-                ),
-            ));
-            if !last.is_empty() {
-                rows.push((
-                    format!("{}, rms error", surface.name),
-                    format!(
-                        "{:.1} mm last event of each pixel, {:.1} mm mean of ten, without the false ones",
-                        root_mean_square(&last),
-                        root_mean_square(&mean),
-                    ),
-                ));
-            }
-        }
-        rows
+    /// Begins to compare the events of `cycles` laser cycles with the scene.
+    ///
+    /// # Errors
+    /// If the settings give no range.
+    pub fn comparison(&self, settings: &Settings, cycles: u64) -> anyhow::Result<Comparison<'_>> {
+        let bins = usize::from(self.bins);
+        Ok(Comparison {
+            scene: self,
+            scale: settings.range_scale()?,
+            cycles,
+            last_bin: settings.gate.map_or(bins - 1, |(_, last)| last.into()),
+            tallies: vec![Tally::new(self.geometry.addresses()); self.surfaces.len() + 1],
+            false_peaks: vec![0; bins],
+        })
     }
 
     /// Where the last bin ends.
@@ -108,21 +87,161 @@ impl Scene {
             .filter(|&address| is_beyond(address, 0) || is_beyond(address, cycles))
             .count()
     }
+}
 
-    /// Range less truth of the last events of a pixel, oldest first.
-    fn errors(&self, address: PixelAddress, pixel: &PixelHistory) -> Vec<f64> {
-        let error =
-            |(cycle, range_mm): (u64, f64)| Some(range_mm - self.truth(address, cycle)?.range_mm);
-        pixel.recent().filter_map(error).collect()
+impl Comparison<'_> {
+    /// Takes events into account.
+    pub fn add(&mut self, events: &[DepthEvent]) {
+        for event in events {
+            let view = self.scene.truth(event.pixel, event.cycle.0);
+            let error_mm = view.map(|view| range_mm(event, &self.scale) - view.range_mm);
+            let limit_mm = FALSE_BEYOND_BINS * self.scene.mm_per_bin();
+            let right = error_mm.filter(|error| error.abs() <= limit_mm);
+            let surface = view.map_or(self.scene.surfaces.len(), |view| view.surface);
+            self.tallies[surface].add(event, right.map(|error| (error, error.abs() / limit_mm)));
+            if right.is_none() {
+                self.false_peaks[usize::from(event.peak_bin.raw())] += 1;
+            }
+        }
+    }
+
+    /// How they compare.
+    #[must_use]
+    pub fn finish(&self) -> AgainstTruth {
+        let step_mm = FALSE_BEYOND_BINS * self.scene.mm_per_bin() / STEPS as f64;
+        let mut all = Tally::new(0);
+        let mut surfaces = Vec::new();
+        let names = self.scene.surfaces.iter().map(|surface| &*surface.name);
+        for (index, name) in names.chain(["no surface"]).enumerate() {
+            let tally = &self.tallies[index];
+            all += tally;
+            // Events of pixels that see nothing are only worth a word if there are any.
+            if index < self.scene.surfaces.len() || tally.events > 0 {
+                surfaces.push(OfSurface {
+                    name: name.to_owned(),
+                    pixels: tally.has_sent.iter().filter(|sent| **sent).count(),
+                    first_cycle: tally.first_cycle,
+                    errors: tally.errors(step_mm),
+                    pixels_beyond: self.scene.pixels_beyond(index, self.cycles),
+                });
+            }
+        }
+        AgainstTruth {
+            false_beyond_bins: FALSE_BEYOND_BINS,
+            all: all.errors(step_mm),
+            surfaces,
+            cover_glass: self.cover_glass(all.events),
+        }
+    }
+
+    /// What looks like the cover glass: more than half of all false alarms, in as many bins
+    /// as an event may lie from the truth, nearer than every surface.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "bins of a histogram"
+    )]
+    fn cover_glass(&self, events: u64) -> Option<CoverGlass> {
+        let false_alarms: u64 = self.false_peaks.iter().sum();
+        let reach = FALSE_BEYOND_BINS as usize;
+        let most = self.false_peaks.iter().max()?;
+        let middle = self.false_peaks.iter().position(|count| count == most)?;
+        let first = middle.saturating_sub(reach);
+        let last = (middle + reach).min(self.last_bin);
+        let here: u64 = self.false_peaks.get(first..=last)?.iter().sum();
+        let even = false_alarms * (last + 1 - first) as u64 / self.false_peaks.len() as u64;
+        let is_glass = 2 * here > false_alarms
+            && here >= GLASS_AT_LEAST
+            && here >= events / GLASS_ONE_IN
+            && here > GLASS_TIMES_EVEN * even;
+        // The gate begins where the pulse of the glass has ended, but before that of a surface.
+        let sigma = self.scene.pulse_sigma_bins;
+        let ends = middle as f64 + (GLASS_ENDS_SIGMA * sigma).ceil().max(FALSE_BEYOND_BINS);
+        let nearest = self.nearest_mm() / self.scene.mm_per_bin();
+        let gate = (ends + 1.0).min((nearest - FALSE_BEYOND_BINS).floor());
+        let has_room = gate > last as f64 && gate + LEAST_GATE as f64 <= self.last_bin as f64 + 1.0;
+        (is_glass && has_room).then_some(CoverGlass {
+            bins: (first as u16, last as u16),
+            false_alarms: here,
+            gate: (gate as u16, self.last_bin as u16),
+        })
+    }
+
+    /// As near as any surface comes.
+    fn nearest_mm(&self) -> f64 {
+        let ends = [0.0, self.scene.seconds(self.cycles)];
+        let nearest = |seconds| {
+            let surfaces = self.scene.surfaces.iter();
+            let ranges =
+                surfaces.map(move |surface| surface.nearest_mm(seconds, self.scene.layout));
+            ranges.fold(f64::INFINITY, f64::min)
+        };
+        nearest(ends[0]).min(nearest(ends[1]))
     }
 }
 
-#[allow(clippy::cast_precision_loss, reason = "some thousand pixels")]
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
+impl Tally {
+    fn new(addresses: usize) -> Self {
+        Self {
+            has_sent: vec![false; addresses],
+            first_cycle: None,
+            events: 0,
+            sum: 0.0,
+            squares: 0.0,
+            sizes: vec![0; STEPS],
+        }
+    }
+
+    /// An event; with its error in millimetres and as a share of the largest, unless it is a
+    /// false alarm.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "0 to STEPS"
+    )]
+    fn add(&mut self, event: &DepthEvent, error: Option<(f64, f64)>) {
+        self.has_sent[usize::from(event.pixel.0)] = true;
+        self.first_cycle.get_or_insert(event.cycle.0);
+        self.events += 1;
+        if let Some((error, size)) = error {
+            self.sum += error;
+            self.squares += error * error;
+            self.sizes[((size * STEPS as f64) as usize).min(STEPS - 1)] += 1;
+        }
+    }
+
+    #[allow(
+        clippy::cast_precision_loss,
+        reason = "2^53 events are more than any run has"
+    )]
+    fn errors(&self, step_mm: f64) -> Errors {
+        let right: u64 = self.sizes.iter().sum();
+        let false_alarms = self.events - right;
+        let of = |sum: f64, count: u64| (count > 0).then(|| sum / count as f64);
+        let mut so_far = 0;
+        let within = self.sizes.iter().position(|count| {
+            so_far += count;
+            so_far > 0 && 20 * so_far >= 19 * right
+        });
+        Errors {
+            events: self.events,
+            false_alarms,
+            false_alarm_share: of(false_alarms as f64, self.events),
+            bias_mm: of(self.sum, right),
+            rms_mm: of(self.squares, right).map(f64::sqrt),
+            within_95_mm: within.map(|step| (step + 1) as f64 * step_mm),
+        }
+    }
 }
 
-fn root_mean_square(errors: &[f64]) -> f64 {
-    let squares: Vec<f64> = errors.iter().map(|error| error * error).collect();
-    mean(&squares).sqrt()
+impl std::ops::AddAssign<&Self> for Tally {
+    /// But for pixels and times, which nobody asks of all.
+    fn add_assign(&mut self, other: &Self) {
+        self.events += other.events;
+        self.sum += other.sum;
+        self.squares += other.squares;
+        for (sum, count) in self.sizes.iter_mut().zip(&other.sizes) {
+            *sum += count;
+        }
+    }
 }
