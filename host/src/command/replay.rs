@@ -12,7 +12,7 @@ use dtof::events::output::Output;
 use dtof::input::photon_csv::PhotonCsv;
 use dtof::input::recorded::{Capture, RecordedHistograms, RecordingLength};
 use dtof::input::source::{Geometry, PhotonSource};
-use dtof::{npy, tmf8820};
+use dtof::input::{npy, tmf8820};
 use dtof_core::fixed::types::{I24F8, U16F16};
 
 use super::operation::{Frames, Operation};

@@ -4,7 +4,6 @@ use anyhow::{Result, ensure};
 use dtof::engine::detection::WIDEST_PULSE;
 use dtof_core::DepthEstimator;
 use dtof_theory::tune::{Request, window};
-use dtof_theory::tune::{Request, window};
 
 use super::{Line, Tune, number};
 
