@@ -32,8 +32,8 @@
 
 use core::fmt;
 
-use crate::dynamic_depth::DynamicDepthEvent;
 use crate::event::DepthEvent;
+use crate::events::DynamicDepthEvent;
 use crate::flags::Flags;
 use crate::units::{BinIndex, BinPosition, Count, LaserCycle, PixelAddress, SubBinOffset};
 

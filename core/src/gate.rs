@@ -39,12 +39,20 @@ pub enum GateError {
     TooNarrow,
 }
 
-impl fmt::Display for GateError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl GateError {
+    /// What is wrong, in one line.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
             Self::PastLastBin => "the range gate ends past the last bin of the histogram",
             Self::TooNarrow => "the range gate leaves fewer than 8 bins",
-        })
+        }
+    }
+}
+
+impl fmt::Display for GateError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.text())
     }
 }
 

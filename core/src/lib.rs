@@ -6,19 +6,17 @@
 //! the moment its peak stands clear of the background; then it starts over.
 //! The method is that of Y. Liu et al., *An on-chip Pixel Processing Approach
 //! with 2.4 µs latency for Asynchronous Read-out of SPAD-based dToF Flash
-//! LiDARs*; sections, equations and algorithms cited in this crate are that
+//! LiDARs*. Sections, equations and algorithms cited in this crate are that
 //! paper's.
 //!
 //! ```text
 //! photon (TDC code)
 //!   → Histogram     saturating counters, highest bin kept while counting
 //!   → [every X laser cycles, once L1 < N < L2]
-//!     Peak          the highest bin, the lowest index wins a tie
-//!     background    smaller quadrant maximum of the half without the peak
-//!     Threshold     background + α·√background
-//!                   or another DetectionRule: WindowRule, AnyRule
+//!     DetectionRule the peak against the background: PaperRule, WindowRule, AnyRule
+//!     DepthEstimator where in its bins the pulse lies: centroid, CentredWindow
 //!   → DepthEvent    pixel, laser cycle, exposure, sub-bin depth, counts, flags
-//!   → AerWord       128 bits, held by the pixel until the link takes it
+//!   → AerWord       128 bits
 //!
 //! of the events of a pixel: RunningMean, Reflectivity, DynamicDepthEvent
 //! ```
@@ -29,35 +27,51 @@
 //! a background photon:
 //!
 //! ```
-//! use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+//! use dtof_core::fixed::types::{I24F8, U16F16};
 //! use dtof_core::*;
 //!
-//! let rule = PaperRule::new(const { U8F8::lit("8") }, Count::saturating(5));
-//! let config = PixelConfig::<128>::new(10, 100, 2000, RangeGate::full(), rule)?;
-//! let scale = RangeScale::new(const { U16F16::lit("250") }, I24F8::ZERO)?; // 250 ps bins
-//! let mut pixel = AsyncPixel::<128>::new(PixelAddress(0));
+//! // Checked when compiled. The bins are 250 ps wide.
+//! const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().x(4).l1(40).l2(2000).build());
+//! const SCALE: RangeScale = checked!(RangeScale::new(U16F16::lit("250"), I24F8::ZERO));
 //!
+//! let mut pixel = AsyncPixel::<128>::new(PixelAddress(0));
+//! let mut statistics = Statistics::default(); // of all pixels
 //! let mut event = None;
-//! for cycle in 0..1000 {
-//!     pixel.count(&config, 60);
+//! for cycle in 0..100 {
+//!     pixel.count(&CONFIG, 60);
 //!     if cycle % 7 == 0 {
-//!         pixel.count(&config, (cycle % 128) as u16);
+//!         pixel.count(&CONFIG, cycle as u16);
 //!     }
-//!     pixel.end_laser_cycle(&config, LaserCycle(cycle));
+//!     pixel.end_laser_cycle(&CONFIG, &mut statistics, LaserCycle(cycle));
 //!     event = event.or(pixel.acknowledge());
 //! }
 //! let event = event.expect("a peak as clear as this is reported");
-//! assert_eq!(event.exposure, 110); // the first look with N > 100
-//! assert_eq!(scale.range(event.position()).round(), 2267); // 60.5 bins, in mm
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! assert_eq!(event.exposure, 44); // the first look with N > 40
+//! assert_eq!(SCALE.range(event.position()).round(), 2267); // 60.5 bins, in mm
 //! ```
+//!
+//! More examples are in `core/examples`: `minimal`, `whole_histogram`, `aer_stream`.
+//!
+//! # Modules
+//!
+//! Each module imports only from those above it.
+//!
+//! | module | what it has |
+//! |---|---|
+//! | `units`, `flags` | quantities as types; what is to be said against an event |
+//! | `gate`, `counter`, `histogram` | the range gate, counter widths, the histogram |
+//! | `event` | the depth event |
+//! | `depth` | where in its bins the pulse lies, and how far that is |
+//! | `detect` | whether the peak stands clear: rules, thresholds, one decision |
+//! | `config`, `statistics`, `pixel` | one configuration and one statistics, many pixels |
+//! | `events` | what comes of events: means, changes of depth, reflectivity |
+//! | `aer` | events as words |
 //!
 //! # Rules of the crate
 //!
 //! Data flows one way through the pipeline. Configuration and state are separate
-//! types: one configuration, many pixels. Time is an
-//! argument. What is lost (saturated, rejected, gated out) is counted. Nothing
-//! is logged.
+//! types: one configuration, many pixels. Time is an argument. What is lost
+//! (saturated, rejected, gated out) is counted. Nothing is logged.
 //!
 //! # Glossary
 //!
@@ -69,7 +83,13 @@
 //! - **Exposure (N)**: laser cycles since the histogram was cleared.
 //! - **Look**: the check of N every X laser cycles, with a decision if
 //!   `L1 < N < L2`.
-//! - **Peak event**, here *depth event*: a peak that stands clear.
+//! - **Background**: photons that a bin holds without a target.
+//! - **Detection**: a peak that stands clear of the background.
+//! - **False alarm**: a detection without a target.
+//! - **CFAR**: a test with a constant false-alarm rate, whatever the background.
+//! - **Peak event**, here *depth event*: a detection that a pixel reports.
+//! - **Centroid**: the centre of the photons of some bins.
+//! - **Dead time**, **pile-up**: the TDC takes one photon and misses those behind it.
 //! - **Dynamic depth**: events of changes of depth only, with a polarity.
 //! - **AER**: address-event representation; REQ and ACK are its handshake.
 
@@ -84,56 +104,39 @@
 )]
 
 mod aer;
-mod any_rule;
-pub mod background;
-mod centred_window;
+mod check;
+mod config;
+mod counter;
 mod depth;
-mod detection;
-mod dynamic_depth;
-mod estimator;
+mod detect;
 mod event;
+mod events;
 mod flags;
 mod gate;
 mod histogram;
-mod isqrt;
-pub mod peak;
-mod photon_count;
 mod pixel;
-mod processing_element;
-mod reflectivity;
-mod rule;
-mod running_mean;
-mod threshold;
+mod statistics;
 mod units;
-mod window;
-mod window_z;
 
 /// The fixed-point numbers of α, bin width and range.
 pub use fixed;
 
 pub use aer::{AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord};
-pub use any_rule::AnyRule;
-pub use centred_window::CentredWindow;
-pub use depth::{Depth, RangeScale, RangeScaleError, centre_of_mass};
-pub use detection::{Detection, detect};
-pub use dynamic_depth::{
-    DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Polarity, Reference,
-    ZeroThresholdError,
+pub use config::{ConfigError, PixelConfig, PixelConfigBuilder};
+pub use counter::{Count10, Count16, Count24, CounterWidth, PhotonCount};
+pub use depth::{CentredWindow, Depth, DepthEstimator, RangeScale, RangeScaleError, centroid};
+pub use detect::{
+    AnyRule, ComparatorTree, Detection, DetectionRule, HIGHEST_Z, PaperRule, Threshold, WindowRule,
+    WindowWidthError, detect, isqrt, quadrant_background, whole_background, z_for,
 };
-pub use estimator::DepthEstimator;
-pub use event::{DepthEvent, EventSlot};
+pub use event::DepthEvent;
+pub use events::{
+    DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Polarity, Reference, Reflectivity,
+    RunningMean, ZeroThresholdError,
+};
 pub use flags::Flags;
 pub use gate::{GateError, RangeGate};
-pub use histogram::{Count10, Count16, Count24, CounterWidth, Histogram};
-pub use isqrt::isqrt;
-pub use peak::Peak;
-pub use photon_count::PhotonCount;
-pub use pixel::{AsyncPixel, ConfigError, Look, PixelConfig, Statistics};
-pub use processing_element::{Macropixel, ProcessingElement};
-pub use reflectivity::Reflectivity;
-pub use rule::{DetectionRule, PaperRule, whole_background};
-pub use running_mean::RunningMean;
-pub use threshold::Threshold;
+pub use histogram::{Histogram, Peak};
+pub use pixel::{AsyncPixel, Look};
+pub use statistics::Statistics;
 pub use units::{BinIndex, BinPosition, Count, LaserCycle, PixelAddress, SubBinOffset};
-pub use window::{WindowRule, WindowWidthError};
-pub use window_z::{HIGHEST_Z, z_for};

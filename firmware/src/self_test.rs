@@ -10,7 +10,7 @@ use core::fmt::{self, Write};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AerDecoder, AerEncoder, AerRecord, AerWord, AsyncPixel, Count, DepthEvent, LaserCycle,
-    PaperRule, PixelAddress, PixelConfig, RangeGate, isqrt,
+    PaperRule, PixelAddress, PixelConfig, Statistics, isqrt,
 };
 
 /// The last line of a run that came to its end.
@@ -55,12 +55,12 @@ fn stream<const BINS: usize>(
 ) -> fmt::Result {
     writeln!(out, "stream of {BINS} bins")?;
     let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
-    let gate = RangeGate::full();
-    let config = match PixelConfig::<BINS>::new(10, 40, 2000, gate, rule) {
+    let config = match PixelConfig::<BINS>::with_rule(rule).x(10).build() {
         Ok(config) => config,
         Err(error) => return writeln!(out, "{error}"),
     };
     let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(u16::from(BINS > 8)));
+    let mut statistics = Statistics::default();
     let mut random = Random(1);
     // Just before the upper bits of the laser cycle change.
     let first = (1 << 20) - 400;
@@ -73,7 +73,7 @@ fn stream<const BINS: usize>(
         if random.below(2) == 0 {
             pixel.count(&config, random.below(bins));
         }
-        pixel.end_laser_cycle(&config, LaserCycle(cycle));
+        pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle));
         // Now and then the link has no room.
         if cycle % 256 < 160
             && let Some(event) = pixel.acknowledge()
@@ -81,7 +81,8 @@ fn stream<const BINS: usize>(
             write_event(out, encoder, &event)?;
         }
     }
-    writeln!(out, "{:?}", pixel.statistics())
+    statistics.add_photons_of(pixel.histogram());
+    writeln!(out, "{statistics:?}")
 }
 
 /// An event, its words, and whether they come back as the event.

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AerDecoder, AerRecord, AerWord, AsyncPixel, Count, DepthEvent, LaserCycle, PaperRule,
-    PixelAddress, PixelConfig, RangeGate,
+    PixelAddress, PixelConfig, Statistics,
 };
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
@@ -120,13 +120,19 @@ struct Script {
 
 fn script(cycles: u64, rng: &mut Pcg32) -> Script {
     let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
-    let config = PixelConfig::<128>::new(4, 20, 200, RangeGate::full(), rule).unwrap();
+    let config = PixelConfig::<128>::with_rule(rule)
+        .x(4)
+        .l1(20)
+        .l2(200)
+        .build()
+        .unwrap();
     let mut pixels: Vec<_> = (0..PIXELS)
         .map(|address| AsyncPixel::<128>::new(PixelAddress(address)))
         .collect();
     let mut messages = vec![Vec::new()];
     let mut events = Vec::new();
     let mut photons = 0;
+    let mut statistics = Statistics::default();
     for cycle in 0..cycles {
         // One laser cycle a piece, some of them a message.
         let mut piece = Vec::new();
@@ -147,7 +153,7 @@ fn script(cycles: u64, rng: &mut Pcg32) -> Script {
         }
         piece.extend(Token::EndOfCycles { cycles: 1 }.to_bytes());
         for pixel in &mut pixels {
-            pixel.end_laser_cycle(&config, LaserCycle(cycle));
+            pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle));
             events.extend(pixel.acknowledge());
         }
         if messages.last().unwrap().len() + piece.len() > BODY_BYTES {

@@ -9,7 +9,8 @@ use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
     AnyRule, AsyncPixel, CentredWindow, Count, Count24, DepthEstimator, DepthEvent,
     DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Flags, Histogram, LaserCycle,
-    PaperRule, PixelAddress, PixelConfig, RangeGate, RangeScale, Reference, WindowRule, detect,
+    PaperRule, PixelAddress, PixelConfig, RangeGate, RangeScale, Reference, Statistics, WindowRule,
+    detect,
 };
 use dtof_firmware::sidecar::{Pixel, Sidecar};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
@@ -26,7 +27,7 @@ type Pixels = heapless::Vec<Pixel, 8>;
 /// A configuration with each rule and estimator, and the same as the core takes it.
 fn configurations() -> [(Configuration, PixelConfig<128, AnyRule>); 2] {
     let minimum_count = Count::saturating(5);
-    let config = |rule| PixelConfig::new(4, 20, 200, RangeGate::full(), rule).unwrap();
+    let config = |rule| PixelConfig::with_rule(rule).x(4).l1(20).l2(200);
     let paper = PaperRule::new(U8F8::lit("4"), minimum_count);
     let window = WindowRule::new(3, U4F12::lit("4.5"), minimum_count).unwrap();
     let centred = CentredWindow::new(U8F8::lit("2.5")).unwrap();
@@ -39,10 +40,13 @@ fn configurations() -> [(Configuration, PixelConfig<128, AnyRule>); 2] {
         ..CONFIGURATION
     };
     [
-        (CONFIGURATION, config(paper.into())),
+        (CONFIGURATION, config(paper.into()).build().unwrap()),
         (
             with_windows,
-            config(window.into()).with_estimator(DepthEstimator::CentredWindow(centred)),
+            config(window.into())
+                .estimator(DepthEstimator::CentredWindow(centred))
+                .build()
+                .unwrap(),
         ),
     ]
 }
@@ -82,6 +86,7 @@ fn reference(script: &[Vec<Call>], config: &PixelConfig<128, AnyRule>) -> Vec<De
         .map(|address| AsyncPixel::<128>::new(PixelAddress(address)))
         .collect();
     let mut events = Vec::new();
+    let mut statistics = Statistics::default();
     let mut cycle = 0;
     for call in script.iter().flatten() {
         match *call {
@@ -89,7 +94,7 @@ fn reference(script: &[Vec<Call>], config: &PixelConfig<128, AnyRule>) -> Vec<De
             Call::End(cycles) => {
                 for _ in 0..cycles {
                     for pixel in &mut pixels {
-                        pixel.end_laser_cycle(config, LaserCycle(cycle));
+                        pixel.end_laser_cycle(config, &mut statistics, LaserCycle(cycle));
                         events.extend(pixel.acknowledge());
                     }
                     cycle += 1;
@@ -384,16 +389,7 @@ fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<1
         let mut histogram = Histogram::<128, Count24>::new();
         histogram.add_frame(counts, &gate);
         let detection = detect(&histogram, &gate, config.rule(), config.estimator()).unwrap();
-        DepthEvent {
-            pixel: PixelAddress(3),
-            cycle: LaserCycle(cycle),
-            exposure: 1,
-            peak_bin: detection.peak.bin,
-            offset: detection.depth.offset,
-            peak_count: detection.peak.count,
-            background: detection.background,
-            flags: detection.depth.flags,
-        }
+        detection.event(PixelAddress(3), LaserCycle(cycle), 1)
     };
     assert_eq!(
         host.events,

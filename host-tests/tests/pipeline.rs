@@ -11,6 +11,7 @@ use dtof::simulate::SimulatedPixel;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AsyncPixel, Count, LaserCycle, Look, PaperRule, PixelAddress, PixelConfig, RangeGate,
+    Statistics,
 };
 use dtof_host_tests::reference;
 use dtof_theory::random::pixel_rng;
@@ -85,7 +86,13 @@ fn run<const BINS: usize>(seed: u64, exposures: u32, tally: &mut Tally) {
     let draw = draw::<BINS>(&mut rng);
     let gate = RangeGate::new(draw.first, draw.last).unwrap();
     let rule = PaperRule::new(draw.alpha, Count::saturating(draw.minimum_count.into()));
-    let config = PixelConfig::<BINS>::new(draw.x, draw.l1, draw.l2, gate, rule).unwrap();
+    let config = PixelConfig::<BINS>::with_rule(rule)
+        .x(draw.x)
+        .l1(draw.l1)
+        .l2(draw.l2)
+        .gate(gate)
+        .build()
+        .unwrap();
     let alpha: f64 = draw.alpha.to_num();
     let reference_config = reference::Config {
         x: draw.x.into(),
@@ -99,6 +106,7 @@ fn run<const BINS: usize>(seed: u64, exposures: u32, tally: &mut Tally) {
     let bins = u16::try_from(BINS).unwrap();
     let mut photons = SimulatedPixel::new(&draw.rates, bins, rng).unwrap();
     let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(3));
+    let mut statistics = Statistics::new();
     let mut twin = reference::Pixel::new(BINS, 1023.0, reference_config);
     // The laser cycle in which the twin was made.
     let mut twin_start = 0;
@@ -115,7 +123,7 @@ fn run<const BINS: usize>(seed: u64, exposures: u32, tally: &mut Tally) {
         let exposure = pixel.exposure() + 1;
         // Cleared by an event, so kept for the proof.
         let histogram = pixel.histogram().clone();
-        let look = pixel.end_laser_cycle(&config, LaserCycle(cycle));
+        let look = pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle));
         let float = twin.end_laser_cycle();
         let event = pixel.acknowledge();
 

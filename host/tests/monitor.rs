@@ -19,7 +19,7 @@ use dtof::events::events_csv;
 use dtof_core::fixed::types::{U0F32, U8F8, U8F24, U16F16, U24F8};
 use dtof_core::{
     AnyRule, AsyncPixel, DepthEvent, DynamicDepthPixel, LaserCycle, PixelAddress, PixelConfig,
-    Reference,
+    Reference, Statistics,
 };
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::Report;
@@ -195,7 +195,7 @@ impl PhotonSink for Pixels {
     fn end_laser_cycles(&mut self, cycles: u16) {
         for _ in 0..cycles {
             for pixel in &mut self.pixels {
-                pixel.end_laser_cycle(&self.config, LaserCycle(self.cycle));
+                pixel.end_laser_cycle(&self.config, &mut Statistics::new(), LaserCycle(self.cycle));
                 self.events.extend(pixel.acknowledge());
             }
             self.cycle += 1;

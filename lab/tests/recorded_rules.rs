@@ -15,7 +15,7 @@ use dtof::input::tmf8820::{self, BINS};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
     AsyncPixel, Count, DepthEstimator, DetectionRule, LaserCycle, PaperRule, PixelAddress,
-    PixelConfig, RangeGate, RangeScale, WindowRule,
+    PixelConfig, RangeScale, Statistics, WindowRule,
 };
 use dtof_lab::studies::methods::passage::{Ladder, Method, Passage, count_false};
 use dtof_theory::looks::exposure::{Exposures, Looks};
@@ -83,6 +83,7 @@ impl Recording<'_> {
             }
             let mut rng = Pcg64::seed_from_u64(capture);
             let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(0));
+            let mut statistics = Statistics::new();
             let mut left = pixels[CENTRE].photons.iter().peekable();
             let before = errors.len();
             for cycle in 0..pixels[CENTRE].cycles {
@@ -94,12 +95,14 @@ impl Recording<'_> {
                     pixel.count(config, bins.sample(&mut rng));
                     more -= 1.0;
                 }
-                let _ = pixel.end_laser_cycle(config, LaserCycle(cycle.into()));
+                let now = LaserCycle(cycle.into());
+                let _ = pixel.end_laser_cycle(config, &mut statistics, now);
                 if let Some(event) = pixel.acknowledge() {
                     errors.push(scale.range(event.position()).to_num::<f64>() - truth);
                 }
             }
-            photons += pixel.statistics().photons();
+            statistics.add_photons_of(pixel.histogram());
+            photons += statistics.photons();
             distances += usize::from(errors.len() > before);
         }
         // One constant offset is allowed for.
@@ -189,10 +192,10 @@ impl Setting {
         let estimator = if self.is_centred {
             DepthEstimator::for_pulse(U8F8::lit("1"))
         } else {
-            DepthEstimator::CentreOfMass3
+            DepthEstimator::Centroid3
         };
-        let config = PixelConfig::new(X, L1, L2, RangeGate::full(), rule).unwrap();
-        recording.replay(&config.with_estimator(estimator))
+        let config = PixelConfig::with_rule(rule).x(X).l1(L1).l2(L2);
+        recording.replay(&config.estimator(estimator).build().unwrap())
     }
 
     /// With the largest minimum that takes no more than so many photons an event.

@@ -99,7 +99,6 @@ impl From<ConfigError> for Refusal {
             ConfigError::XAboveL1 => Self::XAboveL1,
             ConfigError::L2NotAboveL1 => Self::L2NotAboveL1,
             ConfigError::NoLook => Self::NoLook,
-            ConfigError::XNotFour => Self::Unknown,
         }
     }
 }

@@ -13,10 +13,8 @@
 
 use core::fmt::{self, Write};
 
-use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AerEncoder, AerWord, AsyncPixel, ConfigError, Count, LaserCycle, PaperRule, PixelAddress,
-    PixelConfig, RangeGate, Statistics,
+    AerEncoder, AerWord, AsyncPixel, ConfigError, LaserCycle, PixelAddress, PixelConfig, Statistics,
 };
 
 use crate::io;
@@ -41,8 +39,7 @@ pub const FEW: u32 = 1;
 /// # Errors
 /// None: the configuration is valid.
 pub const fn config() -> Result<PixelConfig<BINS>, ConfigError> {
-    let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
-    PixelConfig::new(X, L1, L2, RangeGate::full(), rule)
+    PixelConfig::paper().x(X).l1(L1).l2(L2).build()
 }
 
 /// A word of the photon FIFO.
@@ -123,6 +120,7 @@ impl Mark {
 pub struct Pixels<const N: usize> {
     config: PixelConfig<BINS>,
     pixels: [AsyncPixel<BINS>; N],
+    statistics: Statistics,
     /// Laser cycles that had ended at each macropixel's last look.
     looked: [u64; N],
     /// Laser cycles that have ended.
@@ -161,6 +159,7 @@ impl<const N: usize> Pixels<N> {
         Ok(Self {
             config,
             pixels,
+            statistics: Statistics::new(),
             looked: [0; N],
             now: 0,
             turn: 0,
@@ -214,7 +213,7 @@ impl<const N: usize> Pixels<N> {
         let passed = u16::try_from(passed).unwrap_or(u16::MAX);
         let last = LaserCycle(self.now - 1);
         io::mark(Mark::Look(self.now).to_raw());
-        let _ = pixel.end_laser_cycles(&self.config, last, passed);
+        let _ = pixel.end_laser_cycles(&self.config, &mut self.statistics, last, passed);
         self.link(index);
     }
 
@@ -260,9 +259,9 @@ impl<const N: usize> Pixels<N> {
     /// # Errors
     /// Those of `out`.
     pub fn report(&self, out: &mut impl Write) -> fmt::Result {
-        let mut all = Statistics::default();
+        let mut all = self.statistics;
         for pixel in &self.pixels {
-            all += pixel.statistics();
+            all.add_photons_of(pixel.histogram());
         }
         writeln!(
             out,

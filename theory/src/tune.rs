@@ -14,7 +14,7 @@ pub mod window;
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{Count, Count10, CounterWidth, DepthEstimator, PaperRule, Threshold};
+use dtof_core::{Count, Count10, CounterWidth, DepthEstimator, PaperRule, PixelConfig, Threshold};
 
 use self::shortest::shortest;
 use crate::counts::poisson::Poisson;
@@ -130,7 +130,7 @@ pub fn tune(request: &Request, table: &Table) -> Result<Tuned> {
             let decisions = Decisions {
                 looks,
                 rule: PaperRule::new(tuned.alpha, minimum_count).into(),
-                estimator: DepthEstimator::CentreOfMass3,
+                estimator: DepthEstimator::Centroid3,
             };
             Some((decisions, tuned))
         })
@@ -161,9 +161,11 @@ fn check(request: &Request) -> Result<()> {
         "--bins {bins}: must be a power of two from 8 to 1024"
     );
     if let Some(l1) = request.l1 {
-        let rule = PaperRule::new(U8F8::ZERO, Count::default());
-        let gate = dtof_core::RangeGate::<8>::full();
-        dtof_core::PixelConfig::new(x, l1, l2, gate, rule)
+        PixelConfig::<8>::paper()
+            .x(x)
+            .l1(l1)
+            .l2(l2)
+            .build()
             .with_context(|| format!("--x {x} --l1 {l1} --l2 {l2}"))?;
     } else {
         ensure!(

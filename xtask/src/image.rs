@@ -26,12 +26,11 @@ const PROFILES: [&str; 2] = ["firmware", "firmware-small"];
 const UNDEFINED: &str = "dtof_core_has_a_reachable_panic";
 
 /// The functions of `core_image.rs` that between them use all of dtof-core.
-const PARTS: [&str; 13] = [
+const PARTS: [&str; 11] = [
     "units",
     "roots",
     "ranges",
     "words",
-    "slot",
     "products",
     "texts",
     "gates",
@@ -39,7 +38,6 @@ const PARTS: [&str; 13] = [
     "thresholds",
     "histograms",
     "pixels",
-    "elements",
 ];
 
 /// Bytes of code below which something has been optimised away: half of the

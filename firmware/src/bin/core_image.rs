@@ -27,14 +27,13 @@ use core::ptr;
 use core::sync::atomic::AtomicU32;
 
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
-use dtof_core::peak::ComparatorTree;
 use dtof_core::{
     AerDecoder, AerEncoder, AerWord, AnyRule, AsyncPixel, BinIndex, BinPosition, CentredWindow,
-    Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DepthEvent, DetectionRule,
-    DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, EventSlot, Flags, Histogram,
-    LaserCycle, Macropixel, PaperRule, Peak, PixelAddress, PixelConfig, ProcessingElement,
-    RangeGate, RangeScale, Reference, Reflectivity, RunningMean, Statistics, SubBinOffset,
-    Threshold, WindowRule, background, centre_of_mass, detect, isqrt, whole_background, z_for,
+    ComparatorTree, Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DepthEvent,
+    DetectionRule, DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Flags, Histogram,
+    LaserCycle, PaperRule, Peak, PixelAddress, PixelConfig, PixelConfigBuilder, RangeGate,
+    RangeScale, Reference, Reflectivity, RunningMean, Statistics, SubBinOffset, Threshold,
+    WindowRule, centroid, detect, isqrt, quadrant_background, whole_background, z_for,
 };
 
 #[allow(unsafe_code, reason = "the linker knows the entry by this name")]
@@ -45,7 +44,6 @@ extern "C" fn _start() -> ! {
         roots();
         ranges();
         words();
-        slot();
         products();
         texts();
         for_bins::<8>();
@@ -65,7 +63,6 @@ fn for_width<const BINS: usize, W: CounterWidth>() {
     thresholds::<W>();
     histograms::<BINS, W>();
     pixels::<BINS, W>();
-    elements::<BINS, W>();
 }
 
 #[inline(never)]
@@ -119,16 +116,6 @@ fn words() {
     keep(AerWord::end(double(), word()).to_le_bytes());
 }
 
-#[inline(never)]
-fn slot() {
-    let mut slot = EventSlot::new();
-    while more() {
-        keep(slot.offer(event()));
-        keep(slot.request());
-        keep(slot.acknowledge());
-    }
-}
-
 /// What is made of the events of a pixel.
 #[inline(never)]
 fn products() {
@@ -179,7 +166,7 @@ fn texts() {
     if let Err(error) = RangeGate::<8>::new(half(), half()) {
         keep(write!(Link, "{error}"));
     }
-    if let Err(error) = PixelConfig::<8>::new(half(), half(), half(), gate(), rule()) {
+    if let Err(error) = settings::<8, _>(rule()).build() {
         keep(write!(Link, "{error}"));
     }
     if let Err(error) = RangeScale::new(U16F16::from_bits(word()), millimetres()) {
@@ -223,6 +210,7 @@ fn trees<const BINS: usize>() {
 fn thresholds<W: CounterWidth>() {
     let threshold = Threshold::new(alpha(), count());
     keep((threshold.alpha(), threshold.minimum_count()));
+    keep(*rule().threshold());
     keep(threshold.level::<W>(count()));
     keep(threshold.is_exceeded::<W>(count(), count()));
     keep(threshold.lowest_background::<W>(count()));
@@ -235,10 +223,14 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
     while more() {
         histogram.add(half());
         histogram.add_batch(some(&values::<u16, 16>(half)));
-        keep(histogram.add_frame(&values::<u16, BINS>(half), &gate));
-        keep(histogram.add_frame(&values::<u32, BINS>(word), &gate));
+        histogram.add_gated(half(), &gate);
+        histogram.add_gated_batch(some(&values::<u16, 16>(half)), &gate);
+        histogram.add_frame(&values::<u8, BINS>(byte), &gate);
+        histogram.add_frame(&values::<u16, BINS>(half), &gate);
+        histogram.add_frame(&values::<u32, BINS>(word), &gate);
         keep((histogram.peak(), histogram.count(usize::from(half()))));
-        keep(detect(&histogram, &gate, &rule(), &estimator()));
+        let detection = detect(&histogram, &gate, &rule(), &estimator());
+        keep(detection.map(|found| (found.position(), found.event(address(), cycle(), half()))));
         if let Some(rule) = window_rule() {
             keep(detect(&histogram, &gate, &rule, &estimator()));
         }
@@ -248,85 +240,71 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
             bin: bin(),
             count: count(),
         };
-        keep(background::quadrant(histogram.counts(), &gate, peak.bin));
-        keep(background::quadrant_reaches(
-            histogram.counts(),
-            &gate,
-            peak.bin,
-            word(),
-        ));
-        keep(rule().detect_whole::<W, BINS>(histogram.counts(), &gate));
-        keep(centre_of_mass(&histogram, &gate, peak, background_level()));
+        keep(quadrant_background(histogram.counts(), &gate, peak.bin));
+        keep(centroid(&histogram, &gate, peak, background_level()));
         keep(estimator().estimate(&histogram, &gate, peak, background_level()));
         if more() {
             histogram.clear();
         }
     }
     keep((histogram.total(), histogram.rejected()));
-    keep((histogram.saturated(), histogram));
+    keep((histogram.saturated(), histogram.gated_out(), histogram));
 }
 
 #[inline(never)]
 fn pixels<const BINS: usize, W: CounterWidth>() {
     keep(z_for::<BINS>(word(), &gate(), half(), half(), half()));
-    if let Some(config) = config::<BINS>() {
-        pixels_with::<BINS, W, _>(&config);
-        let [x, l1, l2] = [config.x(), config.l1(), config.l2()];
-        if let Some(rule) = window_rule()
-            && let Ok(config) = PixelConfig::new(x, l1, l2, gate(), rule)
-        {
-            pixels_with::<BINS, W, _>(&config.with_estimator(estimator()));
-        }
-        let any = match window_rule() {
-            Some(rule) => AnyRule::from(rule),
-            None => AnyRule::from(rule()),
-        };
-        if let Ok(config) = PixelConfig::new(x, l1, l2, gate(), any) {
-            let config = config.with_one_hit_tdc();
-            keep(config.is_one_hit());
-            pixels_with::<BINS, W, _>(&config);
-        }
+    pixels_with::<BINS, W, _>(rule());
+    if let Some(rule) = window_rule() {
+        pixels_with::<BINS, W, _>(rule);
     }
+    pixels_with::<BINS, W, _>(match window_rule() {
+        Some(rule) => AnyRule::from(rule),
+        None => AnyRule::from(rule()),
+    });
 }
 
-fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(
-    config: &PixelConfig<BINS, R>,
-) {
+fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(rule: R) {
+    let config = match settings::<BINS, R>(rule).build() {
+        Ok(config) if more() => config.with_one_hit_tdc(),
+        Ok(config) => config,
+        Err(error) => return keep(error),
+    };
+    keep((config.x(), config.l1(), config.l2()));
+    keep((*config.gate(), *config.rule(), *config.estimator()));
+    keep(config.is_one_hit());
+    let config = &config;
+    let mut statistics = Statistics::default();
     let mut pixel = AsyncPixel::<BINS, W>::new(address());
     while more() {
         pixel.count(config, half());
         pixel.count_batch(config, some(&values::<u16, 16>(half)));
         pixel.count_frame(config, &values::<u16, BINS>(half));
         pixel.count_frame(config, &values::<u32, BINS>(word));
-        keep(pixel.end_laser_cycle(config, cycle()));
-        keep(pixel.end_laser_cycles(config, cycle(), half()));
+        keep(pixel.end_laser_cycle(config, &mut statistics, cycle()));
+        keep(pixel.end_laser_cycles(config, &mut statistics, cycle(), half()));
         keep((pixel.request(), pixel.exposure()));
         if more() {
             keep(pixel.acknowledge());
         }
     }
-    keep((pixel.address(), pixel.statistics()));
+    keep((pixel.address(), config.detect(pixel.histogram())));
+    statistics.add_photons_of(pixel.histogram());
+    let mut sum = Statistics::default();
+    sum += statistics;
+    keep((sum, sum.photons()));
     keep(pixel.histogram().peak());
 }
 
-#[inline(never)]
-fn elements<const BINS: usize, W: CounterWidth>() {
-    let Some(config) = config::<BINS>() else {
-        return;
-    };
-    let addresses = values(address);
-    let mut element = match ProcessingElement::<BINS, PaperRule, W>::new(config, addresses) {
-        Ok(element) => element,
-        Err(error) => return keep(error),
-    };
-    let mut statistics = Statistics::default();
-    while more() {
-        element.count(macropixel(), half());
-        keep(element.end_laser_cycle(cycle()));
-        keep(element.acknowledge(macropixel()));
-        statistics += element.pixel(macropixel()).statistics();
-    }
-    keep((statistics, statistics.photons()));
+/// Valid or not.
+fn settings<const BINS: usize, R: DetectionRule>(rule: R) -> PixelConfigBuilder<BINS, R> {
+    PixelConfig::with_rule(rule)
+        .x(half())
+        .l1(half())
+        .l2(half())
+        .gate(gate())
+        .estimator(estimator())
+        .one_hit_tdc(more())
 }
 
 fn gate<const BINS: usize>() -> RangeGate<BINS> {
@@ -358,7 +336,7 @@ fn estimator() -> DepthEstimator {
             DepthEstimator::CentredWindow(window)
         }
         None if more() => estimator,
-        None => DepthEstimator::CentreOfMass3,
+        None => DepthEstimator::Centroid3,
     }
 }
 
@@ -368,21 +346,6 @@ fn background_level() -> U24F8 {
         U24F8::from_bits(word())
     } else {
         whole_background(count())
-    }
-}
-
-fn config<const BINS: usize>() -> Option<PixelConfig<BINS>> {
-    match PixelConfig::new(half(), half(), half(), gate(), rule()) {
-        Ok(config) => {
-            keep((config.x(), config.l1(), config.l2()));
-            keep((*config.gate(), *config.rule().threshold()));
-            keep(*config.estimator());
-            Some(config.with_estimator(estimator()))
-        }
-        Err(error) => {
-            keep(error);
-            None
-        }
     }
 }
 
@@ -407,15 +370,6 @@ fn change() -> Option<DynamicDepthEvent> {
 
 fn distance() -> U24F8 {
     U24F8::from_bits(word())
-}
-
-fn macropixel() -> Macropixel {
-    match byte() {
-        0 => Macropixel::A,
-        1 => Macropixel::B,
-        2 => Macropixel::C,
-        _ => Macropixel::D,
-    }
 }
 
 fn alpha() -> U8F8 {

@@ -30,13 +30,18 @@ impl Sidecar<'_> {
         }
         let gate = RangeGate::new(wanted.gate_first, wanted.gate_last)?;
         let rule = rule(wanted, minimum)?;
-        let config = PixelConfig::new(wanted.x, wanted.l1, wanted.l2, gate, rule)?
-            .with_estimator(estimator(wanted)?);
-        let config = match wanted.one_hit {
-            0 => config,
-            1 => config.with_one_hit_tdc(),
-            _ => return Err(Refusal::Unknown),
-        };
+        let config = PixelConfig::with_rule(rule)
+            .x(wanted.x)
+            .l1(wanted.l1)
+            .l2(wanted.l2)
+            .gate(gate)
+            .estimator(estimator(wanted)?)
+            .one_hit_tdc(match wanted.one_hit {
+                0 => false,
+                1 => true,
+                _ => return Err(Refusal::Unknown),
+            })
+            .build()?;
         let scale = RangeScale::new(bin_width, I24F8::from_bits(wanted.offset))?;
         let dynamic_depth = dynamic_depth(wanted, &scale)?;
         self.pixels.clear();
@@ -65,7 +70,7 @@ fn rule(wanted: &Configuration, minimum: Count) -> Result<AnyRule, Refusal> {
 
 fn estimator(wanted: &Configuration) -> Result<DepthEstimator, Refusal> {
     match wanted.estimator {
-        0 => Ok(DepthEstimator::CentreOfMass3),
+        0 => Ok(DepthEstimator::Centroid3),
         1 => CentredWindow::new(U8F8::from_bits(wanted.half_width))
             .map(DepthEstimator::CentredWindow)
             .ok_or(Refusal::HalfWidth),

@@ -93,8 +93,9 @@ pub struct Sidecar<'a> {
     cycle: u64,
     /// Laser cycles since the pixels looked last: all look at once.
     since_look: u16,
-    /// What was done with histograms that came whole.
-    whole: Statistics,
+    /// What was done by all pixels, and with histograms that came whole. Photons of
+    /// exposures that have not ended are not among them.
+    statistics: Statistics,
     /// The pixel whose slot is emptied next.
     turn: usize,
     unaddressed: u64,
@@ -132,7 +133,7 @@ impl<'a> Sidecar<'a> {
             words: Queue::new(),
             cycle: 0,
             since_look: 0,
-            whole: Statistics::default(),
+            statistics: Statistics::default(),
             turn: 0,
             unaddressed: 0,
             unknown: 0,
@@ -378,15 +379,15 @@ impl<'a> Sidecar<'a> {
     fn restart_counts(&mut self) {
         self.cycle = 0;
         self.since_look = 0;
-        self.whole = Statistics::default();
+        self.statistics = Statistics::default();
         self.turn = 0;
         self.unaddressed = 0;
     }
 
     fn report(&self, overrun: u32) -> Report {
-        let mut statistics = self.whole;
+        let mut statistics = self.statistics;
         for pixel in self.pixels.iter() {
-            statistics += pixel.detector.statistics();
+            statistics.add_photons_of(pixel.detector.histogram());
         }
         // Those that were sent before the report.
         statistics.events -= self.waiting();

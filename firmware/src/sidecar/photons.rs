@@ -87,7 +87,8 @@ impl Sidecar<'_> {
         let last = LaserCycle(self.cycle.saturating_sub(1));
         let mut fired = false;
         for pixel in self.pixels.iter_mut() {
-            fired |= pixel.detector.end_laser_cycles(config, last, ended) == Look::Event;
+            let (pixel, statistics) = (&mut pixel.detector, &mut self.statistics);
+            fired |= pixel.end_laser_cycles(config, statistics, last, ended) == Look::Event;
         }
         if fired {
             self.drain();

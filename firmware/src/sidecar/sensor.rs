@@ -1,8 +1,6 @@
 //! Photons and histograms of a sensor, which does not wait.
 
-use dtof_core::{
-    Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, PixelConfig, Statistics, detect,
-};
+use dtof_core::{Count24, Histogram, LaserCycle, PixelAddress, PixelConfig};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
 use super::{BINS, Sidecar, has_room_for_event};
@@ -112,33 +110,16 @@ impl PhotonSink for Sidecar<'_> {
             return;
         }
         let mut histogram = Histogram::<BINS, Count24>::new();
-        let gated_out = histogram.add_frame(counts, config.gate());
-        let mut done = Statistics {
-            counted: histogram.total().into(),
-            saturated: histogram.saturated().into(),
-            gated_out: gated_out.into(),
-            ..Statistics::default()
-        };
+        histogram.add_frame(counts, config.gate());
+        self.statistics.add_photons_of(&histogram);
         if !has_room_for_event(&self.words) {
-            done.deferred = 1;
-        } else if let Some(detection) =
-            detect(&histogram, config.gate(), config.rule(), config.estimator())
-        {
-            self.enqueue(&DepthEvent {
-                pixel,
-                cycle,
-                exposure: 1,
-                peak_bin: detection.peak.bin,
-                offset: detection.depth.offset,
-                peak_count: detection.peak.count,
-                background: detection.background,
-                flags: detection.depth.flags,
-            });
-            done.events = 1;
+            self.statistics.deferred += 1;
+        } else if let Some(detection) = config.detect(&histogram) {
+            self.enqueue(&detection.event(pixel, cycle, 1));
+            self.statistics.events += 1;
         } else {
-            done.expired = 1;
+            self.statistics.expired += 1;
         }
-        self.whole += done;
         self.drain();
     }
 }

@@ -96,7 +96,7 @@ pub fn configuration(
         Rule::Window { window, z } => (1, 0, window, z.0.to_bits()),
     };
     let (estimator, half_width) = match settings.estimator.in_core() {
-        DepthEstimator::CentreOfMass3 => (0, 0),
+        DepthEstimator::Centroid3 => (0, 0),
         DepthEstimator::CentredWindow(window) => (1, window.half_width().to_bits()),
     };
     let (output, reference, threshold) = match dynamic_depth {

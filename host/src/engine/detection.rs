@@ -108,7 +108,7 @@ impl Estimator {
     #[must_use]
     pub const fn in_core(&self) -> DepthEstimator {
         match self {
-            Self::CentreOfMass3 => DepthEstimator::CentreOfMass3,
+            Self::CentreOfMass3 => DepthEstimator::Centroid3,
             Self::CentredWindow { sigma_bins } => DepthEstimator::for_pulse(sigma_bins.0),
         }
     }
@@ -117,7 +117,7 @@ impl Estimator {
     #[must_use]
     pub fn row(&self) -> Row {
         let depth = match self.in_core() {
-            DepthEstimator::CentreOfMass3 => "centre of mass of 3 bins".to_owned(),
+            DepthEstimator::Centroid3 => "centre of mass of 3 bins".to_owned(),
             DepthEstimator::CentredWindow(window) => {
                 format!("centred window of ±{} bins", window.half_width())
             }

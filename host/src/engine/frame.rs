@@ -43,11 +43,7 @@ impl<const BINS: usize> FramePixel<BINS> {
         if cycle < self.first {
             return;
         }
-        if usize::from(code) < BINS && !gate.contains(code) {
-            self.statistics.gated_out += 1;
-        } else {
-            self.histogram.add(code);
-        }
+        self.histogram.add_gated(code, gate);
     }
 
     /// Ends laser cycle `cycle`. None until the frame ends, or if no bin stands above the
@@ -64,39 +60,20 @@ impl<const BINS: usize> FramePixel<BINS> {
         self.first = cycle + 1;
         let any = PaperRule::new(U8F8::ZERO, Count::saturating(1));
         let found = detect(&self.histogram, gate, &any, estimator);
-        self.statistics += Statistics {
-            events: found.is_some().into(),
-            expired: found.is_none().into(),
-            ..counted(&self.histogram)
-        };
+        self.statistics.add_photons_of(&self.histogram);
         self.histogram.clear();
-        let found = found?;
-        Some(DepthEvent {
-            pixel: self.address,
-            cycle: LaserCycle(cycle),
-            exposure: self.length,
-            peak_bin: found.peak.bin,
-            offset: found.depth.offset,
-            peak_count: found.peak.count,
-            background: found.background,
-            flags: found.depth.flags,
-        })
+        match found {
+            Some(_) => self.statistics.events += 1,
+            None => self.statistics.expired += 1,
+        }
+        Some(found?.event(self.address, LaserCycle(cycle), self.length))
     }
 
     /// What it has done so far, the frame that has not ended included.
     fn statistics(&self) -> Statistics {
         let mut statistics = self.statistics;
-        statistics += counted(&self.histogram);
+        statistics.add_photons_of(&self.histogram);
         statistics
-    }
-}
-
-fn counted<const BINS: usize>(histogram: &Histogram<BINS, Count16>) -> Statistics {
-    Statistics {
-        counted: histogram.total().into(),
-        saturated: histogram.saturated().into(),
-        rejected: histogram.rejected().into(),
-        ..Statistics::default()
     }
 }
 

@@ -16,6 +16,8 @@ use crate::input::source::{PixelPhotons, Slice};
 struct HostEngine<const BINS: usize> {
     config: PixelConfig<BINS, AnyRule>,
     pixels: Vec<AsyncPixel<BINS>>,
+    /// Of all pixels, without the exposures that have not ended.
+    statistics: Statistics,
 }
 
 /// An engine on this computer for the pixels `addresses`.
@@ -46,6 +48,7 @@ impl<const BINS: usize> HostEngine<BINS> {
         Ok(Box::new(Self {
             config: settings.config()?,
             pixels: addresses.iter().copied().map(AsyncPixel::new).collect(),
+            statistics: Statistics::new(),
         }))
     }
 }
@@ -53,42 +56,47 @@ impl<const BINS: usize> HostEngine<BINS> {
 impl<const BINS: usize> Engine for HostEngine<BINS> {
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
         let config = &self.config;
-        let mut events: Vec<DepthEvent> = self
+        let of_pixels: Vec<(Vec<DepthEvent>, Statistics)> = self
             .pixels
             .par_iter_mut()
             .zip(&slice.pixels)
-            .flat_map_iter(|(pixel, received)| {
-                run_pixel(pixel, config, slice.first_cycle, received)
-            })
+            .map(|(pixel, received)| run_pixel(pixel, config, slice.first_cycle, received))
             .collect();
+        let mut events = Vec::new();
+        for (of_pixel, statistics) in of_pixels {
+            events.extend(of_pixel);
+            self.statistics += statistics;
+        }
         events.sort_unstable_by_key(|event| (event.cycle, event.pixel));
         Ok(events)
     }
 
     fn statistics(&self) -> Statistics {
-        let mut sum = Statistics::default();
+        let mut sum = self.statistics;
         for pixel in &self.pixels {
-            sum += pixel.statistics();
+            sum.add_photons_of(pixel.histogram());
         }
         sum
     }
 }
 
-/// One pixel through one slice; its link takes each event at once.
+/// One pixel through one slice, whose link takes each event at once: its events, and what
+/// it has done.
 fn run_pixel<const BINS: usize>(
     pixel: &mut AsyncPixel<BINS>,
     config: &PixelConfig<BINS, AnyRule>,
     first_cycle: u64,
     received: &PixelPhotons,
-) -> Vec<DepthEvent> {
-    let mut events = Vec::new();
+) -> (Vec<DepthEvent>, Statistics) {
+    let (mut events, mut statistics) = (Vec::new(), Statistics::new());
     let mut photons = received.photons.iter().peekable();
     for cycle in 0..received.cycles {
         while let Some(photon) = photons.next_if(|photon| photon.cycle == cycle) {
             pixel.count(config, photon.code);
         }
-        pixel.end_laser_cycle(config, LaserCycle(first_cycle + u64::from(cycle)));
+        let now = LaserCycle(first_cycle + u64::from(cycle));
+        pixel.end_laser_cycle(config, &mut statistics, now);
         events.extend(pixel.acknowledge());
     }
-    events
+    (events, statistics)
 }

@@ -71,14 +71,15 @@ impl Settings {
         let gate = self.range_gate()?;
         ensure!(self.min_count >= 1, "--min-count must be at least 1");
         let rule = self.rule.with_minimum_count(self.min_count)?;
-        let config = PixelConfig::new(self.x, self.l1, self.l2, gate, rule)
-            .with_context(|| format!("--x {} --l1 {} --l2 {}", self.x, self.l1, self.l2))?
-            .with_estimator(self.estimator.in_core());
-        Ok(if self.one_hit_tdc {
-            config.with_one_hit_tdc()
-        } else {
-            config
-        })
+        PixelConfig::with_rule(rule)
+            .x(self.x)
+            .l1(self.l1)
+            .l2(self.l2)
+            .gate(gate)
+            .estimator(self.estimator.in_core())
+            .one_hit_tdc(self.one_hit_tdc)
+            .build()
+            .with_context(|| format!("--x {} --l1 {} --l2 {}", self.x, self.l1, self.l2))
     }
 
     /// The gate among `BINS` bins.

@@ -58,7 +58,7 @@ impl Instructions<'_> {
         };
         match estimator {
             Estimator::HighestBin => Ok(0.0),
-            Estimator::Paper | Estimator::CentreOfMass3 => self.of("depth", "centre_of_mass"),
+            Estimator::Paper | Estimator::CentreOfMass3 => self.of("depth", "centroid"),
             Estimator::CentredWindow(sigma) => centred(sigma),
             Estimator::OwnWindow => centred(sigma),
         }

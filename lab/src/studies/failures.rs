@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AsyncPixel, Count, DepthEstimator, DepthEvent, DetectionRule, Flags, LaserCycle, Look,
-    PaperRule, PixelAddress, PixelConfig, WindowRule, z_for,
+    PaperRule, PixelAddress, PixelConfig, Statistics, WindowRule, z_for,
 };
 use rand_pcg::Pcg64;
 
@@ -125,14 +125,16 @@ impl Method {
         let estimator = if self.is_centred {
             DepthEstimator::for_pulse(U8F8::from_num(SIGMA))
         } else {
-            DepthEstimator::CentreOfMass3
+            DepthEstimator::Centroid3
         };
-        let config = PixelConfig::new(X, L1, L2, case.gate, rule)?.with_estimator(estimator);
-        let config = if case.is_one_hit() {
-            config.with_one_hit_tdc()
-        } else {
-            config
-        };
+        let config = PixelConfig::with_rule(rule)
+            .x(X)
+            .l1(L1)
+            .l2(L2)
+            .gate(case.gate)
+            .estimator(estimator)
+            .one_hit_tdc(case.is_one_hit())
+            .build()?;
         Ok(Box::new((config, AsyncPixel::new(PixelAddress(0)))))
     }
 }
@@ -147,7 +149,7 @@ impl<R: DetectionRule> Pixel for (PixelConfig<BINS, R>, AsyncPixel<BINS>) {
     fn laser_cycle(&mut self, codes: &[u16], cycle: u32) -> (Look, Option<DepthEvent>) {
         let (config, pixel) = self;
         pixel.count_batch(config, codes);
-        let look = pixel.end_laser_cycle(config, LaserCycle(cycle.into()));
+        let look = pixel.end_laser_cycle(config, &mut Statistics::new(), LaserCycle(cycle.into()));
         (look, pixel.acknowledge())
     }
 }

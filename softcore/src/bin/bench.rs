@@ -15,7 +15,7 @@ mod scene;
 use core::arch::asm;
 use core::hint::black_box;
 
-use dtof_core::{AerEncoder, AsyncPixel, Count10, LaserCycle, Look, PixelAddress, detect, isqrt};
+use dtof_core::{AerEncoder, AsyncPixel, LaserCycle, Look, PixelAddress, isqrt};
 use dtof_softcore::{cache, io, println, program};
 
 use scene::{CYCLES, PHOTONS, PHOTONS_A_CYCLE, State};
@@ -84,14 +84,14 @@ const ROWS: [Row; 16] = [
     row(
         "decision: whole histogram; no event",
         false,
-        counted,
+        arrived,
         whole,
         1,
     ),
     row(
-        "decision: whole histogram; event without depth",
+        "decision: whole histogram; event and depth",
         true,
-        counted,
+        arrived,
         whole,
         1,
     ),
@@ -179,10 +179,15 @@ fn counted(state: &mut State) {
     state.wait_for_last_look();
 }
 
+/// The counts come from elsewhere.
+fn arrived(state: &mut State) {
+    counted(state);
+    state.histogram.clear();
+}
+
 fn at_event(state: &mut State) {
     counted(state);
-    let cycle = LaserCycle(u64::from(CYCLES) - 1);
-    let _ = state.pixel.end_laser_cycle(&state.config, cycle);
+    let _ = state.end_laser_cycle(u32::from(CYCLES) - 1);
     state.event = state.pixel.acknowledge();
 }
 
@@ -221,13 +226,7 @@ extern "C" fn add_batch(state: &mut State, _: u32) -> u32 {
 
 #[inline(always)]
 fn kept_event(state: &State) -> Option<dtof_core::Detection> {
-    let config = &state.config;
-    detect(
-        state.pixel.histogram(),
-        config.gate(),
-        config.rule(),
-        config.estimator(),
-    )
+    state.config.detect(state.pixel.histogram())
 }
 
 extern "C" fn kept(state: &mut State, _: u32) -> u32 {
@@ -238,23 +237,21 @@ extern "C" fn kept(state: &mut State, _: u32) -> u32 {
 }
 
 extern "C" fn look(state: &mut State, cycle: u32) -> u32 {
-    let cycle = LaserCycle(cycle.into());
-    state.pixel.end_laser_cycle(&state.config, cycle) as u32
+    state.end_laser_cycle(cycle) as u32
 }
 
 extern "C" fn whole(state: &mut State, _: u32) -> u32 {
-    let config = &state.config;
-    let detected = config
-        .rule()
-        .detect_whole::<Count10, _>(&state.foreign, config.gate());
-    detected.map_or(0, |(peak, background)| {
-        u32::from(peak.bin.raw()) + background.raw()
-    })
+    state
+        .histogram
+        .add_frame(&state.foreign, state.config.gate());
+    match state.config.detect(&state.histogram) {
+        Some(detection) => detection.depth.offset.raw().unsigned_abs().into(),
+        None => 0,
+    }
 }
 
 extern "C" fn event(state: &mut State, cycle: u32) -> u32 {
-    let cycle = LaserCycle(cycle.into());
-    if state.pixel.end_laser_cycle(&state.config, cycle) == Look::Event {
+    if state.end_laser_cycle(cycle) == Look::Event {
         state.event = state.pixel.acknowledge();
     }
     pack(state, 0)
@@ -279,8 +276,12 @@ extern "C" fn exposure(state: &mut State, _: u32) -> u32 {
     for cycle in 0..CYCLES {
         let photons = photons.next().unwrap_or_default();
         state.pixel.count_batch(&state.config, photons);
-        let cycle = LaserCycle(cycle.into());
-        if state.pixel.end_laser_cycle(&state.config, cycle) == Look::Event {
+        let (statistics, cycle) = (&mut state.statistics, LaserCycle(cycle.into()));
+        if state
+            .pixel
+            .end_laser_cycle(&state.config, statistics, cycle)
+            == Look::Event
+        {
             state.event = state.pixel.acknowledge();
         }
     }

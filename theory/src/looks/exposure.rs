@@ -7,8 +7,8 @@
 
 use anyhow::{Context, Result};
 use dtof_core::{
-    AnyRule, Count, Count10, CounterWidth, DepthEstimator, Detection, Histogram, RangeGate,
-    background, detect,
+    AnyRule, Count, DepthEstimator, Detection, Histogram, RangeGate, detect, isqrt,
+    quadrant_background,
 };
 use rand_core::Rng;
 use rand_distr::{Distribution, Poisson};
@@ -210,12 +210,12 @@ fn highest_alpha<const BINS: usize>(
     minimum_count: Count,
 ) -> Option<u16> {
     let peak = histogram.peak();
-    let background = background::quadrant(histogram.counts(), &RangeGate::full(), peak.bin);
+    let background = quadrant_background(histogram.counts(), &RangeGate::full(), peak.bin);
     if peak.count < minimum_count || peak.count <= background {
         return None;
     }
     let excess = (peak.count.raw() - background.raw()) << 8;
-    let root = Count10::square_root(background.raw());
+    let root = isqrt::<5>(background.raw());
     // Without a background every α fires.
     let highest = (excess - 1).checked_div(root).unwrap_or(u32::MAX);
     Some(u16::try_from(highest).unwrap_or(u16::MAX))
@@ -224,7 +224,7 @@ fn highest_alpha<const BINS: usize>(
 #[cfg(test)]
 mod tests {
     use dtof_core::fixed::types::U8F8;
-    use dtof_core::{AsyncPixel, LaserCycle, Look, PaperRule, PixelConfig};
+    use dtof_core::{AsyncPixel, LaserCycle, Look, PaperRule, PixelConfig, Statistics};
 
     use super::*;
     use crate::random::trial_rng;
@@ -240,12 +240,17 @@ mod tests {
             (3, 5, 7),
         ] {
             let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
-            let config = PixelConfig::<8>::new(x, l1, l2, RangeGate::full(), rule).unwrap();
+            let config = PixelConfig::<8>::with_rule(rule)
+                .x(x)
+                .l1(l1)
+                .l2(l2)
+                .build()
+                .unwrap();
             let looks = Looks::new(x, l1, l2);
             let mut pixel = AsyncPixel::<8>::new(PixelAddress(0));
-            let mut seen = Vec::new();
+            let (mut seen, mut statistics) = (Vec::new(), Statistics::new());
             for cycle in 0.. {
-                match pixel.end_laser_cycle(&config, LaserCycle(cycle)) {
+                match pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle)) {
                     Look::NoPeak => seen.push(u32::from(pixel.exposure())),
                     Look::Expired => {
                         assert_eq!(cycle + 1, u64::from(looks.expiry()));

@@ -49,7 +49,7 @@ pub fn decided(
         looked: 0,
     };
     let mut pixels: Vec<Pixel> = (0..pixels).map(pixel).collect();
-    let mut events = Vec::new();
+    let (mut events, mut all) = (Vec::new(), Statistics::default());
     let mut turn = 0;
     for &mark in marks {
         match Mark::from_raw(mark) {
@@ -61,7 +61,8 @@ pub fn decided(
                 let passed = u16::try_from(now - pixel.looked).unwrap_or(u16::MAX);
                 pixel.looked = now;
                 let last = LaserCycle(now - 1);
-                let _ = pixel.pixel.end_laser_cycles(&config, last, passed);
+                let looked = &mut pixel.pixel;
+                let _ = looked.end_laser_cycles(&config, &mut all, last, passed);
             }
             Mark::Taken(address) => {
                 let pixel = pixels.get_mut(usize::from(address.0));
@@ -70,10 +71,9 @@ pub fn decided(
             }
         }
     }
-    let mut all = Statistics::default();
     for pixel in &mut pixels {
         pixel.count(&config, u64::MAX);
-        all += pixel.pixel.statistics();
+        all.add_photons_of(pixel.pixel.histogram());
     }
     Ok((events, all))
 }

@@ -3,7 +3,7 @@
 use core::hint::black_box;
 
 use dtof_core::fixed::types::U24F8;
-use dtof_core::{LaserCycle, Look, centre_of_mass};
+use dtof_core::{LaserCycle, Look, centroid};
 
 use crate::counter::{Counter, Operation};
 use crate::report::Report;
@@ -38,7 +38,7 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
         ),
         ("photon", "Histogram::add_batch", add_batch, empty, photons),
         ("frame", "Histogram::add_frame", add_frame, frame, EXPOSURES),
-        ("depth", "centre_of_mass", depth, with_target, EXPOSURES),
+        ("depth", "centroid", depth, with_target, EXPOSURES),
         (
             "pack",
             "encode and to_le_bytes",
@@ -112,13 +112,14 @@ extern "C" fn add_batch(state: &mut State, _: u32) -> u32 {
 extern "C" fn add_frame(state: &mut State, _: u32) -> u32 {
     state
         .histogram
-        .add_frame(&state.foreign, state.config.gate())
+        .add_frame(&state.foreign, state.config.gate());
+    0
 }
 
 extern "C" fn depth(state: &mut State, _: u32) -> u32 {
     let peak = state.histogram.peak();
     let gate = state.config.gate();
-    let depth = centre_of_mass(&state.histogram, gate, peak, const { U24F8::lit("3") });
+    let depth = centroid(&state.histogram, gate, peak, const { U24F8::lit("3") });
     depth.offset.raw().unsigned_abs().into()
 }
 
@@ -137,8 +138,7 @@ extern "C" fn clear(state: &mut State, _: u32) -> u32 {
 }
 
 extern "C" fn end_laser_cycle(state: &mut State, cycle: u32) -> u32 {
-    let cycle = LaserCycle(cycle.into());
-    state.pixel.end_laser_cycle(&state.config, cycle) as u32
+    state.end_laser_cycle(cycle) as u32
 }
 
 extern "C" fn exposure(state: &mut State, _: u32) -> u32 {
@@ -146,8 +146,12 @@ extern "C" fn exposure(state: &mut State, _: u32) -> u32 {
     for cycle in 0..CYCLES {
         let photons = photons.next().unwrap_or_default();
         state.pixel.count_batch(&state.config, photons);
-        let cycle = LaserCycle(cycle.into());
-        if state.pixel.end_laser_cycle(&state.config, cycle) == Look::Event {
+        let (statistics, cycle) = (&mut state.statistics, LaserCycle(cycle.into()));
+        if state
+            .pixel
+            .end_laser_cycle(&state.config, statistics, cycle)
+            == Look::Event
+        {
             state.event = state.pixel.acknowledge();
         }
     }
@@ -160,8 +164,12 @@ extern "C" fn exposure_single(state: &mut State, _: u32) -> u32 {
         for &code in photons.next().unwrap_or_default() {
             state.pixel.count(&state.config, code);
         }
-        let cycle = LaserCycle(cycle.into());
-        if state.pixel.end_laser_cycle(&state.config, cycle) == Look::Event {
+        let (statistics, cycle) = (&mut state.statistics, LaserCycle(cycle.into()));
+        if state
+            .pixel
+            .end_laser_cycle(&state.config, statistics, cycle)
+            == Look::Event
+        {
             state.event = state.pixel.acknowledge();
         }
     }

@@ -4,8 +4,9 @@
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
     AerEncoder, AnyRule, AsyncPixel, ConfigError, Count, DepthEstimator, DepthEvent,
-    DynamicDepthConfig, DynamicDepthPixel, Histogram, LaserCycle, PaperRule, PixelAddress,
-    PixelConfig, RangeGate, RangeScale, Reference, Reflectivity, RunningMean, WindowRule,
+    DynamicDepthConfig, DynamicDepthPixel, Histogram, LaserCycle, Look, PaperRule, PixelAddress,
+    PixelConfig, RangeGate, RangeScale, Reference, Reflectivity, RunningMean, Statistics,
+    WindowRule,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -26,6 +27,7 @@ pub const EXPOSURES: u32 = 64;
 pub struct State {
     pub histogram: Histogram<BINS>,
     pub pixel: AsyncPixel<BINS>,
+    pub statistics: Statistics,
     /// X = 4, L1 = 40, α = 4, at least 5 photons.
     pub config: PixelConfig<BINS>,
     /// The same with a gate whose quadrants do not start at even bins.
@@ -75,6 +77,7 @@ impl State {
             reflectivity: Reflectivity::new(),
             codes: [0; PHOTONS as usize],
             pixel: AsyncPixel::new(PixelAddress(7)),
+            statistics: Statistics::default(),
             histogram: Histogram::new(),
             foreign: [0; BINS],
             encoder: AerEncoder::new(),
@@ -90,7 +93,12 @@ impl State {
         gate: RangeGate<BINS>,
     ) -> Result<PixelConfig<BINS>, ConfigError> {
         let rule = PaperRule::new(const { U8F8::lit("4") }, Count::saturating(minimum));
-        PixelConfig::new(4, l1, l2, gate, rule)
+        PixelConfig::with_rule(rule)
+            .x(4)
+            .l1(l1)
+            .l2(l2)
+            .gate(gate)
+            .build()
     }
 
     /// The photons of exposure `number`, about six a laser cycle, and empty pixels
@@ -130,25 +138,11 @@ impl State {
         self.foreign = *self.histogram.counts();
     }
 
-    /// The photons of `exposures` exposures without a target in one histogram.
-    pub fn counted_together(&mut self, first: u32, exposures: u32) {
-        self.foreign = [0; BINS];
-        for number in first..first + exposures {
-            self.empty(number, false);
-            self.histogram.add_batch(&self.codes);
-            for (sum, &count) in self.foreign.iter_mut().zip(self.histogram.counts()) {
-                *sum += count;
-            }
-        }
-    }
-
     /// The event of exposure `number` with a target.
     pub fn target(&mut self, number: u32) {
         self.counted(number, true);
         self.wait_for_last_look();
-        let _ = self
-            .pixel
-            .end_laser_cycle(&self.config, LaserCycle(u64::from(CYCLES) - 1));
+        let _ = self.end_laser_cycle(u32::from(CYCLES) - 1);
         self.event = self.pixel.acknowledge();
     }
 
@@ -159,12 +153,18 @@ impl State {
         self.pixel.count_batch(&self.config, &self.codes);
     }
 
+    /// Ends laser cycle `cycle`, looking if it is time.
+    #[inline(always)]
+    pub fn end_laser_cycle(&mut self, cycle: u32) -> Look {
+        let cycle = LaserCycle(cycle.into());
+        self.pixel
+            .end_laser_cycle(&self.config, &mut self.statistics, cycle)
+    }
+
     /// Lets all laser cycles but the last pass.
     pub fn wait_for_last_look(&mut self) {
-        for cycle in 0..CYCLES - 1 {
-            let _ = self
-                .pixel
-                .end_laser_cycle(&self.config, LaserCycle(cycle.into()));
+        for cycle in 0..u32::from(CYCLES) - 1 {
+            let _ = self.end_laser_cycle(cycle);
         }
     }
 
@@ -176,18 +176,6 @@ impl State {
             for _ in 0..photons {
                 self.histogram.add(bin);
                 self.pixel.count(&self.config, bin);
-            }
-        }
-    }
-
-    /// The highest counts of the quadrants, of which two could be the peak and one
-    /// background is twice what its bits tell: what a whole histogram takes longest for.
-    pub fn undecided_bits(&mut self) {
-        self.empty(0, false);
-        self.foreign = [0; BINS];
-        for (bin, photons) in [(31, 15), (63, 15), (95, 20), (127, 19)] {
-            if let Some(count) = self.foreign.get_mut(bin) {
-                *count = photons;
             }
         }
     }

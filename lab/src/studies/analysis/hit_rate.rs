@@ -1,7 +1,7 @@
 //! How often the highest bin is the pulse's (Eq. 7 and its figures).
 
 use anyhow::{Context, Result};
-use dtof_core::peak::ComparatorTree;
+use dtof_core::ComparatorTree;
 use rand_pcg::Pcg64;
 
 use super::paper_setting::{Histograms, gaussian, means, target};

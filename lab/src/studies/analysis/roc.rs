@@ -2,7 +2,7 @@
 //! at several SNR.
 
 use anyhow::Result;
-use dtof_core::peak::ComparatorTree;
+use dtof_core::ComparatorTree;
 use rand_pcg::Pcg64;
 
 use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target};

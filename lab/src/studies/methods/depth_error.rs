@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
 use dtof_core::{
     BinPosition, Count, Count10, DepthEstimator, DetectionRule, Histogram, Peak, RangeGate,
-    SubBinOffset, WindowRule, background, whole_background,
+    SubBinOffset, WindowRule, quadrant_background, whole_background,
 };
 use rand_core::Rng;
 use rand_pcg::Pcg64;
@@ -93,10 +93,10 @@ impl Method {
             let estimator = DepthEstimator::for_pulse(U8F8::saturating_from_num(sigma));
             estimate(estimator, mean_background(histogram, peak))
         };
-        let mass = |background| estimate(DepthEstimator::CentreOfMass3, background);
+        let mass = |background| estimate(DepthEstimator::Centroid3, background);
         let offset = match self {
             Self::HighestBin => SubBinOffset::CENTRE,
-            Self::Paper => mass(whole_background(background::quadrant(
+            Self::Paper => mass(whole_background(quadrant_background(
                 histogram.counts(),
                 &gate,
                 peak.bin,

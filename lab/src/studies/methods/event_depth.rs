@@ -55,7 +55,7 @@ pub const STUDY: Study = Study {
 /// The estimators that a pixel may have, of [`ESTIMATORS`], for a pulse of `sigma` bins.
 fn estimators(sigma: f64) -> [DepthEstimator; 2] {
     let centred = DepthEstimator::for_pulse(U8F8::saturating_from_num(sigma));
-    [DepthEstimator::CentreOfMass3, centred]
+    [DepthEstimator::Centroid3, centred]
 }
 
 /// The window rule that suits a pulse of `sigma` bins.

@@ -292,7 +292,7 @@ pub fn count_false(passage: &mut Passage, exposures: u64, rng: &mut Pcg64) -> Ta
 
 #[cfg(test)]
 mod tests {
-    use dtof_core::{AsyncPixel, LaserCycle, PixelAddress, PixelConfig};
+    use dtof_core::{AsyncPixel, LaserCycle, PixelAddress, PixelConfig, Statistics};
 
     use super::*;
     use crate::sweep::point;
@@ -311,13 +311,19 @@ mod tests {
 
     /// When a pixel reports first, if it does.
     fn event<R: DetectionRule>(rule: R, frames: &[(u32, [u16; BINS])]) -> Option<u32> {
-        let config = PixelConfig::new(4, 39, 1000, RangeGate::full(), rule).unwrap();
+        let config = PixelConfig::with_rule(rule)
+            .x(4)
+            .l1(39)
+            .l2(1000)
+            .build()
+            .unwrap();
         let mut pixel = AsyncPixel::<BINS, Count16>::new(PixelAddress(0));
-        let mut before = 0;
+        let (mut before, mut statistics) = (0, Statistics::new());
         for (cycles, frame) in frames {
             pixel.count_frame(&config, frame);
             let passed = u16::try_from(cycles - before).unwrap();
-            let _ = pixel.end_laser_cycles(&config, LaserCycle((*cycles).into()), passed);
+            let last = LaserCycle((*cycles).into());
+            let _ = pixel.end_laser_cycles(&config, &mut statistics, last, passed);
             if let Some(event) = pixel.acknowledge() {
                 return Some(event.exposure.into());
             }

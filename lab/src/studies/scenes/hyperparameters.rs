@@ -13,7 +13,7 @@ mod setting;
 use anyhow::Result;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AsyncPixel, Count, LaserCycle, Look, PaperRule, PixelAddress, PixelConfig, RangeGate,
+    AsyncPixel, Count, LaserCycle, Look, PaperRule, PixelAddress, PixelConfig, Statistics,
 };
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
@@ -93,14 +93,19 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     // The paper has no minimum count; a peak holds a photon.
     let alpha = U8F8::from_num(point["alpha"]);
     let rule = PaperRule::new(alpha, Count::saturating(1));
-    let config = PixelConfig::new(FRAME, point["l1"] as u16, L2, RangeGate::full(), rule)?;
+    let config = PixelConfig::with_rule(rule)
+        .x(FRAME)
+        .l1(point["l1"] as u16)
+        .l2(L2)
+        .build()?;
     let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(0));
+    let mut statistics = Statistics::new();
     let [mut false_events, mut squares, mut fourth_powers] = [0; 3];
     for frame in 1..=u64::from(FRAMES) {
         let counts = laws.map(|law| law.sample(rng) as u32);
         pixel.count_frame(&config, &counts);
         let last = LaserCycle(frame * u64::from(FRAME) - 1);
-        if pixel.end_laser_cycles(&config, last, FRAME) != Look::Event {
+        if pixel.end_laser_cycles(&config, &mut statistics, last, FRAME) != Look::Event {
             continue;
         }
         if let Some(event) = pixel.acknowledge() {
@@ -112,7 +117,6 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             fourth_powers += error.pow(4);
         }
     }
-    let statistics = pixel.statistics();
     Ok(tally([
         ("events", statistics.events),
         ("expired", statistics.expired),

@@ -1,7 +1,7 @@
 //! How long a pixel takes from its first photon to its event (Table II).
 
 use anyhow::Result;
-use dtof_core::{AsyncPixel, LaserCycle, PixelAddress};
+use dtof_core::{AsyncPixel, LaserCycle, PixelAddress, Statistics};
 use rand_core::Rng;
 use rand_pcg::Pcg64;
 
@@ -82,14 +82,14 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let address = PixelAddress(0);
     let mut photons = SimulatedPixel::new(&rates, CODES, pixel_rng(rng.next_u64(), address))?;
     let mut pixel = AsyncPixel::<BINS>::new(address);
-    let mut tally = Tally::new();
+    let (mut tally, mut statistics) = (Tally::new(), Statistics::new());
     let (mut reset, mut first, mut events) = (0, None, 0);
     for cycle in 0..CYCLES {
         photons.next_cycle(|code| {
             first.get_or_insert(cycle);
             pixel.count(&config, code);
         });
-        pixel.end_laser_cycle(&config, LaserCycle(cycle));
+        pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle));
         if pixel.acknowledge().is_none() {
             continue;
         }

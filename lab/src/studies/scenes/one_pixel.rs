@@ -4,7 +4,7 @@
 use anyhow::Result;
 use dtof_core::{
     AnyRule, AsyncPixel, BinPosition, DepthEstimator, DepthEvent, LaserCycle, PixelAddress,
-    PixelConfig, RangeGate,
+    PixelConfig, RangeGate, Statistics,
 };
 
 use dtof::engine::frame::FramePixel;
@@ -93,6 +93,7 @@ pub fn watch(
     mut photons: impl FnMut(u64, &mut dyn FnMut(u16)) -> Result<()>,
 ) -> Result<[Vec<Reading>; 5]> {
     let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(0));
+    let mut statistics = Statistics::new();
     let mut lengths = FRAMES.into_iter();
     let mut frames = phases.map(|first| frames(first, lengths.next().unwrap_or_default()));
     let mut readings: [Vec<Reading>; 5] = Default::default();
@@ -103,7 +104,7 @@ pub fn watch(
                 frame.count(&RangeGate::full(), cycle, code);
             }
         })?;
-        pixel.end_laser_cycle(config, LaserCycle(cycle));
+        pixel.end_laser_cycle(config, &mut statistics, LaserCycle(cycle));
         let [events, of_frames @ ..] = &mut readings;
         events.extend(pixel.acknowledge().as_ref().map(Reading::of));
         for (readings, frame) in of_frames.iter_mut().zip(&mut frames) {

@@ -162,7 +162,7 @@ pub fn exposure(
 
 #[cfg(test)]
 mod tests {
-    use dtof_core::{AsyncPixel, LaserCycle, PixelAddress, PixelConfig};
+    use dtof_core::{AsyncPixel, LaserCycle, PixelAddress, PixelConfig, Statistics};
 
     use super::super::estimators;
     use super::*;
@@ -216,17 +216,16 @@ mod tests {
             for (pixel, event) in pixels.iter().zip(events) {
                 for (index, estimator) in both.into_iter().enumerate() {
                     let l1 = u16::try_from(pixel.first_look - 1).unwrap();
-                    let config = PixelConfig::new(4, l1, 1000, RangeGate::full(), pixel.rule)
-                        .unwrap()
-                        .with_estimator(estimator);
+                    let config = PixelConfig::with_rule(pixel.rule).l1(l1).l2(1000);
+                    let config = config.estimator(estimator).build().unwrap();
                     let mut of_core = AsyncPixel::<BINS>::new(PixelAddress(0));
-                    let mut before = 0;
+                    let (mut before, mut statistics) = (0, Statistics::new());
                     let mut found = None;
                     for (cycles, frame) in &frames {
                         of_core.count_frame(&config, frame);
                         let passed = u16::try_from(cycles - before).unwrap();
                         let cycle = LaserCycle((*cycles).into());
-                        let _ = of_core.end_laser_cycles(&config, cycle, passed);
+                        let _ = of_core.end_laser_cycles(&config, &mut statistics, cycle, passed);
                         before = *cycles;
                         found = of_core.acknowledge();
                         if found.is_some() {

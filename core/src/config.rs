@@ -1,0 +1,252 @@
+//! How pixels operate: one configuration for many pixels.
+//!
+//! A configuration is built from settings, and checked once. [`checked!`](crate::checked)
+//! does that when it is compiled:
+//!
+//! ```
+//! use dtof_core::{PixelConfig, checked};
+//!
+//! const CONFIG: PixelConfig<128> =
+//!     checked!(PixelConfig::paper().x(4).l1(40).l2(2000).build());
+//! ```
+//!
+//! A program that learns its settings when it runs gets an error instead. Another rule
+//! than the paper's goes into [`PixelConfig::with_rule`]:
+//!
+//! ```
+//! use dtof_core::fixed::types::{U4F12, U8F8};
+//! use dtof_core::*;
+//!
+//! let rule = WindowRule::new(3, const { U4F12::lit("4.47") }, Count::saturating(5))?;
+//! let estimator = DepthEstimator::for_pulse(const { U8F8::lit("1") });
+//! let config = PixelConfig::<128, _>::with_rule(rule).estimator(estimator);
+//! assert!(config.l1(4).build().is_ok());
+//! assert_eq!(config.l1(3).build(), Err(ConfigError::XAboveL1));
+//! # Ok::<(), WindowWidthError>(())
+//! ```
+//!
+//! Source: X, L1 and L2 are those of the flow chart in the paper's section II-B; X of 4
+//! and L1 of 40 those of its FPGA (section IV).
+
+use core::fmt;
+
+use fixed::types::U8F8;
+
+use crate::counter::CounterWidth;
+use crate::depth::DepthEstimator;
+use crate::detect::{Detection, DetectionRule, PaperRule, detect};
+use crate::gate::RangeGate;
+use crate::histogram::Histogram;
+use crate::units::Count;
+
+/// How pixels operate. Valid by construction: made by [`Self::paper`] or [`Self::with_rule`],
+/// some settings, and [`PixelConfigBuilder::build`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PixelConfig<const BINS: usize, R: DetectionRule = PaperRule> {
+    x: u16,
+    l1: u16,
+    l2: u16,
+    gate: RangeGate<BINS>,
+    rule: R,
+    estimator: DepthEstimator,
+    is_one_hit: bool,
+}
+
+/// Settings of pixels that are not checked yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[must_use = "`build` makes a configuration of it"]
+pub struct PixelConfigBuilder<const BINS: usize, R: DetectionRule = PaperRule>(
+    PixelConfig<BINS, R>,
+);
+
+/// A configuration that cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ConfigError {
+    /// X is 0.
+    ZeroX,
+    /// X is greater than L1.
+    XAboveL1,
+    /// L2 is not greater than L1.
+    L2NotAboveL1,
+    /// No multiple of X lies between L1 and L2, so that the pixel would never
+    /// decide.
+    NoLook,
+}
+
+impl ConfigError {
+    /// What is wrong, in one line.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::ZeroX => "X must be at least 1",
+            Self::XAboveL1 => "X must not be greater than L1",
+            Self::L2NotAboveL1 => "L2 must be greater than L1",
+            Self::NoLook => "no multiple of X lies strictly between L1 and L2",
+        }
+    }
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.text())
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+impl<const BINS: usize> PixelConfig<BINS> {
+    /// The paper's rule and depth, with α = 4 and at least 5 photons in the peak.
+    /// For the rest see [`Self::with_rule`].
+    pub const fn paper() -> PixelConfigBuilder<BINS> {
+        let alpha = const { U8F8::lit("4") };
+        Self::with_rule(PaperRule::new(alpha, Count::saturating(5)))
+    }
+}
+
+impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
+    /// With another rule. Unless set otherwise X is 4, L1 is 40, L2 is 2000, there is no
+    /// gate, the depth is the paper's, and the TDC takes every photon.
+    pub const fn with_rule(rule: R) -> PixelConfigBuilder<BINS, R> {
+        PixelConfigBuilder(Self {
+            x: 4,
+            l1: 40,
+            l2: 2000,
+            gate: RangeGate::full(),
+            rule,
+            estimator: DepthEstimator::Centroid3,
+            is_one_hit: false,
+        })
+    }
+
+    /// The same for a TDC that takes one photon a laser cycle, for programs that learn
+    /// that from their sensor. See [`PixelConfigBuilder::one_hit_tdc`].
+    #[must_use]
+    pub const fn with_one_hit_tdc(self) -> Self {
+        Self {
+            is_one_hit: true,
+            ..self
+        }
+    }
+
+    /// Whether the highest bin of `histogram` stands clear, and how deep its pulse lies.
+    /// `histogram` must hold gated bins only.
+    #[inline(always)]
+    #[must_use]
+    pub fn detect<W: CounterWidth>(&self, histogram: &Histogram<BINS, W>) -> Option<Detection> {
+        detect(histogram, &self.gate, &self.rule, &self.estimator)
+    }
+
+    /// Laser cycles between looks.
+    #[must_use]
+    pub const fn x(&self) -> u16 {
+        self.x
+    }
+
+    /// The exposure that a decision must exceed.
+    #[must_use]
+    pub const fn l1(&self) -> u16 {
+        self.l1
+    }
+
+    /// The exposure at which the histogram is cleared without an event.
+    #[must_use]
+    pub const fn l2(&self) -> u16 {
+        self.l2
+    }
+
+    /// The bins that may hold the peak.
+    #[must_use]
+    pub const fn gate(&self) -> &RangeGate<BINS> {
+        &self.gate
+    }
+
+    /// The detection rule.
+    #[must_use]
+    pub const fn rule(&self) -> &R {
+        &self.rule
+    }
+
+    /// How the depth of an event is found.
+    #[must_use]
+    pub const fn estimator(&self) -> &DepthEstimator {
+        &self.estimator
+    }
+
+    /// Whether the TDC takes one photon a laser cycle.
+    #[must_use]
+    pub const fn is_one_hit(&self) -> bool {
+        self.is_one_hit
+    }
+}
+
+impl<const BINS: usize, R: DetectionRule> PixelConfigBuilder<BINS, R> {
+    /// Looks every `x` laser cycles.
+    pub const fn x(mut self, x: u16) -> Self {
+        self.0.x = x;
+        self
+    }
+
+    /// Decides once the exposure exceeds `l1` laser cycles.
+    pub const fn l1(mut self, l1: u16) -> Self {
+        self.0.l1 = l1;
+        self
+    }
+
+    /// Clears the histogram once the exposure reaches `l2` laser cycles.
+    pub const fn l2(mut self, l2: u16) -> Self {
+        self.0.l2 = l2;
+        self
+    }
+
+    /// Takes photons of the gated bins only.
+    pub const fn gate(mut self, gate: RangeGate<BINS>) -> Self {
+        self.0.gate = gate;
+        self
+    }
+
+    /// Finds the depth with `estimator`.
+    pub const fn estimator(mut self, estimator: DepthEstimator) -> Self {
+        self.0.estimator = estimator;
+        self
+    }
+
+    /// Whether the TDC takes the first photon of a laser cycle only. An event then gets
+    /// [`Flags::PILE_UP`](crate::Flags::PILE_UP) if its exposure has more photons than
+    /// half its laser cycles. Photons that the gate left out count.
+    ///
+    /// At that half, 0.7 photons arrive in a laser cycle. A Gaussian pulse on its own is
+    /// then read 0.2 of its standard deviation too near. False alarms begin above four
+    /// fifths (`docs/failures.md`). Photon counting usually keeps to 5 %. That asks for
+    /// a depth error of a hundredth of the pulse, far below that of an event's few
+    /// photons.
+    pub const fn one_hit_tdc(mut self, is_one_hit: bool) -> Self {
+        self.0.is_one_hit = is_one_hit;
+        self
+    }
+
+    /// The configuration.
+    ///
+    /// # Errors
+    /// [`ConfigError`] unless `0 < X <= L1 < L2` and a multiple of X lies strictly
+    /// between L1 and L2.
+    pub const fn build(self) -> Result<PixelConfig<BINS, R>, ConfigError> {
+        let PixelConfig { x, l1, l2, .. } = self.0;
+        if x == 0 {
+            return Err(ConfigError::ZeroX);
+        }
+        if x > l1 {
+            return Err(ConfigError::XAboveL1);
+        }
+        if l2 <= l1 {
+            return Err(ConfigError::L2NotAboveL1);
+        }
+        // The last multiple of x below l2.
+        let last_look = (l2 - 1) - (l2 - 1) % x;
+        if last_look <= l1 {
+            return Err(ConfigError::NoLook);
+        }
+        Ok(self.0)
+    }
+}

@@ -1,0 +1,121 @@
+//! The counters of a histogram: how wide they are, and what is asked of many of them.
+//!
+//! A counter saturates at `2^BITS - 1`. Nothing is shifted or scaled to fit, because
+//! Poisson statistics need real counts.
+//!
+//! ```
+//! use dtof_core::{Count10, CounterWidth, PhotonCount};
+//!
+//! assert_eq!(Count10::MAX, 1023);
+//! let counts = [3u16, 9, 1, 0];
+//! assert_eq!(u16::highest(&counts), 9);
+//! assert!(u16::any_reaches(&counts, 9) && !u16::any_reaches(&counts, 10));
+//! ```
+//!
+//! Cost on a Cortex-M4: [`PhotonCount::highest`] takes three instructions a 16-bit
+//! count. [`PhotonCount::any_reaches`] ends at the first count that is high enough.
+//!
+//! Source: 10 bits are those of the paper's FPGA (section IV-B).
+
+mod sealed {
+    pub trait Sealed {}
+}
+
+/// How wide the counters of a histogram are.
+///
+/// The decision is the same for all widths. Only the square root needs more iterations
+/// for wider counts.
+pub trait CounterWidth: sealed::Sealed {
+    /// The integer that holds one counter.
+    type Counter: PhotonCount + Ord + core::fmt::Debug;
+    /// An empty counter.
+    const ZERO: Self::Counter;
+    /// Bits a counter uses; it saturates at `2^BITS - 1`.
+    const BITS: u32;
+    /// The count at which a counter is full.
+    const MAX: u32 = (1 << Self::BITS) - 1;
+
+    /// `count`, which is at most [`Self::MAX`], as a counter.
+    fn counter(count: u32) -> Self::Counter;
+}
+
+/// 10-bit counters (0..=1023), those of the paper's FPGA and the default.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count10 {}
+/// 16-bit counters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count16 {}
+/// 24-bit counters, those of commercial sensors that send whole histograms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count24 {}
+
+macro_rules! counter_width {
+    ($name:ident, $counter:ty, $bits:literal) => {
+        impl sealed::Sealed for $name {}
+        impl CounterWidth for $name {
+            type Counter = $counter;
+            const ZERO: $counter = 0;
+            const BITS: u32 = $bits;
+            #[inline]
+            #[allow(clippy::cast_possible_truncation)] // at most 2^BITS - 1, which fits
+            fn counter(count: u32) -> $counter {
+                count as $counter
+            }
+        }
+    };
+}
+counter_width!(Count10, u16, 10);
+counter_width!(Count16, u16, 16);
+counter_width!(Count24, u32, 24);
+
+/// An integer that counts the photons of one bin.
+pub trait PhotonCount: Copy + Into<u32> {
+    /// The highest of some counts, 0 of none.
+    #[inline(always)]
+    fn highest(counts: &[Self]) -> u32 {
+        // Not `max()`, which carries a reference along with each count.
+        fold(counts, 0, |highest: u32, count| highest.max(count.into()))
+    }
+
+    /// Whether one of some counts is `level` or more.
+    #[inline(always)]
+    fn any_reaches(counts: &[Self], level: u32) -> bool {
+        // Four a turn, so that the loop itself costs little.
+        let reaches = |&count: &Self| count.into() >= level;
+        let (fours, rest) = counts.as_chunks::<4>();
+        let one_of =
+            |[a, b, c, d]: &[Self; 4]| reaches(a) || reaches(b) || reaches(c) || reaches(d);
+        fours.iter().any(one_of) || rest.iter().any(reaches)
+    }
+}
+
+impl PhotonCount for u8 {}
+impl PhotonCount for u32 {}
+impl PhotonCount for u16 {
+    #[inline(always)]
+    fn highest(counts: &[Self]) -> u32 {
+        // How much room is left above the highest: two instructions a count with
+        // Arm's DSP extension, one less than a comparison.
+        let room = fold(counts, Self::MAX, |room: Self, count| {
+            room.saturating_add(count) - count
+        });
+        (!room).into()
+    }
+}
+
+/// Sixteen a turn, so that the loop itself costs little.
+#[inline(always)]
+fn fold<C: Copy, A>(counts: &[C], start: A, next: impl Fn(A, C) -> A) -> A {
+    let eight = |so_far, &[a, b, c, d, e, f, g, h]: &[C; 8]| {
+        let so_far = next(next(next(next(so_far, a), b), c), d);
+        next(next(next(next(so_far, e), f), g), h)
+    };
+    let (eights, rest) = counts.as_chunks::<8>();
+    let (pairs, last) = eights.as_chunks::<2>();
+    let folded = pairs.iter().fold(start, |so_far, [one, other]| {
+        eight(eight(so_far, one), other)
+    });
+    let folded = last.iter().fold(folded, eight);
+    rest.iter()
+        .fold(folded, |so_far, &count| next(so_far, count))
+}

@@ -1,0 +1,92 @@
+//! The paper's depth: the centroid of three bins.
+//!
+//! The background is taken off first. With `l`, `c`, `r` the counts of the peak bin's
+//! left neighbour, itself and its right neighbour, less the background and not
+//! below 0, the pulse lies
+//!
+//! ```text
+//! peak bin + 0.5 + (r - l) / (l + c + r)      in bins from the start of bin 0
+//! ```
+//!
+//! so that photons spread evenly over bin i give i + 0.5. The result is a
+//! fixed-point number with 8 fractional bits, rounded to the nearest 1/256 bin.
+//!
+//! ```
+//! use dtof_core::fixed::types::U24F8;
+//! use dtof_core::{Histogram, RangeGate, centroid};
+//!
+//! let mut histogram = Histogram::<128>::new();
+//! histogram.add_batch(&[40, 40, 40, 41]);
+//! let depth = centroid(&histogram, &RangeGate::full(), histogram.peak(), U24F8::ZERO);
+//! assert_eq!(depth.offset.raw(), 128 + 64); // 40.75 bins
+//! ```
+//!
+//! Cost on a Cortex-M4: 68 instructions. It suits pulses of up to 0.5 bins (σ); wider
+//! ones are drawn to the middle of the peak bin.
+//!
+//! Source: the paper's section III-A (CMM).
+
+use fixed::types::U24F8;
+
+use super::estimate::Depth;
+use crate::counter::CounterWidth;
+use crate::flags::Flags;
+use crate::gate::RangeGate;
+use crate::histogram::{Histogram, Peak};
+use crate::units::SubBinOffset;
+
+/// Three-bin centroid around `peak`, less the `background` a bin.
+///
+/// Within 1/512 bin of the real-valued formula for 10- and 16-bit counters,
+/// within 1/256 bin for 24-bit ones. With nothing above the background the
+/// middle of the peak bin. A neighbour outside the gate counts as empty.
+#[inline(always)]
+#[must_use]
+pub fn centroid<const BINS: usize, W: CounterWidth>(
+    histogram: &Histogram<BINS, W>,
+    gate: &RangeGate<BINS>,
+    peak: Peak,
+    background: U24F8,
+) -> Depth {
+    let neighbour = |bin: u16| {
+        if gate.contains(bin) {
+            histogram.count(bin.into())
+        } else {
+            None
+        }
+    };
+    let left = neighbour(peak.bin.raw().wrapping_sub(1));
+    let right = neighbour(peak.bin.raw() + 1);
+
+    let mut flags = Flags::NONE;
+    if peak.count.raw() >= W::MAX {
+        flags |= Flags::SATURATED;
+    }
+    if left.is_none() || right.is_none() {
+        flags |= Flags::CLIPPED;
+    }
+
+    let above = |count: u32| (count << 8).saturating_sub(background.to_bits());
+    let left = above(left.unwrap_or(0));
+    let centre = above(peak.count.raw());
+    let right = above(right.unwrap_or(0));
+    // Only their ratio counts, so that what is past 22 bits, 14 of them whole counts,
+    // may lose its last to keep the 256-fold numerator within 32.
+    let excess = if W::BITS > 14 {
+        10u32.saturating_sub((left | centre | right).leading_zeros())
+    } else {
+        0
+    };
+    let (left, centre, right) = (left >> excess, centre >> excess, right >> excess);
+    let sum = left + centre + right;
+    let numerator = (right.abs_diff(left) << 8) + sum / 2;
+    // At most 128 when `peak` is the highest bin; limited to what the offset
+    // holds when it is not.
+    let shift = numerator.checked_div(sum).unwrap_or(0).min(256) as i16;
+    let shift = if right < left { -shift } else { shift };
+    Depth {
+        offset: SubBinOffset::new(SubBinOffset::CENTRE.raw() + shift)
+            .unwrap_or(SubBinOffset::CENTRE),
+        flags,
+    }
+}

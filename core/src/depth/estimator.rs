@@ -1,0 +1,61 @@
+//! Which depth estimator: chosen when configured, to the width of the pulse.
+//!
+//! ```
+//! use dtof_core::fixed::types::U8F8;
+//! use dtof_core::{DepthEstimator, PixelConfig, checked};
+//!
+//! // A pulse with a standard deviation of one bin.
+//! const ESTIMATOR: DepthEstimator = DepthEstimator::for_pulse(U8F8::lit("1"));
+//! const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().estimator(ESTIMATOR).build());
+//! ```
+//!
+//! Cost: that of the estimator, once an event.
+
+use fixed::types::{U8F8, U24F8};
+
+use super::centred_window::CentredWindow;
+use super::centroid::centroid;
+use super::estimate::Depth;
+use crate::counter::CounterWidth;
+use crate::gate::RangeGate;
+use crate::histogram::{Histogram, Peak};
+
+/// How the place of the pulse in its bins is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum DepthEstimator {
+    /// The paper's: the [`centroid`] of three bins.
+    #[default]
+    Centroid3,
+    /// The centroid of a window that suits the pulse and lies evenly about it.
+    CentredWindow(CentredWindow),
+}
+
+impl DepthEstimator {
+    /// What suits a pulse of the standard deviation `sigma` in bins: a
+    /// [`CentredWindow::for_pulse`].
+    #[must_use]
+    pub const fn for_pulse(sigma: U8F8) -> Self {
+        Self::CentredWindow(CentredWindow::for_pulse(sigma))
+    }
+
+    /// The depth of `peak`, less the `background` a bin, which is that of the rule. A
+    /// [`CentredWindow`] has its own, if the gate leaves a bin for it.
+    #[inline(always)]
+    #[must_use]
+    pub fn estimate<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        peak: Peak,
+        background: U24F8,
+    ) -> Depth {
+        match self {
+            Self::Centroid3 => centroid(histogram, gate, peak, background),
+            Self::CentredWindow(window) => {
+                let outside = window.background_outside(histogram, gate, peak);
+                window.estimate(histogram, gate, peak, outside.unwrap_or(background))
+            }
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! Does a peak stand clear of the background?
+//!
+//! | module | what it has |
+//! |---|---|
+//! | `rule` | what a detection rule is |
+//! | `quadrant` | the paper's rule, with its `background`, `threshold` and square `root` |
+//! | `window`, `window_z` | the window rule, a CFAR test over all photons of the pulse, and its z |
+//! | `any_rule` | a rule that is chosen when the program runs |
+//! | `decision` | one decision on one histogram |
+//! | `comparator_tree` | the paper's search for the peak, as a model of its hardware |
+
+mod any_rule;
+mod background;
+mod comparator_tree;
+mod decision;
+mod quadrant;
+mod root;
+mod rule;
+mod threshold;
+mod window;
+mod window_z;
+
+pub use any_rule::AnyRule;
+pub use background::quadrant_background;
+pub use comparator_tree::ComparatorTree;
+pub use decision::{Detection, detect};
+pub use quadrant::PaperRule;
+pub use root::isqrt;
+pub use rule::{DetectionRule, whole_background};
+pub use threshold::Threshold;
+pub use window::{WindowRule, WindowWidthError};
+pub use window_z::{HIGHEST_Z, z_for};

@@ -1,0 +1,81 @@
+//! The paper's rule: the peak bin against the smaller of two quadrant maxima.
+//!
+//! The peak is a detection if it exceeds `background + α·√background`, the
+//! [`Threshold`] of the [`quadrant_background`]. It is a CFAR test whose reference is a
+//! maximum. The false-alarm rate for a given α therefore moves with the background;
+//! [`WindowRule`](crate::WindowRule) is the way out.
+//!
+//! ```
+//! use dtof_core::fixed::types::U8F8;
+//! use dtof_core::{Count, DepthEstimator, Histogram, PaperRule, RangeGate, detect};
+//!
+//! let rule = PaperRule::new(const { U8F8::lit("4") }, Count::saturating(5));
+//! let mut histogram = Histogram::<128>::new();
+//! histogram.add_batch(&[60, 60, 60, 60, 7]);
+//! let (gate, estimator) = (RangeGate::full(), DepthEstimator::default());
+//! assert_eq!(detect(&histogram, &gate, &rule, &estimator), None);
+//! histogram.add(60); // the fifth photon
+//! assert!(detect(&histogram, &gate, &rule, &estimator).is_some());
+//! ```
+//!
+//! Cost on a Cortex-M4, 128 bins: 91 instructions for a usual look without an event, 272
+//! if every bin has to be read. A look that does not fire never learns the background:
+//! [`Threshold::lowest_background`] says which background would hold the peak back, and
+//! the search ends at the first count that reaches it.
+//!
+//! Source: the paper's section IV-B and Eq. 5.
+
+use fixed::types::{U8F8, U24F8};
+
+use super::background::{background_reaches, quadrant_background};
+use super::rule::{DetectionRule, whole_background};
+use super::threshold::Threshold;
+use crate::counter::CounterWidth;
+use crate::gate::RangeGate;
+use crate::histogram::{Histogram, Peak};
+use crate::units::Count;
+
+/// The paper's rule: the peak bin against the quadrant background plus α of its
+/// standard deviations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PaperRule {
+    threshold: Threshold,
+}
+
+impl PaperRule {
+    /// See [`Threshold::new`].
+    #[must_use]
+    pub const fn new(alpha: U8F8, minimum_count: Count) -> Self {
+        Self {
+            threshold: Threshold::new(alpha, minimum_count),
+        }
+    }
+
+    /// The threshold it applies.
+    #[must_use]
+    pub const fn threshold(&self) -> &Threshold {
+        &self.threshold
+    }
+}
+
+impl DetectionRule for PaperRule {
+    #[inline(always)]
+    fn detect<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        peak: Peak,
+    ) -> Option<U24F8> {
+        if peak.count < self.threshold.minimum_count() {
+            return None;
+        }
+        // Most looks end here, without the background itself.
+        let lowest = self.threshold.lowest_background::<W>(peak.count);
+        if background_reaches(histogram.counts(), gate, peak.bin, lowest) {
+            return None;
+        }
+        let background = quadrant_background(histogram.counts(), gate, peak.bin);
+        Some(whole_background(background))
+    }
+}

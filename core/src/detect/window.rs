@@ -1,0 +1,225 @@
+//! A calibrated detection rule: all photons of the pulse against all the others.
+//!
+//! With `T` photons in `B` gated bins, and `S` of them in a window of `w` bins, of all that
+//! hold the peak bin the one with most, the peak is a detection if
+//!
+//! ```text
+//! S > Tp + z·V/√(V + z²/36) + z²/6·(1 - 2p)     p = w/B     V = Tp·(1 - p)
+//! ```
+//!
+//! the last term at least 0. That is the binomial distribution of `T` photons that fall
+//! into every bin alike: its mean, `z` standard deviations `√V`, and two corrections for
+//! small counts, whose distribution is skew. They are those of Cornish and Fisher, `z²/6` and
+//! `-z³/(72·√V)`; the second stands in the form that fits below one photon as well, where the
+//! series does not. What the
+//! background is need not be known, so that one `z` gives the same rate of false events
+//! from fractions of a count a bin to hundreds, for every width and from 8 bins on, where
+//! the α of the paper's rule has to follow the background. The total of the histogram is
+//! known, so that this takes no pass over the bins.
+//!
+//! With `n = B - w` bins outside, multiplied by `B` and squared, this is
+//!
+//! ```text
+//! (B·S - w·T - z²/6·(n - w))² > z²·N²/(N + c)     N = n·w·T     c = z²/36·B²
+//! ```
+//!
+//! if what is squared is positive, without a root. As the right side is at least `z²·(N - c)`, its
+//! division is only done where that is exceeded.
+//!
+//! ```
+//! use dtof_core::fixed::types::U4F12;
+//! use dtof_core::{Count, DepthEstimator, Histogram, RangeGate, WindowRule, detect};
+//!
+//! let rule = WindowRule::new(2, const { U4F12::lit("4.3") }, Count::saturating(4))?;
+//! let mut histogram = Histogram::<128>::new();
+//! histogram.add_batch(&[7, 60, 60, 61]);
+//! let (gate, estimator) = (RangeGate::full(), DepthEstimator::default());
+//! assert_eq!(detect(&histogram, &gate, &rule, &estimator), None);
+//! histogram.add_batch(&[61, 60]);
+//! assert!(detect(&histogram, &gate, &rule, &estimator).is_some());
+//! # Ok::<(), dtof_core::WindowWidthError>(())
+//! ```
+
+use core::fmt;
+
+use fixed::types::{U4F12, U8F8, U24F8};
+
+use super::rule::DetectionRule;
+use crate::counter::CounterWidth;
+use crate::gate::RangeGate;
+use crate::histogram::{Histogram, Peak, mean};
+use crate::units::Count;
+
+/// The sum of a window around the peak against the photons of all bins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct WindowRule {
+    width: u8,
+    z: U4F12,
+    minimum_count: Count,
+}
+
+/// The window is not 1 to [`WindowRule::MAX_WIDTH`] bins wide.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct WindowWidthError;
+
+impl WindowWidthError {
+    /// What is wrong, in one line.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        "the window must be 1 to 7 bins wide"
+    }
+}
+
+impl fmt::Display for WindowWidthError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.text())
+    }
+}
+
+impl core::error::Error for WindowWidthError {}
+
+impl WindowRule {
+    /// The widest window: a gate always leaves a bin outside it.
+    pub const MAX_WIDTH: u8 = 7;
+
+    /// A window of `width` bins, `z` standard deviations above the background and
+    /// at least `minimum_count` photons in the window.
+    ///
+    /// [`Self::width_for_pulse`] says which width suits the pulse.
+    ///
+    /// Where the window takes half of the `B` gated bins or more, it needs more than
+    /// `z²·(width/(B - width) - B²/(36·width·(B - width)))` photons even without any
+    /// background, which is many where it leaves few bins: with 7 of 8 and z 4 more than 107.
+    ///
+    /// # Errors
+    /// [`WindowWidthError`] unless `width` is 1 to [`Self::MAX_WIDTH`].
+    pub const fn new(width: u8, z: U4F12, minimum_count: Count) -> Result<Self, WindowWidthError> {
+        if width == 0 || width > Self::MAX_WIDTH {
+            return Err(WindowWidthError);
+        }
+        Ok(Self {
+            width,
+            z,
+            minimum_count,
+        })
+    }
+
+    /// The width that suits a pulse of the standard deviation `sigma` in bins: 2 bins up
+    /// to 0.6, 3 up to 1.25, 5 above.
+    #[must_use]
+    pub const fn width_for_pulse(sigma: U8F8) -> u8 {
+        let bits = sigma.to_bits();
+        if bits <= const { U8F8::lit("0.6").to_bits() } {
+            2
+        } else if bits <= const { U8F8::lit("1.25").to_bits() } {
+            3
+        } else {
+            5
+        }
+    }
+
+    /// Bins in the window.
+    #[must_use]
+    pub const fn width(&self) -> u8 {
+        self.width
+    }
+
+    /// How many standard deviations above the background.
+    #[must_use]
+    pub const fn z(&self) -> U4F12 {
+        self.z
+    }
+
+    /// The fewest photons in the window of a detection.
+    #[must_use]
+    pub const fn minimum_count(&self) -> Count {
+        self.minimum_count
+    }
+
+    /// The most photons in a gated window that holds the peak bin: at most 7 · 2²⁴.
+    #[inline(always)]
+    fn window_sum<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        peak: Peak,
+    ) -> u32 {
+        let width = u16::from(self.width);
+        let (bin, last) = (peak.bin.raw(), gate.last());
+        let first_start = (bin + 1).saturating_sub(width).max(gate.first());
+        let last_start = bin.min((last + 1).saturating_sub(width));
+        // From the first bin of the first window to the last of the last.
+        let bins = usize::from(first_start)..usize::from(last_start + width);
+        let bins = histogram.counts().get(bins).unwrap_or_default();
+        let windows = bins.split_at_checked(width.into());
+        let (first, entering) = windows.unwrap_or_default();
+        let mut sum = first
+            .iter()
+            .fold(0, |sum: u32, &count| sum.wrapping_add(count.into()));
+        let mut highest = sum;
+        for (&leaving, &entering) in bins.iter().zip(entering) {
+            sum = sum
+                .wrapping_add(entering.into())
+                .wrapping_sub(leaving.into());
+            highest = highest.max(sum);
+        }
+        highest
+    }
+}
+
+impl DetectionRule for WindowRule {
+    #[inline(always)]
+    fn detect<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        peak: Peak,
+    ) -> Option<U24F8> {
+        let inside = self.window_sum(histogram, gate, peak);
+        if inside < self.minimum_count.raw() {
+            return None;
+        }
+        let width = u32::from(self.width);
+        let bins = u32::from(gate.last() + 1 - gate.first());
+        let bins_outside = bins - width;
+
+        // In 1/16 counts.
+        let z_squared = u32::from(self.z.to_bits()) * u32::from(self.z.to_bits());
+        let skew = bins_outside.saturating_sub(width) * ((z_squared / 6) >> 20);
+        let (inside_times, total_times) = (bins << 4, width << 4);
+        let above = if W::BITS <= 10 {
+            // 14 + 13 bits, 7 + 20 bits and 20 bits.
+            let level = total_times * histogram.total() + skew;
+            (inside_times * inside).checked_sub(level)?
+        } else {
+            let level = u64::from(total_times) * u64::from(histogram.total()) + u64::from(skew);
+            let above = (u64::from(inside_times) * u64::from(inside)).checked_sub(level)?;
+            // Its square is then above any variance.
+            u32::try_from(above).unwrap_or(u32::MAX).min((1 << 30) - 1)
+        };
+        // At most 8 + 3 + 32 bits, or 10 + 3 + 26; in 1/16, and with z², 20 more.
+        let spread = u64::from(bins_outside * width) * u64::from(histogram.total());
+        let exceeds = |sixteenths: u64| {
+            (u64::from(above) * u64::from(above)) << 4 > sixteenths * u64::from(z_squared >> 16)
+        };
+        // 20 + 12 bits, and after the division 23.
+        let most = bins * bins * (z_squared >> 20) / (36 << 4);
+        if above == 0 || !exceeds(spread.saturating_sub(most.into()) << 4) {
+            return None;
+        }
+        // N/(N + c) of the upper 16 bits, in 1/2¹⁶.
+        let sum = spread + u64::from(most);
+        let shift = u64::BITS - (sum >> 16).leading_zeros();
+        #[allow(clippy::cast_possible_truncation, reason = "16 bits")]
+        let [sum, part] = [sum >> shift, spread >> shift].map(|value| value as u32);
+        let part = (part << 16).checked_div(sum)?;
+        // 43 + 16 bits, or 39 + 17.
+        if !exceeds((spread * u64::from(part)) >> 12) {
+            return None;
+        }
+        let outside = histogram.total().wrapping_sub(inside);
+        mean(outside, bins_outside)
+    }
+}

@@ -1,0 +1,96 @@
+//! The z that gives a wanted rate of false events.
+//!
+//! Without a target the window rule tries its luck once a bin and look. Neighbouring
+//! windows and successive looks share photons: the looks of an exposure are worth fewer
+//! independent ones, the more alike they are. The first table says how many the first
+//! `k` looks are worth when there is one every X laser cycles; of looks from
+//! `N = X·k` on, those before are taken off. The second is the normal distribution's:
+//! the z that one in so many trials exceeds.
+//!
+//! Both are written by `cargo run --release -p dtof-core --example window_z`, the first
+//! from simulation, and `core/tests/detect/window_z.rs` holds them against another one.
+
+use fixed::types::U4F12;
+
+use crate::gate::RangeGate;
+
+/// What the first 1, 2, 4, … looks are worth, in 1/16.
+const LOOKS: [u16; 11] = [12, 23, 45, 73, 112, 164, 222, 300, 388, 469, 573];
+
+/// The highest z that [`z_for`] gives, 6.44: for 2³⁴ trials or more, so that more false
+/// events may come than wanted.
+pub const HIGHEST_Z: U4F12 = U4F12::from_bits(26394);
+
+/// z in 1/4096 for 2⁶, 2⁸, … trials.
+const Z: [u16; 15] = [
+    8822, 10896, 12686, 14283, 15737, 17079, 18331, 19509, 20625, 21687, 22702, 23677, 24614,
+    25519, 26394,
+];
+
+/// The z of a [`WindowRule`](crate::WindowRule) with which one in `one_in` exposures
+/// without a target brings a false event: 100 for 1 %, 1000 for 0.1 %.
+///
+/// `gate`, `x`, `l1` and `l2` are those of the [`PixelConfig`](crate::PixelConfig). With 8 to
+/// 128 bins, 1 in 100 or 1000 and many looks an exposure, at most 1.5 times as many come as
+/// wanted, whatever the width of the window and the background; with a single look, 512
+/// bins or more, or 1 in a million, up to 2.5 times. With 128 bins and 0.4 photons a bin at
+/// the first look or more it is at least 0.5 times as many; with fewer bins or photons,
+/// or a window of most of the bins, fewer still. From 64 to 2³⁴ trials, z 2.15 to
+/// [`HIGHEST_Z`], to which it is limited.
+///
+/// ```
+/// use dtof_core::{RangeGate, z_for};
+///
+/// let gate = RangeGate::<128>::full();
+/// let z = z_for(100, &gate, 4, 40, 1000);
+/// assert_eq!((z.to_num::<f64>() * 100.0).round(), 446.0);
+/// ```
+#[must_use]
+#[allow(clippy::cast_possible_truncation, reason = "the highest z is 16 bits")]
+pub fn z_for<const BINS: usize>(
+    one_in: u32,
+    gate: &RangeGate<BINS>,
+    x: u16,
+    l1: u16,
+    l2: u16,
+) -> U4F12 {
+    let first = l1.checked_div(x).unwrap_or(0).saturating_add(1);
+    let last = l2.saturating_sub(1).checked_div(x).unwrap_or(0);
+    let looks = 16 + worth(last).saturating_sub(worth(first));
+    let bins = gate.last() - gate.first() + 1;
+    // At most 32 + 11 + 11 bits.
+    let trials = u64::from(one_in) * u64::from(bins) * u64::from(looks) / 16;
+
+    let above = log2(trials).saturating_sub(6 << 8);
+    let (index, part) = ((above >> 9) as usize, above & 511);
+    let z = match Z.get(index..) {
+        Some(&[low, high, ..]) => u32::from(low) + ((u32::from(high - low) * part) >> 9),
+        _ => u32::from(HIGHEST_Z.to_bits()),
+    };
+    U4F12::from_bits(z as u16)
+}
+
+/// What the first `looks` are worth, in 1/16: between powers of two a straight line in
+/// the number of looks; past the last each power as much more as it.
+fn worth(looks: u16) -> u32 {
+    let power = looks.checked_ilog2().unwrap_or(0);
+    let part = u32::from(looks).saturating_sub(1 << power);
+    let index = power.min(9);
+    let Some(&[low, high, ..]) = LOOKS.get(index as usize..) else {
+        return 0;
+    };
+    let (low, rise) = (u32::from(low), u32::from(high - low));
+    low + rise * (power - index) + ((rise * part) >> power)
+}
+
+/// In 1/256, with a straight line between powers of two; 0 of 0. `value` is less than
+/// 2⁵⁶.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "only the last 8 bits are kept"
+)]
+fn log2(value: u64) -> u32 {
+    let power = value.checked_ilog2().unwrap_or(0);
+    let part = ((value << 8) >> power) as u32 & 255;
+    (power << 8) | part
+}

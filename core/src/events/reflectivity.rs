@@ -1,0 +1,123 @@
+//! Reflectivity: how bright a surface is, whatever its distance.
+//!
+//! What comes back from a surface falls with the square of its distance, so that a
+//! count of what came times the square of the distance is its reflectivity, up to a
+//! factor that is the same for all pixels (section III-B of the paper).
+//!
+//! - The paper counts events: [`Reflectivity::of_events`]. An event takes L1 laser
+//!   cycles at least, so that bright surfaces all count alike, and its number grows
+//!   with the square of the brightness of dark ones.
+//! - What the events say is more: the photons of the peak above the background, and the
+//!   laser cycles they came in. Their ratio, over all events, is the signal a laser
+//!   cycle: [`Reflectivity::of_signal`].
+//!
+//! Both are relative. A part of the pulse lies outside the peak bin, more so where the
+//! pulse lies on an edge, and a saturated peak counts too little. The paper's background is
+//! a maximum, so that what is above it reads low, the more so the dimmer the pixel: at a
+//! background of 0.05 photons a bin and laser cycle and α = 4 by a quarter to a third for 0.05
+//! signal photons, an eighth for 0.5 and almost nothing for 2; with a window rule it does not
+//! (`core/tests/events/reflectivity.rs`). Exposures that end without an event do not count, so that
+//! pixels which often have none read high.
+//!
+//! ```
+//! use dtof_core::fixed::types::{I24F8, U48F16};
+//! # use dtof_core::{BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, SubBinOffset};
+//! use dtof_core::Reflectivity;
+//! # let event = |cycle, exposure, peak| DepthEvent {
+//! #     pixel: PixelAddress(0), cycle: LaserCycle(cycle), exposure,
+//! #     peak_bin: BinIndex::saturating(40), offset: SubBinOffset::CENTRE,
+//! #     peak_count: Count::saturating(peak), background: Count::saturating(4),
+//! #     flags: Flags::NONE,
+//! # };
+//! let mut pixel = Reflectivity::new();
+//! pixel.add(&event(100, 40, 24)); // 20 of the signal in 40 laser cycles
+//! pixel.add(&event(180, 80, 44)); // 40 in 80
+//! let range = I24F8::from_num(1000); // mm
+//! assert_eq!(pixel.of_events(range), 2_000_000); // 2 events × (1000 mm)²
+//! assert_eq!(pixel.of_signal(range), U48F16::from_num(500_000)); // 0.5 a laser cycle × (1000 mm)²
+//! ```
+
+use fixed::types::{I24F8, U48F16};
+
+use crate::event::DepthEvent;
+
+/// What is counted of the events of one pixel: 24 bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Reflectivity {
+    events: u32,
+    signal: u64,
+    exposure: u64,
+}
+
+impl Reflectivity {
+    /// Of no events.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            events: 0,
+            signal: 0,
+            exposure: 0,
+        }
+    }
+
+    /// Takes an event in. Their number stays at 2³² − 1. Once the photons would exceed
+    /// 2⁴⁸ − 1, neither they nor the laser cycles grow any more.
+    #[inline]
+    pub const fn add(&mut self, event: &DepthEvent) {
+        self.events = self.events.saturating_add(1);
+        let signal = event
+            .peak_count
+            .raw()
+            .saturating_sub(event.background.raw());
+        // 48 bits and 24.
+        let signal = self.signal + signal as u64;
+        if signal <= Self::MOST {
+            self.signal = signal;
+            self.exposure = self.exposure.saturating_add(event.exposure as u64);
+        }
+    }
+
+    /// How many events.
+    #[must_use]
+    pub const fn events(&self) -> u32 {
+        self.events
+    }
+
+    /// Signal photons in the peak bin a laser cycle of the events' exposures, rounded
+    /// down to 1/65536; 0 of no events.
+    #[inline]
+    #[must_use]
+    pub const fn signal(&self) -> U48F16 {
+        match (self.signal << U48F16::FRAC_NBITS).checked_div(self.exposure) {
+            Some(signal) => U48F16::from_bits(signal),
+            None => U48F16::ZERO,
+        }
+    }
+
+    /// The paper's: the number of events times the square of the range in mm. Compare
+    /// pixels that have looked equally long. Limited to 64 bits, which 2³² events reach
+    /// beyond 65 m.
+    #[inline]
+    #[must_use]
+    pub const fn of_events(&self, range: I24F8) -> u64 {
+        times_square(self.events as u64, range)
+    }
+
+    /// The signal a laser cycle times the square of the range in mm. Limited to 2⁴⁸,
+    /// which 1023 photons a laser cycle reach beyond 500 m.
+    #[inline]
+    #[must_use]
+    pub const fn of_signal(&self, range: I24F8) -> U48F16 {
+        U48F16::from_bits(times_square(self.signal().to_bits(), range))
+    }
+
+    const MOST: u64 = (1 << 48) - 1;
+}
+
+/// `value` times the square of the range in whole mm, limited to 64 bits.
+const fn times_square(value: u64, range: I24F8) -> u64 {
+    // 24 bits, their square 48.
+    let millimetres = (range.to_bits().unsigned_abs() as u64 + (1 << 7)) >> 8;
+    value.saturating_mul(millimetres * millimetres)
+}

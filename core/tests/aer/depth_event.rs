@@ -1,0 +1,237 @@
+//! Depth events, end words and time words: there and back, and the bytes the document
+//! wants.
+
+use std::collections::BTreeMap;
+
+use dtof_core::{
+    AerDecoder, AerEncoder, AerError, AerRecord, AerWord, DepthEvent, DynamicDepthEvent, LaserCycle,
+};
+use proptest::prelude::*;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+use crate::document::{Field, bit_table, event, pack, pack_event, pack_time, tables};
+
+/// There and back, from nothing, and the bytes the document wants.
+fn check_event(tables: &[Vec<Field>; 2], event: &DepthEvent) {
+    let (time, word) = AerEncoder::new().encode(event);
+    let time = time.unwrap().to_le_bytes();
+    let bytes = word.to_le_bytes();
+    assert_eq!(time, pack_time(&tables[1], event.cycle));
+    assert_eq!(bytes, pack_event(&tables[0], event), "{event:?}");
+
+    let mut decoder = AerDecoder::new();
+    let start = LaserCycle(event.cycle.0 / (1 << 20) * (1 << 20));
+    assert_eq!(
+        decoder.decode(AerWord::from_le_bytes(time)),
+        Ok(AerRecord::Time(start))
+    );
+    let decoded = decoder.decode(AerWord::from_le_bytes(bytes));
+    assert_eq!(decoded, Ok(AerRecord::Event(*event)));
+}
+
+#[test]
+fn all_combinations_of_field_boundaries_round_trip() {
+    // Four boundaries a field; eight of the laser cycle, five of the offset.
+    let bits = |bits: u32| {
+        let max = u64::MAX >> (64 - bits);
+        [0, 1, max - 1, max]
+    };
+    let tables = tables();
+    let mut events = 0;
+    for pixel in bits(16) {
+        for cycle in bits(20).into_iter().chain(bits(64)) {
+            for exposure in bits(16) {
+                for peak_bin in bits(10) {
+                    for offset in [0, 511, 512, 513, 1023] {
+                        for count in bits(24) {
+                            for background in bits(24) {
+                                for flags in bits(6) {
+                                    let numbers = [
+                                        pixel, cycle, exposure, peak_bin, offset, count,
+                                        background, flags,
+                                    ];
+                                    let (time, word) = AerEncoder::new().encode(&event(numbers));
+                                    let mut decoder = AerDecoder::new();
+                                    decoder.decode(time.unwrap()).unwrap();
+                                    let decoded = decoder.decode(word);
+                                    assert_eq!(decoded, Ok(AerRecord::Event(event(numbers))));
+                                    events += 1;
+                                    if events % 64 == 0 {
+                                        check_event(&tables, &event(numbers));
+                                    }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn each_field_alone_at_each_of_its_bits() {
+    let tables = tables();
+    let widths = [16, 64, 16, 10, 10, 24, 24, 6];
+    for (field, width) in widths.into_iter().enumerate() {
+        for bit in 0..width {
+            let mut numbers = [0; 8];
+            numbers[field] = 1 << bit;
+            check_event(&tables, &event(numbers));
+            let mut numbers = numbers.map(|number: u64| !number);
+            check_event(&tables, &event(numbers));
+            numbers[4] = 512; // offset 0
+            check_event(&tables, &event(numbers));
+        }
+    }
+}
+
+fn random_event(rng: &mut Pcg32) -> DepthEvent {
+    event([0; 8].map(|_| rng.next_u64()))
+}
+
+#[test]
+fn a_million_random_events_round_trip() {
+    let mut rng = Pcg32::seed_from_u64(1);
+    let tables = tables();
+    let mut encoder = AerEncoder::new();
+    let mut decoder = AerDecoder::new();
+    for number in 0..1_000_000 {
+        let mut event = random_event(&mut rng);
+        if number % 2 == 0 {
+            event.cycle.0 %= 1 << 22; // few time words
+        }
+        let (time, word) = encoder.encode(&event);
+        if let Some(time) = time {
+            decoder.decode(time).unwrap();
+        }
+        assert_eq!(decoder.decode(word), Ok(AerRecord::Event(event)));
+        if number % 20 == 0 {
+            check_event(&tables, &event);
+        }
+    }
+}
+
+#[test]
+fn end_words_are_those_of_the_document() {
+    let table = bit_table("### End word");
+    for events in [0, 1, 1 << 32, u64::MAX] {
+        for checksum in [0, 1, 0x8000_0000, u32::MAX] {
+            let word = AerWord::end(events, checksum);
+            let values = BTreeMap::from([("events", events.into()), ("checksum", checksum.into())]);
+            assert_eq!(word.to_le_bytes(), pack(&table, &values));
+            let decoded = AerDecoder::new().decode(word);
+            assert_eq!(decoded, Ok(AerRecord::End { events, checksum }));
+        }
+    }
+}
+
+#[test]
+fn time_words_come_before_the_first_event_and_at_every_change_of_the_upper_bits() {
+    const TURN: u64 = 1 << 20;
+    const HALF: u64 = 1 << 63;
+    let mut encoder = AerEncoder::new();
+    let mut decoder = AerDecoder::new();
+    for (cycle, due) in [
+        (5, true), // the first
+        (0, false),
+        (TURN - 1, false),
+        (TURN, true),
+        (2 * TURN - 1, false),
+        (TURN - 1, true), // back
+        (TURN, true),
+        (7 * TURN, true),
+        (HALF - 1, true),
+        (HALF, true),
+        (HALF + TURN - 1, false),
+        (HALF - 1, true),
+        (u64::MAX - TURN, true),
+        (u64::MAX, true),
+        (u64::MAX - TURN + 1, false),
+        (0, true),
+    ] {
+        let event = event([3, cycle, 1, 2, 600, 9, 4, 0]);
+        let (time, word) = encoder.encode(&event);
+        assert_eq!(time.is_some(), due, "{cycle}");
+        if let Some(time) = time {
+            let start = LaserCycle(cycle - cycle % TURN);
+            assert_eq!(decoder.decode(time), Ok(AerRecord::Time(start)));
+        }
+        assert_eq!(decoder.decode(word), Ok(AerRecord::Event(event)));
+    }
+}
+
+#[test]
+fn a_late_receiver_is_right_from_the_first_time_word_on() {
+    let mut encoder = AerEncoder::new();
+    let mut late = AerDecoder::new();
+    for (cycle, expected) in [(70, false), (80, false), (1 << 20, true), (90, true)] {
+        let event = event([0, cycle, 0, 0, 0, 0, 0, 0]);
+        let (time, word) = encoder.encode(&event);
+        // The first time word is missed.
+        if let Some(time) = time.filter(|_| cycle != 70) {
+            late.decode(time).unwrap();
+        }
+        let wanted = if expected {
+            Ok(AerRecord::Event(event))
+        } else {
+            Err(AerError::MissingTime)
+        };
+        assert_eq!(late.decode(word), wanted);
+    }
+}
+
+#[test]
+fn an_error_leaves_the_decoder_as_it_was() {
+    let mut decoder = AerDecoder::new();
+    let event = event([1, 12_345_678, 1, 1, 1, 1, 1, 1]);
+    let (time, word) = AerEncoder::new().encode(&event);
+    decoder.decode(time.unwrap()).unwrap();
+    for (byte, bit, error) in [
+        (0, 0x01, AerError::ReservedBits),   // of a time word
+        (6, 0x20, AerError::UnknownControl), // 1 becomes 3
+        (7, 0xc0, AerError::UnknownKind),    // 0 becomes 3
+        (15, 0x80, AerError::ReservedBits),
+    ] {
+        let mut bytes = AerWord::time(LaserCycle(0)).to_le_bytes();
+        bytes[byte] |= bit;
+        assert_eq!(decoder.decode(AerWord::from_le_bytes(bytes)), Err(error));
+        assert_eq!(decoder.decode(word), Ok(AerRecord::Event(event)));
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_stream(numbers in prop::collection::vec(any::<([u64; 8], u32)>(), 0..50)) {
+        let mut encoder = AerEncoder::new();
+        let mut decoder = AerDecoder::new();
+        let mut high = None;
+        for (mut numbers, shift) in numbers {
+            numbers[1] >>= 20 + shift % 44; // often the same upper bits
+            let event = event(numbers);
+            let change = DynamicDepthEvent::new(
+                event.pixel,
+                event.cycle,
+                event.position(),
+                1 + i32::from(event.offset.raw()).abs(),
+                event.flags,
+            );
+            let change = change.filter(|_| shift % 3 == 0);
+            let (time, word) = match &change {
+                None => encoder.encode(&event),
+                Some(change) => encoder.encode_dynamic_depth(change),
+            };
+            let record = match change {
+                None => AerRecord::Event(event),
+                Some(change) => AerRecord::DynamicDepth(change),
+            };
+            prop_assert_eq!(time.is_some(), high != Some(event.cycle.0 >> 20));
+            high = Some(event.cycle.0 >> 20);
+            if let Some(time) = time {
+                decoder.decode(time).unwrap();
+            }
+            prop_assert_eq!(decoder.decode(word), Ok(record));
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! A rule chosen when the program runs decides as the one it holds.
+
+use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::{
+    AnyRule, CentredWindow, Count, Count10, Count24, CounterWidth, DepthEstimator, Detection,
+    DetectionRule, Histogram, PaperRule, RangeGate, WindowRule, detect,
+};
+use proptest::prelude::*;
+use rand_core::SeedableRng;
+use rand_pcg::Pcg32;
+
+/// What `rule` itself and as one of all decide; both the same.
+fn decides<const BINS: usize, W: CounterWidth>(
+    rule: impl DetectionRule + Into<AnyRule>,
+    histogram: &Histogram<BINS, W>,
+    gate: &RangeGate<BINS>,
+    estimator: &DepthEstimator,
+) -> Result<Option<Detection>, TestCaseError> {
+    let any: AnyRule = rule.into();
+    let alone = detect(histogram, gate, &rule, estimator);
+    prop_assert_eq!(detect(histogram, gate, &any, estimator), alone);
+    let peak = histogram.peak();
+    prop_assert_eq!(
+        any.detect(histogram, gate, peak),
+        rule.detect(histogram, gate, peak)
+    );
+    Ok(alone)
+}
+
+fn check<const BINS: usize, W: CounterWidth>(
+    (seed, round): (u64, u32),
+    (alpha, z, width): (u16, u16, u8),
+    minimum: u32,
+    half_width: u16,
+) -> Result<[bool; 2], TestCaseError> {
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let (gate, histogram, _) = crate::common::histogram::<BINS, W>(&mut rng, round);
+    let minimum = Count::saturating(minimum);
+    let paper = PaperRule::new(U8F8::from_bits(alpha), minimum);
+    let window = WindowRule::new(width, U4F12::from_bits(z), minimum).unwrap();
+    let centred = CentredWindow::new(U8F8::from_bits(half_width)).unwrap();
+    let estimator = DepthEstimator::CentredWindow(centred);
+    Ok([
+        decides(paper, &histogram, &gate, &estimator)?.is_some(),
+        decides(window, &histogram, &gate, &estimator)?.is_some(),
+    ])
+}
+
+proptest! {
+    #[test]
+    fn any_rule_decides_as_the_rule_inside(
+        histogram: (u64, u32),
+        alpha in 0u16..2048, z: u16, width in 1u8..=7,
+        minimum in 0u32..2000,
+        half_width in 256u16..=1024,
+    ) {
+        check::<8, Count10>(histogram, (alpha, z, width), minimum, half_width)?;
+        check::<128, Count10>(histogram, (alpha, z, width), minimum, half_width)?;
+        check::<128, Count24>(histogram, (alpha, z, width), minimum, half_width)?;
+    }
+}
+
+/// The histograms above are some on either side of both rules.
+#[test]
+fn both_rules_fire_and_do_not() {
+    let mut fired = [0; 2];
+    for seed in 0..200 {
+        let found = check::<128, Count10>((seed, 1), (1024, 4 << 12, 3), 5, 512).unwrap();
+        for (fired, found) in fired.iter_mut().zip(found) {
+            *fired += u32::from(found);
+        }
+    }
+    assert!(
+        fired.iter().all(|fired| (20..180).contains(fired)),
+        "{fired:?}"
+    );
+}

@@ -1,0 +1,13 @@
+//! Rules, thresholds, roots and peaks.
+
+#![allow(clippy::cast_possible_truncation, reason = "small numbers")]
+
+mod any_rule;
+mod background;
+mod common;
+mod peak;
+mod quadrant;
+mod root;
+mod threshold;
+mod window;
+mod window_z;

@@ -1,0 +1,79 @@
+//! The paper's rule decides as it is written.
+
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{
+    Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DetectionRule, Histogram,
+    PaperRule, Peak, RangeGate, detect, quadrant_background, whole_background,
+};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+/// Peak and background, each as the rule is written.
+fn as_written<const BINS: usize, W: CounterWidth>(
+    rule: &PaperRule,
+    histogram: &Histogram<BINS, W>,
+    gate: &RangeGate<BINS>,
+) -> Option<(Peak, Count)> {
+    let peak = histogram.peak();
+    let background = quadrant_background(histogram.counts(), gate, peak.bin);
+    let exceeded = rule.threshold().is_exceeded::<W>(peak.count, background);
+    exceeded.then_some((peak, background))
+}
+
+/// Random histograms with a peak that stands more or less clear; how many fired.
+fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) -> u32 {
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let mut fired = 0;
+    for round in 0..rounds {
+        let (gate, histogram, most) = crate::common::histogram::<BINS, W>(&mut rng, round);
+        let alpha = rng.next_u32() as u16 >> (rng.next_u32() % 16);
+        let minimum = Count::saturating(rng.next_u32() % (2 * most));
+        let minimum = if round % 2 == 0 {
+            Count::default()
+        } else {
+            minimum
+        };
+        let rule = PaperRule::new(U8F8::from_bits(alpha), minimum);
+
+        let expected = as_written(&rule, &histogram, &gate);
+        let background = rule.detect(&histogram, &gate, histogram.peak());
+        assert_eq!(
+            background,
+            expected.map(|(_, background)| whole_background(background))
+        );
+        let detection = detect(&histogram, &gate, &rule, &DepthEstimator::default());
+        let detected = detection.map(|detection| (detection.peak, detection.background));
+        assert_eq!(detected, expected);
+        fired += u32::from(expected.is_some());
+    }
+    fired
+}
+
+#[test]
+fn it_decides_as_the_rule_is_written() {
+    for (fired, rounds) in [
+        (check::<8, Count10>(20_000, 1), 20_000),
+        (check::<32, Count10>(20_000, 6), 20_000),
+        (check::<32, Count16>(20_000, 7), 20_000),
+        (check::<128, Count10>(5000, 2), 5000),
+        (check::<128, Count16>(5000, 3), 5000),
+        (check::<128, Count24>(5000, 4), 5000),
+        (check::<1024, Count10>(500, 5), 500),
+    ] {
+        // Both answers, often.
+        assert!(
+            fired > rounds / 20 && fired < rounds - rounds / 20,
+            "{fired}"
+        );
+    }
+}
+
+#[test]
+fn an_empty_histogram_is_no_detection() {
+    let rule = PaperRule::new(U8F8::ZERO, Count::default());
+    let (gate, estimator) = (RangeGate::full(), DepthEstimator::default());
+    assert_eq!(
+        detect(&Histogram::<8>::new(), &gate, &rule, &estimator),
+        None
+    );
+}

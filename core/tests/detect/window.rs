@@ -1,0 +1,245 @@
+//! The window rule decides as it is written, whatever the counts, and as seldom without
+//! a target as it says.
+
+use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
+use dtof_core::{
+    Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DetectionRule, Histogram,
+    RangeGate, WindowRule, WindowWidthError, detect,
+};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+/// The most photons of all gated windows of `width` bins that hold the peak, the
+/// photons outside it, and how many bins these are in.
+fn window<const BINS: usize, W: CounterWidth>(
+    histogram: &Histogram<BINS, W>,
+    gate: &RangeGate<BINS>,
+    width: usize,
+) -> (u64, u64, u64) {
+    let counts: Vec<u64> = (gate.first()..=gate.last())
+        .map(|bin| histogram.count(bin.into()).unwrap().into())
+        .collect();
+    let peak = usize::from(histogram.peak().bin.raw() - gate.first());
+    let most = (0..=counts.len() - width)
+        .filter(|&start| (start..start + width).contains(&peak))
+        .map(|start| counts[start..start + width].iter().sum())
+        .max();
+    let (most, all): (u64, u64) = (most.unwrap(), counts.iter().sum());
+    (most, all - most, (counts.len() - width) as u64)
+}
+
+/// The background in 1/256 of a detection, the rule in whole numbers that cannot
+/// overflow, and checked against the rule in real ones.
+fn as_written<const BINS: usize, W: CounterWidth>(
+    rule: &WindowRule,
+    histogram: &Histogram<BINS, W>,
+    gate: &RangeGate<BINS>,
+) -> Option<U24F8> {
+    let width = rule.width();
+    let (inside, outside, bins) = window(histogram, gate, width.into());
+    // 1/4096 squared; z²/6 and z²/36·B² from 1/16, and z² in 1/256, rounded down.
+    let z_squared = i128::from(rule.z().to_bits()).pow(2);
+    let (skew, sixteenths) = ((z_squared / 6) >> 20, z_squared >> 20);
+    let z_squared = z_squared >> 16;
+    let (s, r, n, w) = (
+        i128::from(inside),
+        i128::from(outside),
+        i128::from(bins),
+        i128::from(width),
+    );
+    let above = 16 * (n * s - w * r) - (n - w).max(0) * skew;
+    // N/(N + c) of the upper 16 bits, in 1/2¹⁶ and rounded down.
+    let spread = n * w * (s + r);
+    let sum = spread + (n + w).pow(2) * sixteenths / (36 * 16);
+    let shift = (0..).find(|&shift| sum >> shift < 1 << 16).unwrap();
+    let part = ((spread >> shift) << 16).checked_div(sum >> shift);
+    let sixteenths = (spread * part.unwrap_or(0)) >> 12;
+    let clear = above > 0 && 16 * above.pow(2) > z_squared * sixteenths;
+
+    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+    let (inside_real, total) = (inside as f64, (inside + outside) as f64);
+    #[allow(clippy::cast_precision_loss, reason = "at most 1024")]
+    let share = f64::from(width) / (bins + u64::from(width)) as f64;
+    let variance = total * share * (1.0 - share);
+    let z = rule.z().to_num::<f64>();
+    let skew = (1.0 - 2.0 * share).max(0.0) * z * z / 6.0;
+    let level = |z: f64, spread: f64| total * share + skew + z * spread.max(0.0).sqrt();
+    let spread = |c: f64| {
+        let sum = variance + c;
+        if sum > 0.0 {
+            variance * variance / sum
+        } else {
+            0.0
+        }
+    };
+    // z² and its sixth, 1/36 and N²/(N + c) are rounded down, the last by 1/16 and, as the upper
+    // bits alone are divided, by variance/2¹⁵.
+    let c = z * z / 36.0;
+    let exact = level(z, spread(c));
+    let z_low = (z * z - 1.0 / 256.0).max(0.0).sqrt();
+    let unit = 1.0 / ((bins + u64::from(width)) as f64).powi(2);
+    let low = level(z_low, spread(c) - variance / 32_768.0 - unit / 16.0) - 0.0626;
+    let c_low = (c - 1.0 / (36.0 * 16.0) - unit).max(0.0);
+    let high = level(z, spread(c_low) + variance / 32_768.0);
+    if inside_real > high + 1e-6 * high {
+        assert!(clear, "{inside_real} {exact}");
+    }
+    if inside_real < low - 1e-6 * low {
+        assert!(!clear, "{inside_real} {exact}");
+    }
+    let fires = clear && inside >= u64::from(rule.minimum_count().raw());
+    fires.then(|| U24F8::from_bits(((outside << 8) / bins) as u32))
+}
+
+/// Random histograms with a peak that stands more or less clear; how many fired.
+fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) -> u32 {
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let mut fired = 0;
+    for round in 0..rounds {
+        let (gate, histogram, most) = crate::common::histogram::<BINS, W>(&mut rng, round);
+        let z = U4F12::from_bits(rng.next_u32() as u16 >> (rng.next_u32() % 16));
+        let minimum = rng.next_u32() % (2 * most) * (round % 2);
+        let width = 1 + (rng.next_u32() % 7) as u8;
+        let rule = WindowRule::new(width, z, Count::saturating(minimum)).unwrap();
+        let expected = as_written(&rule, &histogram, &gate);
+        assert_eq!(rule.detect(&histogram, &gate, histogram.peak()), expected);
+        let detection = detect(&histogram, &gate, &rule, &DepthEstimator::default());
+        let rounded = detection.map(|detection| detection.background.raw());
+        assert_eq!(rounded, expected.map(|level| (level.to_bits() + 128) >> 8));
+        fired += u32::from(expected.is_some());
+    }
+    fired
+}
+
+#[test]
+fn it_decides_as_it_is_written() {
+    for (fired, rounds) in [
+        (check::<8, Count10>(20_000, 1), 20_000),
+        (check::<128, Count10>(5000, 2), 5000),
+        (check::<128, Count16>(5000, 3), 5000),
+        (check::<128, Count24>(5000, 4), 5000),
+        (check::<1024, Count10>(500, 5), 500),
+        (check::<1024, Count16>(500, 6), 500),
+    ] {
+        // Both answers, often.
+        let often = rounds / 20..rounds - rounds / 20;
+        assert!(often.contains(&fired), "{fired} of {rounds}");
+    }
+}
+
+/// All bins full or empty but the window's, every width, the least and largest z.
+#[test]
+fn it_decides_as_it_is_written_at_the_extremes() {
+    fn all<const BINS: usize, W: CounterWidth>() {
+        let gates = [
+            RangeGate::<BINS>::full(),
+            RangeGate::new(0, 7).unwrap(),
+            RangeGate::new(BINS as u16 - 8, BINS as u16 - 1).unwrap(),
+        ];
+        for gate in gates {
+            for background in [0, 1, W::MAX / 2, W::MAX - 1, W::MAX] {
+                for (bin, other) in [(0, 1), (7, 6), (BINS - 1, BINS - 2), (BINS / 2, 3)] {
+                    for count in [1, W::MAX / 2 + 1, W::MAX] {
+                        let mut counts = [background; BINS];
+                        (counts[bin], counts[other]) = (count, count);
+                        let mut histogram = Histogram::<BINS, W>::new();
+                        histogram.add_frame(&counts, &gate);
+                        for width in 1..=WindowRule::MAX_WIDTH {
+                            for z in [0, 1, 17_613, u16::MAX] {
+                                let z = U4F12::from_bits(z);
+                                let rule = WindowRule::new(width, z, Count::default()).unwrap();
+                                let found = rule.detect(&histogram, &gate, histogram.peak());
+                                let expected = (histogram.total() > 0)
+                                    .then(|| as_written(&rule, &histogram, &gate));
+                                assert_eq!(found, expected.flatten());
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+    all::<8, Count10>();
+    all::<1024, Count10>();
+    all::<1024, Count16>();
+    all::<256, Count24>();
+}
+
+#[test]
+fn only_windows_that_can_be_used() {
+    for width in 0..=u8::MAX {
+        let rule = WindowRule::new(width, U4F12::ONE, Count::saturating(9));
+        if (1..=7).contains(&width) {
+            let rule = rule.unwrap();
+            let minimum = rule.minimum_count().raw();
+            assert_eq!((rule.width(), rule.z(), minimum), (width, U4F12::ONE, 9));
+        } else {
+            assert_eq!(rule, Err(WindowWidthError));
+        }
+    }
+}
+
+#[test]
+fn an_empty_histogram_is_no_detection() {
+    for width in 1..=7 {
+        let rule = WindowRule::new(width, U4F12::ZERO, Count::default()).unwrap();
+        let histogram = Histogram::<8>::new();
+        let gate = RangeGate::full();
+        let found = detect(&histogram, &gate, &rule, &DepthEstimator::default());
+        assert_eq!(found, None);
+    }
+}
+
+#[test]
+fn a_window_of_most_bins_needs_many_photons() {
+    let rule = WindowRule::new(7, U4F12::lit("4"), Count::default()).unwrap();
+    for (photons, expected) in [(107, false), (108, true)] {
+        let mut histogram = Histogram::<8>::new();
+        histogram.add_batch(&vec![3; photons]);
+        let gate = RangeGate::full();
+        let found = detect(&histogram, &gate, &rule, &DepthEstimator::default());
+        assert_eq!(found.is_some(), expected);
+    }
+}
+
+#[test]
+fn the_width_suits_the_pulse() {
+    for (sigma, width) in [
+        ("0", 2),
+        ("0.6", 2),
+        ("0.61", 3),
+        ("1", 3),
+        ("1.25", 3),
+        ("1.26", 5),
+        ("1.5", 5),
+        ("255", 5),
+    ] {
+        let sigma: U8F8 = sigma.parse().unwrap();
+        assert_eq!(WindowRule::width_for_pulse(sigma), width, "{sigma}");
+    }
+}
+
+/// What fires does so with any lower z, and with one more photon; a photon alone never does,
+/// unless z is less than 2.5.
+#[test]
+fn more_photons_and_a_lower_z_never_undo_a_detection() {
+    for last in 7..16 {
+        let gate = RangeGate::<16>::new(0, last).unwrap();
+        for width in 1..=7 {
+            let mut before = [false; 256];
+            for photons in 1..=150 {
+                let mut histogram = Histogram::<16>::new();
+                histogram.add_batch(&vec![3; photons]);
+                let fires: [bool; 256] = std::array::from_fn(|z| {
+                    let z = U4F12::from_bits((z as u16) << 8);
+                    let rule = WindowRule::new(width, z, Count::default()).unwrap();
+                    rule.detect(&histogram, &gate, histogram.peak()).is_some()
+                });
+                assert!(fires.is_sorted_by(|lower, higher| lower >= higher));
+                assert!(before.iter().zip(&fires).all(|(before, now)| before <= now));
+                assert!(photons > 1 || !fires[40..].contains(&true));
+                before = fires;
+            }
+        }
+    }
+}

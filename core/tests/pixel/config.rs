@@ -1,0 +1,97 @@
+//! Configurations that are valid, and those that are not.
+
+use dtof_core::fixed::types::{U8F8, U24F8};
+use dtof_core::{
+    ConfigError, Count, CounterWidth, DetectionRule, Histogram, Look, PaperRule, Peak, PixelConfig,
+    RangeGate,
+};
+
+use crate::model::Lone;
+
+#[test]
+fn small_configurations_are_valid_if_and_only_if_there_is_a_look() {
+    let rule = PaperRule::new(U8F8::lit("8"), Count::saturating(5));
+    for x in 0..=12u16 {
+        for l1 in 0..=12 {
+            for l2 in 0..=12 {
+                let config = PixelConfig::<8>::with_rule(rule).x(x).l1(l1).l2(l2).build();
+                let valid =
+                    0 < x && x <= l1 && l1 < l2 && (0..20).any(|k| l1 < k * x && k * x < l2);
+                assert_eq!(config.is_ok(), valid, "{x} {l1} {l2}");
+                let reason = if x == 0 {
+                    ConfigError::ZeroX
+                } else if x > l1 {
+                    ConfigError::XAboveL1
+                } else if l1 >= l2 {
+                    ConfigError::L2NotAboveL1
+                } else {
+                    ConfigError::NoLook
+                };
+                match config {
+                    Ok(config) => {
+                        assert_eq!((config.x(), config.l1(), config.l2()), (x, l1, l2));
+                        assert_eq!(config.gate(), &RangeGate::full());
+                        assert_eq!(config.rule(), &rule);
+                    }
+                    Err(error) => assert_eq!(error, reason, "{x} {l1} {l2}"),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn large_configurations_are_checked_without_overflow() {
+    let rule = PaperRule::new(U8F8::lit("8"), Count::saturating(5));
+    for (x, l1, l2, expected) in [
+        (1, 65_533, 65_535, None),
+        (1, 65_534, 65_535, Some(ConfigError::NoLook)),
+        (32_767, 32_767, 65_535, None), // looks at 65,534
+        (32_767, 32_767, 65_534, Some(ConfigError::NoLook)),
+        (65_535, 65_535, 65_535, Some(ConfigError::L2NotAboveL1)),
+        (65_535, 65_534, 65_535, Some(ConfigError::XAboveL1)),
+        (65_534, 65_534, 65_535, Some(ConfigError::NoLook)),
+    ] {
+        let config = PixelConfig::<8>::with_rule(rule).x(x).l1(l1).l2(l2).build();
+        assert_eq!(config.err(), expected, "{x} {l1} {l2}");
+    }
+}
+
+/// Fires on every second photon, whatever the bins say.
+#[derive(Clone, Copy)]
+struct EverySecond;
+
+impl DetectionRule for EverySecond {
+    fn detect<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        _: &RangeGate<BINS>,
+        _: Peak,
+    ) -> Option<U24F8> {
+        (histogram.total() == 2).then_some(U24F8::lit("1.25"))
+    }
+}
+
+#[test]
+fn another_rule_takes_the_place_of_the_paper_s() {
+    let config = PixelConfig::with_rule(EverySecond)
+        .x(1)
+        .l1(1)
+        .l2(9)
+        .build()
+        .unwrap();
+    let mut pixel = Lone::<8>::new(0);
+    for cycle in 0..100 {
+        pixel.pixel.count(&config, 5);
+        let expected = if cycle % 2 == 0 {
+            Look::TooEarly
+        } else {
+            Look::Event
+        };
+        assert_eq!(pixel.end(&config, cycle, 1), expected);
+        if let Some(event) = pixel.pixel.acknowledge() {
+            assert_eq!((event.peak_count.raw(), event.background.raw()), (2, 1));
+        }
+    }
+    assert_eq!(pixel.statistics().events, 50);
+}

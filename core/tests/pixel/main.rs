@@ -1,0 +1,12 @@
+//! The asynchronous pixel against its flow chart (section II-B).
+
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "small numbers"
+)]
+
+mod config;
+mod flow_chart;
+mod model;
+mod pile_up;

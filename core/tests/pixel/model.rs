@@ -1,0 +1,334 @@
+//! The flow chart (section II-B), redrawn as plainly as it can be, and a pixel beside it.
+
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{
+    AsyncPixel, BinIndex, Count, DepthEvent, DetectionRule, Flags, LaserCycle, Look, PaperRule,
+    PixelAddress, PixelConfig, RangeGate, Statistics, SubBinOffset,
+};
+use proptest::prelude::*;
+use rand_core::Rng;
+use rand_pcg::Pcg32;
+
+/// What a pixel is set to.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    pub x: u16,
+    pub l1: u16,
+    pub l2: u16,
+    pub first: usize,
+    pub last: usize,
+    /// In 1/256.
+    pub alpha: u16,
+    pub minimum: u32,
+    pub is_one_hit: bool,
+}
+
+impl Settings {
+    pub fn config<const BINS: usize>(&self) -> PixelConfig<BINS> {
+        let rule = PaperRule::new(
+            U8F8::from_bits(self.alpha),
+            Count::new(self.minimum).unwrap(),
+        );
+        let gate = RangeGate::new(self.first as u16, self.last as u16).unwrap();
+        let config = PixelConfig::with_rule(rule)
+            .x(self.x)
+            .l1(self.l1)
+            .l2(self.l2);
+        let config = config.gate(gate).one_hit_tdc(self.is_one_hit);
+        config.build().unwrap()
+    }
+}
+
+/// A pixel with statistics of its own.
+pub struct Lone<const BINS: usize> {
+    pub pixel: AsyncPixel<BINS>,
+    statistics: Statistics,
+}
+
+impl<const BINS: usize> Lone<BINS> {
+    pub fn new(address: u16) -> Self {
+        Self {
+            pixel: AsyncPixel::new(PixelAddress(address)),
+            statistics: Statistics::default(),
+        }
+    }
+
+    /// Ends so many laser cycles, the last of which is `last`.
+    pub fn end<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        last: u64,
+        cycles: u16,
+    ) -> Look {
+        let (last, statistics) = (LaserCycle(last), &mut self.statistics);
+        self.pixel
+            .end_laser_cycles(config, statistics, last, cycles)
+    }
+
+    /// With the present exposure.
+    pub fn statistics(&self) -> Statistics {
+        let mut statistics = self.statistics;
+        statistics.add_photons_of(self.pixel.histogram());
+        statistics
+    }
+}
+
+/// The flow chart. Its arithmetic is f64, exact for 10-bit counts.
+pub struct Model {
+    pub settings: Settings,
+    pub counts: Vec<u32>,
+    /// N.
+    pub exposure: u32,
+    pub since_look: u32,
+    /// Photons of the exposure with the code of a bin.
+    pub in_bins: u32,
+    pub put_off: bool,
+    pub waiting: Option<DepthEvent>,
+    pub statistics: Statistics,
+}
+
+impl Model {
+    pub fn new(bins: usize, settings: Settings) -> Self {
+        Self {
+            settings,
+            counts: vec![0; bins],
+            exposure: 0,
+            since_look: 0,
+            in_bins: 0,
+            put_off: false,
+            waiting: None,
+            statistics: Statistics::default(),
+        }
+    }
+
+    pub fn count(&mut self, code: usize) {
+        self.in_bins += u32::from(code < self.counts.len());
+        if code >= self.counts.len() {
+            self.statistics.rejected += 1;
+        } else if code < self.settings.first || code > self.settings.last {
+            self.statistics.gated_out += 1;
+        } else if self.counts[code] == 1023 {
+            self.statistics.saturated += 1;
+        } else {
+            self.counts[code] += 1;
+            self.statistics.counted += 1;
+        }
+    }
+
+    pub fn end(&mut self, last_cycle: u64, cycles: u32) -> Look {
+        self.exposure += cycles;
+        self.since_look += cycles;
+        if self.since_look < u32::from(self.settings.x) {
+            return Look::NotDue;
+        }
+        self.since_look = 0;
+        if self.exposure >= u32::from(self.settings.l2) {
+            self.statistics.expired += 1;
+            self.statistics.expired_deferred += u64::from(self.put_off);
+            self.reset();
+            return Look::Expired;
+        }
+        if self.exposure <= u32::from(self.settings.l1) {
+            return Look::TooEarly;
+        }
+        if self.waiting.is_some() {
+            self.statistics.deferred += 1;
+            self.put_off = true;
+            return Look::Deferred;
+        }
+        self.waiting = self.decide(last_cycle);
+        if self.waiting.is_none() {
+            return Look::NoPeak;
+        }
+        self.statistics.events += 1;
+        self.reset();
+        Look::Event
+    }
+
+    pub fn reset(&mut self) {
+        self.counts.fill(0);
+        self.exposure = 0;
+        self.in_bins = 0;
+        self.put_off = false;
+    }
+
+    pub fn decide(&self, cycle: u64) -> Option<DepthEvent> {
+        let Settings { first, last, .. } = self.settings;
+        let gated = &self.counts[first..=last];
+        let n = gated.len();
+        let peak = *gated.iter().max().unwrap();
+        let at = gated.iter().position(|&count| count == peak).unwrap();
+
+        let [a, b, c, d] = [0..n / 4, n / 4..n / 2, n / 2..n * 3 / 4, n * 3 / 4..n]
+            .map(|quadrant| *gated[quadrant].iter().max().unwrap());
+        let background = if at < n / 2 { c.min(d) } else { a.min(b) };
+
+        let alpha = f64::from(self.settings.alpha) / 256.0;
+        let level = f64::from(background) + alpha * f64::from(background).sqrt().floor();
+        if f64::from(peak) <= level || peak < self.settings.minimum {
+            return None;
+        }
+
+        let mut flags = 0;
+        if peak == 1023 {
+            flags |= 1;
+        }
+        if at == 0 || at == n - 1 {
+            flags |= 2;
+        }
+        if self.put_off {
+            flags |= 4;
+        }
+        if self.settings.is_one_hit && f64::from(self.in_bins) > 0.5 * f64::from(self.exposure) {
+            flags |= 8;
+        }
+        let above =
+            |count: Option<&u32>| f64::from(count.map_or(0, |c| c.saturating_sub(background)));
+        let left = above(at.checked_sub(1).and_then(|left| gated.get(left)));
+        let right = above(gated.get(at + 1));
+        let shift = 256.0 * (right - left) / (left + above(Some(&peak)) + right);
+        Some(DepthEvent {
+            pixel: PixelAddress(77),
+            cycle: LaserCycle(cycle),
+            exposure: self.exposure as u16,
+            peak_bin: BinIndex::new((first + at) as u16).unwrap(),
+            offset: SubBinOffset::new(128 + shift.round() as i16).unwrap(),
+            peak_count: Count::new(peak).unwrap(),
+            background: Count::new(background).unwrap(),
+            flags: Flags::from_bits(flags).unwrap(),
+        })
+    }
+}
+
+/// What happens to the pixel in one laser cycle.
+#[derive(Clone, Debug)]
+pub struct Cycle {
+    /// TDC codes, and how many photons each has.
+    pub photons: Vec<(u16, u16)>,
+    /// Whether the link acknowledges at its end.
+    pub acknowledge: bool,
+}
+
+/// Runs both, compares them after each laser cycle, and checks that no event
+/// was lost.
+pub fn compare<const BINS: usize>(settings: Settings, cycles: &[Cycle]) -> Statistics {
+    let config = settings.config::<BINS>();
+    let mut lone = Lone::<BINS>::new(77);
+    let mut model = Model::new(BINS, settings);
+    let (mut offered, mut acknowledged) = (0, 0);
+    for (number, cycle) in (0..).zip(cycles) {
+        for &(code, times) in &cycle.photons {
+            for _ in 0..times {
+                lone.pixel.count(&config, code);
+                model.count(code.into());
+                offered += 1;
+            }
+        }
+        let waiting_before = lone.pixel.request();
+        let look = lone.end(&config, number, 1);
+        assert_eq!(look, model.end(number, 1), "laser cycle {number}");
+        // An event that waits is never replaced.
+        assert!(!(waiting_before && look == Look::Event));
+        assert_eq!(u32::from(lone.pixel.exposure()), model.exposure);
+        assert_eq!(
+            lone.pixel.histogram().counts().map(u32::from),
+            *model.counts
+        );
+        assert_eq!(lone.pixel.request(), model.waiting.is_some());
+        if cycle.acknowledge {
+            let event = lone.pixel.acknowledge();
+            assert_eq!(event, model.waiting.take());
+            acknowledged += u64::from(event.is_some());
+        }
+        let statistics = lone.statistics();
+        assert_eq!(statistics, model.statistics);
+        let Statistics {
+            counted,
+            saturated,
+            rejected,
+            gated_out,
+            ..
+        } = statistics;
+        assert_eq!(offered, counted + saturated + rejected + gated_out);
+        assert_eq!(
+            statistics.events,
+            acknowledged + u64::from(lone.pixel.request())
+        );
+    }
+    assert_eq!(lone.pixel.address(), PixelAddress(77));
+    assert_eq!(lone.pixel.acknowledge(), model.waiting);
+    lone.statistics()
+}
+
+/// Random laser cycles: noise all over (a few codes past the last bin), a pulse
+/// of `signal` photons in about every other cycle, now and then a flood.
+pub fn random_cycles(bins: u32, cycles: u32, patience: u32, rng: &mut Pcg32) -> Vec<Cycle> {
+    let pulse = rng.next_u32() % bins;
+    let signal = rng.next_u32() % 6;
+    let flood = rng.next_u32().is_multiple_of(4);
+    (0..cycles)
+        .map(|_| {
+            let noise = rng.next_u32() % 4;
+            let mut photons: Vec<(u16, u16)> = (0..noise)
+                .map(|_| ((rng.next_u32() % (bins + bins / 8)) as u16, 1))
+                .collect();
+            if rng.next_u32().is_multiple_of(2) {
+                photons.push(((pulse + rng.next_u32() % 2) as u16, signal as u16));
+            }
+            if flood && rng.next_u32().is_multiple_of(50) {
+                photons.push(((rng.next_u32() % bins) as u16, 800));
+            }
+            Cycle {
+                photons,
+                acknowledge: rng.next_u32().is_multiple_of(patience),
+            }
+        })
+        .collect()
+}
+
+/// Adds what the runs have seen, so that a test can tell that they saw all.
+pub fn add(sum: &mut Statistics, one: Statistics) {
+    sum.saturated += one.saturated;
+    sum.rejected += one.rejected;
+    sum.gated_out += one.gated_out;
+    sum.events += one.events;
+    sum.deferred += one.deferred;
+    sum.expired += one.expired;
+}
+
+/// Settings of which a look exists; 16 bins.
+pub fn settings() -> impl Strategy<Value = Settings> {
+    let exposures = (1u16..=6, 0u16..10, 1u16..60);
+    let gate = (0usize..=8, 8usize..=16);
+    (exposures, gate, 0u16..1024, 0u32..6, any::<bool>())
+        .prop_map(
+            |((x, more, beyond), (first, width), alpha, minimum, is_one_hit)| Settings {
+                x,
+                l1: x + more,
+                l2: x + more + beyond,
+                first,
+                last: (first + width - 1).min(15),
+                alpha,
+                minimum,
+                is_one_hit,
+            },
+        )
+        .prop_filter("no look", |s| (s.l1 + 1..s.l2).any(|n| n % s.x == 0))
+}
+
+pub fn cycle() -> impl Strategy<Value = Cycle> {
+    let photon = prop_oneof![
+        6 => (0u16..18, 1u16..3),
+        2 => (9u16..11, 1u16..6),
+        1 => (0u16..16, Just(600)),
+        1 => (any::<u16>(), Just(1)),
+    ];
+    (
+        prop::collection::vec(photon, 0..3),
+        prop::bool::weighted(0.1),
+    )
+        .prop_map(|(photons, acknowledge)| Cycle {
+            photons,
+            acknowledge,
+        })
+}

@@ -1,0 +1,64 @@
+//! Pile-up is flagged where the TDC takes one photon a laser cycle.
+
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{Count, Flags, Look, PaperRule, PixelConfig, RangeGate};
+
+use crate::model::Lone;
+
+/// More than half of 44 laser cycles, whatever became of the photons, and those of
+/// the exposure alone.
+#[test]
+fn pile_up_is_more_than_a_photon_in_every_other_laser_cycle() {
+    let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+    let gate = RangeGate::new(1, 15).unwrap();
+    let multi = PixelConfig::<16>::with_rule(rule)
+        .x(4)
+        .l1(40)
+        .l2(2000)
+        .gate(gate)
+        .build()
+        .unwrap();
+    let one_hit = multi.with_one_hit_tdc();
+    assert!(one_hit.is_one_hit() && !multi.is_one_hit());
+    // In the peak, gated out, past the last bin.
+    for (photons, is_flagged) in [
+        ([22, 0, 0], false),
+        ([23, 0, 0], true),
+        ([10, 12, 22], false),
+        ([10, 13, 0], true),
+    ] {
+        for (config, may_be_flagged) in [(&multi, false), (&one_hit, true)] {
+            let mut pixel = Lone::<16>::new(0);
+            for exposure in 0..2 {
+                for (code, photons) in [9, 0, 16].into_iter().zip(photons) {
+                    (0..photons).for_each(|_| pixel.pixel.count(config, code));
+                }
+                let last = exposure * 44 + 43;
+                assert_eq!(pixel.end(config, last, 44), Look::Event);
+                let flags = pixel.pixel.acknowledge().unwrap().flags;
+                let expected = is_flagged && may_be_flagged;
+                assert_eq!(flags.contains(Flags::PILE_UP), expected, "{photons:?}");
+            }
+        }
+    }
+}
+
+/// A full counter counts no more, but its photons came.
+#[test]
+fn photons_that_met_a_full_counter_pile_up_too() {
+    let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+    let config = PixelConfig::<8>::with_rule(rule)
+        .x(4)
+        .l1(40)
+        .l2(4000)
+        .build();
+    let config = config.unwrap().with_one_hit_tdc();
+    for (photons, is_flagged) in [(1500, false), (1501, true)] {
+        let mut pixel = Lone::<8>::new(0);
+        (0..photons).for_each(|_| pixel.pixel.count(&config, 5));
+        assert_eq!(pixel.end(&config, 2999, 3000), Look::Event);
+        let flags = pixel.pixel.acknowledge().unwrap().flags;
+        assert_eq!(flags.contains(Flags::PILE_UP), is_flagged);
+        assert!(flags.contains(Flags::SATURATED));
+    }
+}
