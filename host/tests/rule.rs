@@ -146,9 +146,9 @@ fn options_that_contradict_each_other_are_refused_in_one_line() {
             &["--z", "--false-one-in"],
         ),
         ("--rule window", &["--window", "--sigma-bins"]),
-        ("--rule window --window 0", &["--window", "must be 1 to 7"]),
-        ("--rule window --window 8", &["--window", "must be 1 to 7"]),
-        ("--rule window --window -1", &["--window", "must be 1 to 7"]),
+        ("--rule window --window 0", &["--window", "from 1 to 7"]),
+        ("--rule window --window 8", &["--window", "from 1 to 7"]),
+        ("--rule window --window -1", &["--window", "from 1 to 7"]),
         (
             "--rule window --window 3 --z 16",
             &["--z", "a number from 0"],
