@@ -27,6 +27,9 @@ pub struct Monitor {
     /// tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated device
     #[arg(long, value_name = "DEVICE")]
     device: String,
+    /// Image that `--device qemu` runs [default: what `cargo xtask image mps2-an386` has built]
+    #[arg(long, value_name = "FILE")]
+    image: Option<PathBuf>,
     /// Pixels of the sensor, with addresses from 0 [default: as the device says]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pixels: Option<u16>,
@@ -78,7 +81,8 @@ impl Monitor {
             "--frame is not for monitor: a device reports events"
         );
         let name = || self.device.clone();
-        let mut client = Client::new(device::open(&self.device)?).with_context(name)?;
+        let mut client =
+            Client::new(device::open(&self.device, self.image.as_deref())?).with_context(name)?;
         ctrlc::set_handler(|| {
             // Who asks a second time does not wait for the device.
             if INTERRUPTED.swap(true, Ordering::Relaxed) {
