@@ -2,9 +2,10 @@
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 
 use super::qemu::Emulator;
 
@@ -85,15 +86,16 @@ fn gone(error: io::Error) -> io::Error {
     }
 }
 
-/// Opens `tcp:HOST:PORT` or the serial port of that name; `qemu` starts an
-/// emulated device and opens its port.
+/// Opens `tcp:HOST:PORT` or the serial port of that name. `qemu` starts an emulated
+/// device, with `image` or the one that xtask has built, and opens its port.
 ///
 /// # Errors
 /// If there is none.
-pub fn open(name: &str) -> Result<Box<dyn Port>> {
+pub fn open(name: &str, image: Option<&Path>) -> Result<Box<dyn Port>> {
     if name == "qemu" {
-        return Ok(Box::new(Emulator::start()?));
+        return Ok(Box::new(Emulator::start(image)?));
     }
+    ensure!(image.is_none(), "--image is for --device qemu");
     if let Some(address) = name.strip_prefix("tcp:") {
         return Ok(Box::new(tcp(address).with_context(|| name.to_owned())?));
     }
@@ -122,7 +124,7 @@ fn serial_ports() -> String {
 ///
 /// # Errors
 /// If nobody listens.
-pub fn tcp(address: &str) -> io::Result<TcpStream> {
+fn tcp(address: &str) -> io::Result<TcpStream> {
     let mut failed = None;
     let mut connected = None;
     for address in address.to_socket_addrs()? {
@@ -135,7 +137,14 @@ pub fn tcp(address: &str) -> io::Result<TcpStream> {
         }
     }
     let unknown = || failed.unwrap_or_else(|| ErrorKind::AddrNotAvailable.into());
-    let stream = connected.ok_or_else(unknown)?;
+    prompt(connected.ok_or_else(unknown)?)
+}
+
+/// The same connection, which sends at once and does not wait long for a byte.
+///
+/// # Errors
+/// If it is gone.
+pub fn prompt(stream: TcpStream) -> io::Result<TcpStream> {
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(PATIENCE))?;
     Ok(stream)

@@ -7,7 +7,7 @@ use dtof_core::{
 };
 use dtof_softcore::stream::{self, BINS, Mark};
 
-use super::photons::Photon;
+use crate::photons::Photon;
 
 /// The events of the words over the link.
 ///
