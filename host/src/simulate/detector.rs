@@ -13,7 +13,7 @@ use super::effects::jitter::TimingError;
 use super::effects::limits::Timing;
 use super::effects::second_echo::Echo;
 use super::effects::tail::Late;
-use super::pixel::{Arrival, code};
+use super::arrival::{Arrival, code};
 use super::stream::Stream;
 use dtof_theory::rates::Rates;
 
