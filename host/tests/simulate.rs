@@ -6,8 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use common::Scratch;
-use dtof::simulate::scene::Scene;
 use dtof::input::source::Geometry;
+use dtof::simulate::scene::Scene;
 use dtof_core::PixelAddress;
 
 fn repository(path: &str) -> PathBuf {

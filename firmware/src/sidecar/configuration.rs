@@ -62,16 +62,18 @@ impl Sidecar<'_> {
 /// What a configuration has for the other rule is not looked at.
 fn rule(wanted: &Configuration, minimum: Count) -> Result<AnyRule, Refusal> {
     Ok(match wanted.rule {
-        0 => PaperRule::new(U8F8::from_bits(wanted.alpha), minimum).into(),
-        1 => WindowRule::new(wanted.window, U4F12::from_bits(wanted.z), minimum)?.into(),
+        AnyRule::PAPER => PaperRule::new(U8F8::from_bits(wanted.alpha), minimum).into(),
+        AnyRule::WINDOW => {
+            WindowRule::new(wanted.window, U4F12::from_bits(wanted.z), minimum)?.into()
+        }
         _ => return Err(Refusal::Unknown),
     })
 }
 
 fn estimator(wanted: &Configuration) -> Result<DepthEstimator, Refusal> {
     match wanted.estimator {
-        0 => Ok(DepthEstimator::Centroid3),
-        1 => CentredWindow::new(U8F8::from_bits(wanted.half_width))
+        DepthEstimator::CENTROID_3 => Ok(DepthEstimator::Centroid3),
+        DepthEstimator::CENTRED_WINDOW => CentredWindow::new(U8F8::from_bits(wanted.half_width))
             .map(DepthEstimator::CentredWindow)
             .ok_or(Refusal::HalfWidth),
         _ => Err(Refusal::Unknown),
@@ -83,10 +85,9 @@ fn dynamic_depth(
     wanted: &Configuration,
     scale: &RangeScale,
 ) -> Result<Option<DynamicDepthConfig>, Refusal> {
-    let reference = match (wanted.output, wanted.reference) {
-        (0, _) => return Ok(None),
-        (1, 0) => Reference::Previous,
-        (1, 1) => Reference::Reported,
+    let reference = match wanted.output {
+        0 => return Ok(None),
+        1 => Reference::from_number(wanted.reference).ok_or(Refusal::Unknown)?,
         _ => return Err(Refusal::Unknown),
     };
     let threshold = U24F8::from_bits(wanted.threshold);

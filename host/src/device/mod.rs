@@ -8,7 +8,7 @@ mod port;
 mod qemu;
 
 use anyhow::{Result, bail, ensure};
-use dtof_core::{DepthEstimator, DepthEvent, PixelAddress, Reference, Statistics};
+use dtof_core::{AnyRule, DepthEstimator, DepthEvent, PixelAddress, Statistics};
 use dtof_link::endpoint::BODY_BYTES;
 use dtof_link::message;
 use dtof_link::{Configuration, Report, Token};
@@ -94,20 +94,18 @@ pub fn configuration(
     let last_bin = u16::try_from(settings.bins)? - 1;
     let (gate_first, gate_last) = settings.gate.unwrap_or((0, last_bin));
     let (rule, alpha, window, z) = match settings.rule {
-        Rule::Paper { alpha } => (0, alpha.0.to_bits(), 0, 0),
-        Rule::Window { window, z } => (1, 0, window, z.0.to_bits()),
+        Rule::Paper { alpha } => (AnyRule::PAPER, alpha.0.to_bits(), 0, 0),
+        Rule::Window { window, z } => (AnyRule::WINDOW, 0, window, z.0.to_bits()),
     };
-    let (estimator, half_width) = match settings.estimator.in_core() {
-        DepthEstimator::Centroid3 => (0, 0),
-        DepthEstimator::CentredWindow(window) => (1, window.half_width().to_bits()),
+    let estimator = settings.estimator.in_core();
+    let half_width = match estimator {
+        DepthEstimator::Centroid3 => 0,
+        DepthEstimator::CentredWindow(window) => window.half_width().to_bits(),
     };
     let (output, reference, threshold) = match dynamic_depth {
         None => (0, 0, 0),
         Some(dynamic_depth) => {
-            let reference = match dynamic_depth.reference {
-                Reference::Previous => 0,
-                Reference::Reported => 1,
-            };
+            let reference = dynamic_depth.reference.number();
             (1, reference, dynamic_depth.threshold_mm.to_bits())
         }
     };
@@ -126,7 +124,7 @@ pub fn configuration(
         rule,
         window,
         z,
-        estimator,
+        estimator: estimator.number(),
         half_width,
         output,
         reference,
