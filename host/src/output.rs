@@ -103,16 +103,19 @@ impl Output {
         lead: &str,
         sections: &[Section],
     ) -> Result<()> {
-        let pictures = pictures(&self.maps, summary.cycles)?;
-        let bytes = pictures.iter().map(|picture| picture.svg.len()).sum();
-        self.sample.limit(report::room_for_events(bytes));
+        let called = summary.settings.reports();
+        let pictures = pictures(&self.maps, called)?;
         let figures: Vec<Figure> = pictures
             .iter()
-            .map(|picture| Figure {
-                svg: &picture.svg,
-                caption: picture.caption,
+            .filter_map(|picture| {
+                Some(Figure {
+                    svg: &picture.svg,
+                    caption: picture.caption.as_deref()?,
+                })
             })
             .collect();
+        let bytes = figures.iter().map(|figure| figure.svg.len()).sum();
+        self.sample.limit(report::room_for_events(bytes));
         let totals = summary.rows();
         let settings = summary.settings.rows();
         let mut all = vec![Section {
@@ -132,6 +135,7 @@ impl Output {
             cycles: summary.cycles,
             sample: &self.sample,
             pixels: &self.maps.spread(),
+            called,
         };
         let report = report::html(title, lead, &all, &figures, &cloud);
 

@@ -10,8 +10,8 @@ use sha2::{Digest, Sha256};
 
 pub use cloud::Cloud;
 
-use crate::picture::{escape, one_line};
 use crate::sample::Sample;
+use crate::svg::{escape, one_line};
 
 /// A picture of the report.
 #[derive(Clone, Copy, Debug)]

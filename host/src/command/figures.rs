@@ -15,6 +15,9 @@ pub struct Figures {
     /// Work out all seeds, not only those of a quick look
     #[arg(long)]
     all: bool,
+    /// Draw again from what is kept; work out no seed
+    #[arg(long, conflicts_with = "all")]
+    kept: bool,
     /// Change nothing; fail if something would change
     #[arg(long)]
     check: bool,
@@ -22,7 +25,11 @@ pub struct Figures {
 
 impl Figures {
     pub fn run(&self) -> Result<()> {
-        let anew = if self.all { Anew::All } else { Anew::Few };
+        let anew = match (self.all, self.kept) {
+            (true, _) => Anew::All,
+            (_, true) => Anew::None,
+            _ => Anew::Few,
+        };
         let documents = figures::documents(&self.docs, anew, |study| {
             // Nobody may be reading it.
             let _ = writeln!(io::stderr(), "{}", study.name);

@@ -1,240 +1,117 @@
-//! The picture as SVG.
-//!
-//! Axes, texts and the like are drawn by plotters. The pixels are not: it would
-//! write one element each. They become one path for each colour instead.
+//! The picture as a document.
 
-use std::fmt::Write as _;
+use anyhow::{Result, ensure};
 
-use anyhow::{Context as _, Result};
-use plotters::coord::Shift;
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use super::axis::TEXT;
+use super::cells;
+use super::layout::{Bar, EDGE, Frame, LINE, Layout, TITLE};
+use super::map::Map;
+use super::scale::{Scale, levels};
+use crate::palette::{NO_EVENT, hex};
+use crate::svg::{Anchor, At, Svg};
 
-use super::axis::Axis;
-use super::cells::write_cells;
-use super::escape;
-use super::layout::{Bar, Frame, LINE_HEIGHT, Layout};
+/// Draws `map` as a complete SVG document.
+///
+/// Row 0 is at the top. Pixels are square, unless the map is so long and thin
+/// that it has to be stretched to be seen. A single row or column too long to
+/// be drawn in one piece is wrapped into lines, as text is.
+///
+/// The colours span the 2nd to the 98th percentile of the values. Where values
+/// lie beyond, the end of the colour bar is marked `≤` or `≥`. Should the two
+/// percentiles coincide although the values differ, the colours span all values.
+///
+/// The same map always gives the same bytes.
+///
+/// # Errors
+///
+/// Fails if the map has no pixels or if `values` is not `columns * rows` long.
+pub fn heat_map(map: &Map) -> Result<String> {
+    ensure!(
+        map.columns.checked_mul(map.rows) == Some(map.values.len()),
+        "{} values for a map of {} columns and {} rows",
+        map.values.len(),
+        map.columns,
+        map.rows
+    );
+    ensure!(!map.values.is_empty(), "a map without pixels");
 
-/// Background, text, lines, pixels without a value.
-const PAPER: RGBColor = RGBColor(0xff, 0xff, 0xff);
-const INK: RGBColor = RGBColor(0x1f, 0x23, 0x28);
-const LINE: RGBColor = RGBColor(0x8c, 0x95, 0x9f);
-pub(super) const NO_EVENT: RGBColor = RGBColor(0x84, 0x89, 0x90);
-
-/// The first three for a dark colour scheme.
-const DARK: &str = "@media (prefers-color-scheme:dark){\
-.heat-map>[fill=\"#FFFFFF\"]{fill:#0d1117}\
-.heat-map>[fill=\"#1F2328\"]{fill:#e6edf3}\
-.heat-map>[fill=\"#8C959F\"]{fill:#6e7681}}";
-
-const FONT: &str = "system-ui, sans-serif";
-const TEXT_SIZE: f64 = 16.0;
-const TITLE_SIZE: f64 = 19.0;
-
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-
-/// The document for `layout` with the pixels' `levels`.
-pub(super) fn document(layout: &Layout, levels: &[Option<u8>]) -> Result<String> {
-    let mut drawn = String::new();
-    {
-        let area = SVGBackend::with_string(&mut drawn, layout.size).into_drawing_area();
-        area.fill(&PAPER)?;
-        draw_texts(&area, layout)?;
-        draw_frame(&area, layout.plot)?;
-        draw_axes(&area, layout)?;
-        if let Some(bar) = &layout.bar {
-            draw_bar(&area, bar)?;
-        }
-        area.present()?;
-    }
-
-    let head = drawn.find('>').context("SVG without an opening tag")?;
-    let tail = drawn.rfind("</svg>").context("SVG without a closing tag")?;
-    let title = escape(&layout.title.join(" "));
-    // Where there is too little room for the picture its text loses less.
-    let narrow = layout.size.0 * 3 / 4;
-    let mut document = drawn[..head].to_owned();
-    write!(
-        document,
-        " class=\"heat-map\" role=\"img\"><title>{title}</title><style>{DARK}\
-         @media (max-width:{narrow}px){{.heat-map>text{{font-size:{TITLE_SIZE}px}}}}</style>"
-    )?;
-    document.push_str(&drawn[head + 1..tail]);
-    write_cells(
-        &mut document,
-        levels,
+    let scale = Scale::new(map.values);
+    let levels = levels(map.values);
+    let silent = levels.iter().filter(|level| level.is_none()).count();
+    let layout = Layout::new(map, scale.as_ref(), silent);
+    let mut svg = Svg::default();
+    texts(&mut svg, &layout);
+    axes(&mut svg, &layout);
+    cells::draw(
+        &mut svg,
+        &levels,
         layout.columns,
-        layout.plot,
+        layout.plot.corner,
         layout.cell,
-    )?;
-    if let Some(Bar { frame, levels, .. }) = &layout.bar {
-        let height = f64::from(frame.height) / levels.len() as f64;
-        write_cells(
-            &mut document,
-            levels,
-            1,
-            *frame,
-            (f64::from(frame.width), height),
-        )?;
+    );
+    if let Some(of) = &layout.bar {
+        bar(&mut svg, of);
     }
-    document.push_str("</svg>\n");
-    Ok(document)
+    Ok(svg.document(layout.size, map.title))
 }
 
 /// Title and notes.
-fn draw_texts(area: &Area, layout: &Layout) -> Result<()> {
-    let title = style(TITLE_SIZE, FontStyle::Bold, HPos::Left, VPos::Top);
-    let mut y = 14;
+fn texts(svg: &mut Svg, layout: &Layout) {
+    let mut y = EDGE + 12.5;
     for line in &layout.title {
-        area.draw_text(line, &title, (layout.plot.x, y))?;
-        y += LINE_HEIGHT;
+        svg.text("ink title", (EDGE, y), TITLE, Anchor::Start, line);
+        y += 25.0;
     }
-
-    let text = style(TEXT_SIZE, FontStyle::Normal, HPos::Left, VPos::Center);
-    let mut y = layout.notes_y + LINE_HEIGHT / 2;
+    let mut y = layout.notes_y + LINE / 2.0;
     for note in &layout.notes {
-        let mut x = layout.plot.x;
+        let mut x = EDGE;
         if note.no_event {
-            fill(
-                area,
-                Frame {
-                    x,
-                    y: y - 7,
-                    width: 14,
-                    height: 14,
-                },
-                NO_EVENT,
-            )?;
-            x += 22;
+            let (top, fill) = (At(y - 7.0), hex(NO_EVENT));
+            svg.raw(&format!(
+                "<rect fill=\"{fill}\" x=\"{}\" y=\"{top}\" width=\"14\" height=\"14\"/>",
+                At(x)
+            ));
+            x += 22.0;
         }
-        area.draw_text(&note.text, &text, (x, y))?;
-        y += LINE_HEIGHT;
+        svg.text("soft", (x, y), TEXT, Anchor::Start, &note.text);
+        y += LINE;
     }
-    Ok(())
 }
 
-/// Numbers and names of the axes.
-fn draw_axes(area: &Area, layout: &Layout) -> Result<()> {
-    let Frame {
-        x,
-        y,
-        width,
-        height,
-    } = layout.plot;
-    let [
-        Axis {
-            name: below,
-            numbers: columns,
-        },
-        Axis {
-            name: beside,
-            numbers: rows,
-        },
-    ] = &layout.axes;
-
-    let under = style(TEXT_SIZE, FontStyle::Normal, HPos::Center, VPos::Top);
-    let bottom = y + height + 1;
-    for (at, number) in columns {
-        fill(
-            area,
-            Frame {
-                x: x + at,
-                y: bottom,
-                width: 1,
-                height: 5,
-            },
-            LINE,
-        )?;
-        area.draw_text(number, &under, (x + at, bottom + 8))?;
+/// Numbers and names of the axes: that of the rows stands above them.
+fn axes(svg: &mut Svg, layout: &Layout) {
+    let ((x, y), (width, height)) = (layout.plot.corner, layout.plot.size);
+    let [below, beside] = &layout.axes;
+    let bottom = y + height + 1.0;
+    for (at, number) in &below.numbers {
+        svg.line("edge", (x + at, bottom), (x + at, bottom + 5.0));
+        let place = (x + at, bottom + 15.0);
+        svg.text("soft", place, TEXT, Anchor::Middle, number);
     }
-    area.draw_text(below, &under, (x + width / 2, bottom + 31))?;
-
-    let before = style(TEXT_SIZE, FontStyle::Normal, HPos::Right, VPos::Center);
-    for (at, number) in rows {
-        fill(
-            area,
-            Frame {
-                x: x - 6,
-                y: y + at,
-                width: 5,
-                height: 1,
-            },
-            LINE,
-        )?;
-        area.draw_text(number, &before, (x - 10, y + at))?;
+    let middle = (x + width / 2.0, bottom + 36.0);
+    svg.text("soft", middle, TEXT, Anchor::Middle, &below.name);
+    for (at, number) in &beside.numbers {
+        svg.line("edge", (x - 6.0, y + at), (x - 1.0, y + at));
+        svg.text("soft", (x - 9.0, y + at), TEXT, Anchor::End, number);
     }
-    let upright = style(TEXT_SIZE, FontStyle::Normal, HPos::Center, VPos::Center)
-        .transform(FontTransform::Rotate270);
-    area.draw_text(beside, &upright, (18, y + height / 2))?;
-    Ok(())
+    let above = (EDGE, y - 8.0 - LINE / 2.0);
+    svg.text("soft", above, TEXT, Anchor::Start, &beside.name);
 }
 
-/// Frame, marks and unit of the colour bar.
-fn draw_bar(area: &Area, bar: &Bar) -> Result<()> {
-    draw_frame(area, bar.frame)?;
+/// Steps, marks and unit of the colour bar.
+fn bar(svg: &mut Svg, bar: &Bar) {
     let Frame {
-        x,
-        y,
-        width,
-        height,
+        corner: (x, y),
+        size: (width, height),
     } = bar.frame;
-    let right = x + width + 1;
-    let text = style(TEXT_SIZE, FontStyle::Normal, HPos::Left, VPos::Center);
+    let cell = (width, height / bar.levels.len() as f64);
+    cells::draw(svg, &bar.levels, 1, (x, y), cell);
+    let right = x + width + 1.0;
     for mark in &bar.marks {
-        let at = y + height - mark.offset(height);
-        fill(
-            area,
-            Frame {
-                x: right,
-                y: at,
-                width: 5,
-                height: 1,
-            },
-            LINE,
-        )?;
-        area.draw_text(&mark.label, &text, (right + 9, at))?;
+        let at = y + height * (1.0 - mark.position);
+        svg.line("edge", (right, at), (right + 5.0, at));
+        svg.text("soft", (right + 9.0, at), TEXT, Anchor::Start, &mark.label);
     }
-    area.draw_text(&bar.unit, &text, (x, y - LINE_HEIGHT + 6))?;
-    Ok(())
-}
-
-/// An empty frame around `inside`.
-fn draw_frame(area: &Area, inside: Frame) -> Result<()> {
-    let Frame {
-        x,
-        y,
-        width,
-        height,
-    } = inside;
-    fill(
-        area,
-        Frame {
-            x: x - 1,
-            y: y - 1,
-            width: width + 2,
-            height: height + 2,
-        },
-        LINE,
-    )?;
-    fill(area, inside, PAPER)
-}
-
-fn fill(area: &Area, frame: Frame, color: RGBColor) -> Result<()> {
-    let Frame {
-        x,
-        y,
-        width,
-        height,
-    } = frame;
-    area.draw(&Rectangle::new(
-        [(x, y), (x + width, y + height)],
-        color.filled(),
-    ))?;
-    Ok(())
-}
-
-fn style(size: f64, font: FontStyle, h: HPos, v: VPos) -> TextStyle<'static> {
-    // An SVG of plotters has 1.24 times smaller letters than asked for.
-    let font = FontDesc::new(FontFamily::Name(FONT), size * 1.24, font);
-    TextStyle::from(font).color(&INK).pos(Pos::new(h, v))
+    let above = (x, y - 8.0 - LINE / 2.0);
+    svg.text("soft", above, TEXT, Anchor::Start, &bar.unit);
 }

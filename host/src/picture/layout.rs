@@ -1,34 +1,31 @@
-//! Where everything in a picture is, in pixels from its top left corner.
+//! Where everything in a picture is.
 
-use super::axis::{Axis, Lines};
+use super::axis::{Axis, Lines, TEXT};
+use super::map::Map;
 use super::scale::{Mark, Scale};
-use super::{Map, one_line};
+use crate::svg::{one_line, text_width, wrapped};
 
 /// The room for the pixels of a map.
-const MOST_WIDTH: f64 = 512.0;
-const MOST_HEIGHT: f64 = 800.0;
+const MOST_WIDTH: f64 = 400.0;
+const MOST_HEIGHT: f64 = 640.0;
 /// Side of the only pixel of a map.
 const MOST_CELL: f64 = 64.0;
 /// Thinner maps are stretched.
 const LEAST_SIDE: f64 = 40.0;
 
-const EDGE: i32 = 16;
-const LEAST_CANVAS: i32 = 420;
+pub(super) const EDGE: f64 = 14.0;
+const LEAST_CANVAS: f64 = 400.0;
 /// Between the map and the colour bar.
-const BAR_DISTANCE: i32 = 26;
-const BAR_WIDTH: i32 = 18;
-/// About what a character is wide, in text and in the title.
-pub(super) const CHARACTER: i32 = 10;
-const TITLE_CHARACTER: i32 = 11;
-pub(super) const LINE_HEIGHT: i32 = 25;
+const BAR_DISTANCE: f64 = 22.0;
+const BAR_WIDTH: f64 = 16.0;
+pub(super) const TITLE: f64 = 20.0;
+pub(super) const LINE: f64 = 22.0;
 
 /// A rectangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
-    pub x: i32,
-    pub y: i32,
-    pub width: i32,
-    pub height: i32,
+    pub corner: (f64, f64),
+    pub size: (f64, f64),
 }
 
 /// The colour bar.
@@ -52,7 +49,7 @@ pub(super) struct Note {
 /// A picture but for the values of its pixels.
 #[derive(Debug)]
 pub(super) struct Layout {
-    pub size: (u32, u32),
+    pub size: (f64, f64),
     pub title: Vec<String>,
     pub plot: Frame,
     /// Number of pixels in a drawn line.
@@ -64,16 +61,14 @@ pub(super) struct Layout {
     pub bar: Option<Bar>,
     pub notes: Vec<Note>,
     /// Top of the first note.
-    pub notes_y: i32,
+    pub notes_y: f64,
 }
 
 impl Layout {
     /// The picture of `map`, of which `silent` pixels have no value.
     pub fn new(map: &Map, scale: Option<&Scale>, silent: usize) -> Self {
-        let pixels = map.columns * map.rows;
         let lines = Lines::new(map.columns, map.rows);
         let (columns, rows) = (lines.columns, lines.rows);
-
         let side = (MOST_WIDTH / columns as f64).min(MOST_HEIGHT / rows as f64);
         let side = if side < 1.0 {
             side
@@ -85,63 +80,44 @@ impl Layout {
         let cell = (width / columns as f64, height / rows as f64);
 
         let axes = lines.axes(cell);
-        let widest = axes[1].numbers.iter().map(|(_, number)| number.len()).max();
-        let left = 42 + CHARACTER * count(widest.unwrap_or(0));
+        let numbers = axes[1].numbers.iter();
+        let widest = numbers.map(|(_, number)| text_width(number, TEXT));
+        let left = EDGE + widest.fold(0.0, f64::max).ceil() + 10.0;
 
         let marks_length = height.clamp(160.0, 384.0);
         let unit = one_line(map.unit);
         let marks = scale.map_or_else(Vec::new, |scale| scale.marks(marks_length));
-        let widest = marks.iter().map(|mark| mark.label.chars().count()).max();
-        let right = widest.map_or(0, |most| {
-            let marks = BAR_WIDTH + 10 + CHARACTER * count(most);
-            BAR_DISTANCE + marks.max(CHARACTER * count(unit.chars().count()))
-        });
-        let canvas = (left + whole(width) + right + EDGE).max(LEAST_CANVAS);
+        let widest = marks.iter().map(|mark| text_width(&mark.label, TEXT));
+        let widest = widest.fold(0.0, f64::max);
+        let right = if scale.is_some() {
+            BAR_DISTANCE + (BAR_WIDTH + 10.0 + widest).max(text_width(&unit, TEXT))
+        } else {
+            0.0
+        };
+        let canvas = (left + width + right + EDGE).ceil().max(LEAST_CANVAS);
 
-        let room = (canvas - left - EDGE) / TITLE_CHARACTER;
-        let title = wrapped(&one_line(map.title), usize::try_from(room).unwrap_or(1));
-        // The line above the bar is for its unit.
-        let top = EDGE + LINE_HEIGHT * (count(title.len()) + 1) + 4;
+        let title = wrapped(&one_line(map.title), TITLE, canvas - 2.0 * EDGE);
+        // The line above the map is for the name of its rows and for the bar's unit.
+        let top = EDGE + 25.0 * title.len() as f64 + LINE + 10.0;
         let plot = Frame {
-            x: left,
-            y: top,
-            width: whole(width),
-            height: whole(height),
+            corner: (left, top),
+            size: (width, height),
         };
         let bar = scale.map(|scale| Bar {
             frame: Frame {
-                x: plot.x + plot.width + BAR_DISTANCE,
-                width: BAR_WIDTH,
-                height: whole(marks_length),
-                ..plot
+                corner: (left + width + BAR_DISTANCE, top),
+                size: (BAR_WIDTH, marks_length),
             },
             unit,
             marks,
             levels: scale.bar(),
         });
-
-        let mut notes = Vec::new();
-        if silent > 0 {
-            let text = if silent == pixels {
-                "no event in any pixel".into()
-            } else {
-                format!("no event: {silent} of {pixels} pixels")
-            };
-            notes.push(Note {
-                text,
-                no_event: true,
-            });
-        }
-        notes.extend(scale.map(|scale| Note {
-            text: scale.note().into(),
-            no_event: false,
-        }));
-        let under_bar = bar.as_ref().map_or(0, |bar| top + bar.frame.height + 14);
-        let notes_y = under_bar.max(top + plot.height + 62);
-        let bottom = notes_y + LINE_HEIGHT * count(notes.len()) + EDGE - 4;
-
+        let notes = notes(map, scale, silent);
+        let under_bar = bar.as_ref().map_or(0.0, |_| top + marks_length + 14.0);
+        let notes_y = under_bar.max(top + height + 60.0);
+        let bottom = notes_y + LINE * notes.len() as f64 + EDGE - 4.0;
         Self {
-            size: (canvas.unsigned_abs(), bottom.unsigned_abs()),
+            size: (canvas, bottom),
             title,
             plot,
             columns,
@@ -154,37 +130,23 @@ impl Layout {
     }
 }
 
-/// `text` in lines of at most `width` characters, broken between words if possible.
-fn wrapped(text: &str, width: usize) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    let mut used = width;
-    for word in text.split(' ') {
-        let letters: Vec<_> = word.chars().collect();
-        for (piece, letters) in letters.chunks(width.max(1)).enumerate() {
-            let fits = piece == 0 && used + 1 + letters.len() <= width;
-            match lines.last_mut() {
-                Some(line) if fits => {
-                    line.push(' ');
-                    line.extend(letters);
-                    used += 1 + letters.len();
-                }
-                _ => {
-                    lines.push(letters.iter().collect());
-                    used = letters.len();
-                }
-            }
-        }
+fn notes(map: &Map, scale: Option<&Scale>, silent: usize) -> Vec<Note> {
+    let mut notes = Vec::new();
+    let (missing, pixels) = (map.missing, map.columns * map.rows);
+    if silent > 0 {
+        let text = if silent == pixels {
+            format!("no {missing} in any pixel")
+        } else {
+            format!("no {missing}: {silent} of {pixels} pixels")
+        };
+        notes.push(Note {
+            text,
+            no_event: true,
+        });
     }
-    lines
-}
-
-/// `value` in whole pixels.
-#[allow(clippy::cast_possible_truncation, reason = "saturates")]
-pub(super) fn whole(value: f64) -> i32 {
-    value.round() as i32
-}
-
-/// `number` among lengths in pixels.
-pub(super) fn count(number: usize) -> i32 {
-    i32::try_from(number).unwrap_or(i32::MAX)
+    notes.extend(scale.map(|scale| Note {
+        text: scale.note().into(),
+        no_event: false,
+    }));
+    notes
 }

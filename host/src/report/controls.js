@@ -39,7 +39,7 @@ function tell(news = "") {
   for (let event = shown.first; event < shown.last; event++) {
     if (events.range[event] <= shown.far) count++;
   }
-  status.value = `${number(count)} events from laser cycle ${first} to ${last}. ${pickedText()} ${news}`.trim();
+  status.value = `${number(count)} ${data.events} from laser cycle ${first} to ${last}. ${pickedText()} ${news}`.trim();
 }
 
 /** Adds a pixel's spikes, and says so. */
@@ -166,7 +166,7 @@ far.addEventListener("input", chooseFar);
 element("third").addEventListener("input", (event) => {
   view.third = event.target.value;
   const third = view.third === "range" ? "range" : "laser cycle";
-  cloud.setAttribute("aria-label", `Events by column, row and ${third}, coloured by range`);
+  cloud.setAttribute("aria-label", `${capital(data.events)} by column, row and ${third}, coloured by range`);
   redraw();
 });
 

@@ -5,7 +5,7 @@ use std::fmt;
 use anyhow::{Context, Result};
 
 use super::{Part, PointTally};
-use crate::chart;
+use crate::chart::{self, Chart};
 use crate::theory::binomial;
 use crate::theory::poisson::Poisson;
 
@@ -34,10 +34,27 @@ pub struct Table {
 pub struct Figure {
     /// The file's name, without its extension.
     pub name: &'static str,
+    /// Whether the data show what its title says.
+    pub holds: bool,
     /// An SVG document.
     pub svg: String,
-    /// What it shows, how it was found, and how sure it is.
+    /// How it was found; what it shows, it says itself.
     pub caption: String,
+}
+
+impl Figure {
+    /// Draws `chart`.
+    ///
+    /// # Errors
+    /// If there is nothing to draw.
+    pub fn new(name: &'static str, chart: &Chart, caption: impl Into<String>) -> Result<Self> {
+        Ok(Self {
+            name,
+            holds: chart.finding.holds,
+            svg: chart::chart(chart)?,
+            caption: caption.into(),
+        })
+    }
 }
 
 /// Something the paper says, and whether it is so.

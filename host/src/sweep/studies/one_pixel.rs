@@ -8,6 +8,7 @@ use dtof_core::{
 };
 
 use crate::frame::FramePixel;
+use crate::palette::{self, Pen};
 use crate::scene;
 use crate::settings::Settings;
 
@@ -29,6 +30,14 @@ pub const SENSORS: [&str; 5] = [
     "frames of 1000",
     "frames of 2000",
 ];
+
+/// The pen of a sensor, counted as [`SENSORS`].
+pub const fn pen(sensor: usize) -> Pen {
+    match sensor {
+        0 => palette::EVENTS,
+        number => palette::frames(FRAMES[number - 1]),
+    }
+}
 
 /// Laser cycles of the prototype from one look at the histogram to the next (X).
 pub const PROTOTYPE_X: u16 = 4;
