@@ -10,7 +10,6 @@
 //! ```
 
 pub mod arguments;
-pub mod chart;
 pub mod cli;
 pub mod device;
 pub mod engine;
@@ -19,7 +18,6 @@ pub mod export;
 pub mod files;
 pub mod geometry;
 pub mod input;
-pub mod picture;
 pub mod progress;
-pub mod report;
 pub mod simulate;
+pub mod view;
