@@ -77,6 +77,7 @@ pub fn real(text: &str) -> Option<f64> {
 }
 
 /// Reads the name of a file or a folder. `-`, elsewhere standard input or output, is none.
+#[must_use]
 pub fn path() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(|path| {
         if path.as_os_str() == "-" {

@@ -22,4 +22,5 @@ pub mod input;
 pub mod picture;
 pub mod progress;
 pub mod report;
+pub mod rows;
 pub mod simulate;

@@ -6,13 +6,13 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, ensure};
 use dtof::device::monitor;
 use dtof::device::{Client, DeviceEngine, configuration};
-use dtof::engine::detection::{Estimator, Rule};
-use dtof::engine::settings::{Settings, U16F16Number};
+use dtof::engine::settings::Settings;
 use dtof::engine::{Engine, host::host_engine};
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::scene;
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_link::FaultRecord;
+use dtof_core::{Count, PaperRule, WindowRule};
+use dtof_link::{FaultRecord, Source};
 
 use crate::firmware::{Board, Sensor};
 use crate::log;
@@ -111,7 +111,7 @@ fn ends(board: Board, image: &Path) -> Result<Vec<u64>> {
 /// What decides the events: a setting at which there are many.
 fn settings() -> Settings {
     Settings {
-        rule: Rule::paper(U8F8::lit("4")),
+        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
         l1: 20,
         x: 4,
         ..scene::settings(1)
@@ -121,8 +121,10 @@ fn settings() -> Settings {
 /// The other rule and the other estimator.
 fn with_windows() -> Settings {
     Settings {
-        rule: Rule::window(2, U4F12::lit("4.5")),
-        estimator: Estimator::for_pulse(U8F8::lit("0.55")),
+        rule: WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
+            .unwrap()
+            .into(),
+        sigma_bins: Some(U8F8::lit("0.55")),
         ..settings()
     }
 }
@@ -235,9 +237,9 @@ fn says_unplugged(board: Board, image: &Path, sensor: Sensor, array: Geometry) -
         .with_context(|| format!("{name}: no sensor"))?;
     let mut wanted = settings();
     if let Some(bin_width) = about.bin_width {
-        wanted.bin_width_ps = U16F16Number(bin_width);
+        wanted.bin_width_ps = bin_width;
     }
-    client.configure(&configuration(&wanted, pixels, 1, None)?)?;
+    client.configure(&configuration(&wanted, pixels, Source::Sensor, None)?)?;
     let since = Instant::now();
     let report = loop {
         let report = client.report().with_context(|| name.clone())?;

@@ -2,8 +2,8 @@
 
 use clap::{Args, ValueEnum};
 use dtof::arguments::fixed;
-use dtof::events::dynamic_depth::DynamicDepth;
 use dtof_core::fixed::types::U24F8;
+use dtof_link::DynamicDepth;
 
 #[derive(Args)]
 pub struct Options {

@@ -121,8 +121,8 @@ impl Monitor {
                 let header = Header {
                     bins: client.bins().into(),
                     geometry,
-                    bin_width_ps: settings.bin_width_ps.0,
-                    offset_mm: settings.offset_mm.0,
+                    bin_width_ps: settings.bin_width_ps,
+                    offset_mm: settings.offset_mm,
                 };
                 Some(Recording::new(file, &header)?)
             }

@@ -6,9 +6,9 @@ use serde_json::json;
 
 use super::BASE64;
 use crate::events::sample::Sample;
-use crate::events::summary::grouped;
 use crate::input::source::Geometry;
 use crate::picture;
+use crate::rows::grouped;
 use dtof_core::PixelAddress;
 
 /// The events of a run.

@@ -21,7 +21,7 @@ use crate::sweep::mean::{add, add_error};
 use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::{Part, Point, Study, Tally, point};
 use dtof::chart::{Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 
 /// Bins of a histogram.
 pub const BINS: usize = 128;

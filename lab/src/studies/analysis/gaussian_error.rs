@@ -9,7 +9,7 @@ use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target}
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, Study, Tally, point};
 use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof_theory::gaussian::{self as printed, threshold};
 use dtof_theory::known_background;
 

@@ -8,7 +8,7 @@ use super::paper_setting::{Histograms, gaussian, means, target};
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Share, Verdict};
 use crate::sweep::{Part, Point, Study, Tally, point, tally};
 use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof_theory::known_background;
 
 /// Mean background counts a bin (N·B): the paper's B = 0.05 at N = 2 to 2000.

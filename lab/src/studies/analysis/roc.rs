@@ -9,7 +9,7 @@ use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target}
 use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point, tally};
 use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof_theory::counts::binomial;
 use dtof_theory::gaussian::{false_positive_rate, threshold};
 use dtof_theory::known_background;

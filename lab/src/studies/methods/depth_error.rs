@@ -15,7 +15,7 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use dtof::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof_theory::bounds::cramer_rao::Pulse;
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::rates::Rates;

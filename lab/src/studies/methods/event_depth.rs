@@ -22,7 +22,7 @@ use crate::sweep::mean::{add, add_error, add_value};
 use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::{Part, Point, Study, Tally, point};
 use dtof::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof_theory::rates::Rates;
 
 pub use crate::studies::methods::time_to_detect::{BACKGROUNDS, SIGMAS};

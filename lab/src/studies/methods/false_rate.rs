@@ -10,7 +10,7 @@ use crate::studies::methods::passage::{BINS, LOOKS, Ladder, Method, Passage, cou
 use crate::sweep::results::{Figure, Results, Share, Table};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use dtof::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof_theory::looks::exposure::Exposures;
 use dtof_theory::rates::Rates;
 

@@ -13,7 +13,7 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use dtof::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof_theory::bounds::likelihood_ratio::{LikelihoodRatio, signal_for_information};
 use dtof_theory::looks::exposure::Exposures;
 use dtof_theory::rates::Rates;

@@ -13,7 +13,7 @@ use crate::sweep::mean::{Measured, add, add_value};
 use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::simulate::SimulatedPixel;
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;

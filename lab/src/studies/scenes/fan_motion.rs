@@ -15,7 +15,7 @@ use crate::sweep::mean::add;
 use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::simulate::SimulatedPixel;
 use dtof::simulate::scene::{Fan, Scene, Shape};
 use dtof_theory::random::pixel_rng;

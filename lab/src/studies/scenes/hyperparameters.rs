@@ -22,7 +22,7 @@ use self::setting::{NOTHING, Setting, error, false_share};
 use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point, tally};
 use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::simulate::MM_PER_PS;
 use dtof_theory::rates::bin_share;
 

@@ -12,7 +12,7 @@ use crate::sweep::mean::{Measured, add, add_value};
 use crate::sweep::results::{Claim, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::simulate::{MM_PER_PS, SimulatedPixel};
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;

@@ -9,7 +9,7 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Figure, Results, Share, Table, Verdict};
 use crate::sweep::{Part, PointTally};
 use dtof::chart::{Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 
 /// The paper's threshold in millimetres.
 const PAPER_MM: u32 = 100;

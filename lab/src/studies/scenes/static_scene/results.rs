@@ -11,7 +11,7 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Figure, Results, Verdict};
 use crate::sweep::{Part, PointTally};
 use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 
 /// Every surface of a point with its mean signal photons a laser cycle.
 fn surfaces(point: &PointTally) -> Result<Vec<(String, f64)>> {
