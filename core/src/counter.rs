@@ -77,6 +77,12 @@ pub trait PhotonCount: Copy + Into<u32> {
         fold(counts, 0, |highest: u32, count| highest.max(count.into()))
     }
 
+    /// The sum of some counts, wrapping.
+    #[inline(always)]
+    fn sum(counts: &[Self]) -> u32 {
+        fold(counts, 0, |sum: u32, count| sum.wrapping_add(count.into()))
+    }
+
     /// Whether one of some counts is `level` or more.
     #[inline(always)]
     fn any_reaches(counts: &[Self], level: u32) -> bool {
@@ -86,6 +92,17 @@ pub trait PhotonCount: Copy + Into<u32> {
         let one_of =
             |[a, b, c, d]: &[Self; 4]| reaches(a) || reaches(b) || reaches(c) || reaches(d);
         fours.iter().any(one_of) || rest.iter().any(reaches)
+    }
+
+    /// Which is the first of some counts that is `level` or more.
+    #[inline(always)]
+    fn first_reaching(counts: &[Self], level: u32) -> Option<usize> {
+        let reaches = |&count: &Self| count.into() >= level;
+        let (fours, _) = counts.as_chunks::<4>();
+        let four = fours.iter().position(|four| four.iter().any(reaches));
+        let start = 4 * four.unwrap_or(fours.len());
+        let place = counts.get(start..)?.iter().position(reaches)?;
+        Some(start + place)
     }
 }
 

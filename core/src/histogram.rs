@@ -1,12 +1,14 @@
 //! The histogram of one macropixel.
 //!
 //! Counters saturate and never wrap. What a full counter cannot take is counted as
-//! *saturated*, a TDC code beyond the last bin as *rejected*, a bin outside the range
-//! gate as *gated out*. No photon is lost without a trace:
+//! *saturated*, a TDC code beyond the last bin as *rejected*. No photon is lost without a
+//! trace:
 //!
 //! ```text
-//! photons offered = total + saturated + rejected + gated out
+//! photons offered = total + saturated + rejected
 //! ```
+//!
+//! Photons that the range gate leaves out never enter the histogram.
 //!
 //! The highest bin is kept while counting. Counts only grow, so the key
 //! `(count << log2(BINS)) - bin` of the highest bin is the maximum of the keys of all
@@ -22,7 +24,7 @@
 //! assert_eq!((histogram.total(), histogram.rejected()), (4, 1));
 //! ```
 //!
-//! Cost on a Cortex-M4: 10 instructions a photon in a batch, 40 to clear 128 bins.
+//! Cost on a Cortex-M4: 10 instructions a photon in a batch, 39 to clear 128 bins.
 //!
 //! Source: the saturating 10-bit counters of the paper's FPGA (section IV-B). Its
 //! search for the highest bin is [`ComparatorTree`](crate::ComparatorTree).
@@ -31,7 +33,7 @@ use core::sync::atomic::{Ordering, compiler_fence};
 
 use fixed::types::U24F8;
 
-use crate::counter::{Count10, CounterWidth};
+use crate::counter::{Count10, CounterWidth, PhotonCount};
 use crate::gate::RangeGate;
 use crate::units::{BinIndex, Count};
 
@@ -49,7 +51,7 @@ pub struct Peak {
 /// 1024 (checked when compiled).
 ///
 /// 2 bytes a bin for [`Count10`] and [`Count16`](crate::Count16), 4 for
-/// [`Count24`](crate::Count24), and 20 bytes more.
+/// [`Count24`](crate::Count24), and 16 bytes more.
 #[derive(Clone, Debug)]
 pub struct Histogram<const BINS: usize, W: CounterWidth = Count10> {
     counts: [W::Counter; BINS],
@@ -57,7 +59,6 @@ pub struct Histogram<const BINS: usize, W: CounterWidth = Count10> {
     total: u32,
     rejected: u32,
     saturated: u32,
-    gated_out: u32,
 }
 
 impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
@@ -84,7 +85,6 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
             total: 0,
             rejected: 0,
             saturated: 0,
-            gated_out: 0,
         }
     }
 
@@ -103,16 +103,16 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         self.add_gated_batch(codes, &RangeGate::full());
     }
 
-    /// Counts one photon, as [`Self::add`] does, unless the gate leaves its bin out.
+    /// Counts one photon, as [`Self::add`] does, if its bin is gated. Returns the
+    /// photons left out by the gate, 0 or 1.
     #[inline]
-    pub fn add_gated(&mut self, code: u16, gate: &RangeGate<BINS>) {
+    pub(crate) fn add_gated(&mut self, code: u16, gate: &RangeGate<BINS>) -> u32 {
         let Some(counter) = self.counts.get_mut(usize::from(code)) else {
             self.rejected = self.rejected.saturating_add(1);
-            return;
+            return 0;
         };
         if !gate.contains(code) {
-            self.gated_out = self.gated_out.saturating_add(1);
-            return;
+            return 1;
         }
         let mut saturated = 0;
         Self::count_photon(counter, code, &mut self.peak_key, &mut saturated);
@@ -121,21 +121,23 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         } else {
             self.total = self.total.wrapping_add(1);
         }
+        0
     }
 
-    /// Counts one photon for each TDC code, as [`Self::add_gated`] does.
+    /// Counts one photon for each TDC code whose bin is gated. Returns the photons
+    /// left out by the gate.
     #[inline]
-    pub fn add_gated_batch(&mut self, codes: &[u16], gate: &RangeGate<BINS>) {
+    pub(crate) fn add_gated_batch(&mut self, codes: &[u16], gate: &RangeGate<BINS>) -> u32 {
         // Bins from 0 on save an instruction a photon.
         if gate.is_full() {
-            self.add_gated_inlined(codes, &RangeGate::full());
+            self.add_gated_inlined(codes, &RangeGate::full())
         } else {
-            self.add_gated_inlined(codes, gate);
+            self.add_gated_inlined(codes, gate)
         }
     }
 
     #[inline(always)]
-    fn add_gated_inlined(&mut self, codes: &[u16], gate: &RangeGate<BINS>) {
+    fn add_gated_inlined(&mut self, codes: &[u16], gate: &RangeGate<BINS>) -> u32 {
         // Here and not in `self`, so that they stay in registers.
         let (mut peak_key, mut saturated, mut rejected, mut gated_out) = (self.peak_key, 0, 0, 0);
         let counters = self.counts.get_mut(gate.bins()).unwrap_or_default();
@@ -172,8 +174,8 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         if lost > 0 {
             self.saturated = self.saturated.saturating_add(saturated);
             self.rejected = self.rejected.saturating_add(rejected);
-            self.gated_out = self.gated_out.saturating_add(gated_out);
         }
+        gated_out
     }
 
     /// Counts one photon in the counter of its bin, unless that is full.
@@ -197,11 +199,45 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     /// Adds the gated bins of a histogram that was counted elsewhere, such as the
     /// 5-laser-cycle mini-frames of the paper's sensor (section III-A).
     ///
-    /// Counters saturate bin by bin.
-    pub fn add_frame<C: Copy + Into<u32>>(&mut self, frame: &[C; BINS], gate: &RangeGate<BINS>) {
+    /// Counters saturate bin by bin. Returns the photons left out by the gate; sticks at
+    /// `u32::MAX`.
+    pub fn add_frame<C: PhotonCount>(&mut self, frame: &[C; BINS], gate: &RangeGate<BINS>) -> u32 {
         let gated = gate.bins();
-        let counters = self.counts.get_mut(gated.clone()).unwrap_or_default();
         let photons = frame.get(gated.clone()).unwrap_or_default();
+        let highest = C::highest(photons);
+        // An empty histogram is no more than a copy, unless a counter would be full.
+        if self.peak_key == 0 && highest <= W::MAX {
+            self.copy(photons, highest, gate);
+        } else {
+            self.add_to_each(photons, gate);
+        }
+        let outside = |bins: Option<&[C]>| {
+            let photons = bins.unwrap_or_default().iter();
+            photons.fold(0u32, |sum, &photons| sum.saturating_add(photons.into()))
+        };
+        outside(frame.get(..gated.start)).saturating_add(outside(frame.get(gated.end..)))
+    }
+
+    /// Takes the photons of the gated bins, of which the highest is `highest`.
+    #[inline(always)]
+    fn copy<C: PhotonCount>(&mut self, photons: &[C], highest: u32, gate: &RangeGate<BINS>) {
+        let counters = self.counts.get_mut(gate.bins()).unwrap_or_default();
+        for (counter, &photons) in counters.iter_mut().zip(photons) {
+            *counter = W::counter(photons.into());
+        }
+        self.total = C::sum(photons);
+        if highest > 0 {
+            let bin = C::first_reaching(photons, highest);
+            #[allow(clippy::cast_possible_truncation)] // less than 1024
+            let bin = bin.unwrap_or_default() as u32 + u32::from(gate.first());
+            self.peak_key = Self::key(highest, bin);
+        }
+    }
+
+    /// Adds the photons of the gated bins.
+    #[inline(never)]
+    fn add_to_each<C: PhotonCount>(&mut self, photons: &[C], gate: &RangeGate<BINS>) {
+        let counters = self.counts.get_mut(gate.bins()).unwrap_or_default();
         let (mut total, mut saturated, mut peak_key) = (0u32, 0u32, self.peak_key);
         let bins = u32::from(gate.first())..;
         for (bin, (counter, &photons)) in bins.zip(counters.iter_mut().zip(photons)) {
@@ -223,16 +259,6 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         self.total = self.total.wrapping_add(total);
         self.saturated = self.saturated.saturating_add(saturated);
         self.peak_key = peak_key;
-        let outside = |bins: Option<&[C]>| {
-            let photons = bins.unwrap_or_default().iter();
-            photons.fold(0u32, |sum, &photons| sum.saturating_add(photons.into()))
-        };
-        for outside in [
-            outside(frame.get(..gated.start)),
-            outside(frame.get(gated.end..)),
-        ] {
-            self.gated_out = self.gated_out.saturating_add(outside);
-        }
     }
 
     /// The highest bin; the lowest index wins a tie. Bin 0 with a count of 0
@@ -288,14 +314,6 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         self.saturated
     }
 
-    /// Photons in bins that the gate leaves out, since the last [`Self::clear`]. Sticks
-    /// at `u32::MAX`.
-    #[inline]
-    #[must_use]
-    pub const fn gated_out(&self) -> u32 {
-        self.gated_out
-    }
-
     /// Empties the histogram for the next exposure.
     #[inline]
     pub fn clear(&mut self) {
@@ -311,7 +329,6 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         self.total = 0;
         self.rejected = 0;
         self.saturated = 0;
-        self.gated_out = 0;
     }
 
     /// Orders bins by count, the lower bin first among equals. `count` is at

@@ -96,6 +96,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(
+    clippy::disallowed_types,
     clippy::expect_used,
     clippy::float_arithmetic,
     clippy::indexing_slicing,

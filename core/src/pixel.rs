@@ -35,7 +35,7 @@
 //! and ACK.
 
 use crate::config::PixelConfig;
-use crate::counter::{Count10, CounterWidth};
+use crate::counter::{Count10, CounterWidth, PhotonCount};
 use crate::detect::DetectionRule;
 use crate::event::DepthEvent;
 use crate::flags::Flags;
@@ -73,6 +73,8 @@ pub struct AsyncPixel<const BINS: usize, W: CounterWidth = Count10> {
     /// Whether `event` waits for the link. Apart from it, where it takes no room.
     is_requesting: bool,
     event: DepthEvent,
+    /// Photons of this exposure that the gate left out, fewer than 2³².
+    gated_out: u32,
     histogram: Histogram<BINS, W>,
 }
 
@@ -100,6 +102,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
                 background: Count::saturating(0),
                 flags: Flags::NONE,
             },
+            gated_out: 0,
             histogram: Histogram::new(),
         }
     }
@@ -107,24 +110,27 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// Counts one photon with the TDC code `code` in the present laser cycle.
     #[inline]
     pub fn count<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, code: u16) {
-        self.histogram.add_gated(code, config.gate());
+        let gated_out = self.histogram.add_gated(code, config.gate());
+        self.leave_out(gated_out);
     }
 
     /// Counts one photon for each TDC code, as [`Self::count`] does.
     #[inline]
     pub fn count_batch<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, codes: &[u16]) {
-        self.histogram.add_gated_batch(codes, config.gate());
+        let gated_out = self.histogram.add_gated_batch(codes, config.gate());
+        self.leave_out(gated_out);
     }
 
     /// Counts the photons of a whole mini-frame, a histogram over one or more
     /// laser cycles. Follow it by [`Self::end_laser_cycles`] with as many.
     #[inline]
-    pub fn count_frame<R: DetectionRule, C: Copy + Into<u32>>(
+    pub fn count_frame<R: DetectionRule, C: PhotonCount>(
         &mut self,
         config: &PixelConfig<BINS, R>,
         frame: &[C; BINS],
     ) {
-        self.histogram.add_frame(frame, config.gate());
+        let gated_out = self.histogram.add_frame(frame, config.gate());
+        self.leave_out(gated_out);
     }
 
     /// Ends laser cycle `cycle`, and looks if X have passed since the last look.
@@ -236,16 +242,34 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         &self.histogram
     }
 
+    /// Adds the photons of the present exposure to `statistics`. Those of exposures that
+    /// have ended are there already.
+    #[inline(always)]
+    pub fn add_photons_to(&self, statistics: &mut Statistics) {
+        statistics.add_photons_of(&self.histogram, self.gated_out);
+    }
+
     /// Photons of the present exposure with a TDC code of a bin.
     fn photons(&self) -> u64 {
         let histogram = &self.histogram;
         let counted = u64::from(histogram.total()) + u64::from(histogram.saturated());
-        counted + u64::from(histogram.gated_out())
+        counted + u64::from(self.gated_out)
+    }
+
+    /// Counts photons that the gate left out.
+    #[inline(always)]
+    fn leave_out(&mut self, photons: u32) {
+        // Most often none.
+        if photons > 0 {
+            self.gated_out = self.gated_out.wrapping_add(photons);
+        }
     }
 
     /// Begins a new exposure.
     fn restart(&mut self, statistics: &mut Statistics) {
-        statistics.add_photons_of(&self.histogram);
+        self.add_photons_to(statistics);
+        // Not behind what `clear` ends with: together they would be a call of `memset`.
+        self.gated_out = 0;
         self.histogram.clear();
         self.exposure = 0;
         self.deferred = false;

@@ -17,7 +17,7 @@
 //! }
 //! assert_eq!((statistics.events, statistics.photons()), (2, 2 * 44));
 //! for pixel in &pixels {
-//!     statistics.add_photons_of(pixel.histogram());
+//!     pixel.add_photons_to(&mut statistics);
 //! }
 //! assert_eq!(statistics.photons(), 2 * 50);
 //! ```
@@ -76,17 +76,21 @@ impl Statistics {
         self.counted + self.saturated + self.rejected + self.gated_out
     }
 
-    /// Adds the photons of an exposure that a pixel has not ended, or of a histogram
-    /// that is no pixel's.
-    #[inline]
+    /// Adds the photons of a histogram, and those that the gate left `gated_out`, as
+    /// [`Histogram::add_frame`] gives them.
+    #[inline(always)]
     pub fn add_photons_of<const BINS: usize, W: CounterWidth>(
         &mut self,
         histogram: &Histogram<BINS, W>,
+        gated_out: u32,
     ) {
         self.counted += u64::from(histogram.total());
-        self.saturated += u64::from(histogram.saturated());
-        self.rejected += u64::from(histogram.rejected());
-        self.gated_out += u64::from(histogram.gated_out());
+        // Most often none is lost.
+        if histogram.saturated() | histogram.rejected() | gated_out != 0 {
+            self.saturated += u64::from(histogram.saturated());
+            self.rejected += u64::from(histogram.rejected());
+            self.gated_out += u64::from(gated_out);
+        }
     }
 }
 

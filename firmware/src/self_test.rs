@@ -81,7 +81,7 @@ fn stream<const BINS: usize>(
             write_event(out, encoder, &event)?;
         }
     }
-    statistics.add_photons_of(pixel.histogram());
+    pixel.add_photons_to(&mut statistics);
     writeln!(out, "{statistics:?}")
 }
 

@@ -115,7 +115,7 @@ fn same_events(
     reads_every: Duration,
     at_least: u64,
 ) -> Vec<DepthEvent> {
-    let mut client = Client::new(device::open(&device(None)).unwrap()).unwrap();
+    let mut client = Client::new(device::open(&device(None), None).unwrap()).unwrap();
     assert_eq!((client.bins(), client.pixels()), (128, 64));
     client.reads_every = reads_every;
     let mut on_device = DeviceEngine::new(client, settings, &addresses()).unwrap();
@@ -168,7 +168,7 @@ fn every_rule_and_estimator_gives_the_same_events_on_a_device() {
 fn a_configuration_the_device_cannot_take_is_refused_with_its_reason() {
     let name = device(None);
     let refused = |settings: &Settings, pixels: u16| {
-        let client = Client::new(device::open(&name).unwrap()).unwrap();
+        let client = Client::new(device::open(&name, None).unwrap()).unwrap();
         let addresses: Vec<_> = (0..pixels).map(dtof_core::PixelAddress).collect();
         let engine = DeviceEngine::new(client, settings, &addresses);
         format!("{:#}", engine.err().expect("refused"))
@@ -194,7 +194,7 @@ fn a_configuration_the_device_cannot_take_is_refused_with_its_reason() {
 #[test]
 fn a_device_that_restarts_is_noticed() {
     let name = device(Some(Duration::from_millis(200)));
-    let client = Client::new(device::open(&name).unwrap()).unwrap();
+    let client = Client::new(device::open(&name, None).unwrap()).unwrap();
     let mut engine = DeviceEngine::new(client, &settings(), &addresses()).unwrap();
     let error = loop {
         if let Err(error) = events(&mut engine, 250) {
@@ -208,7 +208,7 @@ fn a_device_that_restarts_is_noticed() {
 fn nobody_at_the_other_end_is_an_error_not_a_hang() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let name = format!("tcp:{}", listener.local_addr().unwrap());
-    let error = Client::new(device::open(&name).unwrap())
+    let error = Client::new(device::open(&name, None).unwrap())
         .err()
         .expect("nobody answers");
     assert!(
@@ -216,6 +216,6 @@ fn nobody_at_the_other_end_is_an_error_not_a_hang() {
         "{error:#}"
     );
     drop(listener);
-    assert!(device::open(&name).is_err());
-    assert!(device::open("/dev/not-a-port").is_err());
+    assert!(device::open(&name, None).is_err());
+    assert!(device::open("/dev/not-a-port", None).is_err());
 }

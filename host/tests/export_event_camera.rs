@@ -1,5 +1,5 @@
 //! `dtof export --format evt2` and `mcap`: order, slices, damaged files. What is in them
-//! is checked with other projects' readers by `cargo xtask check-export`.
+//! is checked with other projects' readers by the test `readers` of `dtof-host-tests`.
 
 mod common;
 

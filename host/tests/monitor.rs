@@ -258,7 +258,7 @@ fn watch(
 }
 
 fn client(name: &str) -> Client {
-    Client::new(device::open(name).unwrap()).unwrap()
+    Client::new(device::open(name, None).unwrap()).unwrap()
 }
 
 #[test]

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use common::Scratch;
 use dtof::input::source::Geometry;
+use dtof::rows::grouped;
 use dtof::simulate::scene::Scene;
 use dtof_core::PixelAddress;
 
@@ -178,7 +179,10 @@ fn every_event_is_compared_with_the_truth() {
         .lines()
         .find(|line| line.contains("wall, false alarms"))
         .unwrap();
-    assert!(row.contains(&format!("{false_alarms} of ")), "{row}");
+    assert!(
+        row.contains(&format!("{} of ", grouped(false_alarms as u64))),
+        "{row}"
+    );
     // The background lies everywhere.
     assert!(truth["cover_glass"].is_null() && !printed.contains("--gate"));
 }
@@ -204,8 +208,12 @@ fn events_without_a_surface_are_false_alarms() {
     let all = printed
         .lines()
         .find(|line| line.trim().starts_with("false alarms"));
-    let count = summary["against_truth"]["false_alarms"].to_string();
-    assert!(all.unwrap().contains(&format!("{count} of ")), "{printed}");
+    let count = &summary["against_truth"]["false_alarms"];
+    assert!(
+        all.unwrap()
+            .contains(&format!("{} of ", grouped(count.as_u64().unwrap()))),
+        "{printed}"
+    );
 }
 
 /// The gate that is named leaves out the glass and keeps the target.
@@ -229,7 +237,8 @@ fn a_cover_glass_is_named_with_the_gate_that_leaves_it_out() {
     let gate = gate.lines().next().unwrap();
     assert!(scratch.simulate(&scene, &["--gate", gate]).status.success());
     let truth = &scratch.summary()["against_truth"];
-    assert_eq!(truth["false_alarms"], 0, "{truth}");
+    // Of the background one now and then.
+    assert!(truth["false_alarm_share"].as_f64() < Some(0.01), "{truth}");
     assert!(truth["events"].as_u64() > Some(100), "{truth}");
     assert!(truth["cover_glass"].is_null());
 
@@ -257,11 +266,11 @@ fn a_surface_beyond_the_last_bin_is_named() {
     };
     // 128 bins of 250 ps are 4797 mm.
     let far = printed("range_mm = 4790\nrange_right_mm = 4800\n");
-    let expected = "at the start or the end in 1 of 4 pixels: no photons from 4797 mm on";
+    let expected = "1 of 4 pixels at the start or the end: no photons from 4797 mm on";
     assert!(far.contains(expected), "{far}");
     assert!(!printed("range_mm = 4790\n").contains("beyond the last bin"));
     let moving = printed("range_mm = 4796\nvelocity_m_per_s = 1000\n");
-    assert!(moving.contains("in 4 of 4 pixels"), "{moving}");
+    assert!(moving.contains("4 of 4 pixels at"), "{moving}");
 }
 
 /// Events of a TDC that takes one hit say when that makes for pile-up.

@@ -101,7 +101,7 @@ impl Recording<'_> {
                     errors.push(scale.range(event.position()).to_num::<f64>() - truth);
                 }
             }
-            statistics.add_photons_of(pixel.histogram());
+            pixel.add_photons_to(&mut statistics);
             photons += statistics.photons();
             distances += usize::from(errors.len() > before);
         }

@@ -1,7 +1,7 @@
 //! What bare programs on an RV32 soft-core need: the start, the trap handler, the
 //! registers of the testbench or of QEMU's `virt`, and the programs' parts.
 //!
-//! The programs are in `src/bin`; `cargo xtask softcore` builds and runs them, and
+//! The programs are in `src/bin`; `cargo softcore` builds and runs them, and
 //! `docs/softcore.md` says what to take from here for a design of one's own.
 
 #![no_std]

@@ -261,7 +261,7 @@ impl<const N: usize> Pixels<N> {
     pub fn report(&self, out: &mut impl Write) -> fmt::Result {
         let mut all = self.statistics;
         for pixel in &self.pixels {
-            all.add_photons_of(pixel.histogram());
+            pixel.add_photons_to(&mut all);
         }
         writeln!(
             out,

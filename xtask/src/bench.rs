@@ -8,7 +8,7 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 
 use crate::firmware::Board;
-use crate::qemu::{Emulator, End};
+use crate::qemu;
 
 const FILE: &str = "docs/bench/instructions.csv";
 const HEADER: &str = "operation,variant,opt,instructions";
@@ -61,9 +61,7 @@ fn count(root: &Path) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for (level, small) in [("3", false), ("s", true)] {
         let image = board.bench(root, small)?;
-        let emulator = Emulator::start_with(board, &image, &[], &COUNT_INSTRUCTIONS)?;
-        let End { status, output, .. } = emulator.wait()?;
-        let output = String::from_utf8_lossy(&output);
+        let (status, output) = qemu::run(board, &image, &COUNT_INSTRUCTIONS)?;
         ensure!(status.success(), "QEMU: {status}: {}", output.trim());
         for line in output.lines() {
             rows.push(measured(line, level).with_context(|| format!("what is `{line}`?"))?);

@@ -3,12 +3,12 @@
 use std::env;
 use std::fs;
 use std::io::{self, IsTerminal};
+use std::iter;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::{target_folder, toolchain};
+use crate::{cargo, target_folder, toolchain};
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 const PROFILE: &str = "firmware";
@@ -32,43 +32,85 @@ impl Board {
         }
     }
 
-    pub fn named(name: &str) -> Result<Self> {
+    fn named(name: &str) -> Result<Self> {
         let found = Self::ALL.into_iter().find(|board| board.name() == name);
         found.with_context(|| format!("no board `{name}`: mps2-an386 or stm32f405"))
     }
 
-    /// Builds the sidecar, with these features more, and without a program for a
-    /// sensor.
-    pub fn sidecar(self, root: &Path, features: &[&str]) -> Result<PathBuf> {
-        self.sidecar_with(root, features, None)
+    /// Builds an image as it goes onto the board; that of a TMF8820/21/28 has the
+    /// sensor's own program in it, which `TMF882X_IMAGE` names.
+    pub fn build(self, root: &Path, what: Build) -> Result<PathBuf> {
+        let program = match what {
+            Build::With(Sensor::Tmf882x) => Some(sensor_program()?),
+            _ => None,
+        };
+        self.link(root, what, &[], program.as_deref())
     }
 
-    fn sidecar_with(
-        self,
-        root: &Path,
-        features: &[&str],
-        program: Option<&Path>,
-    ) -> Result<PathBuf> {
-        let image = format!("sidecar-{}", self.name());
-        let features = [&[self.name()], features].concat();
-        build(root, &image, &features, program, PROFILE)
+    /// The same without the sensor's own program.
+    pub fn build_bare(self, root: &Path, what: Build) -> Result<PathBuf> {
+        self.link(root, what, &[], None)
     }
 
-    /// Builds the self-test.
-    pub fn self_test(self, root: &Path) -> Result<PathBuf> {
-        build(
-            root,
-            "self-test",
-            &[self.name(), "self-test"],
-            None,
-            PROFILE,
-        )
+    /// The same for QEMU, whose `stm32f405` has no PLL.
+    pub fn build_for_emulator(self, root: &Path, what: Build) -> Result<PathBuf> {
+        let features: &[&str] = match self {
+            Self::Mps2An386 => &[],
+            Self::Stm32F405 => &["pll-off"],
+        };
+        self.link(root, what, features, None)
     }
 
     /// Builds the image that counts instructions, `small` or fast.
     pub fn bench(self, root: &Path, small: bool) -> Result<PathBuf> {
         let profile = if small { SMALL_PROFILE } else { PROFILE };
-        build(root, "bench", &[self.name(), "bench"], None, profile)
+        link(root, "bench", &[self.name(), "bench"], None, profile)
+    }
+
+    fn link(
+        self,
+        root: &Path,
+        what: Build,
+        more: &[&str],
+        program: Option<&Path>,
+    ) -> Result<PathBuf> {
+        let sidecar = format!("sidecar-{}", self.name());
+        let (image, feature) = match what {
+            Build::Sidecar => (&*sidecar, None),
+            Build::With(sensor) => {
+                ensure!(
+                    self == Self::Stm32F405,
+                    "only stm32f405 has a place for a sensor"
+                );
+                (&*sidecar, Some(sensor.feature()))
+            }
+            Build::SelfTest => ("self-test", Some("self-test")),
+        };
+        let mut features = vec![self.name()];
+        features.extend(feature);
+        features.extend(more);
+        link(root, image, &features, program, PROFILE)
+    }
+}
+
+/// What is built for a board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Build {
+    /// The sidecar with simulated photons.
+    Sidecar,
+    /// The sidecar with those of a sensor.
+    With(Sensor),
+    SelfTest,
+}
+
+impl Build {
+    pub fn named(name: &str) -> Result<Self> {
+        Ok(match name {
+            "self-test" => Self::SelfTest,
+            "tdc7200" => Self::With(Sensor::Tdc7200),
+            "tmf882x" | "tmf8820" | "tmf8821" | "tmf8828" => Self::With(Sensor::Tmf882x),
+            _ => bail!("what is `{name}`? tdc7200, tmf882x or self-test"),
+        })
     }
 }
 
@@ -89,42 +131,28 @@ impl Sensor {
         }
     }
 
-    pub fn feature(self) -> &'static str {
+    fn feature(self) -> &'static str {
         match self {
             Self::Tdc7200 => "sensor-tdc7200",
             Self::Tmf882x => "sensor-tmf882x",
         }
     }
-
-    pub fn named(name: &str) -> Result<Self> {
-        let name = match name {
-            "tmf8820" | "tmf8821" | "tmf8828" => "tmf882x",
-            name => name,
-        };
-        let found = Self::ALL.into_iter().find(|sensor| sensor.name() == name);
-        found.with_context(|| format!("no sensor `{name}`: tdc7200 or tmf882x"))
-    }
-
-    /// The sidecar that takes its photons.
-    pub fn sidecar(self, root: &Path) -> Result<PathBuf> {
-        if self == Self::Tmf882x {
-            let path = env::var_os(IMAGE).map(PathBuf::from);
-            let path = path.with_context(|| {
-                format!("{IMAGE} has to name the sensor's program, raw bytes from its vendor")
-            })?;
-            let name = || format!("{IMAGE}={}", path.display());
-            let bytes = fs::read(&path).with_context(name)?;
-            check_program(&bytes).with_context(name)?;
-            // The build script runs in another folder.
-            let path = path.canonicalize().with_context(name)?;
-            return Board::Stm32F405.sidecar_with(root, &[self.feature()], Some(&path));
-        }
-        Board::Stm32F405.sidecar(root, &[self.feature()])
-    }
 }
 
 /// What `firmware/build.rs` takes the program of the TMF8820/21/28 from.
 const IMAGE: &str = "TMF882X_IMAGE";
+
+/// Where the program of the TMF8820/21/28 is.
+fn sensor_program() -> Result<PathBuf> {
+    let path = env::var_os(IMAGE).map(PathBuf::from);
+    let path = path.with_context(|| {
+        format!("{IMAGE} has to name the sensor's program, raw bytes from its vendor")
+    })?;
+    let name = || format!("{IMAGE}={}", path.display());
+    check_program(&fs::read(&path).with_context(name)?).with_context(name)?;
+    // The build script runs in another folder.
+    path.canonicalize().with_context(name)
+}
 
 /// Whether this may be a program of the TMF8820/21/28, whose bootloader counts
 /// addresses in 16 bits.
@@ -142,9 +170,8 @@ fn check_program(bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Builds one image and says where it is. Each set of features has a folder of
-/// its own, so that none takes another's place.
-fn build(
+/// Links one image and gives the path of a copy that no other image replaces.
+fn link(
     root: &Path,
     image: &str,
     features: &[&str],
@@ -153,7 +180,16 @@ fn build(
 ) -> Result<PathBuf> {
     toolchain::ensure_target(TARGET)?;
     let folder = target_folder(root);
-    let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    let kept = folder.join("images");
+    fs::create_dir_all(&kept).with_context(|| kept.display().to_string())?;
+    let more = features.iter().filter(|&&feature| !image.contains(feature));
+    let name: Vec<&str> = iter::once(image).chain(more.copied()).collect();
+    let name = name.join("+");
+    let kept = kept.join(&name);
+    if !kept.exists() {
+        eprintln!("building {name} for the first time");
+    }
+    let mut cargo = cargo();
     match program {
         Some(path) => cargo.env(IMAGE, path),
         None => cargo.env_remove(IMAGE),
@@ -170,28 +206,18 @@ fn build(
     ensure!(status.success(), "{image} does not build, see above");
 
     let built = folder.join(TARGET).join(profile).join(image);
-    if !built.is_file() {
-        bail!("{image} was built, but is not at {}", built.display());
-    }
-    let kept = folder.join(TARGET).join("images");
-    fs::create_dir_all(&kept).with_context(|| kept.display().to_string())?;
-    let kept = kept.join(format!("{image}+{}", features.join("+")));
-    fs::copy(&built, &kept).with_context(|| kept.display().to_string())?;
+    fs::copy(&built, &kept).with_context(|| built.display().to_string())?;
     Ok(kept)
 }
 
-/// Builds the sidecar of a board and says where it is.
-pub fn image(root: &Path, board: &str, sensor: Option<&str>) -> Result<()> {
+/// Builds an image and prints its path.
+pub fn image(root: &Path, board: &str, what: Option<&str>, emulator: bool) -> Result<()> {
     let board = Board::named(board)?;
-    let path = match sensor {
-        None => board.sidecar(root, &[])?,
-        Some(sensor) => {
-            ensure!(
-                board == Board::Stm32F405,
-                "only stm32f405 has a place for a sensor"
-            );
-            Sensor::named(sensor)?.sidecar(root)?
-        }
+    let what = what.map_or(Ok(Build::Sidecar), Build::named)?;
+    let path = if emulator {
+        board.build_for_emulator(root, what)?
+    } else {
+        board.build(root, what)?
     };
     println!("{}", path.display());
     Ok(())

@@ -8,17 +8,14 @@
 //! search through the instructions of thumbv7em would, and needs no
 //! disassembler.
 
-use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use anyhow::{Context, Result, bail, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
 
-use crate::panics;
-use crate::symbols;
 use crate::toolchain::{self, Toolchain};
+use crate::{cargo, panics, symbols, target_folder};
 
 const PROFILES: [&str; 2] = ["firmware", "firmware-small"];
 
@@ -96,9 +93,8 @@ enum Build {
 /// Builds one image, with these arguments more for the compiler.
 fn build(root: &Path, target: &str, profile: &str, compiler: &[&str]) -> Result<Build> {
     // Given to cargo as well, so that there is no doubt where the image is.
-    let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
-    let folder = root.join(folder);
-    let output = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+    let folder = target_folder(root);
+    let output = cargo()
         .current_dir(root)
         .args(["rustc", "--quiet", "--locked"])
         .args(["--package", "dtof-firmware", "--bin", "core-image"])

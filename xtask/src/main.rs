@@ -1,25 +1,16 @@
-//! `cargo xtask`: what set-up and checks need beyond cargo itself.
+//! `cargo xtask`: what set-up, images and their checks need beyond cargo itself.
 
 mod bench;
-mod boards;
-mod debugger;
 mod emulate;
 mod firmware;
+mod flash;
 mod image;
-mod log;
 mod panics;
 mod python;
 mod qemu;
-mod readers;
-mod report;
 mod self_test;
 mod sizes;
-mod softcore;
-mod source;
-mod stack;
-mod stack_bound;
 mod symbols;
-mod thumb;
 mod toolchain;
 mod tools;
 
@@ -28,43 +19,38 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
+use lexopt::prelude::{Long, Short, Value};
+use lexopt::{Parser, ValueExt};
+
+use firmware::Build;
 
 const HELP: &str = "\
 cargo xtask <command>
 
   setup         install what rust-toolchain.toml names and is not there yet;
-                QEMU, defmt-print, GNU parallel, Chromium and Python as well if
-                that needs no question
-  check-image   link dtof-core for every target; no panic, float or allocation
-  check-source  no floating-point type and no unsafe in core/src
-
-  image BOARD [SENSOR]
-                build the sidecar for mps2-an386 or stm32f405; for the latter also
-                with tdc7200 or tmf882x connected instead of simulated photons
-  sizes         flash, RAM and stack of each image
-  emulate [--port PORT] [exit|panic|fault]
-                run the sidecar in QEMU, its serial port on a TCP port (5386)
+                the emulators, Verilator and the other tools as well if that
+                needs no question
+  image BOARD [SENSOR | self-test] [--emulator]
+                build the sidecar for mps2-an386 or stm32f405, or the self-test,
+                and print its path; stm32f405 takes a sensor, tdc7200 or
+                tmf882x; --emulator builds for QEMU, with its slower clock
+                and without the sensor's own program
   flash [--chip CHIP] [SENSOR | self-test]
-                write the sidecar onto an STM32F405 or STM32F407 and show its log, or
-                the self-test and show its lines, which should be those of
-                firmware/self-test.out; the chip as probe-rs names it, by default
-                that of the Discovery
-  check-boards  the images start, decide and end in QEMU, and keep to their
-                stack
-  check-report [--picture]
-                the reports in headless Chromium: drawn, turned, without a network;
-                --picture writes docs/figures/report.png
-  check-export  the files of dtof export agree with what other projects' readers find in
-                them; installs those below target/ first
-  self-test     the core works out the same on the target; --bless writes down
-                what it works out here
-  bench         instructions the core's operations take on the target; writes
-                docs/bench/instructions.csv, or with --check compares with it
-  softcore [--qemu-only] [--core NAME]... [--check]
-                the core on RV32 processors: golden vectors in QEMU and on the
-                Verilog of VexRiscv, PicoRV32, SERV and Ibex, cycles and photon rates
-                there; writes docs/bench/softcore*.csv and softcore.md if all cores
-                run, or with --check compares with them";
+                write the sidecar onto an STM32F405 or STM32F407 and show its log,
+                or write the self-test and show its lines; CHIP is its name in
+                probe-rs, by default that of the Discovery
+  emulate [--port PORT] [exit | panic | fault]
+                run the sidecar in QEMU, its serial port on a TCP port (5386)
+  sizes         flash, RAM and stack of each image
+  check-image   link dtof-core for every target: no panic, float or allocation
+  self-test [--bless]
+                the self-test in QEMU prints the lines of firmware/self-test.out;
+                --bless writes them
+  bench [--check]
+                count the instructions of the core's operations in QEMU and write
+                docs/bench/instructions.csv; --check compares with it instead
+  python FILE   install the packages of a requirements file below the build folder
+                and print the path of a Python that has them";
 
 fn main() -> ExitCode {
     match run() {
@@ -76,36 +62,67 @@ fn main() -> ExitCode {
     }
 }
 
+/// The options of all commands.
+#[derive(Default)]
+struct Options {
+    bless: bool,
+    check: bool,
+    chip: Option<String>,
+    emulator: bool,
+    port: Option<u16>,
+}
+
 fn run() -> Result<()> {
-    let arguments: Vec<String> = env::args().skip(1).collect();
-    match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["setup"] => {
-            toolchain::set_up(root()?)?;
-            tools::set_up();
-            Ok(())
+    let mut parser = Parser::from_env();
+    let command = match parser.next()? {
+        Some(Value(command)) => command.string()?,
+        Some(Short('h') | Long("help")) => "help".to_owned(),
+        Some(other) => return Err(other.unexpected().into()),
+        None => bail!("which command?\n\n{HELP}"),
+    };
+    let mut options = Options::default();
+    let mut words = Vec::new();
+    while let Some(argument) = parser.next()? {
+        match (&*command, argument) {
+            ("self-test", Long("bless")) => options.bless = true,
+            ("bench", Long("check")) => options.check = true,
+            ("flash", Long("chip")) => options.chip = Some(parser.value()?.string()?),
+            ("image", Long("emulator")) => options.emulator = true,
+            ("emulate", Long("port")) => options.port = Some(parser.value()?.parse()?),
+            (_, Value(word)) => words.push(word.string()?),
+            (_, other) => return Err(other.unexpected().into()),
         }
-        ["check-image"] => image::check(root()?),
-        ["check-source"] => source::check(root()?),
-        ["image", board] => firmware::image(root()?, board, None),
-        ["image", board, sensor] => firmware::image(root()?, board, Some(sensor)),
-        ["sizes"] => sizes::print(root()?),
-        ["emulate", ref rest @ ..] => emulate::emulate(root()?, rest),
-        ["flash", ref rest @ ..] => emulate::flash(root()?, rest),
-        ["check-boards"] => boards::check(root()?),
-        ["check-report"] => report::check(root()?, false),
-        ["check-report", "--picture"] => report::check(root()?, true),
-        ["check-export"] => readers::check(root()?),
-        ["self-test"] => self_test::run(root()?),
-        ["self-test", "--bless"] => self_test::bless(root()?),
-        ["bench"] => bench::run(root()?),
-        ["bench", "--check"] => bench::check(root()?),
-        ["softcore", ref rest @ ..] => softcore::run(root()?, rest),
-        ["help" | "--help" | "-h"] => {
-            println!("{HELP}");
-            Ok(())
-        }
-        _ => bail!("which command?\n\n{HELP}"),
     }
+    let root = root()?;
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    match (&*command, &words[..]) {
+        ("help", []) => println!("{HELP}"),
+        ("setup", []) => {
+            toolchain::set_up(root)?;
+            tools::set_up();
+        }
+        ("image", &[board]) => firmware::image(root, board, None, options.emulator)?,
+        ("image", &[board, what]) => firmware::image(root, board, Some(what), options.emulator)?,
+        ("flash", []) => flash::flash(root, options.chip.as_deref(), Build::Sidecar)?,
+        ("flash", &[what]) => {
+            flash::flash(root, options.chip.as_deref(), Build::named(what)?)?;
+        }
+        ("emulate", []) => emulate::emulate(root, options.port, None)?,
+        ("emulate", &[end @ ("exit" | "panic" | "fault")]) => {
+            emulate::emulate(root, options.port, Some(end))?;
+        }
+        ("sizes", []) => sizes::print(root)?,
+        ("check-image", []) => image::check(root)?,
+        ("self-test", []) if options.bless => self_test::bless(root)?,
+        ("self-test", []) => self_test::check(root)?,
+        ("bench", []) if options.check => bench::check(root)?,
+        ("bench", []) => bench::run(root)?,
+        ("python", &[requirements]) => {
+            println!("{}", python::environment(root, requirements)?.display());
+        }
+        _ => bail!("`{command} {}`: no such command\n\n{HELP}", words.join(" ")),
+    }
+    Ok(())
 }
 
 /// The folder of the workspace.
@@ -119,4 +136,9 @@ fn root() -> Result<&'static Path> {
 fn target_folder(root: &Path) -> PathBuf {
     let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
     root.join(folder)
+}
+
+/// The cargo that runs this program.
+fn cargo() -> std::process::Command {
+    std::process::Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }

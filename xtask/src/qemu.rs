@@ -1,277 +1,85 @@
-//! QEMU, with an image and its serial port on a TCP port.
+//! QEMU, with an image.
 
-use std::fmt;
 use std::io::Read;
-use std::net::{Ipv4Addr, TcpListener};
 use std::path::Path;
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::thread::{self, JoinHandle};
+use std::process::{Command, ExitStatus, Stdio};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use dtof::device::{self, Port};
 
-use crate::debugger::Debugger;
 use crate::firmware::Board;
-use crate::stack::{self, Image};
 use crate::tools::QEMU;
 
-/// How long anything may take that takes no time.
-const PATIENCE: Duration = Duration::from_secs(20);
+/// Far more than any image takes that ends.
+const PATIENCE: Duration = Duration::from_secs(60);
 
-/// What an image asks for that ends: `SYS_EXIT` and `SYS_EXIT_EXTENDED` of
-/// Arm's semihosting.
-const SYS_EXIT: [u32; 2] = [0x18, 0x20];
-
-/// QEMU's version: major and minor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Version(u32, u32);
-
-impl Version {
-    /// That of the QEMU there is.
-    fn installed() -> Result<Self> {
-        let line = QEMU.require()?;
-        Self::parse(&line).with_context(|| format!("what version is `{line}`?"))
-    }
-
-    /// From `QEMU emulator version 7.2.22 (…)`.
-    fn parse(line: &str) -> Option<Self> {
-        let mut numbers = line.split_once("version ")?.1.split(['.', ' ']);
-        Some(Self(
-            numbers.next()?.parse().ok()?,
-            numbers.next()?.parse().ok()?,
-        ))
-    }
-}
-
-impl fmt::Display for Version {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{}", self.0, self.1)
-    }
-}
+/// The QEMU that is known to run `stm32f405`: QEMU 10, for one, ends at a reset of
+/// the clocks.
+const KNOWN: &str = "version 7.2.";
 
 /// Why this QEMU does not run the images of `board`, if so.
 pub fn cannot_run(board: Board) -> Result<Option<String>> {
-    let version = Version::installed()?;
-    // Of netduinoplus2 only this is known to do: QEMU 10, for one, ends at a
-    // reset of the clocks.
-    let known = Version(7, 2);
-    let cannot = board == Board::Stm32F405 && version != known;
+    let version = QEMU.require()?;
+    let cannot = board == Board::Stm32F405 && !version.contains(KNOWN);
     Ok(cannot.then(|| {
         let board = board.name();
-        format!("SKIPPED: {board} is known to run in QEMU {known}, this is {version}")
+        format!("SKIPPED: {board} is known to run in QEMU {KNOWN}x, this is {version}")
     }))
 }
 
-/// How to start an image. `words` are what the image finds on its command line
-/// behind its name.
-pub fn command(board: Board, image: &Path, port: Option<u16>, words: &[&str]) -> Result<Command> {
-    QEMU.require()?;
+/// How to start an image. `word` is what it finds on its command line.
+pub fn command(board: Board, image: &Path, port: Option<u16>, word: Option<&str>) -> Command {
     let uart = port.map_or_else(
         || "null".to_owned(),
         |port| format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on"),
     );
-    let (machine, unused_uarts) = match board {
-        Board::Mps2An386 => ("mps2-an386", 0),
-        // The first is USART1, ours USART2.
-        Board::Stm32F405 => ("netduinoplus2", 1),
-    };
     let mut semihosting = "enable=on,target=native,arg=image".to_owned();
-    for word in words {
+    if let Some(word) = word {
         semihosting.push_str(",arg=");
-        semihosting.push_str(&word.replace(',', ",,"));
+        semihosting.push_str(word);
     }
     let mut command = Command::new(QEMU.program);
-    command.args(["-machine", machine, "-display", "none", "-monitor", "none"]);
-    for _ in 0..unused_uarts {
-        command.args(["-serial", "null"]);
-    }
+    command.args(["-display", "none", "-monitor", "none"]);
+    match board {
+        Board::Mps2An386 => command.args(["-machine", "mps2-an386"]),
+        // The first is USART1, ours USART2.
+        Board::Stm32F405 => command.args(["-machine", "netduinoplus2", "-serial", "null"]),
+    };
     command.args(["-serial", &uart, "-semihosting-config", &semihosting]);
     command.arg("-kernel").arg(image);
     command.stdin(Stdio::null());
-    Ok(command)
+    command
 }
 
-/// An emulator, ended when dropped. It is under a debugger's control, so that
-/// the stack can be read before it ends.
-pub struct Emulator {
-    child: Child,
-    port: u16,
-    debugger: Debugger,
-    image: Image,
-    output: Option<JoinHandle<Vec<u8>>>,
-}
-
-/// How an image has ended its emulator.
-pub struct End {
-    pub status: ExitStatus,
-    /// What was printed.
-    pub output: Vec<u8>,
-    /// Bytes of the stack that were used.
-    pub stack: u64,
-}
-
-impl Emulator {
-    /// Starts an image with its serial port on a free TCP port; before its first
-    /// instruction it waits.
-    pub fn start(board: Board, path: &Path, words: &[&str]) -> Result<Self> {
-        Self::start_with(board, path, words, &[])
-    }
-
-    /// The same with these arguments more for QEMU.
-    pub fn start_with(
-        board: Board,
-        path: &Path,
-        words: &[&str],
-        arguments: &[&str],
-    ) -> Result<Self> {
-        let image = Image::read(path)?;
-        let [port, debugger_port] = free_ports()?;
-        let mut child = command(board, path, Some(port), words)?
-            .args(["-S", "-gdb", &format!("tcp:127.0.0.1:{debugger_port}")])
-            .args(arguments)
-            .stdout(Stdio::piped())
-            .spawn()
-            .with_context(|| format!("{} does not start", QEMU.program))?;
-        let mut stdout = child.stdout.take().context("no output of QEMU")?;
-        let output = thread::spawn(move || {
-            let mut bytes = Vec::new();
-            // What came before an error is all there is.
-            let _ = stdout.read_to_end(&mut bytes);
-            bytes
-        });
-        let debugger = match open(&mut child, || Debugger::connect(debugger_port, PATIENCE)) {
-            Ok(debugger) => debugger,
-            Err(error) => {
-                // It may have ended by itself.
-                let _ = child.kill();
-                let _ = child.wait();
-                return Err(error);
-            }
-        };
-        Ok(Self {
-            child,
-            port,
-            debugger,
-            image,
-            output: Some(output),
-        })
-    }
-
-    /// Lets the image run and connects to its serial port.
-    pub fn connect(&mut self) -> Result<Box<dyn Port>> {
-        self.debugger.resume()?;
-        let port = format!("tcp:127.0.0.1:{}", self.port);
-        open(&mut self.child, || device::open(&port))
-    }
-
-    /// Lets the image run until it ends QEMU. With QEMU ends its memory, so the
-    /// image is stopped before whatever it asks of the emulator.
-    pub fn wait(mut self) -> Result<End> {
-        let start = Instant::now();
-        for &address in &self.image.semihosting {
-            self.debugger.set_breakpoint(address, true)?;
-        }
-        loop {
-            self.debugger.resume()?;
-            self.debugger.wait_for_stop()?;
-            let registers = self.debugger.registers()?;
-            if SYS_EXIT.contains(&registers[0]) {
-                break;
-            }
-            if start.elapsed() > PATIENCE {
-                bail!("the image does not end after {PATIENCE:?}");
-            }
-            let address = registers[15].into();
-            self.debugger.set_breakpoint(address, false)?;
-            self.debugger.step()?;
-            self.debugger.set_breakpoint(address, true)?;
-        }
-        let stack = self.stack()?;
-        for &address in &self.image.semihosting {
-            self.debugger.set_breakpoint(address, false)?;
-        }
-        self.debugger.resume()?;
-        let status = loop {
-            if let Some(status) = self.child.try_wait()? {
-                break status;
-            }
-            if start.elapsed() > PATIENCE {
-                bail!("the image does not end after {PATIENCE:?}");
-            }
-            thread::sleep(Duration::from_millis(20));
-        };
-        Ok(End {
-            status,
-            output: self
-                .output
-                .take()
-                .and_then(|output| output.join().ok())
-                .unwrap_or_default(),
-            stack,
-        })
-    }
-
-    /// Ends QEMU; bytes of the stack that were used.
-    pub fn stop(mut self) -> Result<u64> {
-        self.debugger.interrupt()?;
-        self.stack()
-    }
-
-    /// Bytes of the stack that were used.
-    fn stack(&mut self) -> Result<u64> {
-        let memory = self.debugger.memory(self.image.stack.clone())?;
-        Ok(stack::high_water(&memory))
-    }
-}
-
-/// Two TCP ports that are free now; should another take one meanwhile, QEMU ends
-/// at once.
-fn free_ports() -> Result<[u16; 2]> {
-    let bind = || TcpListener::bind((Ipv4Addr::LOCALHOST, 0));
-    let (first, second) = (bind()?, bind()?);
-    Ok([first.local_addr()?.port(), second.local_addr()?.port()])
-}
-
-/// Opens what QEMU is about to open.
-fn open<T, E: Into<anyhow::Error>>(
-    child: &mut Child,
-    open: impl Fn() -> Result<T, E>,
-) -> Result<T> {
+/// Runs an image that ends, with these arguments more for QEMU; gives how it ended and
+/// what it printed.
+pub fn run(board: Board, image: &Path, arguments: &[&str]) -> Result<(ExitStatus, String)> {
+    QEMU.require()?;
+    let mut emulator = command(board, image, None, None)
+        .args(arguments)
+        .stdout(Stdio::piped())
+        .spawn()
+        .with_context(|| format!("{} does not start", QEMU.program))?;
+    let mut stdout = emulator.stdout.take().context("no output of QEMU")?;
+    let output = thread::spawn(move || {
+        let mut bytes = Vec::new();
+        // What came before an error is all there is.
+        let _ = stdout.read_to_end(&mut bytes);
+        bytes
+    });
     let start = Instant::now();
-    loop {
-        let error = match open() {
-            Ok(opened) => return Ok(opened),
-            Err(error) => error,
-        };
-        if let Some(status) = child.try_wait()? {
-            bail!("QEMU ended at once: {status}");
+    let status = loop {
+        if let Some(status) = emulator.try_wait()? {
+            break status;
         }
         if start.elapsed() > PATIENCE {
-            return Err(error.into()).context("QEMU does not open its ports");
+            emulator.kill()?;
+            emulator.wait()?;
+            bail!("the image does not end after {PATIENCE:?}");
         }
-        thread::sleep(Duration::from_millis(20));
-    }
-}
-
-impl Drop for Emulator {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn reads_the_version() {
-        let line = "QEMU emulator version 7.2.22 (Debian 1:7.2+dfsg-7+deb12u18)";
-        assert_eq!(Version::parse(line), Some(Version(7, 2)));
-        let line = "QEMU emulator version 10.0.0";
-        assert_eq!(Version::parse(line), Some(Version(10, 0)));
-        assert_eq!(Version::parse("QEMU"), None);
-    }
+        thread::sleep(Duration::from_millis(5));
+    };
+    let bytes = output.join().unwrap_or_default();
+    Ok((status, String::from_utf8_lossy(&bytes).into_owned()))
 }

@@ -8,8 +8,7 @@ use object::elf::{SHF_ALLOC, SHT_NOBITS};
 use object::read::elf::{ElfFile32, SectionHeader};
 use object::{Object, ObjectSymbol};
 
-use crate::firmware::{Board, Sensor};
-use crate::{stack, stack_bound};
+use crate::firmware::{Board, Build, Sensor};
 
 /// Macropixels the sidecar has room for.
 const MOST_PIXELS: u64 = 256;
@@ -17,7 +16,11 @@ const MOST_PIXELS: u64 = 256;
 /// the driver of a sensor, and of its 128 KiB of RAM what leaves the stack its reserve.
 const MOST_FLASH: u64 = 48 * 1024;
 const MOST_FLASH_WITH_SENSOR: u64 = 56 * 1024;
-const MOST_RAM: u64 = 128 * 1024 - stack::RESERVE;
+const MOST_RAM: u64 = 128 * 1024 - STACK_RESERVE;
+/// Bytes of its RAM that are left to the stack.
+const STACK_RESERVE: u64 = 19 * 1024;
+/// Bytes of them that an image may need; the rest is for the report of a panic.
+const MOST_STACK: u64 = 12 * 1024;
 
 /// Builds and measures every image. The vendor's program of a TMF8820/21/28 comes
 /// on top of its image.
@@ -27,11 +30,11 @@ pub fn print(root: &Path) -> Result<()> {
     for board in Board::ALL {
         let mut sidecars = vec![(
             format!("sidecar {}", board.name()),
-            board.sidecar(root, &[])?,
+            board.build_bare(root, Build::Sidecar)?,
         )];
         if board == Board::Stm32F405 {
             for sensor in Sensor::ALL {
-                let image = board.sidecar(root, &[sensor.feature()])?;
+                let image = board.build_bare(root, Build::With(sensor))?;
                 sidecars.push((format!("  with {}", sensor.name()), image));
             }
         }
@@ -39,7 +42,10 @@ pub fn print(root: &Path) -> Result<()> {
             let Sizes { flash, ram } = Sizes::read(&path)?;
             let stack = stack_bound::of_image(&path)?;
             println!("{name:<24} {flash:>8} {ram:>8} {stack:>8}");
-            stack::check_need(board, stack)?;
+            ensure!(
+                stack <= MOST_STACK,
+                "more than {MOST_STACK} bytes of stack needed"
+            );
             if board == Board::Stm32F405 {
                 // The first is the one without a sensor.
                 let most = if of_pixels.is_none() {
@@ -53,7 +59,7 @@ pub fn print(root: &Path) -> Result<()> {
             }
         }
         let name = format!("self-test {}", board.name());
-        let Sizes { flash, ram } = Sizes::read(&board.self_test(root)?)?;
+        let Sizes { flash, ram } = Sizes::read(&board.build_bare(root, Build::SelfTest)?)?;
         // It writes through tables of functions; its stack has no bound.
         println!("{name:<24} {flash:>8} {ram:>8} {:>8}", "-");
     }

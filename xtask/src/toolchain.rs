@@ -10,9 +10,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use toml::{Table, Value};
 
 /// What `rust-toolchain.toml` names.
-#[derive(Debug, PartialEq, Eq)]
 pub struct Toolchain {
     pub channel: String,
     pub components: Vec<String>,
@@ -26,40 +26,21 @@ impl Toolchain {
         Self::parse(&text).with_context(|| path.display().to_string())
     }
 
-    /// Reads the little of TOML that this file uses: strings, and lists of them
-    /// over one or more lines.
     fn parse(text: &str) -> Result<Self> {
-        let lines: Vec<&str> = text
-            .lines()
-            .map(|line| line.split('#').next().unwrap_or(line))
-            .collect();
-        let strings = |key: &str| -> Result<Vec<String>> {
-            let found = lines.iter().enumerate().find_map(|(index, line)| {
-                let (name, value) = line.split_once('=')?;
-                (name.trim() == key).then(|| (value.trim(), &lines[index + 1..]))
-            });
-            let (first, rest) = found.with_context(|| format!("no `{key}`"))?;
-            let mut value = first.to_owned();
-            if first.starts_with('[') {
-                value.push_str(&rest.concat());
-                value.truncate(
-                    value
-                        .find(']')
-                        .with_context(|| format!("no end of `{key}`"))?,
-                );
-            }
-            Ok(value
-                .split('"')
-                .skip(1)
-                .step_by(2)
-                .map(Into::into)
-                .collect())
+        let file: Table = text.parse()?;
+        let toolchain = file.get("toolchain").context("no [toolchain]")?;
+        let list = |key: &str| {
+            let names = toolchain.get(key).and_then(Value::as_array);
+            let names = names.with_context(|| format!("no `{key}`"))?.iter();
+            let names = names.map(|name| name.as_str().map(str::to_owned));
+            let names: Option<Vec<_>> = names.collect();
+            names.with_context(|| format!("`{key}` is no list of names"))
         };
-        let channel = strings("channel")?.pop().context("an empty `channel`")?;
+        let channel = toolchain.get("channel").and_then(Value::as_str);
         Ok(Self {
-            channel,
-            components: strings("components")?,
-            targets: strings("targets")?,
+            channel: channel.context("no `channel`")?.to_owned(),
+            components: list("components")?,
+            targets: list("targets")?,
         })
     }
 
@@ -148,36 +129,14 @@ mod tests {
     use crate::root;
 
     #[test]
-    fn reads_lists_over_one_and_more_lines() {
-        let text = "\
-[toolchain] # \"no\"
-channel = \"1.2.3\"
-components = [\"rustfmt\", \"clippy\"]
-targets = [
-    \"thumbv6m-none-eabi\", # why
-    # \"left-out\",
-    \"riscv32i-unknown-none-elf\",
-]
-profile = \"minimal\"
-";
-        let expected = Toolchain {
-            channel: "1.2.3".into(),
-            components: vec!["rustfmt".into(), "clippy".into()],
-            targets: vec![
-                "thumbv6m-none-eabi".into(),
-                "riscv32i-unknown-none-elf".into(),
-            ],
-        };
-        assert_eq!(Toolchain::parse(text).unwrap(), expected);
-        assert!(Toolchain::parse("channel = \"1.2.3\"").is_err());
-    }
-
-    #[test]
     fn reads_the_file_of_this_workspace() {
         let toolchain = Toolchain::read(root().unwrap()).unwrap();
         assert!(toolchain.channel.starts_with("1."));
         assert!(toolchain.components.contains(&"clippy".into()));
         assert!(toolchain.targets.contains(&"thumbv6m-none-eabi".into()));
+        for wrong in ["", "[toolchain]", "[toolchain]\nchannel = \"1.2.3\""] {
+            assert!(Toolchain::parse(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

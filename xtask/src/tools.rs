@@ -21,21 +21,21 @@ pub const QEMU: Tool = Tool {
     install: "sudo apt-get install --yes qemu-system-arm",
 };
 
-/// For `softcore`.
+/// For `cargo softcore`.
 pub const QEMU_RISCV: Tool = Tool {
     program: "qemu-system-riscv32",
     ask: VERSION,
     install: "sudo apt-get install --yes qemu-system-misc",
 };
 
-/// For `softcore`, with what it calls.
+/// For `cargo softcore`, with what it calls.
 pub const VERILATOR: Tool = Tool {
     program: "verilator",
     ask: VERSION,
     install: "sudo apt-get install --yes verilator g++ make",
 };
 
-/// For `softcore`: whether a memory becomes block RAM.
+/// For `cargo softcore`: whether a memory becomes block RAM.
 pub const YOSYS: Tool = Tool {
     program: "yosys",
     ask: &["-V"],
@@ -68,7 +68,7 @@ pub const PROBE_RS: Tool = Tool {
     install: "cargo install --locked probe-rs-tools",
 };
 
-/// For `check-export`: with what makes virtual environments, and the headers that a
+/// For the readers of exported files: with what makes virtual environments, and the headers that a
 /// package may be compiled with, which Debian has apart.
 pub const PYTHON: Tool = Tool {
     program: "python3",
@@ -108,12 +108,13 @@ impl Tool {
     }
 }
 
-/// Installs the emulator, the log's decoder, GNU parallel, the browser and Python if
-/// they are missing and that needs no question; else says what to type. What needs them
-/// says so itself, so that this never fails.
+/// Installs what is missing if that needs no question; else says what to type. What
+/// needs a tool says so itself, so that this never fails.
 pub fn set_up() {
     install(&QEMU, || debian_package("qemu-system-arm"));
-    set_up_softcore();
+    install(&QEMU_RISCV, || debian_package("qemu-system-misc"));
+    install(&VERILATOR, || debian_package("verilator g++ make"));
+    install(&YOSYS, || debian_package("yosys"));
     install(&PARALLEL, || debian_package("parallel"));
     install(&CHROMIUM, || debian_package("chromium"));
     install(&PYTHON, || debian_package("python3-venv python3-dev"));
@@ -122,18 +123,6 @@ pub fn set_up() {
         cargo.args(["install", "--locked", "--quiet", "defmt-print"]);
         Some(cargo)
     });
-}
-
-/// The same for what `softcore` needs in QEMU.
-pub fn set_up_riscv_emulator() {
-    install(&QEMU_RISCV, || debian_package("qemu-system-misc"));
-}
-
-/// The same for all that `softcore` needs.
-pub fn set_up_softcore() {
-    set_up_riscv_emulator();
-    install(&VERILATOR, || debian_package("verilator g++ make"));
-    install(&YOSYS, || debian_package("yosys"));
 }
 
 /// How root installs packages on Debian.

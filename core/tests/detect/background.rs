@@ -206,8 +206,8 @@ proptest! {
             prop_assert_eq!(all.acknowledge(), some.acknowledge());
             prop_assert_eq!(all.histogram().counts(), some.histogram().counts());
         }
-        of_all.add_photons_of(all.histogram());
-        of_some.add_photons_of(some.histogram());
+        all.add_photons_to(&mut of_all);
+        some.add_photons_to(&mut of_some);
         prop_assert_eq!((of_all.gated_out, of_some.gated_out), (outside, 0));
         prop_assert_eq!(of_all.counted, of_some.counted);
     }

@@ -68,7 +68,7 @@ impl<const BINS: usize> Lone<BINS> {
     /// With the present exposure.
     pub fn statistics(&self) -> Statistics {
         let mut statistics = self.statistics;
-        statistics.add_photons_of(self.pixel.histogram());
+        self.pixel.add_photons_to(&mut statistics);
         statistics
     }
 }

@@ -223,11 +223,9 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
     while more() {
         histogram.add(half());
         histogram.add_batch(some(&values::<u16, 16>(half)));
-        histogram.add_gated(half(), &gate);
-        histogram.add_gated_batch(some(&values::<u16, 16>(half)), &gate);
-        histogram.add_frame(&values::<u8, BINS>(byte), &gate);
-        histogram.add_frame(&values::<u16, BINS>(half), &gate);
-        histogram.add_frame(&values::<u32, BINS>(word), &gate);
+        keep(histogram.add_frame(&values::<u8, BINS>(byte), &gate));
+        keep(histogram.add_frame(&values::<u16, BINS>(half), &gate));
+        keep(histogram.add_frame(&values::<u32, BINS>(word), &gate));
         keep((histogram.peak(), histogram.count(usize::from(half()))));
         let detection = detect(&histogram, &gate, &rule(), &estimator());
         keep(detection.map(|found| (found.position(), found.event(address(), cycle(), half()))));
@@ -248,7 +246,7 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
         }
     }
     keep((histogram.total(), histogram.rejected()));
-    keep((histogram.saturated(), histogram.gated_out(), histogram));
+    keep((histogram.saturated(), histogram));
 }
 
 #[inline(never)]
@@ -289,7 +287,7 @@ fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(rule: R) {
         }
     }
     keep((pixel.address(), config.detect(pixel.histogram())));
-    statistics.add_photons_of(pixel.histogram());
+    pixel.add_photons_to(&mut statistics);
     let mut sum = Statistics::default();
     sum += statistics;
     keep((sum, sum.photons()));

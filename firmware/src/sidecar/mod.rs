@@ -293,7 +293,7 @@ impl<'a> Sidecar<'a> {
     fn report(&self, overrun: u32) -> Report {
         let mut statistics = self.statistics;
         for pixel in self.pixels.iter() {
-            statistics.add_photons_of(pixel.detector.histogram());
+            pixel.detector.add_photons_to(&mut statistics);
         }
         // Those that were sent before the report.
         statistics.events -= self.waiting();

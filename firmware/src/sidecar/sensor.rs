@@ -111,8 +111,8 @@ impl PhotonSink for Sidecar<'_> {
             return;
         }
         let mut histogram = Histogram::<BINS, Count24>::new();
-        histogram.add_frame(counts, config.gate());
-        self.statistics.add_photons_of(&histogram);
+        let gated_out = histogram.add_frame(counts, config.gate());
+        self.statistics.add_photons_of(&histogram, gated_out);
         if !has_room_for_event(&self.words) {
             self.statistics.deferred += 1;
         } else if let Some(detection) = config.detect(&histogram) {

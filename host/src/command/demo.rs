@@ -23,6 +23,9 @@ pub struct Demo {
     /// tcp:HOST:PORT or a serial port
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
+    /// Image that `--device qemu` runs [default: what `cargo xtask image mps2-an386` has built]
+    #[arg(long, value_name = "FILE", requires = "device")]
+    image: Option<PathBuf>,
     /// Laser cycles of the scene
     #[arg(long, value_name = "N", default_value_t = Demo::CYCLES, value_parser = whole(1..=u64::MAX))]
     cycles: u64,
@@ -40,6 +43,7 @@ impl Default for Demo {
             out: Self::OUT.into(),
             array: None,
             device: None,
+            image: None,
             cycles: Self::CYCLES,
             seed: Self::SEED,
             quiet: false,
@@ -72,6 +76,7 @@ impl Demo {
             cycles: self.cycles,
             settings: &settings,
             device: self.device.as_deref(),
+            image: self.image.as_deref(),
             out: &self.out,
             lead: &lead,
             quiet: self.quiet,

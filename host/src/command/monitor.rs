@@ -28,6 +28,9 @@ pub struct Monitor {
     /// tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated device
     #[arg(long, value_name = "DEVICE")]
     device: String,
+    /// Image that `--device qemu` runs [default: what `cargo xtask image mps2-an386` has built]
+    #[arg(long, value_name = "FILE")]
+    image: Option<PathBuf>,
     /// Pixels of the sensor, with addresses from 0 [default: as the device says]
     #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX))]
     pixels: Option<u16>,
@@ -75,7 +78,8 @@ impl Monitor {
             "--columns is of --map and --record"
         );
         let name = || self.device.clone();
-        let mut client = Client::new(device::open(&self.device)?).with_context(name)?;
+        let mut client =
+            Client::new(device::open(&self.device, self.image.as_deref())?).with_context(name)?;
         ctrlc::set_handler(|| {
             // Who asks a second time does not wait for the device.
             if INTERRUPTED.swap(true, Ordering::Relaxed) {

@@ -40,6 +40,9 @@ pub struct Simulate {
     /// tcp:HOST:PORT or a serial port
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
+    /// Image that `--device qemu` runs [default: what `cargo xtask image mps2-an386` has built]
+    #[arg(long, value_name = "FILE", requires = "device")]
+    image: Option<PathBuf>,
     /// Laser cycles [default: the file's]
     #[arg(long, value_name = "N", value_parser = whole(1..=u64::MAX))]
     cycles: Option<u64>,
@@ -73,6 +76,7 @@ impl Simulate {
             cycles: self.cycles.unwrap_or(scene.cycles),
             settings: &settings,
             device: self.device.as_deref(),
+            image: self.image.as_deref(),
             out: &self.out,
             lead: &lead,
             quiet: self.quiet,
@@ -89,6 +93,8 @@ pub struct Simulation<'a> {
     pub cycles: u64,
     pub settings: &'a Settings,
     pub device: Option<&'a str>,
+    /// What an emulated device runs.
+    pub image: Option<&'a Path>,
     pub out: &'a Path,
     /// What stands at the head of the report.
     pub lead: &'a str,
@@ -102,7 +108,7 @@ impl Simulation<'_> {
             Some(file) => photons.with_context(|| file.display().to_string())?,
             None => photons?,
         };
-        let mut engine = engine(self.device, self.settings, &photons.addresses())?;
+        let mut engine = engine(self.device, self.image, self.settings, &photons.addresses())?;
         let mut output = Output::create(self.out, self.settings, &photons, self.file)?;
         let mut comparison = self.scene.comparison(self.settings, self.cycles)?;
         let mut summary = run(
@@ -149,6 +155,7 @@ fn export_with(scene: &Scene) -> Option<String> {
 /// The engine of this computer, or that of a device.
 fn engine(
     device: Option<&str>,
+    image: Option<&Path>,
     settings: &Settings,
     addresses: &[PixelAddress],
 ) -> Result<Box<dyn Engine>> {
@@ -159,7 +166,7 @@ fn engine(
         settings.frame.is_none(),
         "--frame is not for --device: a device reports events"
     );
-    let client = Client::new(device::open(device)?).with_context(|| device.to_owned())?;
+    let client = Client::new(device::open(device, image)?).with_context(|| device.to_owned())?;
     Ok(Box::new(DeviceEngine::new(client, settings, addresses)?))
 }
 

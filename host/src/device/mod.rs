@@ -3,6 +3,7 @@
 
 mod client;
 pub mod monitor;
+mod open;
 mod port;
 mod qemu;
 
@@ -13,7 +14,8 @@ use dtof_link::message;
 use dtof_link::{Configuration, DynamicDepth, Report, Source, Token};
 
 pub use client::Client;
-pub use port::{Port, open};
+pub use open::open;
+pub use port::Port;
 
 use crate::engine::Engine;
 use crate::engine::settings::Settings;

@@ -1,19 +1,13 @@
 //! Ports a device can be behind.
 
 use std::io::{self, ErrorKind, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
-
-use super::qemu::Emulator;
-
 /// How long a port waits for a byte.
-const PATIENCE: Duration = Duration::from_millis(2);
+pub(super) const PATIENCE: Duration = Duration::from_millis(2);
 /// A port that takes nothing for so long is gone.
-const STUCK: Duration = Duration::from_secs(5);
-/// What the boards' serial ports are set to.
-const BAUD: u32 = 1_000_000;
+pub(super) const STUCK: Duration = Duration::from_secs(5);
 
 /// Bytes to a device and from it.
 pub trait Port {
@@ -85,57 +79,11 @@ fn gone(error: io::Error) -> io::Error {
     }
 }
 
-/// Opens `tcp:HOST:PORT` or the serial port of that name; `qemu` starts an
-/// emulated device and opens its port.
+/// The same connection, which sends at once and does not wait long for a byte.
 ///
 /// # Errors
-/// If there is none.
-pub fn open(name: &str) -> Result<Box<dyn Port>> {
-    if name == "qemu" {
-        return Ok(Box::new(Emulator::start()?));
-    }
-    if let Some(address) = name.strip_prefix("tcp:") {
-        return Ok(Box::new(tcp(address).with_context(|| name.to_owned())?));
-    }
-    let port = serialport::new(name, BAUD).timeout(PATIENCE).open();
-    match port {
-        Ok(port) => Ok(Box::new(port)),
-        Err(error) if error.kind == serialport::ErrorKind::Io(ErrorKind::NotFound) => {
-            bail!("{name}: {error}; {}", serial_ports())
-        }
-        Err(error) => bail!("{name}: {error}"),
-    }
-}
-
-/// The serial ports there are, for people.
-fn serial_ports() -> String {
-    let ports = serialport::available_ports().unwrap_or_default();
-    let mut names: Vec<String> = ports.into_iter().map(|port| port.port_name).collect();
-    names.sort();
-    if names.is_empty() {
-        return "no serial port is here".to_owned();
-    }
-    format!("serial ports here: {}", names.join(", "))
-}
-
-/// A connection that waits no longer than a port should.
-///
-/// # Errors
-/// If nobody listens.
-pub fn tcp(address: &str) -> io::Result<TcpStream> {
-    let mut failed = None;
-    let mut connected = None;
-    for address in address.to_socket_addrs()? {
-        match TcpStream::connect_timeout(&address, STUCK) {
-            Ok(stream) => {
-                connected = Some(stream);
-                break;
-            }
-            Err(error) => failed = Some(error),
-        }
-    }
-    let unknown = || failed.unwrap_or_else(|| ErrorKind::AddrNotAvailable.into());
-    let stream = connected.ok_or_else(unknown)?;
+/// If it is gone.
+pub fn prompt(stream: TcpStream) -> io::Result<TcpStream> {
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(PATIENCE))?;
     Ok(stream)

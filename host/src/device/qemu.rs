@@ -1,76 +1,119 @@
-//! An emulated device of one's own: `cargo xtask emulate` in this workspace.
+//! An emulated device of one's own: QEMU with an image of the board `mps2-an386`.
 
 use std::env;
-use std::io::{self, IsTerminal};
-use std::net::{Ipv4Addr, TcpListener};
-use std::path::Path;
+use std::io::{self, ErrorKind};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 
 use super::port::{self, Port};
 
-/// The image may have to be built first.
-const PATIENCE: Duration = Duration::from_secs(300);
+const QEMU: &str = "qemu-system-arm";
+
+/// What `cargo xtask image mps2-an386` builds, in the folder that cargo builds in.
+const IMAGE: &str = "images/sidecar-mps2-an386";
+
+/// How long QEMU may take to start.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Runs its arguments until they end or its standard input does: however this program
+/// ends, the other end of the pipe then does.
+const UNTIL_END_OF_INPUT: &str = "exec 3<&0
+\"$@\" </dev/null 3<&- &
+command=$!
+{ read -r end <&3; kill $command; } 2>/dev/null >/dev/null &
+watch=$!
+wait $command
+status=$?
+kill $watch 2>/dev/null
+exit $status";
 
 /// An emulator and its serial port; it ends with this.
 pub struct Emulator {
-    cargo: Child,
-    port: Box<dyn Port>,
+    _process: Process,
+    port: TcpStream,
 }
 
 impl Emulator {
-    /// Builds the image if need be and starts it.
+    /// Starts QEMU with `image`, or with the one that xtask has built.
     ///
     /// # Errors
-    /// If it does not start, as without QEMU; the reason is on standard error.
-    pub fn start() -> Result<Self> {
-        // Free now; should another take it meanwhile, QEMU ends at once.
-        let number = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?
-            .local_addr()?
-            .port();
-        let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        let mut command = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        command
-            .current_dir(workspace)
-            .args(["xtask", "emulate", "--port", &number.to_string()])
-            // However this program ends, the other end of the pipe then does.
-            .args(["--until", "end-of-input"])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null());
-        #[cfg(unix)]
-        {
-            use std::os::unix::process::CommandExt;
-            // Of its own, so that the emulator ends with the cargo that ran it.
-            command.process_group(0);
-        }
-        if io::stderr().is_terminal() {
-            eprintln!("starting the emulator; its image may have to be built first");
-        }
-        let mut cargo = command.spawn().context("cargo does not start")?;
+    /// If there is no image or no QEMU, or QEMU does not start.
+    pub fn start(image: Option<&Path>) -> Result<Self> {
+        let image = image.map_or_else(built, |image| Ok(image.to_owned()))?;
+        ensure!(
+            image.is_file(),
+            "no image at {}: `cargo xtask image mps2-an386` builds one, --image names another",
+            image.display()
+        );
+        let mut ask = Command::new(QEMU);
+        let ask = ask.arg("--version").stdin(Stdio::null());
+        let asked = ask.stdout(Stdio::null()).stderr(Stdio::null()).status();
+        ensure!(
+            asked.is_ok_and(|status| status.success()),
+            "{QEMU} is missing: `cargo xtask setup` installs it"
+        );
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
+        listener.set_nonblocking(true)?;
+        let mut command = qemu(&image, listener.local_addr()?.port());
+        let command = command.stdin(Stdio::piped()).stdout(Stdio::null());
+        let mut process = Process(command.spawn().context("QEMU does not start")?);
         let since = Instant::now();
         loop {
-            if let Ok(stream) = port::tcp(&format!("127.0.0.1:{number}")) {
-                return Ok(Self {
-                    cargo,
-                    port: Box::new(stream),
-                });
+            match listener.accept() {
+                Ok((stream, _)) => {
+                    stream.set_nonblocking(false)?;
+                    return Ok(Self {
+                        _process: process,
+                        port: port::prompt(stream)?,
+                    });
+                }
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+                Err(error) => return Err(error.into()),
             }
-            if let Some(status) = cargo.try_wait()? {
-                bail!("`cargo xtask emulate` ended with {status}, see above");
+            if let Some(status) = process.0.try_wait()? {
+                bail!("QEMU ended with {status}, see above");
             }
-            if since.elapsed() > PATIENCE {
-                end(&mut cargo);
-                bail!(
-                    "the emulator does not start within {} seconds",
-                    PATIENCE.as_secs()
-                );
-            }
-            thread::sleep(Duration::from_millis(50));
+            ensure!(
+                since.elapsed() < PATIENCE,
+                "QEMU does not start within {} seconds",
+                PATIENCE.as_secs()
+            );
+            thread::sleep(Duration::from_millis(10));
         }
     }
+}
+
+/// Where the image is that xtask builds: this program lies in a folder beside it.
+fn built() -> Result<PathBuf> {
+    let program = env::current_exe()?;
+    let folder = program.ancestors().nth(2);
+    Ok(folder.context("a program in no folder")?.join(IMAGE))
+}
+
+/// QEMU, with the serial port of the image connected to a TCP port of this computer.
+fn qemu(image: &Path, port: u16) -> Command {
+    #[cfg(unix)]
+    let mut command = {
+        use std::os::unix::process::CommandExt;
+        let mut shell = Command::new("sh");
+        shell.args(["-c", UNTIL_END_OF_INPUT, "sh", QEMU]);
+        // Of its own, so that Ctrl-C is for this program alone.
+        shell.process_group(0);
+        shell
+    };
+    #[cfg(not(unix))]
+    let mut command = Command::new(QEMU);
+    command.args(["-machine", "mps2-an386", "-display", "none"]);
+    command.args(["-monitor", "none", "-serial"]);
+    command.arg(format!("tcp:127.0.0.1:{port},nodelay=on"));
+    command.args(["-semihosting-config", "enable=on,target=native,arg=image"]);
+    command.arg("-kernel").arg(image);
+    command
 }
 
 impl Port for Emulator {
@@ -83,25 +126,18 @@ impl Port for Emulator {
     }
 }
 
-impl Drop for Emulator {
-    fn drop(&mut self) {
-        end(&mut self.cargo);
-    }
-}
+/// QEMU or what runs it; it ends with this.
+struct Process(Child);
 
-/// Ends cargo and all it has started.
-fn end(cargo: &mut Child) {
-    drop(cargo.stdin.take());
-    let since = Instant::now();
-    while since.elapsed() < Duration::from_secs(2) {
-        if !matches!(cargo.try_wait(), Ok(None)) {
-            return;
+impl Drop for Process {
+    fn drop(&mut self) {
+        if cfg!(unix) {
+            // QEMU ends then, and the shell with it.
+            drop(self.0.stdin.take());
+        } else {
+            // It may have ended by itself.
+            let _ = self.0.kill();
         }
-        thread::sleep(Duration::from_millis(10));
+        let _ = self.0.wait();
     }
-    // The minus sign names the group. Where there is no `kill`, cargo alone ends.
-    let group = format!("-{}", cargo.id());
-    let _ = Command::new("kill").args(["-TERM", "--", &group]).status();
-    let _ = cargo.kill();
-    let _ = cargo.wait();
 }

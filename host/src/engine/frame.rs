@@ -22,6 +22,8 @@ pub struct FramePixel<const BINS: usize> {
     /// Laser cycles of a frame.
     length: u16,
     histogram: Histogram<BINS, Count16>,
+    /// Photons of the frame that the gate left out.
+    gated_out: u32,
     statistics: Statistics,
 }
 
@@ -34,6 +36,7 @@ impl<const BINS: usize> FramePixel<BINS> {
             first,
             length,
             histogram: Histogram::new(),
+            gated_out: 0,
             statistics: Statistics::default(),
         }
     }
@@ -43,7 +46,11 @@ impl<const BINS: usize> FramePixel<BINS> {
         if cycle < self.first {
             return;
         }
-        self.histogram.add_gated(code, gate);
+        if usize::from(code) < BINS && !gate.contains(code) {
+            self.gated_out += 1;
+        } else {
+            self.histogram.add(code);
+        }
     }
 
     /// Ends laser cycle `cycle`. None until the frame ends, or if no bin stands above the
@@ -60,8 +67,9 @@ impl<const BINS: usize> FramePixel<BINS> {
         self.first = cycle + 1;
         let any = PaperRule::new(U8F8::ZERO, Count::saturating(1));
         let found = detect(&self.histogram, gate, &any, estimator);
-        self.statistics.add_photons_of(&self.histogram);
+        self.statistics = self.statistics();
         self.histogram.clear();
+        self.gated_out = 0;
         match found {
             Some(_) => self.statistics.events += 1,
             None => self.statistics.expired += 1,
@@ -72,7 +80,7 @@ impl<const BINS: usize> FramePixel<BINS> {
     /// What it has done so far, the frame that has not ended included.
     fn statistics(&self) -> Statistics {
         let mut statistics = self.statistics;
-        statistics.add_photons_of(&self.histogram);
+        statistics.add_photons_of(&self.histogram, self.gated_out);
         statistics
     }
 }

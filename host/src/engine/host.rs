@@ -74,7 +74,7 @@ impl<const BINS: usize> Engine for HostEngine<BINS> {
     fn statistics(&self) -> Statistics {
         let mut sum = self.statistics;
         for pixel in &self.pixels {
-            sum.add_photons_of(pixel.histogram());
+            pixel.add_photons_to(&mut sum);
         }
         sum
     }

@@ -5,6 +5,7 @@ use dtof_core::PixelAddress;
 use rand_distr::{Distribution, Poisson, StandardUniform};
 use rand_pcg::Pcg64;
 
+use super::arrival::{Arrival, code};
 use super::effects::Effects;
 use super::effects::afterpulsing::Trap;
 use super::effects::cover_glass::Crosstalk;
@@ -13,7 +14,6 @@ use super::effects::jitter::TimingError;
 use super::effects::limits::Timing;
 use super::effects::second_echo::Echo;
 use super::effects::tail::Late;
-use super::pixel::{Arrival, code};
 use super::stream::Stream;
 use dtof_theory::rates::Rates;
 

@@ -22,6 +22,7 @@
 //! all others as they were.
 
 mod array;
+mod arrival;
 mod detector;
 pub mod effects;
 mod pixel;

@@ -6,17 +6,10 @@ use dtof_theory::rates::Rates;
 use rand_distr::{Bernoulli, Distribution, Normal, Poisson, Uniform};
 use rand_pcg::Pcg64;
 
+use super::arrival::{Arrival, code};
 use super::detector::Detector;
 use super::effects::Effects;
 use super::effects::limits::Timing;
-
-/// A photon of the plain model.
-pub(super) enum Arrival {
-    /// In a bin, anywhere.
-    Background(u16),
-    /// So many bins from the start of bin 0.
-    Signal(f64),
-}
 
 /// The plain model at constant rates.
 #[derive(Clone, Debug)]
@@ -150,14 +143,4 @@ impl SimulatedPixel {
             Arrival::Signal(_) => {}
         });
     }
-}
-
-/// The bin of a position within the histogram.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "rounded down, within the bins"
-)]
-pub(super) fn code(position: f64) -> u16 {
-    position as u16
 }

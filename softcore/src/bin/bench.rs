@@ -6,7 +6,7 @@
 #![no_main]
 
 #[cfg(not(target_arch = "riscv32"))]
-compile_error!("an image for a soft-core: cargo xtask softcore");
+compile_error!("an image for a soft-core: cargo softcore");
 
 #[path = "../../../firmware/src/bin/bench/scene.rs"]
 #[allow(dead_code, reason = "not every operation is measured here")]

@@ -4,7 +4,7 @@
 #![no_main]
 
 #[cfg(not(target_arch = "riscv32"))]
-compile_error!("an image for a soft-core: cargo xtask softcore");
+compile_error!("an image for a soft-core: cargo softcore");
 
 use dtof_softcore::{println, program};
 

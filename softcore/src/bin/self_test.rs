@@ -1,10 +1,10 @@
-//! The golden vectors: `cargo xtask softcore`.
+//! The golden vectors: `cargo softcore`.
 
 #![no_std]
 #![no_main]
 
 #[cfg(not(target_arch = "riscv32"))]
-compile_error!("an image for a soft-core: cargo xtask softcore");
+compile_error!("an image for a soft-core: cargo softcore");
 
 use dtof_softcore::{golden, io::Printer, program};
 

@@ -4,6 +4,6 @@
 #![no_main]
 
 #[cfg(not(target_arch = "riscv32"))]
-compile_error!("an image for a soft-core: cargo xtask softcore");
+compile_error!("an image for a soft-core: cargo softcore");
 
 dtof_softcore::stream_program!(1);

@@ -11,6 +11,10 @@ pub const FALSE_BEYOND_BINS: f64 = 3.0;
 /// All events of a run against the truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AgainstTruth {
+    /// Pixels of the array.
+    pub pixels: usize,
+    /// Where the last bin ends.
+    pub histogram_ends_mm: f64,
     /// [`FALSE_BEYOND_BINS`].
     pub false_beyond_bins: f64,
     /// Of all events.
@@ -34,7 +38,7 @@ pub struct OfSurface {
     /// How they compare.
     #[serde(flatten)]
     pub errors: Errors,
-    /// Pixels that see it beyond the last bin, at the start or the end.
+    /// Pixels that see it beyond the last bin, at the start or the end of the run.
     pub pixels_beyond: usize,
 }
 
@@ -51,7 +55,8 @@ pub struct Errors {
     pub bias_mm: Option<f64>,
     /// Root mean square of the error.
     pub rms_mm: Option<f64>,
-    /// 95 % of the errors are at most so large, rounded up to 1/1024 bin.
+    /// 95 % of the errors are at most so large, rounded up to 1/1024 bin: that is how fine they
+    /// are counted.
     pub within_95_mm: Option<f64>,
 }
 
@@ -75,7 +80,7 @@ impl AgainstTruth {
             rows.extend(self.all.rows(""));
         }
         for surface in &self.surfaces {
-            rows.extend(surface.rows());
+            rows.extend(surface.rows(self));
         }
         if let Some(glass) = &self.cover_glass {
             let (first, last) = glass.bins;
@@ -94,7 +99,7 @@ impl AgainstTruth {
 }
 
 impl OfSurface {
-    fn rows(&self) -> Vec<Row> {
+    fn rows(&self, of: &AgainstTruth) -> Vec<Row> {
         let name = &self.name;
         let first = self.first_cycle.map_or("-".to_owned(), grouped);
         let mut rows = vec![(
@@ -109,8 +114,8 @@ impl OfSurface {
             rows.push((
                 format!("{name}, beyond the last bin"),
                 format!(
-                    "in {} pixels at the start or the end: no photons from there",
-                    self.pixels_beyond
+                    "{} of {} pixels at the start or the end: no photons from {:.0} mm on",
+                    self.pixels_beyond, of.pixels, of.histogram_ends_mm
                 ),
             ));
         }

@@ -127,6 +127,8 @@ impl Comparison<'_> {
             }
         }
         AgainstTruth {
+            pixels: self.scene.geometry.addresses(),
+            histogram_ends_mm: self.scene.end_mm(),
             false_beyond_bins: FALSE_BEYOND_BINS,
             all: all.errors(step_mm),
             surfaces,

@@ -2,16 +2,13 @@
 
 use std::fmt::Write as _;
 
-use super::image::Sizes;
-use super::memory::Memory;
-use super::sustained::Sustained;
-use super::table::{COLD, Row};
+use crate::image::Sizes;
+use crate::memory::Memory;
+use crate::sustained::Sustained;
+use crate::table::{COLD, Row};
 
-const START: &str = "\
-# Figures of the soft-cores
-
-Made by `cargo xtask softcore`; do not edit. What they are figures of is in [softcore.md](../softcore.md).
-";
+/// The page but for its tables, each of which stands where its name is in braces.
+const PAGE: &str = include_str!("../page.md");
 
 /// What 2.4 µs are at 100 MHz.
 const CYCLES: u64 = 240;
@@ -26,13 +23,10 @@ const AGAINST: [&str; 5] = [
 
 /// The whole file.
 pub fn text(rows: &[Row], photons: &[Sustained], memory: &[Memory]) -> String {
-    format!(
-        "{START}{}{}{}{}",
-        cycles(rows),
-        against(rows),
-        rates(photons),
-        bytes(memory)
-    )
+    PAGE.replace("{cycles}\n", &cycles(rows))
+        .replace("{against}\n", &against(rows))
+        .replace("{rates}\n", &rates(photons))
+        .replace("{bytes}\n", &bytes(memory))
 }
 
 /// The processors, each once.
@@ -59,9 +53,7 @@ fn cycles(rows: &[Row]) -> String {
         let mut of_core = rows.iter().filter(|row| row.core == core);
         of_core.any(|row| row.operation.ends_with(COLD))
     };
-    let mut text = "\n## Cycles, and instructions in brackets\n\n\
-        Lines filled are those of code and of data.\n\n| operation |"
-        .to_owned();
+    let mut text = "| operation |".to_owned();
     let mut columns = 1;
     for &core in &cores {
         let name = core.replace(',', ", ");
@@ -98,8 +90,7 @@ fn cycles(rows: &[Row]) -> String {
 
 /// What is within [`CYCLES`], in bold.
 fn against(rows: &[Row]) -> String {
-    let mut text =
-        format!("\n## Against {CYCLES} cycles\n\nWhat is within them is bold.\n\n| core |");
+    let mut text = "| core |".to_owned();
     for operation in AGAINST {
         let _ = write!(text, " {operation} | cold |");
     }
@@ -123,15 +114,7 @@ fn against(rows: &[Row]) -> String {
 
 /// Some lines a processor: the highest rate, and parts of it.
 fn rates(photons: &[Sustained]) -> String {
-    let mut text = "
-## Photons sustained
-
-Of four macropixels together, at 100 MHz and a laser of 10 MHz.
-
-| core | photons a laser cycle | photons a second | laser cycles between looks | photons | events | exposures without an event | events a second | most words in the FIFO |
-|---|---|---|---|---|---|---|---|---|
-"
-    .to_owned();
+    let mut text = String::new();
     for sustained in photons {
         let _ = writeln!(
             text,
@@ -152,13 +135,7 @@ Of four macropixels together, at 100 MHz and a laser of 10 MHz.
 }
 
 fn bytes(memory: &[Memory]) -> String {
-    let mut text = "
-## Bytes
-
-| instruction set | macropixels | code and constants | data | stack |
-|---|---|---|---|---|
-"
-    .to_owned();
+    let mut text = String::new();
     for Memory {
         isa,
         macropixels,
@@ -180,12 +157,12 @@ mod tests {
     use std::fs;
     use std::path::Path;
 
-    use super::super::files::{DOCUMENT, Files};
     use super::*;
+    use crate::files::{DOCUMENT, Files};
 
     #[test]
     fn the_document_says_what_the_files_say() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let files = Files::read(&root).unwrap();
         let written = fs::read_to_string(root.join(DOCUMENT)).unwrap();
         assert_eq!(text(&files.rows, &files.photons, &files.memory), written);
@@ -230,7 +207,7 @@ mod tests {
 
     #[test]
     fn the_readme_says_what_the_files_say() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let text = fs::read_to_string(root.join("README.md")).unwrap();
         let words: Vec<&str> = text.split_whitespace().collect();
         let expected = readme(&Files::read(&root).unwrap());
@@ -239,7 +216,7 @@ mod tests {
 
     #[test]
     fn what_the_page_says_of_240_cycles_holds() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let rows = Files::read(&root).unwrap().rows;
         let is_within = |core: &str, operation| {
             let (warm, cold) = find(&rows, core, operation);
@@ -265,7 +242,7 @@ mod tests {
 
     #[test]
     fn the_rates_are_a_highest_one_and_parts_of_it() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let photons = Files::read(&root).unwrap().photons;
         for of_core in photons.chunks(3) {
             assert!(of_core.iter().all(|one| one.core == of_core[0].core));

@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
-use super::counted::Counted;
-use super::memory::MACROPIXELS;
-use super::photons::{PER_PHOTON, Photon, Photons, photons};
-use super::rtl::{Laser, Simulator};
-use super::sustained::Sustained;
-use super::table::Row;
+use crate::counted::Counted;
+use crate::memory::MACROPIXELS;
+use crate::photons::{PER_PHOTON, Photon, Photons, photons};
+use crate::rtl::{Laser, Simulator};
+use crate::sustained::Sustained;
+use crate::table::Row;
 
 /// Photons of a run at the highest rate, about, or as many as come in so many laser cycles. At
 /// other rates a run has as many laser cycles.

@@ -10,8 +10,7 @@ use object::elf::{SHF_ALLOC, SHF_WRITE, SHT_NOBITS};
 use object::read::elf::{ElfFile32, SectionHeader};
 use object::{Object, ObjectSegment};
 
-use crate::python::succeed;
-use crate::{target_folder, toolchain};
+use crate::target_folder;
 
 const PROFILE: &str = "firmware";
 
@@ -37,7 +36,6 @@ impl Images {
     pub fn build(root: &Path, isa: &str, virt: bool) -> Result<Self> {
         let letters = isa.strip_prefix("rv").context("no RISC-V")?;
         let target = format!("riscv{letters}-unknown-none-elf");
-        toolchain::ensure_target(&target)?;
         let target_folder = target_folder(root);
         let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
         cargo.current_dir(root);
@@ -45,7 +43,8 @@ impl Images {
         cargo.args(["--bins", "--target", &target, "--profile", PROFILE]);
         cargo.args(["--features", if virt { "image,virt" } else { "image" }]);
         cargo.arg("--target-dir").arg(&target_folder);
-        succeed(&mut cargo, "cargo build")?;
+        let status = cargo.status().context("cargo does not start")?;
+        ensure!(status.success(), "the images do not build, see above");
 
         // The other machine's images would take their place.
         let machine = if virt { "virt" } else { "testbench" };

@@ -1,4 +1,4 @@
-//! `cargo xtask softcore`: the core on RV32 processors, in QEMU and on the processors'
+//! `cargo softcore`: the core on RV32 processors, in QEMU and on the processors'
 //! own Verilog in simulation, cycle by cycle.
 
 mod counted;
@@ -15,18 +15,36 @@ mod table;
 mod trials;
 mod virt;
 
+use std::env;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
+use lexopt::ValueExt;
+use lexopt::prelude::{Long, Short};
 
-use crate::{self_test, target_folder, tools};
 use files::Files;
 use image::Images;
 use memory::{Memory, Stacks};
 use program::Ran;
 use rtl::{CORES, Core, Simulator};
 use trials::{Cycles, Found, Trials};
+
+const HELP: &str = "\
+cargo softcore [--qemu-only] [--core NAME]... [--check]
+
+The core on RV32 processors: golden vectors in QEMU and on the Verilog of VexRiscv,
+Ibex, PicoRV32 and SERV, cycles and photon rates there. If all cores run, writes
+docs/bench/softcore*.csv and softcore.md.
+
+  --qemu-only   no cycles, no Verilator
+  --core NAME   this processor only, more of them if given more than once:
+                vexriscv, ibex, picorv32, picorv32-rv32i or serv
+  --check       compare with the files and write none";
+
+/// What every program is compared with.
+const EXPECTED: &str = "firmware/self-test.out";
 
 /// The instruction sets with an image, the least first.
 const ISAS: [&str; 3] = ["rv32i", "rv32im", "rv32imc"];
@@ -58,6 +76,23 @@ fn last_words(core: Core, program: &str) -> &'static str {
 /// What the trap handler says.
 const ILLEGAL: &str = "trap: illegal instruction";
 
+fn main() -> ExitCode {
+    let done = Options::parse(lexopt::Parser::from_env()).and_then(|options| match options {
+        Some(options) => run(&options),
+        None => {
+            println!("{HELP}");
+            Ok(())
+        }
+    });
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
 /// What is asked for.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Options {
@@ -68,31 +103,32 @@ struct Options {
 }
 
 impl Options {
-    fn parse(arguments: &[&str]) -> Result<Self> {
+    /// `None` if help is asked for.
+    fn parse(mut parser: lexopt::Parser) -> Result<Option<Self>> {
         let mut options = Self::default();
-        let mut rest = arguments.iter();
-        while let Some(&argument) = rest.next() {
+        while let Some(argument) = parser.next()? {
             match argument {
-                "--qemu-only" => options.qemu_only = true,
-                "--check" => options.check = true,
-                "--core" => {
-                    let name = *rest.next().context("--core wants a name")?;
+                Long("qemu-only") => options.qemu_only = true,
+                Long("check") => options.check = true,
+                Long("core") => {
+                    let name = parser.value()?.string()?;
                     let names = CORES.map(|core| core.name);
                     ensure!(
-                        names.contains(&name),
+                        names.contains(&&*name),
                         "no core `{name}`: {}",
                         names.join(", ")
                     );
-                    options.cores.push(name.to_owned());
+                    options.cores.push(name);
                 }
-                _ => bail!("what is `{argument}`? --core NAME, --check and --qemu-only are known"),
+                Short('h') | Long("help") => return Ok(None),
+                other => return Err(other.unexpected().into()),
             }
         }
         ensure!(
             !options.qemu_only || options.cores.is_empty() && !options.check,
             "QEMU counts no cycles: --qemu-only stands alone"
         );
-        Ok(options)
+        Ok(Some(options))
     }
 
     fn wants(&self, core: Core) -> bool {
@@ -100,15 +136,11 @@ impl Options {
     }
 }
 
-/// Sets up, builds and runs.
-pub fn run(root: &Path, arguments: &[&str]) -> Result<()> {
-    let options = Options::parse(arguments)?;
-    if options.qemu_only {
-        tools::set_up_riscv_emulator();
-    } else {
-        tools::set_up_softcore();
-    }
-    let expected = fs::read_to_string(root.join(self_test::EXPECTED))?;
+/// Builds and runs.
+fn run(options: &Options) -> Result<()> {
+    let root = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let root = &root.canonicalize()?;
+    let expected = fs::read_to_string(root.join(EXPECTED)).context(EXPECTED)?;
     for isa in ISAS {
         in_qemu(root, isa, &expected).with_context(|| format!("QEMU, {isa}"))?;
     }
@@ -139,6 +171,12 @@ pub fn run(root: &Path, arguments: &[&str]) -> Result<()> {
         measured.write(root)?;
     }
     Ok(())
+}
+
+/// Where cargo builds.
+fn target_folder(root: &Path) -> PathBuf {
+    let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
+    root.join(folder)
 }
 
 /// Core and instruction set as the files have them.
@@ -173,7 +211,7 @@ fn in_qemu(root: &Path, isa: &str, expected: &str) -> Result<()> {
     println!(
         "QEMU, {isa}: {} lines as in {}, {stack} bytes of stack; what must fail fails",
         expected.lines().count(),
-        self_test::EXPECTED
+        EXPECTED
     );
     Ok(())
 }
@@ -189,7 +227,7 @@ fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<(Files, Stacks)> {
         core.name,
         core.isa,
         expected.lines().count(),
-        self_test::EXPECTED
+        EXPECTED
     );
     for (program, message) in MUST_FAIL {
         let limit = match program {
@@ -240,14 +278,13 @@ fn golden(ran: &Ran, expected: &str) -> Result<u64> {
         .output
         .split_once("golden ok\nstack ")
         .with_context(|| format!("no `golden ok`: {}", ran.said()))?;
-    for line in self_test::differences(expected, lines) {
-        println!("{line}");
+    for (number, (expected, line)) in (1..).zip(expected.lines().zip(lines.lines())) {
+        ensure!(
+            line == expected,
+            "line {number} of {EXPECTED} is `{expected}`, not `{line}`"
+        );
     }
-    ensure!(
-        lines == expected,
-        "differs from {}, see above",
-        self_test::EXPECTED
-    );
+    ensure!(lines == expected, "other lines than {EXPECTED} has");
     ensure!(ran.code == Some(0), "ends with {:?}", ran.code);
     Ok(stack.trim().parse()?)
 }
@@ -271,19 +308,22 @@ mod tests {
 
     #[test]
     fn reads_what_is_asked_for() {
-        let options = Options::parse(&["--core", "serv", "--check", "--core", "ibex"]).unwrap();
+        let parse = |arguments: &[&str]| Options::parse(lexopt::Parser::from_args(arguments));
+        let options = parse(&["--core", "serv", "--check", "--core=ibex"]);
+        let options = options.unwrap().unwrap();
         assert!(options.check && !options.qemu_only);
         let wanted = CORES.into_iter().filter(|&core| options.wants(core));
         let names: Vec<&str> = wanted.map(|core| core.name).collect();
         assert_eq!(names, ["ibex", "serv"]);
         assert!(CORES.iter().all(|&core| Options::default().wants(core)));
+        assert_eq!(parse(&["--help"]).unwrap(), None);
         for wrong in [
             &["--core"][..],
             &["--core", "z80"],
             &["--qemu-only", "--check"],
             &["x"],
         ] {
-            assert!(Options::parse(wrong).is_err(), "{wrong:?}");
+            assert!(parse(wrong).is_err(), "{wrong:?}");
         }
     }
 }

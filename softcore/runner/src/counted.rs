@@ -3,9 +3,9 @@
 use anyhow::{Context, Result, ensure};
 use dtof_softcore::stream::FEW;
 
-use super::events;
-use super::photons::Photon;
-use super::program::Ran;
+use crate::events;
+use crate::photons::Photon;
+use crate::program::Ran;
 
 /// What the testbench and the program say of a run.
 pub struct Counted {

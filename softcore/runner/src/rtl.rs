@@ -1,15 +1,15 @@
 //! The processors' own Verilog in the testbench of `softcore/`.
 
+use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 
-use super::program::{self, Limit, Ran};
-use crate::tools::{VERILATOR, YOSYS};
-use crate::{python, target_folder};
+use crate::program::{self, Limit, Ran};
+use crate::target_folder;
 
 /// A processor as it is configured in `softcore/rtl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,8 +66,7 @@ pub struct Simulator(PathBuf);
 impl Simulator {
     /// Builds it, from the package index first if need be.
     pub fn build(root: &Path, core: Core) -> Result<Self> {
-        let requirements = root.join("softcore/requirements.txt");
-        let python = python::environment(root, "softcore-packages", &requirements)?;
+        let python = python(root)?;
         let ask = format!("import {0}; print({0}.data_location)", core.package);
         let mut ask_python = Command::new(python);
         let ran = program::run(ask_python.args(["-c", &ask]), PATIENCE)?;
@@ -120,8 +119,7 @@ pub fn check_fifo(root: &Path) -> Result<()> {
     ensure!(ran.code == Some(0), ran.said());
     print!("{}", ran.output);
 
-    YOSYS.require()?;
-    let mut yosys = Command::new(YOSYS.program);
+    let mut yosys = Command::new("yosys");
     yosys.current_dir(root.join("softcore/rtl"));
     yosys.args(["-q", "-p"]).arg(
         "read_verilog photon_fifo.v; synth_ice40 -top photon_fifo; \
@@ -146,14 +144,30 @@ pub fn check_fifo(root: &Path) -> Result<()> {
     Ok(())
 }
 
+/// A Python that has the processors' packages.
+fn python(root: &Path) -> Result<PathBuf> {
+    let mut xtask = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    let xtask = xtask
+        .current_dir(root)
+        .args(["--locked", "xtask", "python"]);
+    let output = xtask
+        .arg("softcore/requirements.txt")
+        .stderr(Stdio::inherit());
+    let output = output.output().context("cargo does not start")?;
+    ensure!(
+        output.status.success(),
+        "the packages of the processors are missing, see above"
+    );
+    Ok(String::from_utf8(output.stdout)?.trim().into())
+}
+
 /// Builds the simulation that `softcore/sim/NAME.f` lists, with `data` the processor's
 /// files, and says where it is.
 fn verilate(root: &Path, name: &str, data: &str) -> Result<PathBuf> {
-    VERILATOR.require()?;
     let folder = target_folder(root).join("softcore").join(name);
     fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let softcore = root.join("softcore");
-    let mut verilator = Command::new(VERILATOR.program);
+    let mut verilator = Command::new("verilator");
     verilator
         .env("SOFTCORE", &softcore)
         .env("DATA", data)

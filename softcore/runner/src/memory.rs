@@ -4,8 +4,8 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use super::ISAS;
-use super::image::{Images, Sizes};
+use crate::ISAS;
+use crate::image::{Images, Sizes};
 
 /// Macropixels of the programs.
 pub const MACROPIXELS: [u8; 3] = [1, 4, 64];

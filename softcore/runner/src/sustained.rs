@@ -1,6 +1,6 @@
 //! A rate that a processor sustains, as the file has it.
 
-use super::photons::UNIT;
+use crate::photons::UNIT;
 
 /// What a run at such a rate came to.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -7,7 +7,7 @@ use dtof_core::{
 };
 use dtof_softcore::stream::{self, BINS, Mark};
 
-use super::photons::Photon;
+use crate::photons::Photon;
 
 /// The events of the words over the link.
 ///
@@ -73,7 +73,7 @@ pub fn decided(
     }
     for pixel in &mut pixels {
         pixel.count(&config, u64::MAX);
-        all.add_photons_of(pixel.pixel.histogram());
+        pixel.pixel.add_photons_to(&mut all);
     }
     Ok((events, all))
 }

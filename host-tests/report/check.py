@@ -1,4 +1,4 @@
-"""Reports of `dtof` in a real browser: `cargo xtask check-report`.
+"""Reports of `dtof` in a real browser, for the test `report` of `dtof-host-tests`.
 
 Arguments: the browser, the folder for the pictures, the report of a static scene, that of a
 moving one with more events than a report shows, and that of a large array. Ends with an error at the first thing that is
@@ -15,7 +15,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 MOST_BYTES = 5_000_000
-SCRIPTS = Path(__file__).parent.parent / "host/src/report"
+SCRIPTS = Path(__file__).parent.parent.parent / "host/src/report"
 
 
 def check(what, holds):

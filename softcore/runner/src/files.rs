@@ -6,10 +6,10 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 
-use super::document;
-use super::memory::Memory;
-use super::sustained::Sustained;
-use super::table::{self, Row};
+use crate::document;
+use crate::memory::Memory;
+use crate::sustained::Sustained;
+use crate::table::{self, Row};
 
 const ROWS: &str = "docs/bench/softcore.csv";
 const PHOTONS: &str = "docs/bench/softcore-photons.csv";
@@ -132,7 +132,7 @@ impl Files {
         }
         ensure!(
             differences.is_empty(),
-            "not what {ROWS}, {PHOTONS} and {MEMORY} say, see above; `cargo xtask softcore` writes them"
+            "not what {ROWS}, {PHOTONS} and {MEMORY} say, see above; `cargo softcore` writes them"
         );
         println!(
             "{ROWS}, {PHOTONS}, {MEMORY}: {} lines as measured",
@@ -168,8 +168,8 @@ fn is_near(a: &str, b: &str, columns: &[Column]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::image::Sizes;
     use super::*;
+    use crate::image::Sizes;
 
     #[test]
     fn figures_may_differ_by_little() {
@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn the_files_are_read_as_they_are_written() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let files = Files::read(&root).unwrap();
         let [rows, photons, memory] = files.texts();
         for (file, text) in [(ROWS, rows), (PHOTONS, photons), (MEMORY, memory)] {

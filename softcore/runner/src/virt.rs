@@ -6,8 +6,7 @@ use std::time::Duration;
 
 use anyhow::Result;
 
-use super::program::{self, Limit, Ran};
-use crate::tools::QEMU_RISCV;
+use crate::program::{self, Limit, Ran};
 
 /// Whatever ends, ends in a fraction of this.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -17,7 +16,6 @@ const A_MOMENT: Duration = Duration::from_secs(1);
 /// Runs an image until it ends, or a moment longer than it takes to print a line, after which
 /// no end is expected. What the instruction set has not is an illegal instruction.
 pub fn run(image: &Path, isa: &str, last_line: Option<&'static str>) -> Result<Ran> {
-    QEMU_RISCV.require()?;
     let letters = isa.trim_start_matches("rv32");
     let mut processor =
         "rv32,a=false,f=false,d=false,zba=false,zbb=false,zbc=false,zbs=false".to_owned();
@@ -26,7 +24,7 @@ pub fn run(image: &Path, isa: &str, last_line: Option<&'static str>) -> Result<R
             processor.push_str(&format!(",{letter}=false"));
         }
     }
-    let mut qemu = Command::new(QEMU_RISCV.program);
+    let mut qemu = Command::new("qemu-system-riscv32");
     qemu.args(["-machine", "virt", "-cpu", &processor, "-bios", "none"]);
     qemu.args(["-display", "none", "-monitor", "none", "-serial", "stdio"]);
     qemu.arg("-kernel").arg(image);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
 
-use super::program::Ran;
+use crate::program::Ran;
 
 /// What the first operation of the bench is: a call that does nothing, taken off the
 /// others.

@@ -60,7 +60,7 @@ pub fn run(command: &mut Command, limit: Limit) -> Result<Ran> {
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .with_context(|| format!("{name} does not start"))?;
+        .with_context(|| format!("{name} does not start: `cargo xtask setup` installs it"))?;
     let output = Text::read(child.stdout.take().context("no output")?);
     let errors = Text::read(child.stderr.take().context("no error output")?);
     let mut end = match limit {

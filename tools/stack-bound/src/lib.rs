@@ -1,11 +1,13 @@
-//! The most stack an image can need, from its machine code.
+//! The most stack a Cortex-M image can need, from its machine code.
 //!
-//! A function takes the sum of all its instructions take, and the most of what
-//! any function needs it goes to. Interrupts come on top. Recursion, a stack
-//! pointer set otherwise, and a function only known when it runs have no such
-//! bound and are an error; except behind a panic, whose report calls through
-//! tables: the bound is that up to the panic handler. Compiled functions end in
-//! a jump or return, never by running on into the next.
+//! A function takes the sum of what its instructions take, and the most that any
+//! function it goes to needs. Interrupts come on top. Three things have no such
+//! bound and are an error: recursion, a stack pointer set in another way, and a
+//! call of what is only known when the image runs. The report of a panic calls
+//! through tables, so the bound ends at the panic handler. A compiled function ends
+//! in a jump or a return; it never runs on into the next.
+
+mod thumb;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -15,7 +17,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 
-use crate::thumb::{self, Effect};
+use thumb::Effect;
 
 /// What the processor saves when an interrupt comes: 26 words with those of the
 /// floating-point unit, and a word so that the stack stays aligned.
@@ -27,6 +29,9 @@ const HARD_FAULT: usize = 3;
 
 /// Bytes of stack an image can need: the main loop, a handler of an interrupt on
 /// it (all have the same priority), and on that the hard fault's and the NMI's.
+///
+/// # Errors
+/// If the file is no such image, or a function in it has no bound.
 pub fn of_image(path: &Path) -> Result<u64> {
     let bytes = fs::read(path).with_context(|| path.display().to_string())?;
     let file = object::File::parse(&*bytes)?;

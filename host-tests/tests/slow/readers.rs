@@ -1,0 +1,50 @@
+//! What `dtof export` writes, read by other projects' programs and compared by
+//! `host-tests/readers/check.py`. Needs Python; the readers are installed below the
+//! build folder, from the package index unless they are there.
+//!
+//! ```sh
+//! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow readers
+//! ```
+
+use std::fs;
+use std::process::Command;
+
+use anyhow::Result;
+
+use crate::{dtof, python, root, succeed, target_folder, wanted};
+
+/// A scene in which something moves, so that there are changes of depth.
+const SCENE: &str = "scenes/radial.toml";
+const CYCLES: &str = "40000";
+
+#[test]
+fn other_readers_find_in_exported_files_what_is_in_them() -> Result<()> {
+    let test = "exported files in other readers";
+    let Some(_alone) = wanted(test, &["python3"]) else {
+        return Ok(());
+    };
+    let Some(python) = python(test, "host-tests/readers/requirements.txt") else {
+        return Ok(());
+    };
+    let dtof = dtof()?;
+    let root = root().canonicalize()?;
+    let folder = target_folder().join("readers");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder)?;
+    let mut simulate = Command::new(&dtof);
+    simulate.arg("simulate").arg("--scene");
+    simulate.arg(root.join(SCENE));
+    simulate.args(["--cycles", CYCLES, "--quiet", "--out", "scene"]);
+    succeed(simulate.current_dir(&folder))?;
+
+    let mut compare = Command::new(python);
+    compare
+        .arg(root.join("host-tests/readers/check.py"))
+        .arg(&dtof);
+    compare
+        .arg("scene/events.aer")
+        .arg(root.join("docs/export.md"));
+    // No .pyc files in the repository.
+    compare.env("PYTHONDONTWRITEBYTECODE", "1");
+    succeed(compare.current_dir(&folder))
+}

@@ -1,0 +1,57 @@
+//! The reports of `dtof` in a real browser, used as a reader does by
+//! `host-tests/report/check.py`. Needs Chromium and Python.
+//!
+//! ```sh
+//! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow report
+//! cp out/check-report/report.png docs/figures/     # the README's picture anew
+//! ```
+
+use std::fs;
+use std::process::Command;
+
+use anyhow::{Result, ensure};
+
+use crate::{dtof, python, root, succeed, wanted};
+
+/// The most that the picture of the README may take.
+const MOST_BYTES: u64 = 300_000;
+
+/// The reports of a static scene, of a moving one with more events than a report shows,
+/// and of an array whose maps leave room for fewer.
+const REPORTS: [(&str, &str); 3] = [
+    ("static", "demo --quiet --out"),
+    (
+        "moving",
+        "simulate --quiet --scene scenes/fan.toml --cycles 100000 --alpha 8 --out",
+    ),
+    ("large", "demo --quiet --array 256x256 --cycles 2000 --out"),
+];
+
+#[test]
+fn reports_in_a_browser_are_drawn_turned_and_closed() -> Result<()> {
+    let test = "reports in a browser";
+    let Some(_alone) = wanted(test, &["chromium", "python3"]) else {
+        return Ok(());
+    };
+    let Some(python) = python(test, "host-tests/report/requirements.txt") else {
+        return Ok(());
+    };
+    let dtof = dtof()?;
+    let root = root();
+    let folder = root.join("out/check-report");
+    let mut check = Command::new(python);
+    check.arg(root.join("host-tests/report/check.py"));
+    check.arg("chromium").arg(&folder);
+    for (name, arguments) in REPORTS {
+        let out = folder.join(name);
+        let mut command = Command::new(&dtof);
+        let command = command.current_dir(&root).args(arguments.split(' '));
+        succeed(command.arg(out.canonicalize().unwrap_or(out.clone())))?;
+        check.arg(out.join("report.html"));
+    }
+    succeed(&mut check)?;
+
+    let bytes = fs::metadata(folder.join("report.png"))?.len();
+    ensure!(bytes < MOST_BYTES, "report.png has {bytes} bytes");
+    Ok(())
+}
