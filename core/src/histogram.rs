@@ -24,7 +24,8 @@
 //! assert_eq!((histogram.total(), histogram.rejected()), (4, 1));
 //! ```
 //!
-//! Cost on a Cortex-M4: 10 instructions a photon in a batch, 39 to clear 128 bins.
+//! Cost on a Cortex-M4: 10 instructions a photon in a batch, 39 to clear 128 bins, 1004
+//! to take 128 bins that were counted elsewhere.
 //!
 //! Source: the saturating 10-bit counters of the paper's FPGA (section IV-B). Its
 //! search for the highest bin is [`ComparatorTree`](crate::ComparatorTree).
@@ -202,15 +203,15 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     /// Counters saturate bin by bin. Returns the photons left out by the gate; sticks at
     /// `u32::MAX`.
     pub fn add_frame<C: PhotonCount>(&mut self, frame: &[C; BINS], gate: &RangeGate<BINS>) -> u32 {
-        let gated = gate.bins();
-        let photons = frame.get(gated.clone()).unwrap_or_default();
-        let highest = C::highest(photons);
-        // An empty histogram is no more than a copy, unless a counter would be full.
-        if self.peak_key == 0 && highest <= W::MAX {
-            self.copy(photons, highest, gate);
-        } else {
-            self.add_to_each(photons, gate);
+        if gate.is_full() && self.peak_key == 0 {
+            let highest = C::highest(frame);
+            if highest <= W::MAX {
+                self.copy(frame, highest);
+                return 0;
+            }
         }
+        let gated = gate.bins();
+        self.add_to_each(frame.get(gated.clone()).unwrap_or_default(), gate);
         let outside = |bins: Option<&[C]>| {
             let photons = bins.unwrap_or_default().iter();
             photons.fold(0u32, |sum, &photons| sum.saturating_add(photons.into()))
@@ -218,20 +219,32 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         outside(frame.get(..gated.start)).saturating_add(outside(frame.get(gated.end..)))
     }
 
-    /// Takes the photons of the gated bins, of which the highest is `highest`.
+    /// What [`Self::add_to_each`] makes of an empty histogram, in half the time.
+    /// `highest` is the highest count, which fits the counters.
     #[inline(always)]
-    fn copy<C: PhotonCount>(&mut self, photons: &[C], highest: u32, gate: &RangeGate<BINS>) {
-        let counters = self.counts.get_mut(gate.bins()).unwrap_or_default();
-        for (counter, &photons) in counters.iter_mut().zip(photons) {
-            *counter = W::counter(photons.into());
+    fn copy<C: PhotonCount>(&mut self, frame: &[C; BINS], highest: u32) {
+        let (counters, _) = self.counts.as_chunks_mut::<8>();
+        let (photons, _) = frame.as_chunks::<8>();
+        let one = |photons: C| W::counter(photons.into());
+        for (counters, &[a, b, c, d, e, f, g, h]) in counters.iter_mut().zip(photons) {
+            *counters = [
+                one(a),
+                one(b),
+                one(c),
+                one(d),
+                one(e),
+                one(f),
+                one(g),
+                one(h),
+            ];
+            // Else this is a call of `memcpy`, which takes twice as long.
+            compiler_fence(Ordering::Release);
         }
-        self.total = C::sum(photons);
-        if highest > 0 {
-            let bin = C::first_reaching(photons, highest);
-            #[allow(clippy::cast_possible_truncation)] // less than 1024
-            let bin = bin.unwrap_or_default() as u32 + u32::from(gate.first());
-            self.peak_key = Self::key(highest, bin);
-        }
+        self.total = C::sum(frame);
+        let bin = C::first_reaching(frame, highest).unwrap_or_default();
+        #[allow(clippy::cast_possible_truncation)] // less than 1024
+        let key = (highest << Self::LOG2_BINS).wrapping_sub(bin as u32);
+        self.peak_key = key;
     }
 
     /// Adds the photons of the gated bins.

@@ -4,6 +4,7 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
+use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -202,6 +203,25 @@ fn a_device_that_restarts_is_noticed() {
         }
     };
     assert!(format!("{error:#}").contains("restarted"), "{error:#}");
+}
+
+#[test]
+fn an_emulated_device_runs_an_image_and_no_other_takes_one() {
+    let refused = |name: &str, image: &str| {
+        let opened = device::open(name, Some(Path::new(image)));
+        format!("{:#}", opened.err().expect("refused"))
+    };
+    let missing = refused("qemu", "no/such/image");
+    assert!(missing.starts_with("no image at no/such/image: "));
+    assert!(missing.contains("`cargo xtask image mps2-an386`"));
+    assert_eq!(
+        refused("qemu", "Cargo.toml"),
+        "Cargo.toml: no ELF file, as an image is"
+    );
+    assert_eq!(
+        refused("tcp:127.0.0.1:1", "Cargo.toml"),
+        "--image is for --device qemu"
+    );
 }
 
 #[test]

@@ -7,8 +7,8 @@
 //! `N = X·k` on, those before are taken off. The second is the normal distribution's:
 //! the z that one in so many trials exceeds.
 //!
-//! Both are written by `cargo run --release -p dtof-core --example window_z`, the first
-//! from simulation, and `core/tests/detect/window_z.rs` holds them against another one.
+//! `core/tests/detect/window_z_tables.rs` works both out again, the first from
+//! simulation. `core/tests/detect/window_z.rs` holds them against another simulation.
 
 use fixed::types::U4F12;
 

@@ -93,7 +93,6 @@ fn only_widths_that_can_be_used() {
     }
 }
 
-/// All pulses of four bins of up to 5 photons.
 #[test]
 fn the_widest_pulse_has_the_widest_window() {
     let widest = CentredWindow::WIDEST_PULSE;
@@ -102,6 +101,7 @@ fn the_widest_pulse_has_the_widest_window() {
     assert!(width(widest - U8F8::DELTA) < CentredWindow::MAX);
 }
 
+/// All pulses of four bins of up to 5 photons.
 #[test]
 fn all_small_pulses_are_as_written() {
     for number in 0..6usize.pow(4) {

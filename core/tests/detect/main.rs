@@ -11,3 +11,4 @@ mod root;
 mod threshold;
 mod window;
 mod window_z;
+mod window_z_tables;

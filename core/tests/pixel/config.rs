@@ -2,8 +2,8 @@
 
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::{
-    ConfigError, Count, CounterWidth, DetectionRule, Histogram, Look, PaperRule, Peak, PixelConfig,
-    RangeGate,
+    ConfigError, Count, CounterWidth, DepthEstimator, DetectionRule, Histogram, Look, PaperRule,
+    Peak, PixelConfig, RangeGate, checked,
 };
 
 use crate::model::Lone;
@@ -38,6 +38,28 @@ fn small_configurations_are_valid_if_and_only_if_there_is_a_look() {
             }
         }
     }
+}
+
+#[test]
+fn what_is_not_set_is_the_papers() {
+    const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().build());
+    assert_eq!((CONFIG.x(), CONFIG.l1(), CONFIG.l2()), (4, 40, 2000));
+    let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
+    assert_eq!((CONFIG.rule(), CONFIG.gate()), (&rule, &RangeGate::full()));
+    assert_eq!(CONFIG.estimator(), &DepthEstimator::Centroid3);
+    assert!(!CONFIG.is_one_hit());
+}
+
+#[test]
+fn every_setting_arrives() {
+    let gate = RangeGate::new(3, 60).unwrap();
+    let estimator = DepthEstimator::for_pulse(U8F8::ONE);
+    let config = PixelConfig::<64>::paper().x(7).l1(9).l2(99).gate(gate);
+    let config = config.estimator(estimator).one_hit_tdc(true).build();
+    let config = config.unwrap();
+    assert_eq!((config.x(), config.l1(), config.l2()), (7, 9, 99));
+    assert_eq!((config.gate(), config.estimator()), (&gate, &estimator));
+    assert!(config.is_one_hit());
 }
 
 #[test]

@@ -24,7 +24,7 @@ use dtof_core::{Count, PaperRule, WindowRule};
 use dtof_link::{FaultRecord, Source};
 
 use crate::emulator::{Board, Emulator, End, QEMU};
-use crate::{root, skipped, stack, version, wanted};
+use crate::{dtof, root, skipped, stack, succeed, target_folder, version, wanted};
 
 /// Decodes what an image logs.
 const DEFMT_PRINT: &str = "defmt-print";
@@ -94,6 +94,38 @@ fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
         stack::check(&image, &[used])?;
     }
     tests_itself(board)
+}
+
+#[test]
+fn the_demo_on_an_emulated_device_gives_the_same_files() -> Result<()> {
+    let Some(_alone) = wanted("the demo on mps2-an386", &[QEMU]) else {
+        return Ok(());
+    };
+    let image = Board::Mps2An386.image(&[])?;
+    let dtof = dtof()?;
+    let folder = target_folder().join("demo");
+    let demo = |name: &str| {
+        let mut demo = Command::new(&dtof);
+        demo.args(["demo", "--array", "8x8", "--cycles", "500", "--quiet"]);
+        demo.arg("--out").arg(folder.join(name));
+        demo
+    };
+    succeed(&mut demo("host"))?;
+    succeed(
+        demo("device")
+            .args(["--device", "qemu", "--image"])
+            .arg(image),
+    )?;
+    for file in ["events.csv", "events.aer"] {
+        let [of_host, of_device] =
+            ["host", "device"].map(|name| fs::read(folder.join(name).join(file)));
+        let of_host = of_host?;
+        ensure!(
+            !of_host.is_empty() && of_host == of_device?,
+            "{file} differs"
+        );
+    }
+    Ok(())
 }
 
 /// The self-test writes through tables of functions, so that its stack has no bound; it

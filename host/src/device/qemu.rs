@@ -1,7 +1,8 @@
 //! An emulated device of one's own: QEMU with an image of the board `mps2-an386`.
 
 use std::env;
-use std::io::{self, ErrorKind};
+use std::fs::File;
+use std::io::{self, ErrorKind, Read};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -25,9 +26,9 @@ const PATIENCE: Duration = Duration::from_secs(20);
 const UNTIL_END_OF_INPUT: &str = "exec 3<&0
 \"$@\" </dev/null 3<&- &
 command=$!
-{ read -r end <&3; kill $command; } 2>/dev/null >/dev/null &
+{ read -r end <&3; kill -s KILL $command; } 2>/dev/null >/dev/null &
 watch=$!
-wait $command
+wait $command 2>/dev/null
 status=$?
 kill $watch 2>/dev/null
 exit $status";
@@ -48,6 +49,13 @@ impl Emulator {
         ensure!(
             image.is_file(),
             "no image at {}: `cargo xtask image mps2-an386` builds one, --image names another",
+            image.display()
+        );
+        let mut start = [0; 4];
+        let read = File::open(&image).and_then(|mut file| file.read_exact(&mut start));
+        ensure!(
+            read.is_ok() && start == *b"\x7fELF",
+            "{}: no ELF file, as an image is",
             image.display()
         );
         let mut ask = Command::new(QEMU);

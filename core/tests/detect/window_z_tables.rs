@@ -1,4 +1,4 @@
-//! The tables behind `z_for`: `cargo run --release -p dtof-core --example window_z`.
+//! The tables behind `z_for` are what they are said to be.
 //!
 //! z against the number of independent trials is the normal distribution's: one
 //! trial in as many exceeds it. How many independent looks there are in the first `k`,
@@ -16,11 +16,33 @@ const ONE_IN: usize = 300;
 /// As many numbers of looks as `LOOKS` has entries: powers of two.
 const POWERS: usize = 11;
 
-fn main() {
-    println!("Z, from 2^6 trials on, every second power of two:");
-    for log2 in (6..=34).step_by(2) {
-        print!("{}, ", (z_of(f64::from(log2).exp2()) * 4096.0).round());
-    }
+/// The numbers of a table of the source, in its order.
+fn table(name: &str) -> Vec<u32> {
+    let source = include_str!("../../src/detect/window_z.rs");
+    let start = format!("const {name}: ");
+    let (_, rest) = source.split_once(&start).unwrap();
+    let (_, rest) = rest.split_once("= [").unwrap();
+    let (numbers, _) = rest.split_once(']').unwrap();
+    let numbers = numbers.split(',').map(str::trim);
+    let numbers = numbers.filter(|number| !number.is_empty());
+    numbers.map(|number| number.parse().unwrap()).collect()
+}
+
+/// From 2⁶ trials on, every second power of two.
+#[test]
+fn z_is_that_of_the_normal_distribution() {
+    let powers = (6..=34).step_by(2).map(f64::from);
+    let expected: Vec<f64> = powers
+        .map(|power| (z_of(power.exp2()) * 4096.0).round())
+        .collect();
+    let table: Vec<f64> = table("Z").into_iter().map(f64::from).collect();
+    assert_eq!(table, expected);
+}
+
+/// For 1, 2, 4, … looks, in 1/16.
+#[test]
+#[ignore = "takes minutes: cargo test --release -p dtof-core --test detect -- --ignored"]
+fn looks_are_worth_what_is_simulated() {
     let threads = 2;
     let highest: Vec<_> = std::thread::scope(|scope| {
         let run = |seed| scope.spawn(move || simulate(seed, EXPOSURES / threads));
@@ -28,8 +50,7 @@ fn main() {
         let results = workers.into_iter().map(|worker| worker.join().unwrap());
         results.flatten().collect()
     });
-    println!("\nLOOKS in 1/16, for 1, 2, 4, … looks:");
-    for power in 0..POWERS {
+    let worth = (0..POWERS).map(|power| {
         let mut z = 0.0;
         for width in 0..WIDTHS.len() {
             let mut of_all: Vec<f64> = highest.iter().map(|z| z[power][width]).collect();
@@ -37,9 +58,10 @@ fn main() {
             z += of_all[EXPOSURES / ONE_IN] / WIDTHS.len() as f64;
         }
         let trials = 1.0 / upper_tail(z);
-        print!("{}, ", (trials / (ONE_IN * BINS) as f64 * 16.0).round());
-    }
-    println!();
+        (trials / (ONE_IN * BINS) as f64 * 16.0).round()
+    });
+    let table: Vec<f64> = table("LOOKS").into_iter().map(f64::from).collect();
+    assert_eq!(worth.collect::<Vec<_>>(), table);
 }
 
 /// The highest z of each exposure up to each power of two looks, for each width.
