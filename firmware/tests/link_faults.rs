@@ -3,43 +3,35 @@
 
 use std::collections::VecDeque;
 
-use dtof_core::fixed::types::U8F8;
+use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
-    AerDecoder, AerRecord, AerWord, AsyncPixel, Count, DepthEvent, LaserCycle, PaperRule,
-    PixelAddress, PixelConfig, Statistics,
+    AerDecoder, AerRecord, AerWord, AnyRule, AsyncPixel, Count, DepthEstimator, DepthEvent,
+    LaserCycle, PaperRule, PixelAddress, PixelConfig, Statistics,
 };
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message;
 use dtof_link::message::greeting;
-use dtof_link::{Configuration, Report, Token};
+use dtof_link::{Configuration, Report, Source, Token};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 const PIXELS: u16 = 8;
 
 const CONFIGURATION: Configuration = Configuration {
-    alpha: 4 << 8,
-    minimum_count: 5,
+    rule: AnyRule::Paper(PaperRule::new(U8F8::lit("4"), Count::saturating(5))),
+    estimator: DepthEstimator::Centroid3,
     x: 4,
     l1: 20,
     l2: 200,
-    gate_first: 0,
-    gate_last: 127,
+    gate: (0, 127),
+    one_hit_tdc: false,
     pixels: PIXELS,
-    bin_width: 250 << 16,
-    offset: 0,
-    source: 0,
-    rule: 0,
-    window: 0,
-    z: 0,
-    estimator: 0,
-    half_width: 0,
-    output: 0,
-    reference: 0,
-    threshold: 0,
-    one_hit: 0,
+    bin_width_ps: U16F16::lit("250"),
+    offset_mm: I24F8::ZERO,
+    source: Source::Link,
+    dynamic_depth: None,
 };
 
 /// Faults done to the bytes so far.

@@ -87,8 +87,6 @@ fn the_sidecar_decides_recorded_histograms_as_the_core_does() {
     let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut host = Host::new(1, 0);
     let wanted = Configuration {
-        alpha: 4 << 8,
-        minimum_count: 5,
         pixels: 19,
         ..CONFIGURATION
     };

@@ -15,7 +15,7 @@ use dtof_core::{
 use dtof_firmware::sidecar::{Pixel, Sidecar};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message;
-use dtof_link::{Configuration, FaultRecord, Refusal, Report, SensorRecord};
+use dtof_link::{Configuration, DynamicDepth, FaultRecord, Refusal, Report, SensorRecord, Source};
 use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault, simulated};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -32,11 +32,8 @@ fn configurations() -> [(Configuration, PixelConfig<128, AnyRule>); 2] {
     let window = WindowRule::new(3, U4F12::lit("4.5"), minimum_count).unwrap();
     let centred = CentredWindow::new(U8F8::lit("2.5")).unwrap();
     let with_windows = Configuration {
-        rule: 1,
-        window: 3,
-        z: 9 << 11,
-        estimator: 1,
-        half_width: 5 << 7,
+        rule: window.into(),
+        estimator: DepthEstimator::CentredWindow(centred),
         ..CONFIGURATION
     };
     [
@@ -147,16 +144,17 @@ fn dynamic_depth_sends_what_the_core_makes_of_the_events() {
     let (wanted, config) = configurations()[0];
     let scale = RangeScale::new(U16F16::from_num(250), I24F8::ZERO).unwrap();
     // A twentieth of a bin, so that there are many.
-    let threshold = U24F8::lit("2");
-    for (number, reference) in [(0, Reference::Previous), (1, Reference::Reported)] {
+    let threshold_mm = U24F8::lit("2");
+    for reference in [Reference::Previous, Reference::Reported] {
         let mut pixels = Pixels::new();
         let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
         let mut host = Host::new(1, 0);
         let mut sensor = sensor(&script);
         let wanted = Configuration {
-            output: 1,
-            reference: number,
-            threshold: threshold.to_bits(),
+            dynamic_depth: Some(DynamicDepth {
+                threshold_mm,
+                reference,
+            }),
             ..wanted
         };
         host.configure(&mut device, 0, &wanted);
@@ -166,7 +164,7 @@ fn dynamic_depth_sends_what_the_core_makes_of_the_events() {
             host.read(4);
         }
         let report = host.report(&mut device, 5_000);
-        let dynamic_depth = DynamicDepthConfig::new(threshold, &scale, reference).unwrap();
+        let dynamic_depth = DynamicDepthConfig::new(threshold_mm, &scale, reference).unwrap();
         let mut observers = [const { DynamicDepthPixel::<3>::new() }; 8];
         let events = self::reference(&script, &config);
         let expected: Vec<DynamicDepthEvent> = events
@@ -290,7 +288,7 @@ fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
         &mut device,
         10_000,
         &Configuration {
-            source: 0,
+            source: Source::Link,
             ..CONFIGURATION
         },
     );
@@ -356,8 +354,7 @@ fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<1
     let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
     let mut host = Host::new(1, 0);
     let wanted = Configuration {
-        gate_first: 10,
-        gate_last: 99,
+        gate: (10, 99),
         ..wanted
     };
     host.configure(&mut device, 0, &wanted);
@@ -514,15 +511,15 @@ fn a_sensor_is_started_for_each_configuration_and_stopped_once() {
     let mut host = Host::new(1, 0);
     device.poll_sensor(&mut sensor, 0);
     let wanted = |bin_width: u32, source| Configuration {
-        bin_width: bin_width << 16,
+        bin_width_ps: U16F16::from_num(bin_width),
         source,
         ..CONFIGURATION
     };
     for configuration in [
-        wanted(160, 1),
-        wanted(150, 1),
-        wanted(250, 0),
-        wanted(250, 0),
+        wanted(160, Source::Sensor),
+        wanted(150, Source::Sensor),
+        wanted(250, Source::Link),
+        wanted(250, Source::Link),
     ] {
         host.configure(&mut device, 0, &configuration);
         device.poll_sensor(&mut sensor, 0);
@@ -534,7 +531,7 @@ fn a_sensor_is_started_for_each_configuration_and_stopped_once() {
     assert_eq!(sensor.0, expected);
 
     // A new session stops it, too.
-    host.configure(&mut device, 0, &wanted(160, 1));
+    host.configure(&mut device, 0, &wanted(160, Source::Sensor));
     device.poll_sensor(&mut sensor, 2);
     sensor.0.clear();
     let mut next = Host::new(2, 0);
@@ -551,8 +548,8 @@ fn bins_that_are_not_the_sensors_are_refused() {
     // A sixteenth of 160 ps to either side.
     for (bin_width, taken) in [(149, false), (150, true), (170, true), (171, false)] {
         let wanted = Configuration {
-            bin_width: bin_width << 16,
-            source: 1,
+            bin_width_ps: U16F16::from_num(bin_width),
+            source: Source::Sensor,
             ..CONFIGURATION
         };
         let answer = host.answer(&mut device, 0, message::CONFIGURE, &wanted.to_le_bytes());
@@ -564,7 +561,7 @@ fn bins_that_are_not_the_sensors_are_refused() {
         assert_eq!(answer, expected, "{bin_width} ps");
         // Photons of the link have the bins of whoever sends them.
         let wanted = Configuration {
-            source: 0,
+            source: Source::Link,
             ..wanted
         };
         host.configure(&mut device, 0, &wanted);

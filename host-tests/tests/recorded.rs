@@ -6,13 +6,13 @@ mod capture_log;
 use std::path::PathBuf;
 
 use capture_log::{ground_truth, log, tell};
-use dtof::engine::detection::{Estimator, Rule};
 use dtof::engine::host::host_engine;
-use dtof::engine::settings::{I24F8Number, Settings, U16F16Number};
+use dtof::engine::settings::Settings;
 use dtof::input::recorded::{RecordedHistograms, RecordingLength};
 use dtof::input::source::PhotonSource;
 use dtof::input::tmf8820;
 use dtof_core::fixed::types::U8F8;
+use dtof_core::{Count, PaperRule};
 
 const ZONES: usize = 9;
 const CENTRE: usize = 4;
@@ -30,12 +30,11 @@ struct Zone {
 fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES] {
     let settings = Settings {
         bins: tmf8820::BINS,
-        bin_width_ps: U16F16Number(tmf8820::BIN_WIDTH_PS),
-        offset_mm: I24F8Number(tmf8820::OFFSET_MM),
+        bin_width_ps: tmf8820::BIN_WIDTH_PS,
+        offset_mm: tmf8820::OFFSET_MM,
         gate: None,
-        rule: Rule::paper(U8F8::lit("4")),
-        estimator: Estimator::default(),
-        min_count,
+        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(min_count.into())).into(),
+        sigma_bins: None,
         l1: 40,
         l2: 2000,
         x: 4,

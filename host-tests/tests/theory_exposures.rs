@@ -1,17 +1,16 @@
-//! False events of whole exposures: the table against new simulations and
+//! False alarms of whole exposures: the table against new simulations and
 //! against what lies between its points, and `tune` against the engine.
 
-use dtof::engine::detection::{Estimator, Rule};
 use dtof::engine::host::host_engine;
-use dtof::engine::settings::{I24F8Number, Settings, U16F16Number};
+use dtof::engine::settings::Settings;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::{SimulatedArray, SimulatedPixel};
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
-use dtof_core::{Count, DepthEvent, PixelAddress, Threshold};
+use dtof_core::{Count, DepthEvent, PaperRule, PixelAddress, Threshold};
 use dtof_theory::counts::binomial::{alike, plausible};
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::looks::repeated_looks::{
-    ALPHA_STEPS, FalseEvents, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
+    ALPHA_STEPS, FalseAlarms, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
 };
 use dtof_theory::looks::single_look::SingleLook;
 use dtof_theory::looks::table::{self, Found, MARGIN, Row, Table};
@@ -236,7 +235,7 @@ fn how_far_the_table_is_off_between_its_points() {
     ratios.sort_by(f64::total_cmp);
     let [lowest, highest] = [ratios[0], ratios[ratios.len() - 1]];
     println!("{lowest:.2} to {highest:.2} at {} α", ratios.len());
-    // Never far too low, which would let false events through.
+    // Never far too low, which would let false alarms through.
     assert!(
         1.0 / MARGIN < lowest && highest < OFF_ABOVE,
         "{lowest} {highest}"
@@ -258,7 +257,7 @@ const RARE: [(f64, u32, u32); 10] = [
 ];
 
 #[test]
-fn rare_false_events_are_not_more_than_the_upper_limit_and_its_margin() {
+fn rare_false_alarms_are_not_more_than_the_upper_limit_and_its_margin() {
     const EXPOSURES: u32 = 50_000;
     let table = Table::kept().unwrap();
     let mut compared = Vec::new();
@@ -304,12 +303,11 @@ fn request(background: f64, signal: f64, l2: u16, wanted: f64) -> Request {
 fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec<DepthEvent> {
     let settings = Settings {
         bins: 128,
-        bin_width_ps: U16F16Number(U16F16::lit("250")),
-        offset_mm: I24F8Number(I24F8::ZERO),
+        bin_width_ps: U16F16::lit("250"),
+        offset_mm: I24F8::ZERO,
         gate: None,
-        rule: Rule::paper(tuned.alpha),
-        estimator: Estimator::default(),
-        min_count: request.minimum_count,
+        rule: PaperRule::new(tuned.alpha, Count::saturating(request.minimum_count.into())).into(),
+        sigma_bins: None,
         l1: tuned.l1,
         l2: request.l2,
         x: request.x,
@@ -353,18 +351,18 @@ fn tuned_settings_keep_their_word_in_the_engine() {
     for (background, l2, side) in [(0.02, 800, 40), (0.2, 400, 60), (1.0, 300, 24)] {
         let request = request(background, 1.0, l2, wanted);
         let tuned = tune(&request, &table).unwrap();
-        assert!(tuned.false_events <= wanted);
+        assert!(tuned.false_alarms <= wanted);
         let events = first_events(&request, &tuned, 0.0, side);
         let events = u32::try_from(events.len()).unwrap();
         let exposures = side * side;
         println!(
             "B {background}: α {}, L1 {}: {events} of {exposures}, expected {:.4} ({:?})",
-            tuned.alpha, tuned.l1, tuned.false_events, tuned.source
+            tuned.alpha, tuned.l1, tuned.false_alarms, tuned.source
         );
         let share = f64::from(events) / f64::from(exposures);
         assert!(share <= wanted || plausible(events, exposures, wanted, LEVEL / 3.0));
         // And what it says is what happens, but for what the table is off.
-        let [low, high] = [1.0 / OFF_ABOVE, MARGIN].map(|off| off * tuned.false_events);
+        let [low, high] = [1.0 / OFF_ABOVE, MARGIN].map(|off| off * tuned.false_alarms);
         let level = LEVEL / 6.0;
         assert!(
             share >= low || plausible(events, exposures, low, level),
@@ -413,7 +411,7 @@ fn time_and_depth_error_are_those_of_the_engine() {
 #[test]
 fn a_trial_is_a_pure_function() {
     let point = &table::points()[7];
-    let trial = |seed, number| FalseEvents::trial(point, 20, &mut trial_rng(seed, number)).unwrap();
+    let trial = |seed, number| FalseAlarms::trial(point, 20, &mut trial_rng(seed, number)).unwrap();
     assert_eq!(trial(1, 3), trial(1, 3));
     assert_ne!(trial(1, 3), trial(1, 4));
     assert_ne!(trial(1, 3), trial(2, 3));

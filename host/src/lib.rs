@@ -9,7 +9,6 @@
 //!   → Output         events.csv, events.aer, summary.json, pictures, report
 //! ```
 
-pub mod arguments;
 pub mod cli;
 pub mod device;
 pub mod engine;
@@ -19,5 +18,6 @@ pub mod files;
 pub mod geometry;
 pub mod input;
 pub mod progress;
+pub mod rows;
 pub mod simulate;
 pub mod view;

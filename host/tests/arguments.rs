@@ -75,9 +75,6 @@ fn standard_input_and_output_are_no_files_of_that_name() {
         "export events.aer --format csv --out -",
         "export events.aer --format csv --out x --calibration -",
         "monitor --device tcp:localhost:1 --record -",
-        "sweep hit-rate --seeds 0..1 --out -",
-        "merge - --out sum",
-        "merge part --out -",
     ] {
         let output = scratch.dtof(&arguments.split(' ').collect::<Vec<_>>());
         let before = arguments

@@ -9,13 +9,12 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use dtof::device::{self, Client, DeviceEngine};
-use dtof::engine::detection::{Estimator, Rule};
 use dtof::engine::settings::Settings;
 use dtof::engine::{Engine, host::host_engine};
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::scene;
-use dtof_core::DepthEvent;
 use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::{Count, DepthEvent, WindowRule};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 
@@ -28,8 +27,10 @@ fn settings() -> Settings {
 /// The same with the other rule and the other estimator.
 fn with_windows() -> Settings {
     Settings {
-        rule: Rule::window(2, U4F12::lit("4.5")),
-        estimator: Estimator::for_pulse(U8F8::lit("0.55")),
+        rule: WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
+            .unwrap()
+            .into(),
+        sigma_bins: Some(U8F8::lit("0.55")),
         ..settings()
     }
 }
@@ -144,7 +145,7 @@ fn every_rule_and_estimator_gives_the_same_events_on_a_device() {
     let with_windows = with_windows();
     let variants = [
         Settings {
-            estimator: Estimator::default(),
+            sigma_bins: None,
             ..with_windows.clone()
         },
         Settings {

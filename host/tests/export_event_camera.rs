@@ -6,11 +6,11 @@ mod common;
 use common::Scratch;
 use common::aer::{HEADER, byte_of, depth, dynamic, exported, file};
 use dtof::events::aer_file::{Event, Header};
-use dtof::events::dynamic_depth::DynamicDepth;
 use dtof::export::{Format, LaserClock, Options};
 use dtof::input::source::Geometry;
 use dtof_core::fixed::types::U24F8;
 use dtof_core::{DepthEvent, Flags, Reference};
+use dtof_link::DynamicDepth;
 
 /// Time, column, row and whether it is ON, of each event.
 fn evt2(bytes: &[u8]) -> Vec<(u64, u32, u32, bool)> {

@@ -12,19 +12,17 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use dtof::device::monitor::{Outputs, Task, losses, monitor};
 use dtof::device::{self, Client};
-use dtof::engine::detection::Rule;
 use dtof::engine::settings::Settings;
-use dtof::events::dynamic_depth::DynamicDepth;
 use dtof::events::events_csv;
 use dtof_core::fixed::types::{U0F32, U8F8, U8F24, U16F16, U24F8};
 use dtof_core::{
-    AnyRule, AsyncPixel, DepthEvent, DynamicDepthPixel, LaserCycle, PixelAddress, PixelConfig,
-    Reference, Statistics,
+    AnyRule, AsyncPixel, Count, DepthEvent, DynamicDepthPixel, LaserCycle, PaperRule, PixelAddress,
+    PixelConfig, Reference, Statistics,
 };
 use dtof_firmware::sidecar::Sidecar;
-use dtof_link::Report;
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_link::{DynamicDepth, Report};
 use dtof_sensors::simulated::{self, Pulse, Simulated, SimulatedPixel};
 use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
 
@@ -33,7 +31,7 @@ const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
 
 fn settings() -> Settings {
     Settings {
-        rule: Rule::paper(U8F8::lit("4")),
+        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
         l1: 40,
         x: 4,
         ..dtof::simulate::scene::settings(0)

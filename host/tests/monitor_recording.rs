@@ -11,25 +11,25 @@ use std::time::Duration;
 use dtof::device::monitor::map::LiveMap;
 use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::device::{Client, Port};
-use dtof::engine::detection::Rule;
 use dtof::engine::settings::Settings;
 use dtof::events::aer_file::{Event, Header, Reader};
 use dtof::simulate::scene;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
-    AerEncoder, BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, SubBinOffset,
+    AerEncoder, BinIndex, Count, DepthEvent, Flags, LaserCycle, PaperRule, PixelAddress,
+    SubBinOffset,
 };
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message;
 use dtof_link::message::greeting;
-use dtof_link::{Configuration, Report};
+use dtof_link::{Configuration, Report, Source};
 
 const PIXELS: u16 = 4;
 
 fn settings() -> Settings {
     Settings {
-        rule: Rule::paper(U8F8::lit("4")),
+        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
         l1: 40,
         x: 4,
         ..scene::settings(0)
@@ -92,7 +92,7 @@ impl Device {
     fn answer(&mut self, kind: u8, body: &[u8]) {
         let answer = match kind {
             message::CONFIGURE => {
-                if Configuration::from_le_bytes(body).unwrap().source == 0 {
+                if Configuration::from_le_bytes(body).unwrap().source == Source::Link {
                     self.event(Moment::Stops);
                 }
                 (message::CONFIGURED, Vec::new())

@@ -27,7 +27,7 @@ fn a_steady_pixel_reports_when_the_flow_chart_says() {
         &["--alpha", "8", "--x", "4", "--l1", "40", "--l2", "2000"],
     );
     // N = 44 is the first multiple of 4 above 40; cycles count from 0. All in
-    // bin 60 puts the centre of mass at 60.5 bins of 37.474 mm.
+    // bin 60 puts the centroid at 60.5 bins of 37.474 mm.
     let expected = "43,7,44,60,60.5000,2267.180,44,0,0\n87,7,44,60,60.5000,2267.180,44,0,0\n";
     assert_eq!(
         scratch.read("out/events.csv"),
@@ -316,7 +316,7 @@ fn replay_takes_the_stated_defaults_and_keeps_quiet() {
     let summary: serde_json::Value =
         serde_json::from_str(&scratch.read("out/summary.json")).unwrap();
     let settings = serde_json::json!({
-        "bins": 128, "bin_width_ps": 250.0, "offset_mm": 0.0, "gate": null, "rule": "paper", "alpha": 4.0, "estimator": "centre-of-mass-3",
+        "bins": 128, "bin_width_ps": 250.0, "offset_mm": 0.0, "gate": null, "rule": "paper", "alpha": 4.0, "estimator": "centroid",
         "min_count": 5, "l1": 40, "l2": 2000, "x": 4, "one_hit_tdc": false, "seed": 1
     });
     assert_eq!(summary["settings"], settings);

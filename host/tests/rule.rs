@@ -37,11 +37,11 @@ fn replay(scratch: &Scratch, options: &str) -> Output {
 }
 
 #[test]
-fn without_an_option_it_is_the_papers_rule_and_centre_of_mass() {
+fn without_an_option_it_is_the_papers_rule_and_centroid() {
     let (settings, events) = replayed("");
     assert_eq!(
         (&settings["rule"], &settings["estimator"]),
-        (&"paper".into(), &"centre-of-mass-3".into())
+        (&"paper".into(), &"centroid".into())
     );
     assert_eq!(settings["alpha"], 4.0);
     for name in ["window", "z", "sigma_bins"] {
@@ -73,12 +73,12 @@ fn the_pulse_chooses_estimator_and_window() {
     let (settings, _) = replayed("--rule window --sigma-bins 1 --window 5");
     assert_eq!(settings["window"], 5);
     let (settings, _) = replayed("--rule window --window 5");
-    assert_eq!(settings["estimator"], "centre-of-mass-3");
+    assert_eq!(settings["estimator"], "centroid");
 }
 
-/// What `z_for` gives for one in 100 exposures: `core/tests/window_z.rs` holds it.
+/// What `z_for` gives for one in 100 exposures: `core/tests/detect/window_z.rs` holds it.
 #[test]
-fn the_false_events_choose_z() {
+fn the_false_alarms_choose_z() {
     let z = |options: &str| {
         let (settings, _) = replayed(&format!("--rule window --window 2 {options}"));
         settings["z"].as_f64().unwrap()
@@ -88,15 +88,18 @@ fn the_false_events_choose_z() {
         dtof_core::z_for(one_in, &gate, 4, l1, 2000).to_num::<f64>()
     };
     assert_eq!(z(""), z_for(100, 0, 127, 40));
-    assert_eq!(z("--false-one-in 1000"), z_for(1000, 0, 127, 40));
+    assert_eq!(z("--false-alarm 0.01"), z(""));
+    assert_eq!(z("--false-alarm 1e-3"), z_for(1000, 0, 127, 40));
+    // Of a share that is not one in a whole number, the next rarer one.
+    assert_eq!(z("--false-alarm 0.03"), z_for(34, 0, 127, 40));
     assert_eq!(z("--gate 20..119 --l1 8"), z_for(100, 20, 119, 8));
-    assert!(z("--false-one-in 1000") > z("") && z("") > z("--gate 20..119"));
+    assert!(z("--false-alarm 0.001") > z("") && z("") > z("--gate 20..119"));
 }
 
 #[test]
 fn the_summary_says_how_to_do_it_again() {
     for options in [
-        "--rule window --sigma-bins 0.7 --false-one-in 333 --l1 8",
+        "--rule window --sigma-bins 0.7 --false-alarm 0.003 --l1 8",
         "--rule window --window 4 --z 3.1 --l1 8",
         "--sigma-bins 1.3 --alpha 3.3 --l1 8",
     ] {
@@ -138,12 +141,12 @@ fn options_that_contradict_each_other_are_refused_in_one_line() {
         ("--z 4", &["--z is for --rule window"]),
         ("--window 3", &["--window is for --rule window"]),
         (
-            "--false-one-in 99",
-            &["--false-one-in is for --rule window"],
+            "--false-alarm 0.02",
+            &["--false-alarm is for --rule window"],
         ),
         (
-            "--rule window --window 3 --z 4 --false-one-in 99",
-            &["--z", "--false-one-in"],
+            "--rule window --window 3 --z 4 --false-alarm 0.02",
+            &["--z", "--false-alarm"],
         ),
         ("--rule window", &["--window", "--sigma-bins"]),
         ("--rule window --window 0", &["--window", "from 1 to 7"]),
@@ -158,8 +161,16 @@ fn options_that_contradict_each_other_are_refused_in_one_line() {
             &["--z", "a number from 0"],
         ),
         (
-            "--rule window --window 3 --false-one-in 9",
-            &["--false-one-in"],
+            "--rule window --window 3 --false-alarm 0.11",
+            &["--false-alarm", "at most 0.1"],
+        ),
+        (
+            "--rule window --window 3 --false-alarm 0",
+            &["--false-alarm", "above 0"],
+        ),
+        (
+            "--rule window --window 3 --false-alarm 1e-9",
+            &["--false-alarm 0.000000001", "no z for so few"],
         ),
         ("--sigma-bins 0", &["--sigma-bins", "above 0"]),
         ("--sigma-bins -1", &["--sigma-bins"]),

@@ -3,7 +3,7 @@
 mod common;
 
 use common::Scratch;
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 
 #[test]
 fn events_of_a_moving_target_are_compared_with_the_truth_of_their_laser_cycle() {

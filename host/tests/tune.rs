@@ -88,23 +88,23 @@ fn the_histogram_is_one_of_the_options() {
 }
 
 #[test]
-fn fewer_false_events_take_a_higher_alpha_and_longer() {
+fn fewer_false_alarms_take_a_higher_alpha_and_longer() {
     let fixed = format!("{PIXEL} --l1 80");
-    let often = json(&format!("{fixed} --false-per-exposure 0.1"));
-    let seldom = json(&format!("{fixed} --false-per-exposure 0.0001"));
+    let often = json(&format!("{fixed} --false-alarm 0.1"));
+    let seldom = json(&format!("{fixed} --false-alarm 0.0001"));
     assert!(value(&often, "alpha") < value(&seldom, "alpha"));
     assert!(value(&often, "cycles_to_event") < value(&seldom, "cycles_to_event"));
     for (result, wanted) in [(&often, 0.1), (&seldom, 0.0001)] {
-        let found = value(result, "false_events");
+        let found = value(result, "false_alarms");
         assert!(found <= wanted);
         assert!(value(result, "at_least") <= found && found <= value(result, "at_most"));
         // A multiple of 1/256.
         assert_eq!((value(result, "alpha") * 256.0).fract(), 0.0);
     }
     // Too seldom for the table: the bound, which says so.
-    let source = seldom["false_events"]["source"].as_str().unwrap();
+    let source = seldom["false_alarms"]["source"].as_str().unwrap();
     assert!(source.starts_with("formula: upper bound"), "{source}");
-    let source = often["false_events"]["source"].as_str().unwrap();
+    let source = often["false_alarms"]["source"].as_str().unwrap();
     assert!(source.starts_with("simulation: table"), "{source}");
 }
 
@@ -121,12 +121,12 @@ fn snr_and_picoseconds_say_the_same() {
 }
 
 #[test]
-fn false_events_a_second_depend_on_the_laser() {
+fn false_alarms_a_second_depend_on_the_laser() {
     // 0.01 an exposure of 2000 laser cycles at 1 MHz are 5 a second.
     let result = json(&format!(
-        "{PIXEL} --l1 40 --false-per-second 5 --laser-hz 1e6"
+        "{PIXEL} --l1 40 --false-alarms-per-second 5 --laser-hz 1e6"
     ));
-    let wanted = json(&format!("{PIXEL} --l1 40 --false-per-exposure 0.01"));
+    let wanted = json(&format!("{PIXEL} --l1 40 --false-alarm 0.01"));
     // A little higher, as exposures with an event are shorter.
     let [higher, alpha] = [result.clone(), wanted].map(|result| value(&result, "alpha"));
     assert!(alpha <= higher && higher < alpha + 0.05, "{alpha} {higher}");
@@ -173,7 +173,7 @@ fn what_cannot_be_met_is_refused_in_one_line() {
     }
     // One photon and an empty background: no α helps.
     refused(
-        "--background 0.01 --signal 1 --sigma-bins 0.8 --min-count 1 --l1 8 --false-per-exposure 1e-9",
+        "--background 0.01 --signal 1 --sigma-bins 0.8 --min-count 1 --l1 8 --false-alarm 1e-9",
         &["no α", "--min-count"],
     );
     refused(
@@ -186,7 +186,7 @@ fn what_cannot_be_met_is_refused_in_one_line() {
     );
     refused(&format!("{PIXEL} --l2 8"), &["--l2 8", "greater than 2 X"]);
     refused(&format!("{PIXEL} --bins 100"), &["--bins", "power of two"]);
-    refused(&format!("{PIXEL} --false-per-exposure 1"), &["less than 1"]);
+    refused(&format!("{PIXEL} --false-alarm 1"), &["less than 1"]);
     refused(
         "--background 0.05 --signal 1 --sigma-bins 100",
         &["does not fit 128 bins"],
@@ -199,7 +199,10 @@ fn options_that_are_missing_or_no_numbers_are_named() {
     refused("--background 0.05 --signal 1", &["--sigma-bins"]);
     refused("--signal 1 --sigma-bins 1", &["--background"]);
     refused(&format!("{PIXEL} --snr 5"), &["--snr", "--signal"]);
-    refused(&format!("{PIXEL} --false-per-second 1"), &["--laser-hz"]);
+    refused(
+        &format!("{PIXEL} --false-alarms-per-second 1"),
+        &["--laser-hz"],
+    );
     for bad in ["0", "-1", "nan", "inf", "x"] {
         refused(
             &format!("--background={bad} --signal 1 --sigma-bins 1"),
@@ -237,11 +240,11 @@ fn the_window_rule_has_a_z_a_window_and_an_estimator() {
 }
 
 #[test]
-fn z_is_that_of_the_core_and_keeps_false_events_down() {
+fn z_is_that_of_the_core_and_keeps_false_alarms_down() {
     let gate = dtof_core::RangeGate::<128>::full();
     for one_in in [10, 100, 1000] {
         let result = json(&format!(
-            "{WINDOW} --l1 40 --false-per-exposure {}",
+            "{WINDOW} --l1 40 --false-alarm {}",
             1.0 / f64::from(one_in)
         ));
         let z = dtof_core::z_for(one_in, &gate, 4, 40, 2000).to_num::<f64>();
@@ -249,15 +252,15 @@ fn z_is_that_of_the_core_and_keeps_false_events_down() {
         // `z_for`: 0.4 to 1.2 times as many; 4 standard deviations of 4000 exposures.
         let wanted = 1.0 / f64::from(one_in);
         let deviation = (wanted / 4000.0).sqrt();
-        let found = value(&result, "false_events");
-        let source = result["false_events"]["source"].as_str().unwrap();
+        let found = value(&result, "false_alarms");
+        let source = result["false_alarms"]["source"].as_str().unwrap();
         assert!(source.contains("in 4000 exposures"), "{source}");
         assert!(found < 1.2 * wanted + 4.0 * deviation, "{found} {wanted}");
         assert!(found > 0.4 * wanted - 4.0 * deviation, "{found} {wanted}");
     }
 }
 
-/// A window with the z for 1 % false events is faster than the paper's rule with the α
+/// A window with the z for 1 % false alarms is faster than the paper's rule with the α
 /// for it, and the centred window nearer.
 #[test]
 fn the_window_rule_is_faster_and_nearer() {
@@ -287,9 +290,9 @@ fn the_window_rule_refuses_what_the_papers_does() {
     refused(&format!("{WINDOW} --bins 100"), &["--bins", "power of two"]);
     // z goes on for ever, its table does not.
     refused(
-        &format!("{WINDOW} --l1 40 --false-per-exposure 1e-300"),
+        &format!("{WINDOW} --l1 40 --false-alarm 1e-300"),
         &["there is no z for so few"],
     );
-    let rare = json(&format!("{WINDOW} --l1 40 --false-per-exposure 1e-6"));
+    let rare = json(&format!("{WINDOW} --l1 40 --false-alarm 1e-6"));
     assert!((6.0..6.44).contains(&value(&rare, "z")));
 }

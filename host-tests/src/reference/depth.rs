@@ -3,7 +3,7 @@
 /// Speed of light in vacuum, in metres per second.
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
-/// The sub-bin position of a peak, by the centre of mass of the peak bin and
+/// The sub-bin position of a peak, by the centroid of the peak bin and
 /// its two neighbours (the CMM of sec. III-A).
 ///
 /// The background is taken off each of the three counts and what would be

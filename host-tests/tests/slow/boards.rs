@@ -15,13 +15,13 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, ensure};
 use dtof::device::monitor;
 use dtof::device::{Client, DeviceEngine, configuration};
-use dtof::engine::detection::{Estimator, Rule};
-use dtof::engine::settings::{Settings, U16F16Number};
+use dtof::engine::settings::Settings;
 use dtof::engine::{Engine, host::host_engine};
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::scene;
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_link::FaultRecord;
+use dtof_core::{Count, PaperRule, WindowRule};
+use dtof_link::{FaultRecord, Source};
 
 use crate::emulator::{Board, Emulator, End, QEMU};
 use crate::{dtof, root, skipped, stack, succeed, target_folder, version, wanted};
@@ -199,7 +199,7 @@ fn log(image: &Path, bytes: Vec<u8>) -> Result<String> {
 /// What decides the events: a setting at which there are many.
 fn settings() -> Settings {
     Settings {
-        rule: Rule::paper(U8F8::lit("4")),
+        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
         l1: 20,
         x: 4,
         ..scene::settings(1)
@@ -209,8 +209,10 @@ fn settings() -> Settings {
 /// The other rule and the other estimator.
 fn with_windows() -> Settings {
     Settings {
-        rule: Rule::window(2, U4F12::lit("4.5")),
-        estimator: Estimator::for_pulse(U8F8::lit("0.55")),
+        rule: WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
+            .unwrap()
+            .into(),
+        sigma_bins: Some(U8F8::lit("0.55")),
         ..settings()
     }
 }
@@ -311,9 +313,9 @@ fn says_unplugged(
     let about = client.sensor()?.context("no sensor")?;
     let mut wanted = settings();
     if let Some(bin_width) = about.bin_width {
-        wanted.bin_width_ps = U16F16Number(bin_width);
+        wanted.bin_width_ps = bin_width;
     }
-    client.configure(&configuration(&wanted, pixels, 1, None)?)?;
+    client.configure(&configuration(&wanted, pixels, Source::Sensor, None)?)?;
     let since = Instant::now();
     let report = loop {
         let report = client.report()?;

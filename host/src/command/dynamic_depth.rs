@@ -1,9 +1,9 @@
 //! The options of dynamic depth, the same for every command.
 
 use clap::{Args, ValueEnum};
-use dtof::arguments::fixed;
-use dtof::events::dynamic_depth::DynamicDepth;
+use dtof::cli::arguments::fixed;
 use dtof_core::fixed::types::U24F8;
+use dtof_link::DynamicDepth;
 
 #[derive(Args)]
 pub struct Options {

@@ -14,7 +14,8 @@ pub mod tune;
 use std::io::{self, Write};
 use std::path::Path;
 
-use dtof::events::summary::{Row, Summary, aligned};
+use dtof::events::summary::Summary;
+use dtof::rows::{Row, aligned};
 
 /// What a run came to, on the terminal.
 fn print_summary(summary: &Summary, more: &[Row], folder: &Path) -> io::Result<()> {

@@ -9,7 +9,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use console::Term;
-use dtof::arguments::{fixed, path, whole};
+use dtof::cli::arguments::{fixed, path, whole};
 use dtof::device::monitor::map::{LiveMap, SHOW_CURSOR};
 use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::device::{self, Client};
@@ -125,8 +125,8 @@ impl Monitor {
                 let header = Header {
                     bins: client.bins().into(),
                     geometry,
-                    bin_width_ps: settings.bin_width_ps.0,
-                    offset_mm: settings.offset_mm.0,
+                    bin_width_ps: settings.bin_width_ps,
+                    offset_mm: settings.offset_mm,
                 };
                 Some(Recording::new(file, &header)?)
             }

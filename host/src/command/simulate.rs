@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::arguments::{path, whole};
+use dtof::cli::arguments::{path, whole};
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::run::run;
 use dtof::engine::settings::Settings;

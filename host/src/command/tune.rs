@@ -1,4 +1,4 @@
-//! `dtof tune`: the threshold and L1 for a wanted rate of false events.
+//! `dtof tune`: the threshold and L1 for a wanted rate of false alarms.
 
 mod window;
 
@@ -7,7 +7,7 @@ use std::io::{self, Write};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::arguments::{bins, positive, whole};
+use dtof::cli::arguments::{bins, positive, whole};
 use dtof::simulate::MM_PER_PS;
 use dtof_theory::gaussian;
 use dtof_theory::looks::detections::Detections;
@@ -44,12 +44,13 @@ pub struct Tune {
     /// Picoseconds a bin
     #[arg(long, value_name = "PS", default_value_t = 250.0, value_parser = positive)]
     bin_width_ps: f64,
-    /// False events an exposure of a pixel without a target, at most [default: 0.01]
-    #[arg(long, value_name = "P", value_parser = positive, conflicts_with = "false_per_second")]
-    false_per_exposure: Option<f64>,
-    /// Instead: false events a second
-    #[arg(long, value_name = "R", value_parser = positive, requires = "laser_hz")]
-    false_per_second: Option<f64>,
+    /// False alarms: the share of exposures without a target that end with an event, at most
+    /// [default: 0.01]
+    #[arg(long, value_name = "SHARE", value_parser = positive, conflicts_with = "false_alarms_per_second")]
+    false_alarm: Option<f64>,
+    /// Instead: false alarms of a pixel a second
+    #[arg(long, value_name = "RATE", value_parser = positive, requires = "laser_hz")]
+    false_alarms_per_second: Option<f64>,
     /// Laser cycles a second
     #[arg(long, value_name = "HZ", value_parser = positive)]
     laser_hz: Option<f64>,
@@ -117,9 +118,9 @@ impl Tune {
             number(sigma),
             self.bins
         );
-        let wanted = match (self.false_per_second, self.laser_hz) {
+        let wanted = match (self.false_alarms_per_second, self.laser_hz) {
             (Some(per_second), Some(laser_hz)) => Wanted::PerCycle(per_second / laser_hz),
-            _ => Wanted::PerExposure(self.false_per_exposure.unwrap_or(0.01)),
+            _ => Wanted::PerExposure(self.false_alarm.unwrap_or(0.01)),
         };
         Ok(Request {
             background: self.background,
@@ -139,7 +140,7 @@ impl Tune {
     fn paper(&self, request: &Request) -> Result<(Vec<Line>, String)> {
         let table = Table::kept()?;
         let tuned = tune(request, &table)?;
-        let false_events = match tuned.source {
+        let false_alarms = match tuned.source {
             Source::Table => format!("simulation: table, {} exposures a point", table.exposures),
             Source::TableAtMost => format!(
                 "simulation: at most, the least the table saw, {} exposures a point",
@@ -148,17 +149,17 @@ impl Tune {
             Source::Bound => "formula: upper bound, single looks (exact) added up".to_owned(),
         };
         let exact = |what: &str| format!("formula: {what}, single look (exact)");
-        let alpha = format!("smallest for the false events wanted; {false_events}");
+        let alpha = format!("smallest for the false alarms wanted; {false_alarms}");
         let gaussian = gaussian::alpha_min(tuned.wanted, u32::from(request.bins) - 1);
         let mut lines = vec![
             Line("alpha", "α", tuned.alpha.to_num(), "", alpha),
             self.l1(tuned.l1, &tuned.detections),
             Line(
-                "false_events",
-                "false events",
-                tuned.false_events,
+                "false_alarms",
+                "false alarms",
+                tuned.false_alarms,
                 "an exposure",
-                false_events,
+                false_alarms,
             ),
             Line(
                 "at_least",

@@ -9,14 +9,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use dtof_core::{RangeScale, Statistics};
-use dtof_link::FaultRecord;
-use dtof_link::Report;
 use dtof_link::endpoint::LinkCounters;
+use dtof_link::{DynamicDepth, FaultRecord, Report, Source};
 
 use crate::device::{Client, configuration};
 use crate::engine::settings::Settings;
 use crate::events::aer_file::Event;
-use crate::events::dynamic_depth::DynamicDepth;
 use crate::events::events_csv;
 use crate::input::source::Geometry;
 use map::LiveMap;
@@ -153,7 +151,7 @@ fn watch(
 ) -> Result<()> {
     let configuration =
         |source| configuration(task.settings, task.pixels, source, task.dynamic_depth);
-    client.configure(&configuration(1)?)?;
+    client.configure(&configuration(Source::Sensor)?)?;
     let started = Instant::now();
     let mut figures = Figures {
         since: started,
@@ -194,7 +192,7 @@ fn watch(
         outputs.tell(figures.line(client, &report), readers)?;
     }
     // After the answer there are no more events.
-    client.configure(&configuration(0)?)
+    client.configure(&configuration(Source::Link)?)
 }
 
 fn header(out: &mut dyn Write, columns: &str) -> io::Result<()> {

@@ -105,7 +105,7 @@ impl<const BINS: usize> FrameEngine<BINS> {
         let pixels = addresses.iter();
         Ok(Self {
             gate: settings.range_gate()?,
-            estimator: settings.estimator.in_core(),
+            estimator: settings.estimator(),
             pixels: pixels
                 .map(|&address| FramePixel::new(address, 0, length))
                 .collect(),

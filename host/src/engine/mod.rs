@@ -1,6 +1,5 @@
 //! The engine: photons in, depth events out.
 
-pub mod detection;
 pub mod frame;
 pub mod host;
 pub mod run;

@@ -71,8 +71,8 @@ impl Output {
         let header = aer_file::Header {
             bins: u32::try_from(settings.bins)?,
             geometry,
-            bin_width_ps: settings.bin_width_ps.0,
-            offset_mm: settings.offset_mm.0,
+            bin_width_ps: settings.bin_width_ps,
+            offset_mm: settings.offset_mm,
         };
         let aer = aer_file::Writer::new(BufWriter::new(aside(folder, OF_A_RUN)?), &header)?;
         Ok(Self {

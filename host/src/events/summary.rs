@@ -3,11 +3,12 @@
 
 pub mod truth;
 
-use dtof_core::Statistics;
+use dtof_core::{AnyRule, DepthEstimator, Statistics};
 use serde::Serialize;
 
 use crate::engine::settings::Settings;
 use crate::input::source::PhotonSource;
+use crate::rows::{Row, grouped};
 use truth::AgainstTruth;
 
 /// Every `summary.json` begins with it, less the version.
@@ -59,9 +60,6 @@ pub struct Summary {
     /// How the pixels operated.
     pub settings: Settings,
 }
-
-/// A name and a value, for people.
-pub type Row = (String, String);
 
 impl Summary {
     /// Puts together what the pixels counted and where it came from.
@@ -177,11 +175,8 @@ impl Settings {
             format!("{first}..{last}")
         });
         let mut rows = vec![
-            row(
-                "bins",
-                format!("{} of {} ps", self.bins, self.bin_width_ps.0),
-            ),
-            row("range offset", format!("{} mm", self.offset_mm.0)),
+            row("bins", format!("{} of {} ps", self.bins, self.bin_width_ps)),
+            row("range offset", format!("{} mm", self.offset_mm)),
             row("range gate", gate),
         ];
         rows.extend(self.detection_rows());
@@ -226,39 +221,38 @@ impl Settings {
     #[must_use]
     pub fn detection_rows(&self) -> [Row; 2] {
         let decision = match self.frame {
-            None => self.rule.row(self.min_count),
+            None => ("threshold".to_owned(), threshold(&self.rule)),
             Some(length) => (
                 "frames".to_owned(),
                 format!("the highest bin of each {length} laser cycles"),
             ),
         };
-        [decision, self.estimator.row()]
+        let depth = match self.estimator() {
+            DepthEstimator::Centroid3 => "centroid of 3 bins".to_owned(),
+            DepthEstimator::CentredWindow(window) => {
+                format!("centred window of ±{} bins", window.half_width())
+            }
+        };
+        [decision, ("depth".to_owned(), depth)]
     }
 }
 
-/// A number with its thousands apart: 12,345.
-#[must_use]
-pub fn grouped(value: u64) -> String {
-    let digits = value.to_string();
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(',');
+/// What a detection exceeds.
+fn threshold(rule: &AnyRule) -> String {
+    match rule {
+        AnyRule::Paper(rule) => {
+            let threshold = rule.threshold();
+            format!(
+                "background + {} × its square root (α), at least {} photons",
+                threshold.alpha(),
+                threshold.minimum_count()
+            )
         }
-        text.push(digit);
+        AnyRule::Window(rule) => format!(
+            "in a window of {} bins: background + {} standard deviations (z), at least {} photons",
+            rule.width(),
+            rule.z(),
+            rule.minimum_count()
+        ),
     }
-    text
-}
-
-/// Rows as lines of text, names to the left, values aligned.
-#[must_use]
-pub fn aligned(rows: &[Row]) -> String {
-    let width = rows
-        .iter()
-        .map(|(name, _)| name.chars().count())
-        .max()
-        .unwrap_or(0);
-    rows.iter()
-        .map(|(name, value)| format!("  {name:width$}  {value}\n"))
-        .collect()
 }

@@ -17,11 +17,11 @@ use std::io::{self, Write};
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::{DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Polarity};
+use dtof_link::DynamicDepth;
 
 use super::reorder::{Reorder, WAITING};
 use super::{Finished, LaserClock, Out, Sink};
 use crate::events::aer_file::Event;
-use crate::events::dynamic_depth::DynamicDepth;
 use crate::input::source::Geometry;
 
 /// Columns and rows are sent in 11 bits.

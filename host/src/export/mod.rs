@@ -23,10 +23,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use dtof_core::RangeScale;
+use dtof_link::DynamicDepth;
 use tempfile::NamedTempFile;
 
 use crate::events::aer_file::{Event, EventKind};
-use crate::events::dynamic_depth::DynamicDepth;
 use crate::files::{aside, flushed, place_of};
 use crate::geometry::{FieldOfView, Rays};
 use crate::input::source::Geometry;
@@ -178,7 +178,10 @@ pub fn export(
             mcap::Mcap::new(file, projection, array, kind, [slice_ns, end_ns]).map(boxed)
         }
         Format::Evt2 => {
-            let config = options.dynamic_depth.config(&projection.scale)?;
+            let changes = &options.dynamic_depth;
+            let config = changes
+                .config(&projection.scale)
+                .with_context(|| format!("--threshold-mm {}", changes.threshold_mm))?;
             evt2::Evt2::new(file, array, options.clock, config).map(boxed)
         }
     };

@@ -9,11 +9,10 @@ mod file;
 mod surface;
 
 use anyhow::{Result, ensure};
-use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::{Count, PaperRule, PixelAddress};
 
-use crate::engine::detection::{Estimator, Rule};
-use crate::engine::settings::{I24F8Number, Settings, U16F16Number};
+use crate::engine::settings::Settings;
 use crate::geometry::FieldOfView;
 use crate::input::source::{Geometry, PhotonSource};
 use crate::simulate::effects::Effects;
@@ -266,12 +265,11 @@ impl Scene {
 pub fn settings(seed: u64) -> Settings {
     Settings {
         bins: 128,
-        bin_width_ps: U16F16Number(U16F16::lit("250")),
-        offset_mm: I24F8Number(I24F8::ZERO),
+        bin_width_ps: U16F16::lit("250"),
+        offset_mm: I24F8::ZERO,
         gate: None,
-        rule: Rule::paper(U8F8::lit("8")),
-        estimator: Estimator::default(),
-        min_count: 5,
+        rule: PaperRule::new(U8F8::lit("8"), Count::saturating(5)).into(),
+        sigma_bins: None,
         l1: 100,
         l2: 2000,
         x: 10,

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 use clap::Args;
-use dtof::arguments::path;
+use dtof::cli::arguments::path;
 use dtof_lab::pages;
 use dtof_lab::pages::Anew;
 use std::io;

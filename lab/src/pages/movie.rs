@@ -9,8 +9,8 @@ use dtof_core::RangeScale;
 
 use dtof::engine::host::host_engine;
 use dtof::events::events_csv::range_mm;
-use dtof::events::summary::grouped;
 use dtof::input::source::{Geometry, PhotonSource};
+use dtof::rows::grouped;
 use dtof::simulate::scene::{self, Scene};
 use dtof::view::palette;
 use dtof::view::picture::{levels, span};

@@ -10,7 +10,7 @@ use crate::sweep::mean::{add, add_error};
 use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::{Part, Point, Study, Tally, point};
 use anyhow::{Context, Result};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Series, Style};
 use dtof::view::palette;
 use dtof::view::palette::Pen;

@@ -1,8 +1,7 @@
 //! The window rule.
 
 use anyhow::{Result, ensure};
-use dtof::engine::detection::WIDEST_PULSE;
-use dtof_core::DepthEstimator;
+use dtof_core::{CentredWindow, DepthEstimator};
 use dtof_theory::tune::{Request, window};
 
 use super::{Line, Tune, number};
@@ -11,14 +10,15 @@ impl Tune {
     /// z, L1 and what to expect of them; the options for it.
     #[allow(clippy::cast_precision_loss)]
     pub(super) fn window(&self, request: &Request) -> Result<(Vec<Line>, String)> {
+        let widest = CentredWindow::WIDEST_PULSE;
         ensure!(
-            request.sigma <= WIDEST_PULSE.to_num::<f64>(),
-            "a pulse of σ = {} bins is too wide for a window, which suits up to {WIDEST_PULSE}; take \
+            request.sigma <= widest.to_num::<f64>(),
+            "a pulse of σ = {} bins is too wide for a window, which suits up to {widest}; take \
              wider bins, or --rule paper",
             number(request.sigma)
         );
         let tuned = window::tune(request)?;
-        let (exposures, events) = tuned.false_events;
+        let (exposures, events) = tuned.false_alarms;
         let mut lines = vec![
             Line(
                 "z",
@@ -26,7 +26,7 @@ impl Tune {
                 tuned.z.to_num(),
                 "",
                 format!(
-                    "for a false event in {} exposures; simulation: table",
+                    "for a false alarm in {} exposures; simulation: table",
                     tuned.one_in
                 ),
             ),
@@ -50,8 +50,8 @@ impl Tune {
         lines.extend([
             self.l1(tuned.l1, &tuned.detections),
             Line(
-                "false_events",
-                "false events",
+                "false_alarms",
+                "false alarms",
                 events as f64 / exposures as f64,
                 "an exposure",
                 format!(

@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::{Row, grouped};
+use crate::rows::{Row, grouped};
 
 /// An event is a false alarm if its range lies farther from the truth than this many bins.
 pub const FALSE_BEYOND_BINS: f64 = 3.0;

@@ -5,7 +5,8 @@ use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
 use serde::Deserialize;
 
-use super::limits::{LONGEST_PS, Timing, within};
+use super::limits::{LONGEST_PS, Timing};
+use crate::input::range::within;
 
 /// Every time is measured with a normally distributed error; its variance adds
 /// to that of the pulse.

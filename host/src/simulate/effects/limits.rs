@@ -2,8 +2,6 @@
 
 use std::ops::RangeInclusive;
 
-use anyhow::{Result, ensure};
-
 /// The most picoseconds an effect may last: 100 µs.
 pub(in crate::simulate) const LONGEST_PS: f64 = 1e8;
 
@@ -22,17 +20,4 @@ pub struct Timing {
     pub bin_width_ps: f64,
     /// From one laser pulse to the next, in bins; at least `bins`.
     pub period: f64,
-}
-
-/// Is `value` in `range`? Infinity and what is not a number never are.
-///
-/// # Errors
-/// A line that names the key, the value and the range.
-pub fn within(key: &str, value: f64, range: RangeInclusive<f64>) -> Result<()> {
-    let (least, most) = (range.start(), range.end());
-    ensure!(
-        range.contains(&value),
-        "{key} {value}: must be from {least} to {most}"
-    );
-    Ok(())
 }

@@ -9,10 +9,10 @@ use serde::Deserialize;
 use super::Scene;
 use super::surface::{Ball, Fan, Light, Plane, Rectangle, Shape, Surface};
 use crate::geometry::FieldOfView;
+use crate::input::range::within;
 use crate::input::source::Geometry;
 use crate::simulate::MM_PER_PS;
 use crate::simulate::effects::Effects;
-use crate::simulate::effects::limits::within;
 use crate::simulate::effects::{
     afterpulsing::Afterpulsing, cover_glass::CoverGlass, dead_time::DeadTime,
     hot_pixels::HotPixels, jitter::Jitter, second_echo::SecondEcho, tail::Tail, tdc::Tdc,

@@ -6,8 +6,8 @@ use serde_json::json;
 
 use super::BASE64;
 use crate::events::sample::Sample;
-use crate::events::summary::grouped;
 use crate::input::source::Geometry;
+use crate::rows::grouped;
 use crate::view::palette;
 use crate::view::picture;
 use dtof_core::PixelAddress;

@@ -4,14 +4,14 @@
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Share, Table, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use anyhow::{Context, Result};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
 use dtof::view::palette::alpha as pen;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, Threshold};
 use dtof_theory::gaussian::false_positive_rate;
 use dtof_theory::looks::repeated_looks::{
-    ALPHA_STEPS, BINS, FalseEvents, MINIMUM_COUNT, alpha_bits,
+    ALPHA_STEPS, BINS, FalseAlarms, MINIMUM_COUNT, alpha_bits,
 };
 use dtof_theory::looks::single_look::SingleLook;
 use dtof_theory::looks::{repeated_looks, table};
@@ -70,7 +70,7 @@ fn name(last: u32, step: usize) -> String {
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let point = of_table(point)?;
-    let found = FalseEvents::trial(&point, EXPOSURES, rng)?;
+    let found = FalseAlarms::trial(&point, EXPOSURES, rng)?;
     let mut tally = Tally::from([("exposures".to_owned(), found.exposures)]);
     for (&last, events) in point.lasts.iter().zip(&found.events) {
         for (step, &count) in events.iter().enumerate() {
@@ -85,9 +85,9 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 }
 
 /// The tally of a point, added up again.
-fn false_events(point: &PointTally) -> Result<(repeated_looks::Point, FalseEvents)> {
+fn false_events(point: &PointTally) -> Result<(repeated_looks::Point, FalseAlarms)> {
     let of = of_table(&point.parameters)?;
-    let mut sum = FalseEvents::new(of.lasts.len());
+    let mut sum = FalseAlarms::new(of.lasts.len());
     sum.exposures = point.count("exposures");
     for (&last, events) in of.lasts.iter().zip(&mut sum.events) {
         let mut higher = 0;
@@ -119,7 +119,7 @@ fn shares(part: &Part, last: u32, alpha: u16) -> Result<Vec<(f64, Share)>> {
 fn exact(background: f64, alpha: u16) -> f64 {
     let minimum_count = Count::saturating(MINIMUM_COUNT.into());
     let threshold = Threshold::new(U8F8::from_num(alpha), minimum_count);
-    SingleLook::new(128, background).false_event_probability(&threshold)
+    SingleLook::new(128, background).false_alarm_probability(&threshold)
 }
 
 /// Eq. 10, all bins but the pulse's.

@@ -5,7 +5,7 @@ use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target}
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, Study, Tally, point};
 use anyhow::Result;
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
 use dtof::view::palette::alpha as pen;
 use dtof_core::isqrt;

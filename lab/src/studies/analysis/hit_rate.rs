@@ -4,7 +4,7 @@ use super::paper_setting::{Histograms, gaussian, means, target};
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, Study, Tally, point, tally};
 use anyhow::{Context, Result};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
 use dtof::view::palette::NEUTRAL;
 use dtof_core::ComparatorTree;

@@ -4,7 +4,7 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use anyhow::{Context, Result};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
 use dtof::view::palette;
 use dtof::view::palette::Pen;

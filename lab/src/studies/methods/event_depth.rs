@@ -13,7 +13,7 @@ use crate::sweep::mean::{add, add_error, add_value};
 use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::{Part, Point, Study, Tally, point};
 use anyhow::Result;
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
 use dtof::view::palette::{CENTRED, PAPER, REFERENCE};
 use dtof_core::fixed::types::U8F8;

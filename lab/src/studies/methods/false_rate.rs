@@ -5,7 +5,7 @@ use crate::studies::methods::passage::{BINS, LOOKS, Ladder, Method, Passage, cou
 use crate::sweep::results::{Figure, Results, Share, Table};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use anyhow::Result;
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
 use dtof::view::palette::REFERENCE;
 use dtof_theory::looks::exposure::Exposures;

@@ -8,7 +8,7 @@ use crate::sweep::mean::add;
 use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use anyhow::{Result, bail, ensure};
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::simulate::SimulatedPixel;
 use dtof::simulate::scene::{Fan, Scene, Shape};
 use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};

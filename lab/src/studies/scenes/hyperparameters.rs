@@ -14,7 +14,7 @@ use self::setting::{NOTHING, Setting, error, false_share};
 use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point, tally};
 use anyhow::Result;
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::simulate::MM_PER_PS;
 use dtof::view::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
 use dtof::view::palette;

@@ -8,7 +8,7 @@ use crate::sweep::mean::{Measured, add, add_value};
 use crate::sweep::results::{Claim, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use anyhow::Result;
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::simulate::{MM_PER_PS, SimulatedPixel};
 use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
 use dtof_core::PixelAddress;

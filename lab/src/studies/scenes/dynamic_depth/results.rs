@@ -5,7 +5,7 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Figure, Results, Share, Table, Verdict};
 use crate::sweep::{Part, PointTally};
 use anyhow::Result;
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Series, Style};
 use dtof::view::palette::{EVENTS, PAPER};
 use std::fmt::Write as _;

@@ -6,7 +6,7 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Figure, Results, Verdict};
 use crate::sweep::{Part, PointTally};
 use anyhow::Result;
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 use dtof::view::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
 use dtof::view::palette::{EVENTS, PAPER, Pen, STEPS, frames};
 use dtof_core::PixelAddress;
