@@ -14,8 +14,7 @@ use dtof_theory::looks::repeated_looks::{
 };
 use dtof_theory::looks::single_look::SingleLook;
 use dtof_theory::looks::table::{self, Found, MARGIN, Row, Table};
-use dtof_theory::random::pixel_rng;
-use dtof_theory::random::trial_rng;
+use dtof_theory::random::{pixel_rng, trial_rng};
 use dtof_theory::rates::Rates;
 use dtof_theory::tune::{Request, Tuned, Wanted, tune};
 

@@ -9,8 +9,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use dtof::device::{self, Client, DeviceEngine};
+use dtof::engine::Engine;
+use dtof::engine::host::host_engine;
 use dtof::engine::settings::Settings;
-use dtof::engine::{Engine, host::host_engine};
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::scene;
 use dtof_core::fixed::types::{U4F12, U8F8};

@@ -21,9 +21,8 @@ use dtof_core::{
 };
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
-use dtof_link::message;
 use dtof_link::message::greeting;
-use dtof_link::{Configuration, Report, Source};
+use dtof_link::{Configuration, Report, Source, message};
 
 const PIXELS: u16 = 4;
 

@@ -5,18 +5,17 @@
 //! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow boards -- --nocapture
 //! ```
 
-use std::fs;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::thread;
 use std::time::{Duration, Instant};
+use std::{fs, thread};
 
 use anyhow::{Context, Result, ensure};
-use dtof::device::monitor;
-use dtof::device::{Client, DeviceEngine, configuration};
+use dtof::device::{Client, DeviceEngine, configuration, monitor};
+use dtof::engine::Engine;
+use dtof::engine::host::host_engine;
 use dtof::engine::settings::Settings;
-use dtof::engine::{Engine, host::host_engine};
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::scene;
 use dtof_core::fixed::types::{U4F12, U8F8};

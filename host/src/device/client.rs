@@ -4,12 +4,10 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::{AER_VERSION, AerDecoder, AerRecord, AerWord};
-use dtof_link::SensorRecord;
 use dtof_link::endpoint::{Endpoint, LinkCounters, Message};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
-use dtof_link::message::greeting;
-use dtof_link::message::{self, LINK_VERSION};
-use dtof_link::{Configuration, Refusal, Report};
+use dtof_link::message::{self, LINK_VERSION, greeting};
+use dtof_link::{Configuration, Refusal, Report, SensorRecord};
 
 use super::port::Port;
 use crate::events::aer_file::Event;

@@ -10,8 +10,7 @@ mod qemu;
 use anyhow::{Result, bail, ensure};
 use dtof_core::{DepthEvent, PixelAddress, Statistics};
 use dtof_link::endpoint::BODY_BYTES;
-use dtof_link::message;
-use dtof_link::{Configuration, DynamicDepth, Report, Source, Token};
+use dtof_link::{Configuration, DynamicDepth, Report, Source, Token, message};
 
 pub use client::Client;
 pub use open::open;

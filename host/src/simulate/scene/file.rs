@@ -13,10 +13,14 @@ use crate::input::range::within;
 use crate::input::source::Geometry;
 use crate::simulate::MM_PER_PS;
 use crate::simulate::effects::Effects;
-use crate::simulate::effects::{
-    afterpulsing::Afterpulsing, cover_glass::CoverGlass, dead_time::DeadTime,
-    hot_pixels::HotPixels, jitter::Jitter, second_echo::SecondEcho, tail::Tail, tdc::Tdc,
-};
+use crate::simulate::effects::afterpulsing::Afterpulsing;
+use crate::simulate::effects::cover_glass::CoverGlass;
+use crate::simulate::effects::dead_time::DeadTime;
+use crate::simulate::effects::hot_pixels::HotPixels;
+use crate::simulate::effects::jitter::Jitter;
+use crate::simulate::effects::second_echo::SecondEcho;
+use crate::simulate::effects::tail::Tail;
+use crate::simulate::effects::tdc::Tdc;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]

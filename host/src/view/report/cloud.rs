@@ -8,8 +8,7 @@ use super::BASE64;
 use crate::events::sample::Sample;
 use crate::input::source::Geometry;
 use crate::rows::grouped;
-use crate::view::palette;
-use crate::view::picture;
+use crate::view::{palette, picture};
 use dtof_core::PixelAddress;
 
 /// The events of a run.
