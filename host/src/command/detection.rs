@@ -3,7 +3,7 @@
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use dtof::arguments::{fixed, positive, whole};
+use dtof::cli::arguments::{fixed, positive, whole};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{AnyRule, CentredWindow, Count, PaperRule, WindowRule};
 

@@ -1,7 +1,7 @@
 //! The options of dynamic depth, the same for every command.
 
 use clap::{Args, ValueEnum};
-use dtof::arguments::fixed;
+use dtof::cli::arguments::fixed;
 use dtof_core::fixed::types::U24F8;
 use dtof_link::DynamicDepth;
 

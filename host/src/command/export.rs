@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail, ensure};
 use clap::Args;
-use dtof::arguments::{path, whole};
+use dtof::cli::arguments::{path, whole};
 use dtof::events::aer_file::EventKind;
 use dtof::export::{Format, LaserClock, Optics, Options, export};
 use dtof::geometry::FieldOfView;

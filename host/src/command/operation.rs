@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::arguments::whole;
+use dtof::cli::arguments::whole;
 use dtof::engine::settings::Settings;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{Count, HIGHEST_Z, RangeGate};

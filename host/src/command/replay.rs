@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use dtof::arguments::{bins, fixed, path, positive, whole};
+use dtof::cli::arguments::{bins, fixed, path, positive, whole};
 use dtof::engine::host::host_engine;
 use dtof::engine::run::run;
 use dtof::engine::settings::Settings;

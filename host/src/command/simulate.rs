@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::arguments::{path, whole};
+use dtof::cli::arguments::{path, whole};
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::run::run;
 use dtof::engine::settings::Settings;
@@ -13,8 +13,8 @@ use dtof::events::output::Output;
 use dtof::export::LaserClock;
 use dtof::geometry::FieldOfView;
 use dtof::input::source::{Geometry, PhotonSource};
-use dtof::report::Section;
 use dtof::simulate::scene::Scene;
+use dtof::view::report::Section;
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
 

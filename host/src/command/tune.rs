@@ -7,7 +7,7 @@ use std::io::{self, Write};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::arguments::{bins, positive, whole};
+use dtof::cli::arguments::{bins, positive, whole};
 use dtof::simulate::MM_PER_PS;
 use dtof_theory::gaussian;
 use dtof_theory::looks::detections::Detections;

@@ -22,8 +22,8 @@ use crate::events::sample::Sample;
 use crate::events::summary::{self, Summary};
 use crate::files::{ASIDE, aside, flushed, may_replace};
 use crate::input::source::PhotonSource;
-use crate::picture;
-use crate::report::{self, Cloud, Figure, Section};
+use crate::view::report::{self, Cloud, Figure, Section};
+use crate::view::svg;
 use pictures::pictures;
 
 const CSV: &str = "events.csv";
@@ -119,16 +119,21 @@ impl Output {
         lead: &str,
         sections: &[Section],
     ) -> Result<()> {
-        let pictures = pictures(&self.maps, self.sides, summary.cycles)?;
+        let called = summary.settings.reports();
+        let pictures = pictures(&self.maps, self.sides, called)?;
         let bytes = pictures.iter().map(|picture| picture.svg.len()).sum();
         self.sample.limit(report::room_for_events(bytes));
         let figures: Vec<Figure> = pictures
             .iter()
-            .map(|picture| Figure {
-                svg: &picture.svg,
-                caption: picture.caption,
+            .filter_map(|picture| {
+                Some(Figure {
+                    svg: &picture.svg,
+                    caption: picture.caption.as_deref()?,
+                })
             })
             .collect();
+        let bytes = figures.iter().map(|figure| figure.svg.len()).sum();
+        self.sample.limit(report::room_for_events(bytes));
         let totals = summary.rows();
         let settings = summary.settings.rows();
         let mut all = vec![Section {
@@ -149,6 +154,7 @@ impl Output {
             cycles: summary.cycles,
             sample: &self.sample,
             pixels: &self.maps.spread(),
+            called,
         };
         let report = report::html(title, lead, &all, &figures, &cloud);
 
@@ -191,7 +197,7 @@ impl Output {
 
 /// Names of results, and what stands near the start of each.
 fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
-    let pictures = pictures::NAMES.map(|name| (name, picture::MARK));
+    let pictures = pictures::NAMES.map(|name| (name, svg::MARK));
     pictures.into_iter().chain([
         (CSV, events_csv::HEADER),
         (AER, aer_file::MAGIC),

@@ -126,13 +126,18 @@ impl Summary {
         rows.extend([
             row("laser cycles", self.cycles),
             row("photons", self.photons),
-            row("depth events", self.events),
+            match self.settings.frame {
+                None => row("depth events", self.events),
+                Some(_) => row("readings of frames", self.events),
+            },
             (
                 "pixels reporting".to_owned(),
                 format!("{} of {}", self.pixels_reporting, self.pixels),
             ),
-            row("exposures without an event", self.expired),
         ]);
+        if self.settings.frame.is_none() {
+            rows.push(row("exposures without an event", self.expired));
+        }
         let first_decision = self.settings.first_decision();
         if self.cycles < first_decision {
             rows.push((
@@ -194,6 +199,15 @@ impl Settings {
         match self.frame {
             None => "Asynchronous depth events",
             Some(_) => "Frames, as a frame-based sensor reads them",
+        }
+    }
+
+    /// What a pixel reports: one of them, and several.
+    #[must_use]
+    pub const fn reports(&self) -> [&'static str; 2] {
+        match self.frame {
+            None => ["event", "events"],
+            Some(_) => ["reading", "readings"],
         }
     }
 

@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 use dtof_core::RangeScale;
 
 use crate::events::aer_file::Event;
-use crate::picture::{colour, levels, span};
+use crate::view::palette;
+use crate::view::picture::{levels, span};
 
 /// How often it is drawn.
 const EVERY: Duration = Duration::from_millis(200);
@@ -166,7 +167,7 @@ fn cut(line: &str, columns: usize) -> String {
 /// A character with the colours of an upper and a lower pixel.
 fn block(upper: Option<u8>, lower: Option<u8>) -> String {
     let code = |ground: u8, level: u8| {
-        let (red, green, blue) = colour(level);
+        let [red, green, blue] = palette::level(level);
         format!("\x1b[{ground};2;{red};{green};{blue}m")
     };
     let (fore, back) = (38, 48);

@@ -6,7 +6,7 @@ const VIEWS = {
   side: { yaw: Math.PI / 2, pitch: 0, zoom: 1 }, // third axis and rows
   top: { yaw: Math.PI / 2, pitch: Math.PI / 2, zoom: 1 }, // third axis and columns
 };
-const view = { ...VIEWS.reset, third: "cycle" };
+const view = { ...VIEWS.reset, third: "range" };
 
 function turn(yaw, pitch) {
   view.yaw += yaw;

@@ -1,18 +1,19 @@
 //! What the sides of a map count.
 
-use super::layout::{CHARACTER, count, whole};
+use crate::view::svg::text_width;
 
 /// A single line of more pixels is wrapped.
 const MOST_IN_LINE: usize = 256;
-/// Least distance of two numbers along an axis, in pixels of the picture.
-const SPACING: f64 = 44.0;
+/// Size of the numbers, and their least distance along an axis.
+pub(super) const TEXT: f64 = 14.5;
+const GAP: f64 = 14.0;
 
 /// The name and the numbers along one side of a map.
 #[derive(Debug)]
 pub(super) struct Axis {
     pub name: String,
     /// Distances from the start of the axis, and what they are called.
-    pub numbers: Vec<(i32, String)>,
+    pub numbers: Vec<(f64, String)>,
 }
 
 /// How the pixels of a map are drawn in lines.
@@ -73,9 +74,8 @@ impl Lines {
 }
 
 /// The numbers along an axis of `length` steps of `unit`, each `side` wide.
-fn numbers(length: usize, unit: usize, side: f64) -> Vec<(i32, String)> {
-    let digits = (length * unit).to_string().len();
-    let least = SPACING.max(f64::from(CHARACTER * count(digits + 2)));
+fn numbers(length: usize, unit: usize, side: f64) -> Vec<(f64, String)> {
+    let least = text_width(&(length * unit).to_string(), TEXT).max(TEXT) + GAP;
     // Powers of two where they divide the axis evenly.
     let factors: &[usize] = if length.is_multiple_of(8) {
         &[2, 2]
@@ -91,6 +91,6 @@ fn numbers(length: usize, unit: usize, side: f64) -> Vec<(i32, String)> {
     }
     (0..length)
         .step_by(step)
-        .map(|at| (whole((at as f64 + 0.5) * side), (at * unit).to_string()))
+        .map(|at| ((at as f64 + 0.5) * side, (at * unit).to_string()))
         .collect()
 }

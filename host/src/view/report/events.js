@@ -78,6 +78,10 @@ function number(value, digits = 0) {
   return value.toLocaleString("en", { maximumFractionDigits: digits });
 }
 
+function capital(word) {
+  return word[0].toUpperCase() + word.slice(1);
+}
+
 function pixelName(pixel) {
   const [column, row] = data.sides;
   return `${column} ${pixel % data.columns}, ${row} ${Math.floor(pixel / data.columns)}`;

@@ -14,7 +14,7 @@ function addLane(pixel, prepend = false) {
   const name = pixelName(pixel);
   const label = document.createElement("span");
   const thinned = data.oneOf > 1 ? ` (1 of ${number(data.oneOf)})` : "";
-  label.textContent = `${name}: ${number(spikes.length)} events${thinned}`;
+  label.textContent = `${name}: ${number(spikes.length)} ${data.events}${thinned}`;
   const canvas = document.createElement("canvas");
   canvas.setAttribute("role", "img");
   canvas.setAttribute("aria-label", label.textContent);

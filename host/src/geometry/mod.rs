@@ -18,7 +18,7 @@ use std::str::FromStr;
 
 use dtof_core::PixelAddress;
 
-use crate::arguments::real;
+use crate::cli::arguments::real;
 use crate::input::source::Geometry;
 
 /// Degrees across the longer side of an array unless said otherwise.

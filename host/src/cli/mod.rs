@@ -1,6 +1,8 @@
 //! What every program of this project does with its command line: help is printed
 //! whole, an error is one line and a failure.
 
+pub mod arguments;
+
 use std::io::{self, Write};
 use std::process::ExitCode;
 

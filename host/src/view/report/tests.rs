@@ -43,6 +43,7 @@ fn page(sample: &Sample, cycles: u64, sections: &[Section], figures: &[Figure]) 
         cycles,
         sample,
         pixels: &[PixelAddress(2), PixelAddress(0)],
+        called: ["event", "events"],
     };
     html("t", "l", sections, figures, &events)
 }
@@ -75,6 +76,7 @@ fn all_texts_are_escaped() {
         cycles: 1,
         sample: &none,
         pixels: &[],
+        called: ["event", "events"],
     };
     let page = html("</title><script>", "<lead>", &sections, &figures, &events);
 
@@ -90,15 +92,16 @@ fn all_texts_are_escaped() {
 #[test]
 fn page_loads_nothing() {
     let values = [Some(1.0), None];
-    let map = crate::picture::Map {
+    let map = crate::view::picture::Map {
         title: "t",
         unit: "m",
         sides: ["column", "row"],
+        missing: "event",
         columns: 2,
         rows: 1,
         values: &values,
     };
-    let svg = crate::picture::heat_map(&map).unwrap();
+    let svg = crate::view::picture::heat_map(&map).unwrap();
     let figures = [Figure {
         svg: &svg,
         caption: "c",
@@ -180,6 +183,27 @@ fn a_page_says_how_many_of_the_events_it_shows() {
     let note = format!("<strong>1 of 8 events shown</strong>: {kept} of 50, evenly spread.");
     assert!(part.contains(&note));
     assert_eq!(data(&part)["oneOf"], 8);
+}
+
+#[test]
+fn a_report_on_frames_speaks_of_readings() {
+    let sample = sample(10, 10);
+    let events = Cloud {
+        sides: ["column", "row"],
+        geometry: Geometry {
+            columns: 2,
+            rows: 2,
+        },
+        cycles: 10,
+        sample: &sample,
+        pixels: &[],
+        called: ["reading", "readings"],
+    };
+    let page = html("t", "l", &[], &[], &events);
+    assert!(page.contains("All 10 readings are shown."));
+    assert!(page.contains(">Readings in space and time<"));
+    assert_eq!(data(&page)["events"], "readings");
+    assert!(!page.contains("{{"));
 }
 
 #[test]

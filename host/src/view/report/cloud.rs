@@ -7,8 +7,9 @@ use serde_json::json;
 use super::BASE64;
 use crate::events::sample::Sample;
 use crate::input::source::Geometry;
-use crate::picture;
 use crate::rows::grouped;
+use crate::view::palette;
+use crate::view::picture;
 use dtof_core::PixelAddress;
 
 /// The events of a run.
@@ -24,6 +25,8 @@ pub struct Cloud<'a> {
     pub sample: &'a Sample,
     /// Pixels whose spikes are shown first.
     pub pixels: &'a [PixelAddress],
+    /// What they are called: one of them, and several.
+    pub called: [&'static str; 2],
 }
 
 /// The only script of the page, between its tags. A module: it has names of its own.
@@ -51,22 +54,27 @@ impl Cloud<'_> {
         }
         let data = self.data();
         let note = self.note();
+        let [_, events] = self.called;
         format!(
-            "<p class=\"notice\" id=\"unscripted\">Without scripting the events cannot be \
+            "<p class=\"notice\" id=\"unscripted\">Without scripting the {events} cannot be \
              turned; the maps below show them pixel by pixel.</p>\n\
              {}<script type=\"application/json\" id=\"data\">{data}</script>\n\
              <script type=\"module\">{SCRIPT}</script>\n",
-            CARDS.replace("<!-- how many -->", &note)
+            CARDS
+                .replace("{{how many}}", &note)
+                .replace("{{events}}", events)
+                .replace("{{Events}}", &capital(events))
         )
     }
 
     /// How many events there are, and how many of them are shown.
     fn note(&self) -> String {
         let seen = grouped(self.sample.seen());
+        let [_, events] = self.called;
         match self.sample.one_of() {
-            1 => format!("All {seen} events are shown."),
+            1 => format!("All {seen} {events} are shown."),
             k => format!(
-                "<strong>1 of {} events shown</strong>: {} of {seen}, evenly spread.",
+                "<strong>1 of {} {events} shown</strong>: {} of {seen}, evenly spread.",
                 grouped(k),
                 grouped(self.sample.events().len() as u64)
             ),
@@ -89,8 +97,8 @@ impl Cloud<'_> {
         }
         let colours: String = (0..=u8::MAX)
             .map(|level| {
-                let (r, g, b) = picture::colour(level);
-                format!("{r:02x}{g:02x}{b:02x}")
+                let [red, green, blue] = palette::level(level);
+                format!("{red:02x}{green:02x}{blue:02x}")
             })
             .collect();
         let ranges: Vec<_> = self
@@ -111,9 +119,17 @@ impl Cloud<'_> {
             "high": high,
             "colours": colours,
             "spikes": spikes,
+            "events": self.called[1],
             "records": BASE64.encode(records),
         })
     }
+}
+
+/// `word` at the start of a sentence.
+fn capital(word: &str) -> String {
+    let mut letters = word.chars();
+    let first = letters.next().map(|first| first.to_ascii_uppercase());
+    first.into_iter().chain(letters).collect()
 }
 
 /// Bytes of an event: laser cycle, range in millimetres, pixel, all little-endian.

@@ -39,7 +39,7 @@ function tell(news = "") {
   for (let event = shown.first; event < shown.last; event++) {
     if (events.range[event] <= shown.far) count++;
   }
-  status.value = `${number(count)} events from laser cycle ${first} to ${last}. ${pickedText()} ${news}`.trim();
+  status.value = `${number(count)} ${data.events} from laser cycle ${first} to ${last}. ${pickedText()} ${news}`.trim();
 }
 
 /** Adds a pixel's spikes, and says so. */
@@ -167,7 +167,7 @@ function chooseThird() {
   view.third = element("third").value;
   const third = view.third === "range" ? "range" : "laser cycle";
   const by = [...data.sides, third].join(", ");
-  cloud.setAttribute("aria-label", `Events by ${by}, coloured by range`);
+  cloud.setAttribute("aria-label", `${capital(data.events)} by ${by}, coloured by range`);
   redraw();
 }
 element("third").addEventListener("input", chooseThird);

@@ -3,8 +3,6 @@
 #[cfg(test)]
 mod tests;
 
-use super::finite;
-
 /// Steps between the ends of the colour map.
 const TOP_LEVEL: u8 = u8::MAX;
 /// The level of values that are all equal.
@@ -33,12 +31,23 @@ pub(super) struct Mark {
     pub label: String,
 }
 
-impl Mark {
-    /// Its distance from the low end of a bar of `length` pixels, in pixels.
-    #[allow(clippy::cast_possible_truncation, reason = "saturates")]
-    pub fn offset(&self, length: i32) -> i32 {
-        (self.position * f64::from(length)).round() as i32
-    }
+/// What the colours of a map span, lowest and highest; `None` without values.
+#[must_use]
+pub fn span(values: &[Option<f64>]) -> Option<(f64, f64)> {
+    Scale::new(values).map(|scale| (scale.low, scale.high))
+}
+
+/// The places of `values` in the colours, as a map shows them.
+#[must_use]
+pub fn levels(values: &[Option<f64>]) -> Vec<Option<u8>> {
+    let scale = Scale::new(values);
+    let level = |value: &Option<f64>| Some(scale.as_ref()?.level(finite(*value)?));
+    values.iter().map(level).collect()
+}
+
+/// The value of a pixel that has one.
+fn finite(value: Option<f64>) -> Option<f64> {
+    value.filter(|value| value.is_finite())
 }
 
 impl Scale {
@@ -62,11 +71,6 @@ impl Scale {
             above: high < most,
             whole: sorted.iter().all(|v| v.fract() == 0.0),
         })
-    }
-
-    /// What the colours span.
-    pub fn span(&self) -> (f64, f64) {
-        (self.low, self.high)
     }
 
     /// What the colours span, in words.
