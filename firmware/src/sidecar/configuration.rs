@@ -6,9 +6,10 @@ use dtof_link::{Configuration, Refusal, Source};
 use super::{Pixel, Sidecar};
 
 impl Sidecar<'_> {
-    /// Takes a configuration on, all pixels at the beginning of an exposure. The one
-    /// before stays if the device cannot do what is wanted.
-    pub(super) fn configure(&mut self, wanted: &Configuration) -> Result<(), Refusal> {
+    /// Takes the configuration in `body` on, all pixels at the beginning of an exposure.
+    /// The one before stays if the device cannot do what is wanted.
+    pub(super) fn configure(&mut self, body: &[u8]) -> Result<(), Refusal> {
+        let wanted = Configuration::from_le_bytes(body)?;
         if wanted.source == Source::Sensor {
             let sensor = self.sensor.ok_or(Refusal::NoSensor)?;
             if !sensor.has_bins_of(wanted.bin_width_ps) {

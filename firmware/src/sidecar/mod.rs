@@ -26,7 +26,7 @@ use dtof_core::{
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, Message};
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
-use dtof_link::{Configuration, DynamicDepth, Report, SensorRecord, Source};
+use dtof_link::{DynamicDepth, Report, SensorRecord, Source};
 use dtof_sensors::{About, SensorFault};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::spsc::Queue;
@@ -241,13 +241,10 @@ impl<'a> Sidecar<'a> {
 
     fn act(&mut self, message: Message, overrun: u32) -> Option<Answer> {
         match message.kind {
-            message::CONFIGURE => {
-                let wanted = Configuration::from_le_bytes(&message.body);
-                Some(match wanted.and_then(|wanted| self.configure(&wanted)) {
-                    Ok(()) => (message::CONFIGURED, Vec::new()),
-                    Err(refusal) => (message::REFUSED, [refusal as u8].into_iter().collect()),
-                })
-            }
+            message::CONFIGURE => Some(match self.configure(&message.body) {
+                Ok(()) => (message::CONFIGURED, Vec::new()),
+                Err(refusal) => (message::REFUSED, [refusal as u8].into_iter().collect()),
+            }),
             message::PHOTONS if self.config.is_some() && self.source == Source::Link => {
                 self.photons = Some(Photons::new(message.body));
                 None

@@ -23,8 +23,8 @@ pub struct Detection {
     /// by, 0 to 15.9998, rounded to 1/4096
     #[arg(long, value_parser = fixed::<U4F12>, conflicts_with = "false_alarm", allow_hyphen_values = true)]
     z: Option<U4F12>,
-    /// Window rule, instead: the z for this share of false alarms, that is of exposures without a
-    /// target that end with an event, at most 0.1 [default: 0.01]
+    /// Window rule, instead of --z: the share of exposures without a target that may end with an
+    /// event, at most 0.1 [default: 0.01]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     false_alarm: Option<f64>,
     /// Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256: takes the depth from a window that

@@ -44,11 +44,10 @@ pub struct Tune {
     /// Picoseconds a bin
     #[arg(long, value_name = "PS", default_value_t = 250.0, value_parser = positive)]
     bin_width_ps: f64,
-    /// False alarms: the share of exposures without a target that end with an event, at most
-    /// [default: 0.01]
+    /// The share of exposures without a target that may end with an event [default: 0.01]
     #[arg(long, value_name = "SHARE", value_parser = positive, conflicts_with = "false_alarms_per_second")]
     false_alarm: Option<f64>,
-    /// Instead: false alarms of a pixel a second
+    /// Instead: the false alarms of a pixel a second
     #[arg(long, value_name = "RATE", value_parser = positive, requires = "laser_hz")]
     false_alarms_per_second: Option<f64>,
     /// Laser cycles a second
