@@ -23,7 +23,7 @@ use crate::events::summary::{self, Summary};
 use crate::files::{ASIDE, aside, flushed, may_replace};
 use crate::input::source::PhotonSource;
 use crate::view::report::{self, Cloud, Figure, Section};
-use crate::view::svg;
+use dtof_draw::svg;
 use pictures::pictures;
 
 const CSV: &str = "events.csv";

@@ -1,7 +1,3 @@
-//! What people look at: charts, maps, the moving picture and the report.
+//! What people look at.
 
-pub mod chart;
-pub mod palette;
-pub mod picture;
 pub mod report;
-pub mod svg;

@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 pub use cloud::Cloud;
 
 use crate::events::sample::Sample;
-use crate::view::svg::{escape, one_line};
+use dtof_draw::svg::{escape, one_line};
 
 /// A picture of the report.
 #[derive(Clone, Copy, Debug)]

@@ -13,9 +13,9 @@ use crate::studies::methods::{depth_error, time_to_detect};
 use crate::sweep::mean::Measured;
 use crate::sweep::{Part, PointTally};
 use anyhow::{Context, Result, ensure};
-use dtof::view::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style, chart};
-use dtof::view::palette;
-use dtof::view::palette::Pen;
+use dtof_draw::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style, chart};
+use dtof_draw::palette;
+use dtof_draw::palette::Pen;
 use std::path::PathBuf;
 
 pub use self::recorded::RECORDED;

@@ -12,9 +12,9 @@ use dtof::events::events_csv::range_mm;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::rows::grouped;
 use dtof::simulate::scene::{self, Scene};
-use dtof::view::palette;
-use dtof::view::picture::{levels, span};
-use dtof::view::svg::{Anchor, At, Svg, wrapped};
+use dtof_draw::palette;
+use dtof_draw::picture::{levels, span};
+use dtof_draw::svg::{Anchor, At, Svg, wrapped};
 
 /// Laser cycles that are shown, and moments into which they are cut.
 const CYCLES: u16 = 2000;

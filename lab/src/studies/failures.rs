@@ -11,14 +11,14 @@ use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::{Part, Point, Study, Tally, point};
 use anyhow::{Context, Result};
 use dtof::rows::grouped;
-use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Series, Style};
-use dtof::view::palette;
-use dtof::view::palette::Pen;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AsyncPixel, Count, DepthEstimator, DepthEvent, DetectionRule, Flags, LaserCycle, Look,
     PaperRule, PixelAddress, PixelConfig, Statistics, WindowRule, z_for,
 };
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Series, Style};
+use dtof_draw::palette;
+use dtof_draw::palette::Pen;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 

@@ -2,8 +2,8 @@
 
 use super::{Part, PointTally};
 use anyhow::{Context, Result};
-use dtof::view::chart;
-use dtof::view::chart::Chart;
+use dtof_draw::chart;
+use dtof_draw::chart::Chart;
 use dtof_theory::counts::binomial;
 use dtof_theory::counts::poisson::Poisson;
 use std::fmt;

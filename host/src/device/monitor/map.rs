@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use dtof_core::RangeScale;
 
 use crate::events::aer_file::Event;
-use crate::view::palette;
-use crate::view::picture::{levels, span};
+use dtof_draw::palette;
+use dtof_draw::picture::{levels, span};
 
 /// How often it is drawn.
 const EVERY: Duration = Duration::from_millis(200);

@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use crate::events::maps::{Maps, PixelHistory};
 use crate::input::source::Geometry;
-use crate::view::picture::{Map, heat_map};
+use dtof_draw::picture::{Map, heat_map};
 
 /// The files, in the order of [`pictures`].
 pub const NAMES: [&str; 5] = [
@@ -112,7 +112,7 @@ mod tests {
         let pictures = pictures(&maps, ["column", "row"], ["event", "events"]).unwrap();
         assert_eq!(pictures.each_ref().map(|picture| picture.name), NAMES);
         for picture in pictures {
-            assert!(picture.svg[..1024].contains(crate::view::svg::MARK));
+            assert!(picture.svg[..1024].contains(dtof_draw::svg::MARK));
         }
     }
 

@@ -8,8 +8,8 @@ use super::BASE64;
 use crate::events::sample::Sample;
 use crate::input::source::Geometry;
 use crate::rows::grouped;
-use crate::view::{palette, picture};
 use dtof_core::PixelAddress;
+use dtof_draw::{palette, picture};
 
 /// The events of a run.
 #[derive(Clone, Copy, Debug)]

@@ -92,7 +92,7 @@ fn all_texts_are_escaped() {
 #[test]
 fn page_loads_nothing() {
     let values = [Some(1.0), None];
-    let map = crate::view::picture::Map {
+    let map = dtof_draw::picture::Map {
         title: "t",
         unit: "m",
         sides: ["column", "row"],
@@ -101,7 +101,7 @@ fn page_loads_nothing() {
         rows: 1,
         values: &values,
     };
-    let svg = crate::view::picture::heat_map(&map).unwrap();
+    let svg = dtof_draw::picture::heat_map(&map).unwrap();
     let figures = [Figure {
         svg: &svg,
         caption: "c",

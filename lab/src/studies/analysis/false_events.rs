@@ -5,10 +5,10 @@ use crate::sweep::results::{Claim, Comparison, Figure, Results, Share, Table, Ve
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use anyhow::{Context, Result};
 use dtof::rows::grouped;
-use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
-use dtof::view::palette::alpha as pen;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, Threshold};
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::alpha as pen;
 use dtof_theory::gaussian::false_positive_rate;
 use dtof_theory::looks::repeated_looks::{
     ALPHA_STEPS, BINS, FalseAlarms, MINIMUM_COUNT, alpha_bits,

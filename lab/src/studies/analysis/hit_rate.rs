@@ -5,9 +5,9 @@ use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, Study, Tally, point, tally};
 use anyhow::{Context, Result};
 use dtof::rows::grouped;
-use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
-use dtof::view::palette::NEUTRAL;
 use dtof_core::ComparatorTree;
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::NEUTRAL;
 use dtof_theory::known_background;
 use rand_pcg::Pcg64;
 

@@ -5,14 +5,14 @@ use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use anyhow::{Context, Result};
 use dtof::rows::grouped;
-use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
-use dtof::view::palette;
-use dtof::view::palette::Pen;
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
 use dtof_core::{
     BinPosition, Count, Count10, DepthEstimator, DetectionRule, Histogram, Peak, RangeGate,
     SubBinOffset, WindowRule, quadrant_background, whole_background,
 };
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette;
+use dtof_draw::palette::Pen;
 use dtof_theory::bounds::cramer_rao::Pulse;
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::rates::Rates;

@@ -9,7 +9,7 @@ use dtof_core::{Count, Count16, DetectionRule, Histogram, PaperRule, Peak, Range
 use rand_pcg::Pcg64;
 
 use crate::sweep::{PointTally, Tally};
-use dtof::view::palette::{self, Pen};
+use dtof_draw::palette::{self, Pen};
 use dtof_theory::bounds::likelihood_ratio::{Evidence, LikelihoodRatio};
 use dtof_theory::looks::exposure::{Exposures, Looks};
 

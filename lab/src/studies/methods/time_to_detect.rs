@@ -9,7 +9,7 @@ use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use anyhow::Result;
 use dtof::rows::grouped;
-use dtof::view::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
 use dtof_theory::bounds::likelihood_ratio::{LikelihoodRatio, signal_for_information};
 use dtof_theory::looks::exposure::Exposures;
 use dtof_theory::rates::Rates;

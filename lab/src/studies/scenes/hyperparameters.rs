@@ -16,13 +16,13 @@ use crate::sweep::{Part, Point, PointTally, Study, Tally, point, tally};
 use anyhow::Result;
 use dtof::rows::grouped;
 use dtof::simulate::MM_PER_PS;
-use dtof::view::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
-use dtof::view::palette;
-use dtof::view::palette::STEPS;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AsyncPixel, Count, LaserCycle, Look, PaperRule, PixelAddress, PixelConfig, Statistics,
 };
+use dtof_draw::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette;
+use dtof_draw::palette::STEPS;
 use dtof_theory::rates::bin_share;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;

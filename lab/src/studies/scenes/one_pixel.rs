@@ -5,12 +5,12 @@ use anyhow::Result;
 use dtof::engine::frame::FramePixel;
 use dtof::engine::settings::Settings;
 use dtof::simulate::scene;
-use dtof::view::palette;
-use dtof::view::palette::Pen;
 use dtof_core::{
     AnyRule, AsyncPixel, BinPosition, DepthEstimator, DepthEvent, LaserCycle, PixelAddress,
     PixelConfig, RangeGate, Statistics,
 };
+use dtof_draw::palette;
+use dtof_draw::palette::Pen;
 
 /// Bins of a histogram.
 pub const BINS: usize = CODES as usize;

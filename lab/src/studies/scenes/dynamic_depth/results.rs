@@ -6,8 +6,8 @@ use crate::sweep::results::{Claim, Figure, Results, Share, Table, Verdict};
 use crate::sweep::{Part, PointTally};
 use anyhow::Result;
 use dtof::rows::grouped;
-use dtof::view::chart::{Axis, Chart, Finding, Key, Panel, Series, Style};
-use dtof::view::palette::{EVENTS, PAPER};
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Series, Style};
+use dtof_draw::palette::{EVENTS, PAPER};
 use std::fmt::Write as _;
 
 /// The paper's threshold in millimetres.

@@ -7,9 +7,9 @@ use crate::sweep::results::{Claim, Figure, Results, Verdict};
 use crate::sweep::{Part, PointTally};
 use anyhow::Result;
 use dtof::rows::grouped;
-use dtof::view::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
-use dtof::view::palette::{EVENTS, PAPER, Pen, STEPS, frames};
 use dtof_core::PixelAddress;
+use dtof_draw::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::{EVENTS, PAPER, Pen, STEPS, frames};
 use std::f64::consts::SQRT_2;
 
 /// Every surface of a point with its mean signal photons a laser cycle.

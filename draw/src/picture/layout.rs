@@ -3,7 +3,7 @@
 use super::axis::{Axis, Lines, TEXT};
 use super::map::Map;
 use super::scale::{Mark, Scale};
-use crate::view::svg::{one_line, text_width, wrapped};
+use crate::svg::{one_line, text_width, wrapped};
 
 /// The room for the pixels of a map.
 const MOST_WIDTH: f64 = 400.0;

@@ -3,8 +3,8 @@ use proptest::prelude::*;
 use super::names::{Area, Wanted, apart, beside};
 use super::scale::{GAP, Scale, number};
 use super::*;
-use crate::view::palette::{self, EVENTS};
-use crate::view::svg::text_width;
+use crate::palette::{self, EVENTS};
+use crate::svg::text_width;
 
 /// A chart of `points`, joined, with a name.
 fn of(logarithmic: bool, points: Vec<Point>) -> Chart {

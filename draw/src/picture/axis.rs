@@ -1,6 +1,6 @@
 //! What the sides of a map count.
 
-use crate::view::svg::text_width;
+use crate::svg::text_width;
 
 /// A single line of more pixels is wrapped.
 const MOST_IN_LINE: usize = 256;

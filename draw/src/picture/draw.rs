@@ -7,8 +7,8 @@ use super::cells;
 use super::layout::{Bar, EDGE, Frame, LINE, Layout, TITLE};
 use super::map::Map;
 use super::scale::{Scale, levels};
-use crate::view::palette::{NO_EVENT, hex};
-use crate::view::svg::{Anchor, At, Svg};
+use crate::palette::{NO_EVENT, hex};
+use crate::svg::{Anchor, At, Svg};
 
 /// Draws `map` as a complete SVG document.
 ///

@@ -1,6 +1,6 @@
 use super::scale::Scale;
 use super::*;
-use crate::view::palette;
+use crate::palette;
 
 fn picture(columns: usize, rows: usize, values: &[Option<f64>]) -> String {
     let map = Map {

@@ -6,7 +6,7 @@ use super::names::Area;
 use super::panel::{self, LINE, Names, TEXT};
 use super::parts::{Chart, Panel};
 use super::scale::{GAP, Scale, Tick};
-use crate::view::svg::{Anchor, Svg, text_width, wrapped};
+use crate::svg::{Anchor, Svg, text_width, wrapped};
 
 /// Width of every chart. At 400 pixels its smallest letters are 10 high.
 const WIDTH: f64 = 560.0;

@@ -1,7 +1,7 @@
 //! The pixels of a picture, and the steps of its colour bar.
 
-use crate::view::palette::{NO_EVENT, hex, level};
-use crate::view::svg::{At, Svg};
+use crate::palette::{NO_EVENT, hex, level};
+use crate::svg::{At, Svg};
 
 /// Draws `levels`, `columns` in a line, from `corner` on as rectangles of the size
 /// `cell`: one path a colour. Neighbours in a line that look the same share a rectangle.

@@ -1,5 +1,5 @@
 //! A small writer of SVG documents: shapes and texts whose looks are those of the
-//! [palette](crate::view::palette).
+//! [palette](crate::palette).
 //!
 //! A document needs nothing beside itself: no font files, scripts or outside style
 //! sheets. It defines no identifiers, so that any number of them fit into one page.
@@ -7,10 +7,10 @@
 
 use std::fmt::{self, Write as _};
 
-use crate::view::palette::SHEET;
+use crate::palette::SHEET;
 
 /// Every document has it near its start.
-pub(crate) const MARK: &str = "class=\"dtof\"";
+pub const MARK: &str = "class=\"dtof\"";
 
 /// Widths of the characters from space to `~` in Helvetica and Arial, in 1/1000 of the
 /// size.

@@ -1,6 +1,6 @@
 //! What a chart is made of.
 
-use crate::view::palette::{self, Pen};
+use crate::palette::{self, Pen};
 
 /// What a chart shows, and whether its points say so.
 #[derive(Clone, Debug, PartialEq, Eq)]

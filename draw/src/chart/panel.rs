@@ -3,8 +3,8 @@
 use super::names::{Area, Wanted, apart, beside};
 use super::parts::{Panel, Point, Series, Style};
 use super::scale::Scale;
-use crate::view::palette::Mark;
-use crate::view::svg::{Anchor, At, Svg, text_width, wrapped};
+use crate::palette::Mark;
+use crate::svg::{Anchor, At, Svg, text_width, wrapped};
 
 /// Size of all texts but the title, and the height of a line.
 pub(super) const TEXT: f64 = 14.5;
