@@ -235,6 +235,8 @@ fn frames_read_all_pixels_at_once() {
         assert!(of_frame.count() > 32 * 16 * 9 / 10);
     }
     assert!(rows.len() <= 2 * 32 * 16);
+    let report = scratch.read("out/report.html");
+    assert!(report.contains("Readings in space and time") && !report.contains(" events are shown"));
 
     for more in [["--l1", "20"], ["--alpha", "4"], ["--device", "qemu"]] {
         let refused = scratch.simulate(&scene, &[&frames[..], &more].concat());

@@ -2,9 +2,9 @@
 //! is given, and the script.
 
 use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::json;
 
-use super::BASE64;
 use crate::events::sample::Sample;
 use crate::input::source::Geometry;
 use crate::rows::grouped;

@@ -99,17 +99,29 @@ impl Outcome {
     }
 
     /// The largest factor between a share and `wanted`, up or down. Where there is no
-    /// false alarm, that of the interval's end.
+    /// false alarm at all, the one that is sure.
     fn worst_factor(&self, wanted: f64) -> f64 {
-        let factor = |(_, share): &(f64, Share)| {
-            let value = if share.value > 0.0 {
-                share.value
+        let factor = |value: f64| (value / wanted).max(wanted / value);
+        let sure = |(low, high): (f64, f64)| {
+            if low <= wanted && wanted <= high {
+                1.0
             } else {
-                share.interval.1
-            };
-            (value / wanted).max(wanted / value)
+                factor(low).min(factor(high))
+            }
         };
-        self.shares.iter().map(factor).fold(1.0, f64::max)
+        let factors = self.shares.iter().map(|(_, share)| {
+            if self.has_none() {
+                sure(share.interval)
+            } else {
+                factor(share.value)
+            }
+        });
+        factors.fold(1.0, f64::max)
+    }
+
+    /// Whether a background brought no false alarm.
+    fn has_none(&self) -> bool {
+        self.shares.iter().any(|(_, share)| share.value == 0.0)
     }
 
     /// A panel with what is `wanted`.
@@ -170,7 +182,7 @@ fn results(part: &Part) -> Result<Results> {
         let least = outcomes
             .iter()
             .find(is_paper)
-            .is_some_and(|outcome| outcome.shares.iter().any(|(_, share)| share.value == 0.0));
+            .is_some_and(Outcome::has_none);
         let least = if least { "at least " } else { "" };
         let chart = Chart {
             finding: Finding::new(

@@ -251,7 +251,7 @@ fn results(part: &Part) -> Result<Results> {
         let chart = Chart {
             finding: Finding::new(
                 format!(
-                    "Pulse σ {sigma}: a window of {bins} bins is fastest, {:.0} % off the best that is possible",
+                    "Pulse σ {sigma}: a window of {bins} bins is fastest, {:.0} % behind the likelihood ratio",
                     (best.1 - 1.0) * 100.0
                 ),
                 !bins.is_empty(),
