@@ -149,7 +149,7 @@ fn good(rng: &mut Pcg32) -> Line<'_> {
 
 /// Runs a session until the host has its statistics and knows that everything has
 /// arrived, or the device has forgotten the session, or its time is over.
-fn session(device: &mut Sidecar<'_>, number: u16, script: &Script, line: Line<'_>) -> Outcome {
+fn session(device: &mut Sidecar, number: u16, script: &Script, line: &mut Line) -> Outcome {
     let mut host = Host::new(number, 0);
     let (mut up, mut down) = (Wire::new(line.one_in), Wire::new(line.one_in));
     let mut frames = Deframer::new();
@@ -241,7 +241,7 @@ fn run(seed: u64, cycles: u64, change: impl FnOnce(&mut Line<'_>)) -> Outcome {
     let mut pixels = Pixels::new();
     let mut line = good(&mut rng);
     change(&mut line);
-    let outcome = session(&mut Sidecar::new(&mut pixels, None), 7, &script, line);
+    let outcome = session(&mut Sidecar::new(&mut pixels, None), 7, &script, &mut line);
     check(&script, &outcome);
     outcome
 }
@@ -286,11 +286,11 @@ fn ten_thousand_faults_change_no_event_and_are_counted() {
 
 /// Gone in the middle of it, with messages on their way.
 fn interrupted(device: &mut Sidecar<'_>, number: u16, script: &Script, rng: &mut Pcg32) {
-    let line = Line {
+    let mut line = Line {
         milliseconds: 20,
         ..good(rng)
     };
-    let outcome = session(device, number, script, line);
+    let outcome = session(device, number, script, &mut line);
     assert!(outcome.report.is_none() && outcome.events.len() < script.events.len());
     assert!(!outcome.events.is_empty() && script.events.starts_with(&outcome.events));
 }
@@ -304,7 +304,10 @@ fn a_host_that_restarts_begins_anew_and_gets_every_event() {
     for number in 1..20 {
         interrupted(&mut device, number, &script, &mut rng);
     }
-    check(&script, &session(&mut device, 20, &script, good(&mut rng)));
+    check(
+        &script,
+        &session(&mut device, 20, &script, &mut good(&mut rng)),
+    );
 }
 
 #[test]
@@ -314,7 +317,10 @@ fn the_same_session_number_drawn_again_begins_anew() {
     let mut pixels = Pixels::new();
     let mut device = Sidecar::new(&mut pixels, None);
     interrupted(&mut device, 7, &script, &mut rng);
-    check(&script, &session(&mut device, 7, &script, good(&mut rng)));
+    check(
+        &script,
+        &session(&mut device, 7, &script, &mut good(&mut rng)),
+    );
 }
 
 #[test]
@@ -332,7 +338,10 @@ fn a_device_that_restarts_is_noticed_and_serves_the_next_session() {
     host.exchange(&mut device, 0);
     assert!(host.endpoint.is_lost());
     assert_eq!(device.endpoint().counters().foreign, 1);
-    check(&script, &session(&mut device, 2, &script, good(&mut rng)));
+    check(
+        &script,
+        &session(&mut device, 2, &script, &mut good(&mut rng)),
+    );
 }
 
 /// Milliseconds until a hundred messages have crossed a line of so many bytes a
