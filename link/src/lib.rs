@@ -20,6 +20,7 @@ mod configuration;
 pub mod endpoint;
 pub mod frame;
 pub mod message;
+mod numbered;
 mod refusal;
 mod report;
 mod sensor;
