@@ -3,7 +3,7 @@
 use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
 use embedded_hal::i2c::I2c;
 
-use super::frame::{NoPacket, OutOfOrder, PACKET, Packet, Taken};
+use super::frame::{PACKET, Packet, Taken};
 use super::registers::{CONFIG_RESULT, HISTOGRAM_INT, INT_STATUS, RESULT_INT};
 use super::{Error, Result, State, Tmf882x, Waiting, bus_error, count};
 use crate::timer::Since;
@@ -76,16 +76,10 @@ where
             // 0x20 + 135 bytes end at 0xA7.
             register += u8::try_from(chunk.len()).unwrap_or(0);
         }
-        let packet = Packet::of(&bytes).map_err(|error| {
-            self.assembly.restart();
-            match error {
-                NoPacket::ForeignResult(result) => Error::ForeignResult { result },
-                NoPacket::WrongSize(size) => Error::WrongSize { size },
-            }
-        })?;
+        let packet = Packet::of(&bytes).inspect_err(|_| self.assembly.restart())?;
         count(&mut self.counts.packets);
-        match self.assembly.take(packet) {
-            Ok(Taken::Histogram { channel, counts }) => {
+        match self.assembly.take(packet)? {
+            Taken::Histogram { channel, counts } => {
                 let Some(pixel) = self.config.pixel(channel) else {
                     return Ok(Polled::Working);
                 };
@@ -93,12 +87,11 @@ where
                 count(&mut self.counts.histograms);
                 Ok(Polled::Data)
             }
-            Ok(Taken::Part) => Ok(Polled::Working),
-            Ok(Taken::LeftOut) => {
+            Taken::Part => Ok(Polled::Working),
+            Taken::LeftOut => {
                 count(&mut self.counts.left_out);
                 Ok(Polled::Idle)
             }
-            Err(OutOfOrder { expected, found }) => Err(Error::OutOfOrder { expected, found }),
         }
     }
 }
