@@ -1,62 +1,33 @@
 //! A host and a device with a bad wire between them: over ten thousand faults,
 //! every event arrives once, in order and as it was.
 
+mod common;
+
 use std::collections::VecDeque;
 
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use common::host::{CONFIGURATION, Host, deliver};
+use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AerDecoder, AerRecord, AerWord, AnyRule, AsyncPixel, Count, DepthEstimator, DepthEvent,
-    LaserCycle, PaperRule, PixelAddress, PixelConfig, Statistics,
+    AsyncPixel, Count, DepthEvent, LaserCycle, PaperRule, PixelAddress, PixelConfig, Statistics,
 };
-use dtof_firmware::sidecar::Sidecar;
+use dtof_firmware::sidecar::{Pixel, Sidecar};
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
-use dtof_link::message;
-use dtof_link::message::greeting;
+use dtof_link::message::{self, greeting};
 use dtof_link::{Configuration, Report, Source, Token};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 const PIXELS: u16 = 8;
-
-const CONFIGURATION: Configuration = Configuration {
-    rule: AnyRule::Paper(PaperRule::new(U8F8::lit("4"), Count::saturating(5))),
-    estimator: DepthEstimator::Centroid3,
-    x: 4,
-    l1: 20,
-    l2: 200,
-    gate: (0, 127),
-    one_hit_tdc: false,
-    pixels: PIXELS,
-    bin_width_ps: U16F16::lit("250"),
-    offset_mm: I24F8::ZERO,
-    source: Source::Link,
-    dynamic_depth: None,
-};
-
-/// Faults done to the bytes so far.
-#[derive(Debug, Default, Clone, Copy)]
-struct Faults {
-    flipped: u32,
-    dropped: u32,
-    doubled: u32,
-    swapped: u32,
-    pulled: u32,
-}
-
-impl Faults {
-    fn all(&self) -> u32 {
-        self.flipped + self.dropped + self.doubled + self.swapped + self.pulled
-    }
-}
+type Pixels = heapless::Vec<Pixel, { PIXELS as usize }>;
 
 /// One direction of the wire.
 struct Wire {
     bytes: VecDeque<u8>,
-    /// One fault in so many bytes.
+    /// One fault in so many bytes; none if 0.
     one_in: u32,
     pulled_until: u32,
-    faults: Faults,
+    faults: u32,
 }
 
 impl Wire {
@@ -65,7 +36,7 @@ impl Wire {
             bytes: VecDeque::new(),
             one_in,
             pulled_until: 0,
-            faults: Faults::default(),
+            faults: 0,
         }
     }
 
@@ -78,26 +49,17 @@ impl Wire {
                 self.bytes.push_back(byte);
                 continue;
             }
+            self.faults += 1;
             match rng.next_u32() % 100 {
-                0..30 => {
-                    self.bytes.push_back(byte ^ (1 << (rng.next_u32() % 8)));
-                    self.faults.flipped += 1;
-                }
-                30..60 => self.faults.dropped += 1,
-                60..80 => {
-                    self.bytes.extend([byte, byte]);
-                    self.faults.doubled += 1;
-                }
+                0..30 => self.bytes.push_back(byte ^ (1 << (rng.next_u32() % 8))),
+                30..60 => {}
+                60..80 => self.bytes.extend([byte, byte]),
                 80..99 => {
                     let before = self.bytes.pop_back();
                     self.bytes.push_back(byte);
                     self.bytes.extend(before);
-                    self.faults.swapped += 1;
                 }
-                _ => {
-                    self.pulled_until = now + 1000;
-                    self.faults.pulled += 1;
-                }
+                _ => self.pulled_until = now + 1000,
             }
         }
     }
@@ -112,12 +74,8 @@ struct Script {
 
 fn script(cycles: u64, rng: &mut Pcg32) -> Script {
     let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
-    let config = PixelConfig::<128>::with_rule(rule)
-        .x(4)
-        .l1(20)
-        .l2(200)
-        .build()
-        .unwrap();
+    let config = PixelConfig::<128>::with_rule(rule).x(4).l1(20).l2(200);
+    let config = config.build().unwrap();
     let mut pixels: Vec<_> = (0..PIXELS)
         .map(|address| AsyncPixel::<128>::new(PixelAddress(address)))
         .collect();
@@ -132,11 +90,8 @@ fn script(cycles: u64, rng: &mut Pcg32) -> Script {
             for _ in 0..rng.next_u32() % 3 {
                 // Half of them in one bin; a few past the last.
                 let random = (rng.next_u32() % 130) as u16;
-                let code = if rng.next_u32() & 1 == 0 {
-                    20 + 10 * address
-                } else {
-                    random
-                };
+                let is_signal = rng.next_u32() & 1 == 0;
+                let code = if is_signal { 20 + 10 * address } else { random };
                 pixel.count(&config, code);
                 photons += 1;
                 piece.extend(Token::Photon { code }.to_bytes());
@@ -160,164 +115,152 @@ fn script(cycles: u64, rng: &mut Pcg32) -> Script {
     }
 }
 
-/// The events of a message.
-fn decode(decoder: &mut AerDecoder, body: &[u8]) -> Vec<DepthEvent> {
-    let words = body
-        .chunks(AerWord::BYTES)
-        .map(|word| word.try_into().unwrap());
-    words
-        .filter_map(
-            |word| match decoder.decode(AerWord::from_le_bytes(word)).unwrap() {
-                AerRecord::Event(event) => Some(event),
-                AerRecord::Time(_) => None,
-                AerRecord::DynamicDepth(_) => panic!("dynamic depth is off"),
-                AerRecord::End { .. } => panic!("a device ends no stream"),
-            },
-        )
-        .collect()
-}
-
+/// What came of a session.
 struct Outcome {
     events: Vec<DepthEvent>,
-    report: Report,
+    /// None if the session did not get so far.
+    report: Option<Report>,
+    is_lost: bool,
     host: LinkCounters,
     device: LinkCounters,
     faults: u32,
     milliseconds: u32,
 }
 
-/// Runs a session to its end. The host takes messages only in one of
-/// `reads_one_in` milliseconds.
-fn run(script: &Script, one_in: u32, reads_one_in: u32, rng: &mut Pcg32) -> Outcome {
-    let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
-    let mut device = Sidecar::new(&mut pixels, None);
-    let mut host = Endpoint::host(7, greeting(0, 0), 0);
-    let (mut up, mut down) = (Wire::new(one_in), Wire::new(one_in));
-    let (mut up_frames, mut down_frames) = (Deframer::new(), Deframer::new());
+/// How a session goes.
+struct Line<'a> {
+    /// One fault in so many bytes; none if 0.
+    one_in: u32,
+    /// The host takes messages in one of so many milliseconds.
+    reads_one_in: u32,
+    milliseconds: u32,
+    rng: &'a mut Pcg32,
+}
+
+/// A good wire for as long as it takes.
+fn good(rng: &mut Pcg32) -> Line<'_> {
+    Line {
+        one_in: 0,
+        reads_one_in: 1,
+        milliseconds: 10_000_000,
+        rng,
+    }
+}
+
+/// Runs a session until the host has its statistics and knows that everything has
+/// arrived, or the device has forgotten the session, or its time is over.
+fn session(device: &mut Sidecar, number: u16, script: &Script, line: &mut Line) -> Outcome {
+    let mut host = Host::new(number, 0);
+    let (mut up, mut down) = (Wire::new(line.one_in), Wire::new(line.one_in));
+    let mut frames = Deframer::new();
     let mut wire = [0; WIRE_BYTES];
-    let mut decoder = AerDecoder::new();
-    let mut events = Vec::new();
-    let mut report = None;
-    let configuration = CONFIGURATION.to_le_bytes();
+    let wanted = Configuration {
+        source: Source::Link,
+        ..CONFIGURATION
+    };
+    let configuration = wanted.to_le_bytes();
+    let photons = script.messages.iter();
+    let photons = photons.map(|body| (message::PHOTONS, &body[..]));
     let mut to_send: VecDeque<(u8, &[u8])> = [(message::CONFIGURE, &configuration[..])]
         .into_iter()
-        .chain(
-            script
-                .messages
-                .iter()
-                .map(|body| (message::PHOTONS, &body[..])),
-        )
+        .chain(photons)
         .chain([
             (message::SYNCHRONISE, &b"done"[..]),
             (message::STATISTICS_REQUEST, &[]),
         ])
         .collect();
-    let mut answers = Vec::new();
-
-    for now in 0..10_000_000 {
-        while host.is_open() && host.has_room() {
+    let (mut now, mut report) = (0, None);
+    while now < line.milliseconds && !host.endpoint.is_lost() {
+        while host.endpoint.is_open() && host.endpoint.has_room() {
             let Some((kind, body)) = to_send.pop_front() else {
                 break;
             };
-            host.offer(kind, body).unwrap();
+            host.ask(kind, body);
         }
-        loop {
-            let length = host.transmit(now, &mut wire);
-            if length == 0 {
-                break;
-            }
-            down.carry(&wire[..length], now, rng);
+        while let length @ 1.. = host.endpoint.transmit(now, &mut wire) {
+            down.carry(&wire[..length], now, line.rng);
         }
-        while let Some(byte) = down.bytes.pop_front() {
-            if let Some(frame) = down_frames.push(byte) {
-                device.receive(frame, now);
-            }
-        }
+        deliver(&mut frames, &down.bytes, |frame| {
+            device.receive(frame, now);
+        });
+        down.bytes.clear();
         device.work(0);
-        loop {
-            let length = device.transmit(now, &mut wire);
-            if length == 0 {
+        while let length @ 1.. = device.transmit(now, &mut wire) {
+            up.carry(&wire[..length], now, line.rng);
+        }
+        host.hear(&up.bytes, now);
+        up.bytes.clear();
+        if now.is_multiple_of(line.reads_one_in) {
+            host.read(usize::MAX);
+            if let [.., (message::STATISTICS, body, _)] = &host.answers[..]
+                && host.endpoint.is_settled()
+            {
+                let kinds: Vec<u8> = host.answers.iter().map(|&(kind, ..)| kind).collect();
+                let before = [message::CONFIGURED, message::SYNCHRONISED];
+                assert_eq!(kinds[..kinds.len() - 1], before);
+                report = Report::from_le_bytes(body);
                 break;
             }
-            up.carry(&wire[..length], now, rng);
         }
-        while let Some(byte) = up.bytes.pop_front() {
-            if let Some(frame) = up_frames.push(byte) {
-                host.receive(frame, now);
-            }
-        }
-        if !now.is_multiple_of(reads_one_in) {
-            continue;
-        }
-        while let Some(message) = host.take() {
-            match message.kind {
-                message::EVENTS => events.extend(decode(&mut decoder, &message.body)),
-                message::STATISTICS => report = Report::from_le_bytes(&message.body),
-                kind => answers.push(kind),
-            }
-        }
-        if let Some(report) = report
-            && host.is_settled()
-        {
-            assert_eq!(answers, [message::CONFIGURED, message::SYNCHRONISED]);
-            return Outcome {
-                events,
-                report,
-                host: *host.counters(),
-                device: *device.endpoint().counters(),
-                faults: up.faults.all() + down.faults.all(),
-                milliseconds: now,
-            };
-        }
+        now += 1;
     }
-    panic!(
-        "out of step: {:?} {:?}",
-        host.counters(),
-        device.endpoint().counters()
-    );
+    assert!(host.changes.is_empty());
+    Outcome {
+        report,
+        is_lost: host.endpoint.is_lost(),
+        host: *host.endpoint.counters(),
+        device: *device.endpoint().counters(),
+        events: host.events,
+        faults: up.faults + down.faults,
+        milliseconds: now,
+    }
 }
 
 #[track_caller]
 fn check(script: &Script, outcome: &Outcome) {
-    assert!(
-        outcome.events == script.events,
-        "{} of {} events",
-        outcome.events.len(),
-        script.events.len()
-    );
-    let statistics = outcome.report.statistics;
+    let Outcome { host, device, .. } = outcome;
+    let Some(report) = outcome.report else {
+        panic!("out of step: {host:?} {device:?}");
+    };
+    let (got, wanted) = (outcome.events.len(), script.events.len());
+    assert!(outcome.events == script.events, "{got} of {wanted} events");
+    let statistics = report.statistics;
     assert_eq!(
         statistics.counted + statistics.saturated + statistics.rejected + statistics.gated_out,
         script.photons
     );
-    assert!(statistics.rejected > 0);
+    assert!(statistics.rejected > 0 && !outcome.is_lost);
     assert_eq!(statistics.events, script.events.len() as u64);
     assert_eq!(statistics.deferred, 0);
 }
 
+/// A device that was just switched on, and a script of so many laser cycles.
+fn run(seed: u64, cycles: u64, change: impl FnOnce(&mut Line<'_>)) -> Outcome {
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let script = script(cycles, &mut rng);
+    let mut pixels = Pixels::new();
+    let mut line = good(&mut rng);
+    change(&mut line);
+    let outcome = session(&mut Sidecar::new(&mut pixels, None), 7, &script, &mut line);
+    check(&script, &outcome);
+    outcome
+}
+
 #[test]
 fn a_good_wire_needs_no_repetition() {
-    let mut rng = Pcg32::seed_from_u64(1);
-    let script = script(5_000, &mut rng);
-    let outcome = run(&script, 0, 1, &mut rng);
-    check(&script, &outcome);
+    let outcome = run(1, 5_000, |_| {});
     for end in [outcome.host, outcome.device] {
-        assert_eq!(
-            end,
-            LinkCounters {
-                frames: end.frames,
-                ..LinkCounters::default()
-            }
-        );
+        let expected = LinkCounters {
+            frames: end.frames,
+            ..LinkCounters::default()
+        };
+        assert_eq!(end, expected);
     }
 }
 
 #[test]
 fn a_slow_reader_changes_no_event() {
-    let mut rng = Pcg32::seed_from_u64(2);
-    let script = script(2_000, &mut rng);
-    let outcome = run(&script, 0, 500, &mut rng);
-    check(&script, &outcome);
+    let outcome = run(2, 2_000, |line| line.reads_one_in = 500);
     println!("slow reader: {} ms", outcome.milliseconds);
 }
 
@@ -328,98 +271,55 @@ fn ten_thousand_faults_change_no_event_and_are_counted() {
         if faults >= 10_000 {
             break;
         }
-        let mut rng = Pcg32::seed_from_u64(seed);
-        let script = script(4_000, &mut rng);
-        let outcome = run(&script, one_in, 1, &mut rng);
-        check(&script, &outcome);
+        let outcome = run(seed, 4_000, |line| line.one_in = one_in);
+        let Outcome { host, device, .. } = outcome;
         println!(
-            "{} faults in {} ms: host {:?} device {:?}",
-            outcome.faults, outcome.milliseconds, outcome.host, outcome.device
+            "{} faults in {} ms: host {host:?} device {device:?}",
+            outcome.faults, outcome.milliseconds
         );
-        assert!(outcome.host.corrupt + outcome.device.corrupt > 0);
-        assert!(outcome.host.retransmitted + outcome.device.retransmitted > 0);
+        assert!(host.corrupt + device.corrupt > 0);
+        assert!(host.retransmitted + device.retransmitted > 0);
         faults += outcome.faults;
     }
     println!("{faults} faults");
 }
 
-/// Runs a good wire until the host has its statistics, or the device has
-/// forgotten the session, or `milliseconds` are over.
-fn session(
-    device: &mut Sidecar<'_>,
-    number: u16,
-    script: &Script,
-    milliseconds: u32,
-) -> (Vec<DepthEvent>, Option<Report>, bool) {
-    let mut host = Endpoint::host(number, greeting(0, 0), 0);
-    let (mut up, mut down) = (Deframer::new(), Deframer::new());
-    let mut wire = [0; WIRE_BYTES];
-    let configuration = CONFIGURATION.to_le_bytes();
-    let mut to_send: VecDeque<(u8, &[u8])> = [(message::CONFIGURE, &configuration[..])]
-        .into_iter()
-        .chain(
-            script
-                .messages
-                .iter()
-                .map(|body| (message::PHOTONS, &body[..])),
-        )
-        .chain([(message::STATISTICS_REQUEST, &[][..])])
-        .collect();
-    let mut decoder = AerDecoder::new();
-    let mut events = Vec::new();
-    for now in 0..milliseconds {
-        while host.is_open() && host.has_room() {
-            let Some((kind, body)) = to_send.pop_front() else {
-                break;
-            };
-            host.offer(kind, body).unwrap();
-        }
-        let length = host.transmit(now, &mut wire);
-        for &byte in &wire[..length] {
-            if let Some(frame) = down.push(byte) {
-                device.receive(frame, now);
-            }
-        }
-        device.work(0);
-        let length = device.transmit(now, &mut wire);
-        for &byte in &wire[..length] {
-            if let Some(frame) = up.push(byte) {
-                host.receive(frame, now);
-            }
-        }
-        while let Some(message) = host.take() {
-            match message.kind {
-                message::EVENTS => events.extend(decode(&mut decoder, &message.body)),
-                message::STATISTICS => {
-                    return (events, Report::from_le_bytes(&message.body), host.is_lost());
-                }
-                _ => {}
-            }
-        }
-        if host.is_lost() {
-            return (events, None, true);
-        }
-    }
-    (events, None, false)
+/// Gone in the middle of it, with messages on their way.
+fn interrupted(device: &mut Sidecar<'_>, number: u16, script: &Script, rng: &mut Pcg32) {
+    let mut line = Line {
+        milliseconds: 20,
+        ..good(rng)
+    };
+    let outcome = session(device, number, script, &mut line);
+    assert!(outcome.report.is_none() && outcome.events.len() < script.events.len());
+    assert!(!outcome.events.is_empty() && script.events.starts_with(&outcome.events));
 }
 
 #[test]
 fn a_host_that_restarts_begins_anew_and_gets_every_event() {
     let mut rng = Pcg32::seed_from_u64(4);
     let script = script(2_000, &mut rng);
-    let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
+    let mut pixels = Pixels::new();
     let mut device = Sidecar::new(&mut pixels, None);
     for number in 1..20 {
-        // Gone in the middle of it, with messages on their way.
-        let (events, report, _) = session(&mut device, number, &script, 40);
-        assert!(report.is_none() && events.len() < script.events.len());
-        assert!(script.events.starts_with(&events));
+        interrupted(&mut device, number, &script, &mut rng);
     }
-    let (events, report, lost) = session(&mut device, 20, &script, 100_000);
-    assert!(events == script.events && !lost);
-    assert_eq!(
-        report.unwrap().statistics.events,
-        script.events.len() as u64
+    check(
+        &script,
+        &session(&mut device, 20, &script, &mut good(&mut rng)),
+    );
+}
+
+#[test]
+fn the_same_session_number_drawn_again_begins_anew() {
+    let mut rng = Pcg32::seed_from_u64(6);
+    let script = script(2_000, &mut rng);
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, None);
+    interrupted(&mut device, 7, &script, &mut rng);
+    check(
+        &script,
+        &session(&mut device, 7, &script, &mut good(&mut rng)),
     );
 }
 
@@ -427,55 +327,21 @@ fn a_host_that_restarts_begins_anew_and_gets_every_event() {
 fn a_device_that_restarts_is_noticed_and_serves_the_next_session() {
     let mut rng = Pcg32::seed_from_u64(5);
     let script = script(2_000, &mut rng);
-    let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
+    let (mut pixels, mut earlier_pixels) = (Pixels::new(), Pixels::new());
     let mut device = Sidecar::new(&mut pixels, None);
-    let mut host = Endpoint::host(1, greeting(0, 0), 0);
-    let mut wire = [0; WIRE_BYTES];
-    let answer = |device: &mut Sidecar<'_>, host: &mut Endpoint, wire: &mut [u8; WIRE_BYTES]| {
-        let mut up = Deframer::new();
-        let length = device.transmit(0, wire);
-        for &byte in &wire[..length] {
-            if let Some(frame) = up.push(byte) {
-                host.receive(frame, 0);
-            }
-        }
-    };
     // A session of the device's earlier life, which another stands for.
-    let mut earlier_pixels = heapless::Vec::<_, 1>::new();
     let mut earlier = Sidecar::new(&mut earlier_pixels, None);
-    let mut down = Deframer::new();
-    let length = host.transmit(0, &mut wire);
-    for &byte in &wire[..length] {
-        if let Some(frame) = down.push(byte) {
-            earlier.receive(frame, 0);
-        }
-    }
-    answer(&mut earlier, &mut host, &mut wire);
-    assert!(host.is_open() && !host.is_lost());
-    host.offer(message::STATISTICS_REQUEST, &[]).unwrap();
-    let length = host.transmit(0, &mut wire);
-    for &byte in &wire[..length] {
-        if let Some(frame) = down.push(byte) {
-            device.receive(frame, 0);
-        }
-    }
-    answer(&mut device, &mut host, &mut wire);
-    assert!(host.is_lost());
+    let mut host = Host::new(1, 0);
+    host.exchange(&mut earlier, 0);
+    assert!(host.endpoint.is_open() && !host.endpoint.is_lost());
+    host.ask(message::STATISTICS_REQUEST, &[]);
+    host.exchange(&mut device, 0);
+    assert!(host.endpoint.is_lost());
     assert_eq!(device.endpoint().counters().foreign, 1);
-
-    let (events, report, _) = session(&mut device, 2, &script, 100_000);
-    assert!(events == script.events && report.is_some());
-}
-
-#[test]
-fn the_same_session_number_drawn_again_begins_anew() {
-    let mut rng = Pcg32::seed_from_u64(6);
-    let script = script(2_000, &mut rng);
-    let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
-    let mut device = Sidecar::new(&mut pixels, None);
-    session(&mut device, 7, &script, 40);
-    let (events, report, lost) = session(&mut device, 7, &script, 100_000);
-    assert!(events == script.events && report.is_some() && !lost);
+    check(
+        &script,
+        &session(&mut device, 2, &script, &mut good(&mut rng)),
+    );
 }
 
 /// Milliseconds until a hundred messages have crossed a line of so many bytes a
@@ -490,37 +356,24 @@ fn slow_line(bytes_a_second: usize) -> u32 {
     let mut credit = 0;
     for now in 0..1_000_000 {
         while host.is_open() && host.offer(message::PHOTONS, &[1; BODY_BYTES]).is_ok() {}
-        loop {
-            // What the line has not carried waits in front of it, unseen.
-            let length = host.transmit(now, &mut wire);
+        // What the line has not carried waits in front of it, unseen.
+        while let length @ 1.. = host.transmit(now, &mut wire) {
             line.extend(&wire[..length]);
-            if length == 0 {
-                break;
-            }
         }
-        credit += if (5_000..5_250).contains(&now) {
-            0
-        } else {
-            bytes_a_second
-        };
+        if !(5_000..5_250).contains(&now) {
+            credit += bytes_a_second;
+        }
         while credit >= 1000 {
             credit -= 1000;
-            let Some(byte) = line.pop_front() else {
-                continue;
-            };
-            if let Some(frame) = down.push(byte) {
+            deliver(&mut down, line.pop_front().as_ref(), |frame| {
                 device.receive(frame, now);
-            }
+            });
         }
         while device.take().is_some() {
             arrived += u32::from(now > 10_000);
         }
         let length = device.transmit(now, &mut wire);
-        for &byte in &wire[..length] {
-            if let Some(frame) = up.push(byte) {
-                host.receive(frame, now);
-            }
-        }
+        deliver(&mut up, &wire[..length], |frame| host.receive(frame, now));
         if arrived >= 100 {
             return now - 10_000;
         }

@@ -4,7 +4,8 @@
 
 mod common;
 
-use common::host::{CONFIGURATION, Call, Host, Scripted};
+use common::host::{CONFIGURATION, Call, Host, Scripted, configured};
+use common::scene;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
     AnyRule, AsyncPixel, CentredWindow, Count, Count24, DepthEstimator, DepthEvent,
@@ -13,15 +14,12 @@ use dtof_core::{
     detect,
 };
 use dtof_firmware::sidecar::{Pixel, Sidecar};
-use dtof_link::frame::{Deframer, WIRE_BYTES};
-use dtof_link::message;
-use dtof_link::{Configuration, DynamicDepth, FaultRecord, Refusal, Report, SensorRecord, Source};
-use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault, simulated};
+use dtof_link::frame::WIRE_BYTES;
+use dtof_link::{Configuration, DynamicDepth, FaultRecord, Report, Source, message};
+use dtof_sensors::About;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-/// Room for the bytes of a few milliseconds.
-type Buffers = dtof_firmware::serial::Buffers<512, 1024>;
 type Pixels = heapless::Vec<Pixel, 8>;
 
 /// A configuration with each rule and estimator, and the same as the core takes it.
@@ -36,15 +34,11 @@ fn configurations() -> [(Configuration, PixelConfig<128, AnyRule>); 2] {
         estimator: DepthEstimator::CentredWindow(centred),
         ..CONFIGURATION
     };
+    let estimator = DepthEstimator::CentredWindow(centred);
+    let (paper, window) = (config(paper.into()), config(window.into()));
     [
-        (CONFIGURATION, config(paper.into()).build().unwrap()),
-        (
-            with_windows,
-            config(window.into())
-                .estimator(DepthEstimator::CentredWindow(centred))
-                .build()
-                .unwrap(),
-        ),
+        (CONFIGURATION, paper.build().unwrap()),
+        (with_windows, window.estimator(estimator).build().unwrap()),
     ]
 }
 
@@ -59,12 +53,8 @@ fn calls(rng: &mut Pcg32) -> Vec<Call> {
             calls.push(Call::Photon(pixel, code));
         }
     }
-    let cycles = if rng.next_u32().is_multiple_of(10) {
-        7
-    } else {
-        1
-    };
-    calls.push(Call::End(cycles));
+    let is_tenth = rng.next_u32().is_multiple_of(10);
+    calls.push(Call::End(if is_tenth { 7 } else { 1 }));
     calls
 }
 
@@ -120,15 +110,8 @@ fn a_host_that_reads_gets_the_events_of_the_pixels() {
     let script = script(5_000);
     for (wanted, config) in configurations() {
         let mut pixels = Pixels::new();
-        let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
-        let mut host = Host::new(1, 0);
-        let mut sensor = sensor(&script);
-        host.configure(&mut device, 0, &wanted);
-        for now_ms in 0..5_000 {
-            device.poll_sensor(&mut sensor, now_ms);
-            host.exchange(&mut device, now_ms);
-            host.read(4);
-        }
+        let (mut device, mut host) = configured(&mut pixels, &wanted);
+        host.run(&mut device, &mut sensor(&script), 0..5_000, 4);
         let report = host.report(&mut device, 5_000);
         let expected = reference(&script, &config);
         assert!(expected.len() > 500 && host.events == expected);
@@ -147,9 +130,6 @@ fn dynamic_depth_sends_what_the_core_makes_of_the_events() {
     let threshold_mm = U24F8::lit("2");
     for reference in [Reference::Previous, Reference::Reported] {
         let mut pixels = Pixels::new();
-        let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
-        let mut host = Host::new(1, 0);
-        let mut sensor = sensor(&script);
         let wanted = Configuration {
             dynamic_depth: Some(DynamicDepth {
                 threshold_mm,
@@ -157,22 +137,16 @@ fn dynamic_depth_sends_what_the_core_makes_of_the_events() {
             }),
             ..wanted
         };
-        host.configure(&mut device, 0, &wanted);
-        for now_ms in 0..5_000 {
-            device.poll_sensor(&mut sensor, now_ms);
-            host.exchange(&mut device, now_ms);
-            host.read(4);
-        }
+        let (mut device, mut host) = configured(&mut pixels, &wanted);
+        host.run(&mut device, &mut sensor(&script), 0..5_000, 4);
         let report = host.report(&mut device, 5_000);
         let dynamic_depth = DynamicDepthConfig::new(threshold_mm, &scale, reference).unwrap();
         let mut observers = [const { DynamicDepthPixel::<3>::new() }; 8];
         let events = self::reference(&script, &config);
-        let expected: Vec<DynamicDepthEvent> = events
-            .iter()
-            .filter_map(|event| {
-                observers[usize::from(event.pixel.0)].observe(&dynamic_depth, event)
-            })
-            .collect();
+        let observe = |event: &DepthEvent| {
+            observers[usize::from(event.pixel.0)].observe(&dynamic_depth, event)
+        };
+        let expected: Vec<DynamicDepthEvent> = events.iter().filter_map(observe).collect();
         assert!(expected.len() > 30, "{}", expected.len());
         assert!(host.changes == expected && host.events.is_empty());
         // Depth events are counted all the same.
@@ -183,25 +157,15 @@ fn dynamic_depth_sends_what_the_core_makes_of_the_events() {
 #[test]
 fn a_host_that_does_not_read_for_ten_seconds_lengthens_exposures_and_loses_no_event() {
     let script = script(20_000);
+    let wanted = Configuration {
+        l2: 60_000,
+        ..CONFIGURATION
+    };
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
-    let mut host = Host::new(1, 0);
+    let (mut device, mut host) = configured(&mut pixels, &wanted);
     let mut sensor = sensor(&script);
-    host.configure(
-        &mut device,
-        0,
-        &Configuration {
-            l2: 60_000,
-            ..CONFIGURATION
-        },
-    );
-    for now_ms in 0..20_000 {
-        device.poll_sensor(&mut sensor, now_ms);
-        host.exchange(&mut device, now_ms);
-        // Reads for a while, stops for ten seconds, reads again.
-        if !(2_000..12_000).contains(&now_ms) {
-            host.read(4);
-        }
+    for (milliseconds, messages) in [(0..2_000, 4), (2_000..12_000, 0), (12_000..20_000, 4)] {
+        host.run(&mut device, &mut sensor, milliseconds, messages);
     }
     let report = host.report(&mut device, 20_000);
     // Questions do not empty slots; what is still in them comes after.
@@ -227,10 +191,8 @@ fn a_host_that_does_not_read_for_ten_seconds_lengthens_exposures_and_loses_no_ev
 fn questions_are_answered_though_the_sensor_fills_the_link() {
     let script = script(20_000);
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
-    let mut host = Host::new(1, 0);
+    let (mut device, mut host) = configured(&mut pixels, &CONFIGURATION);
     let mut sensor = sensor(&script);
-    host.configure(&mut device, 0, &CONFIGURATION);
     let mut asked = 0;
     for now_ms in 0..20_000 {
         device.poll_sensor(&mut sensor, now_ms);
@@ -256,15 +218,12 @@ fn questions_are_answered_though_the_sensor_fills_the_link() {
     }
     assert!(last.statistics.deferred > 1_000, "{last:?}");
     // No pixel keeps the others from the link.
-    let count = |pixel| {
-        host.events
-            .iter()
-            .filter(|event| event.pixel.0 == pixel)
-            .count()
-    };
-    let counts: Vec<_> = (0..8).map(count).collect();
-    let (least, most) = (counts.iter().min().unwrap(), counts.iter().max().unwrap());
-    assert!(least * 2 > *most, "{counts:?}");
+    let mut counts = [0; 8];
+    for event in &host.events {
+        counts[usize::from(event.pixel.0)] += 1;
+    }
+    let (least, most) = (counts.iter().min(), counts.iter().max());
+    assert!(least.unwrap() * 2 > *most.unwrap(), "{counts:?}");
 }
 
 #[test]
@@ -284,14 +243,11 @@ fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
 
     // A configuration that takes photons from the link keeps the sensor's out.
     let mut host = Host::new(1, 10_000);
-    host.configure(
-        &mut device,
-        10_000,
-        &Configuration {
-            source: Source::Link,
-            ..CONFIGURATION
-        },
-    );
+    let wanted = Configuration {
+        source: Source::Link,
+        ..CONFIGURATION
+    };
+    host.configure(&mut device, 10_000, &wanted);
     device.poll_sensor(&mut unused, 10_000);
     let report = host.report(&mut device, 10_000);
     assert_eq!((report.cycles, offered(&report)), (0, 0));
@@ -316,14 +272,9 @@ fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
 fn a_configuration_waits_for_the_events_of_the_one_before() {
     let script = script(3_000);
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
-    let mut host = Host::new(1, 0);
+    let (mut device, mut host) = configured(&mut pixels, &CONFIGURATION);
     let mut sensor = sensor(&script);
-    host.configure(&mut device, 0, &CONFIGURATION);
-    for now_ms in 0..2_000 {
-        device.poll_sensor(&mut sensor, now_ms);
-        host.exchange(&mut device, now_ms);
-    }
+    host.run(&mut device, &mut sensor, 0..2_000, 0);
     let report = host.report(&mut device, 2_000);
     assert!(report.statistics.deferred > 0);
     assert_eq!(report.statistics.events, host.events.len() as u64);
@@ -350,14 +301,12 @@ fn a_histogram_is_decided_once_within_the_gate() {
 }
 
 fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<128, AnyRule>) {
-    let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
-    let mut host = Host::new(1, 0);
     let wanted = Configuration {
         gate: (10, 99),
         ..wanted
     };
-    host.configure(&mut device, 0, &wanted);
+    let mut pixels = Pixels::new();
+    let (mut device, mut host) = configured(&mut pixels, &wanted);
     let mut outside = histogram(40);
     outside[120] = 100_000;
     let calls = vec![
@@ -397,14 +346,9 @@ fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<1
 #[test]
 fn histograms_without_room_for_an_event_are_counted_as_deferred() {
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
-    let mut host = Host::new(1, 0);
-    host.configure(&mut device, 0, &CONFIGURATION);
+    let (mut device, mut host) = configured(&mut pixels, &CONFIGURATION);
     let mut sensor = Scripted((0..1_000).map(|_| Some(vec![Call::Histogram(0, histogram(40))])));
-    for now_ms in 0..1_000 {
-        device.poll_sensor(&mut sensor, now_ms);
-        host.exchange(&mut device, now_ms);
-    }
+    host.run(&mut device, &mut sensor, 0..1_000, 0);
     let report = host.report(&mut device, 1_000);
     let statistics = report.statistics;
     assert_eq!(statistics.events, host.events.len() as u64);
@@ -414,240 +358,19 @@ fn histograms_without_room_for_an_event_are_counted_as_deferred() {
     assert_eq!(offered(&report), 1_000 * (125 * 100 + 84_000));
 }
 
-/// The main loop of an image, and 100 bytes a millisecond on the wire.
+/// 100 bytes a millisecond on the wire.
 #[test]
 fn the_simulated_scene_comes_over_a_serial_port() {
-    let mut buffers = Buffers::new();
-    let (mut interrupt, mut serial) = buffers.split(|| {});
-    let mut pixels = heapless::Vec::<Pixel, 16>::new();
-    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
-    let mut sensor = simulated::scene();
-    let mut host = Host::new(1, 0);
-    let mut frames = Deframer::new();
-    let mut wire = [0; WIRE_BYTES];
-    for now_ms in 0..5_000 {
-        if now_ms == 10 {
-            let wanted = Configuration {
-                pixels: 16,
-                l1: 40,
-                l2: 2_000,
-                ..CONFIGURATION
-            };
-            host.ask(message::CONFIGURE, &wanted.to_le_bytes());
-        }
-        let length = host.endpoint.transmit(now_ms, &mut wire);
-        wire[..length]
-            .iter()
-            .for_each(|&byte| interrupt.on_receive(byte));
-        let lost = serial.lost();
-        let Ok(()) = device.poll_with(&mut sensor, &mut serial, lost, now_ms);
-        for byte in std::iter::from_fn(|| interrupt.next_to_send()).take(100) {
-            if let Some(frame) = frames.push(byte) {
-                host.endpoint.receive(frame, now_ms);
-            }
-        }
-        host.read(4);
-    }
-    assert_eq!(host.answers.len(), 1);
-    assert_eq!(host.answers[0].0, message::CONFIGURED);
-    assert_eq!(serial.lost(), 0);
+    let (host, _) = scene::over_serial(0, 5_000, 100);
     // All pixels report, and most of the time the right bins.
     assert!(host.events.len() > 2_000, "{}", host.events.len());
     let right = |event: &&DepthEvent| {
         let pulse = 20 + 6 * event.pixel.0;
         (pulse..pulse + 3).contains(&event.peak_bin.raw())
     };
-    let count = host.events.iter().filter(right).count();
-    assert!(
-        count * 100 > host.events.len() * 95,
-        "{count} of {}",
-        host.events.len()
-    );
+    let (count, all) = (host.events.iter().filter(right).count(), host.events.len());
+    assert!(count * 100 > all * 95, "{count} of {all}");
     for pixel in 0..16 {
         assert!(host.events.iter().any(|event| event.pixel.0 == pixel));
-    }
-}
-
-/// A sensor that notes what it is told.
-#[derive(Default)]
-struct Told(Vec<Order>);
-
-#[derive(Debug, PartialEq)]
-enum Order {
-    Start(U16F16),
-    Poll,
-    Stop,
-}
-
-impl Sensor for Told {
-    type Error = SensorFault;
-
-    fn about(&self) -> About {
-        About {
-            bin_width: Some(U16F16::lit("160")),
-            ..About::new(3)
-        }
-    }
-
-    fn start(&mut self, bin_width: U16F16) {
-        self.0.push(Order::Start(bin_width));
-    }
-
-    fn stop(&mut self) {
-        self.0.push(Order::Stop);
-    }
-
-    fn poll(&mut self, _: u32, _: &mut impl PhotonSink) -> Result<Polled, SensorFault> {
-        self.0.push(Order::Poll);
-        Ok(Polled::Idle)
-    }
-}
-
-#[test]
-fn a_sensor_is_started_for_each_configuration_and_stopped_once() {
-    let mut pixels = Pixels::new();
-    let mut sensor = Told::default();
-    let mut device = Sidecar::new(&mut pixels, Some(sensor.about()));
-    let mut host = Host::new(1, 0);
-    device.poll_sensor(&mut sensor, 0);
-    let wanted = |bin_width: u32, source| Configuration {
-        bin_width_ps: U16F16::from_num(bin_width),
-        source,
-        ..CONFIGURATION
-    };
-    for configuration in [
-        wanted(160, Source::Sensor),
-        wanted(150, Source::Sensor),
-        wanted(250, Source::Link),
-        wanted(250, Source::Link),
-    ] {
-        host.configure(&mut device, 0, &configuration);
-        device.poll_sensor(&mut sensor, 0);
-        device.poll_sensor(&mut sensor, 1);
-    }
-    let start = |bin_width| Order::Start(U16F16::from_num(bin_width));
-    let (poll, stop) = (|| Order::Poll, Order::Stop);
-    let expected = [start(160), poll(), poll(), start(150), poll(), poll(), stop];
-    assert_eq!(sensor.0, expected);
-
-    // A new session stops it, too.
-    host.configure(&mut device, 0, &wanted(160, Source::Sensor));
-    device.poll_sensor(&mut sensor, 2);
-    sensor.0.clear();
-    let mut next = Host::new(2, 0);
-    next.report(&mut device, 3);
-    device.poll_sensor(&mut sensor, 3);
-    assert_eq!(sensor.0, [Order::Stop]);
-}
-
-#[test]
-fn bins_that_are_not_the_sensors_are_refused() {
-    let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, Some(Told::default().about()));
-    let mut host = Host::new(1, 0);
-    // A sixteenth of 160 ps to either side.
-    for (bin_width, taken) in [(149, false), (150, true), (170, true), (171, false)] {
-        let wanted = Configuration {
-            bin_width_ps: U16F16::from_num(bin_width),
-            source: Source::Sensor,
-            ..CONFIGURATION
-        };
-        let answer = host.answer(&mut device, 0, message::CONFIGURE, &wanted.to_le_bytes());
-        let expected = if taken {
-            vec![]
-        } else {
-            vec![Refusal::BinWidth as u8]
-        };
-        assert_eq!(answer, expected, "{bin_width} ps");
-        // Photons of the link have the bins of whoever sends them.
-        let wanted = Configuration {
-            source: Source::Link,
-            ..wanted
-        };
-        host.configure(&mut device, 0, &wanted);
-    }
-}
-
-#[test]
-fn the_host_is_told_what_the_sensor_is() {
-    let told = Told::default().about();
-    let told_record = SensorRecord {
-        pixels: told.pixels,
-        bin_width: told.bin_width,
-        offset: told.offset,
-    };
-    let mut pixels = Pixels::new();
-    let mut host = Host::new(1, 0);
-    let mut device = Sidecar::new(&mut pixels, Some(told));
-    let body = host.answer(&mut device, 0, message::SENSOR_REQUEST, &[]);
-    assert_eq!(body, [3, 0, 0, 0, 160, 0, 0, 0, 0, 0]);
-    assert_eq!(SensorRecord::from_le_bytes(&body), Some(Some(told_record)));
-
-    let mut pixels = Pixels::new();
-    let mut host = Host::new(1, 0);
-    let mut device = Sidecar::new(&mut pixels, None);
-    let body = host.answer(&mut device, 0, message::SENSOR_REQUEST, &[]);
-    assert_eq!(SensorRecord::from_le_bytes(&body), Some(None));
-    assert_eq!(SensorRecord::from_le_bytes(&body[1..]), None);
-}
-
-/// A sensor that gives the first photon of a laser cycle only.
-struct OneHit<'a, S>(&'a mut S);
-
-impl<S: Sensor> Sensor for OneHit<'_, S> {
-    type Error = S::Error;
-
-    fn about(&self) -> About {
-        self.0.about()
-    }
-
-    fn is_one_hit(&self) -> bool {
-        true
-    }
-
-    fn start(&mut self, bin_width: U16F16) {
-        self.0.start(bin_width);
-    }
-
-    fn stop(&mut self) {
-        self.0.stop();
-    }
-
-    fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, S::Error> {
-        self.0.poll(now_ms, sink)
-    }
-}
-
-#[test]
-fn events_of_a_sensor_that_gives_one_photon_a_laser_cycle_say_so_at_high_rates() {
-    for is_one_hit in [false, true] {
-        // A photon in 20 of 24 laser cycles, then in 11 of 24.
-        let call = |cycle: u64| {
-            let is_dark = if cycle < 24 { cycle < 4 } else { cycle < 37 };
-            let mut calls = vec![Call::Photon(0, 40), Call::End(1)];
-            calls.drain(..usize::from(is_dark));
-            calls
-        };
-        let mut script = Scripted((0..48).map(call).map(Some));
-        let mut pixels = Pixels::new();
-        let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
-        let mut host = Host::new(1, 0);
-        host.configure(&mut device, 0, &CONFIGURATION);
-        for now_ms in 0..100 {
-            if is_one_hit {
-                device.poll_sensor(&mut OneHit(&mut script), now_ms);
-            } else {
-                device.poll_sensor(&mut script, now_ms);
-            }
-            host.exchange(&mut device, now_ms);
-            host.read(4);
-        }
-        let flags: Vec<Flags> = host.events.iter().map(|event| event.flags).collect();
-        let first = if is_one_hit {
-            Flags::PILE_UP
-        } else {
-            Flags::NONE
-        };
-        assert_eq!(flags, [first, Flags::NONE]);
     }
 }

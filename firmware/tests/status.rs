@@ -4,20 +4,26 @@
 
 mod common;
 
-use common::host::{CONFIGURATION, Host};
+use common::host::{CONFIGURATION, Host, configured};
 use common::mocks::plug::{Answers, Bus, Tdc, Tmf};
 use common::mocks::{Broken, Line};
+use common::scene;
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{DepthEvent, PixelAddress, Statistics};
 use dtof_firmware::sidecar::{Pixel, Sidecar};
 use dtof_link::endpoint::LinkCounters;
-use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message;
 use dtof_link::{Configuration, FaultRecord, Refusal, Report, Source, Token};
 use dtof_sensors::tmf882x::{BootCommand, Command, Tmf882x, Waiting};
-use dtof_sensors::{About, Sensor, SensorFault, simulated, tdc7200, tmf882x};
+use dtof_sensors::{Sensor, SensorFault, tdc7200, tmf882x};
 
 type Pixels = heapless::Vec<Pixel, 9>;
+
+/// One that takes photons from the link.
+const GOOD: Configuration = Configuration {
+    source: Source::Link,
+    ..CONFIGURATION
+};
 
 /// A second with `sensor` and a host that reads; what the device says then. The
 /// sensor is asked three times a millisecond, as by a busy main loop.
@@ -51,13 +57,11 @@ fn unplug<Chip: Default>(
     said: FaultRecord,
 ) {
     let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
-    let mut host = Host::new(1, 0);
     let wanted = Configuration {
         pixels: 9,
         ..CONFIGURATION
     };
-    host.configure(&mut device, 0, &wanted);
+    let (mut device, mut host) = configured(&mut pixels, &wanted);
     let mut now_ms = 0;
     let mut second = || {
         let report = second(&mut sensor, bus, &mut device, &mut host, &mut now_ms);
@@ -134,117 +138,61 @@ fn an_unplugged_tmf882x_is_reported_and_found_again() {
 
 #[test]
 fn every_error_of_a_driver_is_of_its_kind() {
+    use SensorFault::{
+        Bus, Data, NoAnswer, NoImage, NotTaken, Pin, StuckInterrupt, Timeout, WrongChip,
+    };
     type OfTdc = tdc7200::Error<Broken, Broken>;
     type OfTmf = tmf882x::Error<Broken, Broken>;
     let wrong = |config2, int_mask| OfTdc::WrongChip { config2, int_mask };
     for (error, kind) in [
-        (OfTdc::Bus(Broken), SensorFault::Bus),
-        (OfTdc::Pin(Broken), SensorFault::Pin),
-        (OfTdc::NoAnswer, SensorFault::NoAnswer),
-        (wrong(0, 0), SensorFault::NoAnswer),
-        (wrong(0xff, 0xff), SensorFault::NoAnswer),
-        (wrong(0x40, 0xff), SensorFault::WrongChip),
-        (OfTdc::Timeout, SensorFault::Timeout),
-        (OfTdc::Parity { register: 0x10 }, SensorFault::Data),
-        (
-            OfTdc::StuckInterrupt { status: 8 },
-            SensorFault::StuckInterrupt,
-        ),
+        (OfTdc::Bus(Broken), Bus),
+        (OfTdc::Pin(Broken), Pin),
+        (OfTdc::NoAnswer, NoAnswer),
+        (wrong(0, 0), NoAnswer),
+        (wrong(0xff, 0xff), NoAnswer),
+        (wrong(0x40, 0xff), WrongChip),
+        (OfTdc::Timeout, Timeout),
+        (OfTdc::Parity { register: 0x10 }, Data),
+        (OfTdc::StuckInterrupt { status: 8 }, StuckInterrupt),
     ] {
         assert_eq!(SensorFault::from(error), kind, "{error}");
     }
-    let command = Command::Measure;
-    let status = 2;
+    let (command, status) = (Command::Measure, 2);
+    let bootloader = |command, answer| OfTmf::Bootloader { command, answer };
     for (error, kind) in [
-        (OfTmf::Nack(Broken), SensorFault::NoAnswer),
-        (OfTmf::Bus(Broken), SensorFault::Bus),
-        (OfTmf::Pin(Broken), SensorFault::Pin),
-        (OfTmf::WrongChip { id: 7 }, SensorFault::WrongChip),
-        (OfTmf::WrongApplication { id: 7 }, SensorFault::WrongChip),
-        (OfTmf::Timeout(Waiting::Histogram), SensorFault::Timeout),
-        (OfTmf::Timeout(Waiting::PowerUp), SensorFault::NotTaken),
-        (
-            OfTmf::Bootloader {
-                command: BootCommand::WriteRam,
-                answer: [2, 0, 0xFD],
-            },
-            SensorFault::NotTaken,
-        ),
-        (OfTmf::Refused { command, status }, SensorFault::NotTaken),
-        (
-            OfTmf::StuckInterrupt { status },
-            SensorFault::StuckInterrupt,
-        ),
-        (OfTmf::NoImage, SensorFault::NoImage),
-        (OfTmf::WrongSize { size: 1 }, SensorFault::Data),
+        (OfTmf::Nack(Broken), NoAnswer),
+        (OfTmf::Bus(Broken), Bus),
+        (OfTmf::Pin(Broken), Pin),
+        (OfTmf::WrongChip { id: 7 }, WrongChip),
+        (OfTmf::WrongApplication { id: 7 }, WrongChip),
+        (OfTmf::Timeout(Waiting::Histogram), Timeout),
+        (OfTmf::Timeout(Waiting::PowerUp), NotTaken),
+        (bootloader(BootCommand::WriteRam, [2, 0, 0xFD]), NotTaken),
+        (OfTmf::Refused { command, status }, NotTaken),
+        (OfTmf::StuckInterrupt { status }, StuckInterrupt),
+        (OfTmf::NoImage, NoImage),
+        (OfTmf::WrongSize { size: 1 }, Data),
     ] {
         assert_eq!(SensorFault::from(error), kind, "{error}");
     }
-}
-
-/// Two seconds of the simulated scene over a serial port for a host that comes at
-/// `start_ms`, the device being on from 0: all its events, and what the device had
-/// noticed on the link.
-fn session_from(start_ms: u32) -> (Vec<DepthEvent>, LinkCounters) {
-    let mut buffers = dtof_firmware::serial::Buffers::<512, 1024>::new();
-    let (mut interrupt, mut serial) = buffers.split(|| {});
-    let mut pixels = heapless::Vec::<Pixel, 16>::new();
-    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
-    let mut sensor = simulated::scene();
-    for now_ms in 0..start_ms {
-        let lost = serial.lost();
-        let Ok(()) = device.poll_with(&mut sensor, &mut serial, lost, now_ms);
-        assert_eq!(interrupt.next_to_send(), None);
-    }
-    let mut host = Host::new(1, start_ms);
-    let mut frames = Deframer::new();
-    let mut wire = [0; WIRE_BYTES];
-    let wanted = Configuration {
-        pixels: 16,
-        l1: 40,
-        l2: 2_000,
-        ..CONFIGURATION
-    };
-    for now_ms in start_ms..start_ms + 2_000 {
-        if now_ms == start_ms + 10 {
-            host.ask(message::CONFIGURE, &wanted.to_le_bytes());
-        }
-        let length = host.endpoint.transmit(now_ms, &mut wire);
-        wire[..length]
-            .iter()
-            .for_each(|&byte| interrupt.on_receive(byte));
-        let lost = serial.lost();
-        let Ok(()) = device.poll_with(&mut sensor, &mut serial, lost, now_ms);
-        for byte in std::iter::from_fn(|| interrupt.next_to_send()) {
-            if let Some(frame) = frames.push(byte) {
-                host.endpoint.receive(frame, now_ms);
-            }
-        }
-        host.read(4);
-    }
-    assert_eq!(host.answers[0].0, message::CONFIGURED);
-    (host.events, *device.endpoint().counters())
 }
 
 #[test]
 fn a_host_that_comes_after_a_minute_gets_what_it_would_have_got_at_once() {
-    let (events, counters) = session_from(60_000);
-    assert!(events.len() > 500);
+    let (late, counters) = scene::over_serial(60_000, 2_000, usize::MAX);
+    assert!(late.events.len() > 500);
     let clean = LinkCounters {
         frames: counters.frames,
         ..LinkCounters::default()
     };
     assert_eq!(counters, clean);
-    assert!(events == session_from(0).0);
+    let (at_once, _) = scene::over_serial(0, 2_000, usize::MAX);
+    assert!(late.events == at_once.events);
 }
 
 /// A configuration of each kind that cannot be, for eight pixels without a sensor.
 fn refused() -> Vec<(Vec<u8>, Refusal)> {
-    let good = Configuration {
-        source: Source::Link,
-        ..CONFIGURATION
-    };
-    let good = good.to_le_bytes();
+    let good = GOOD.to_le_bytes();
     // From which byte on what stands there, as `docs/link-format.md` numbers them.
     let bad: [(usize, &[u8], Refusal); 25] = [
         (24, &[2], Refusal::Unknown),
@@ -308,11 +256,7 @@ fn photons_between(refused: &[(Vec<u8>, Refusal)]) -> (Vec<DepthEvent>, Statisti
     let mut pixels = Pixels::new();
     let mut device = Sidecar::new(&mut pixels, None);
     let mut host = Host::new(1, 0);
-    let wanted = Configuration {
-        source: Source::Link,
-        ..CONFIGURATION
-    };
-    host.configure(&mut device, 0, &wanted);
+    host.configure(&mut device, 0, &GOOD);
     for turn in 0..100 {
         host.ask(message::PHOTONS, &photons());
         if let Some((wanted, refusal)) = refused.get(turn % refused.len().max(1)) {
@@ -352,11 +296,7 @@ fn a_device_that_has_refused_its_first_configuration_waits_for_a_better_one() {
     host.ask(message::PHOTONS, &photons());
     let report = host.report(&mut device, 0);
     assert_eq!((report.unknown, report.cycles), (1, 0));
-    let wanted = Configuration {
-        source: Source::Link,
-        ..CONFIGURATION
-    };
-    host.configure(&mut device, 0, &wanted);
+    host.configure(&mut device, 0, &GOOD);
     host.ask(message::PHOTONS, &photons());
     assert_eq!(host.report(&mut device, 0).cycles, 6);
 }

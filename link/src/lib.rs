@@ -21,6 +21,7 @@ mod dynamic_depth;
 pub mod endpoint;
 pub mod frame;
 pub mod message;
+mod numbered;
 mod refusal;
 mod report;
 mod sensor;

@@ -34,97 +34,64 @@ impl Report {
     /// Bytes of the record.
     pub const BYTES: usize = 10 * 8 + 10 * 4 + 1;
 
+    /// Its numbers in the order they are sent: those of 8 bytes, then those of 4.
+    const fn numbers(&mut self) -> ([&mut u64; 10], [&mut u32; 10]) {
+        let (statistics, link) = (&mut self.statistics, &mut self.link);
+        (
+            [
+                &mut self.cycles,
+                &mut statistics.counted,
+                &mut statistics.saturated,
+                &mut statistics.rejected,
+                &mut statistics.gated_out,
+                &mut statistics.events,
+                &mut statistics.deferred,
+                &mut statistics.expired,
+                &mut statistics.expired_deferred,
+                &mut self.unaddressed,
+            ],
+            [
+                &mut self.overrun,
+                &mut self.unknown,
+                &mut self.sensor_errors,
+                &mut link.frames,
+                &mut link.corrupt,
+                &mut link.oversized,
+                &mut link.foreign,
+                &mut link.out_of_order,
+                &mut link.duplicate,
+                &mut link.retransmitted,
+            ],
+        )
+    }
+
     /// As it is sent.
     #[must_use]
-    pub fn to_le_bytes(&self) -> Vec<u8, { Self::BYTES }> {
-        let Statistics {
-            counted,
-            saturated,
-            rejected,
-            gated_out,
-            events,
-            deferred,
-            expired,
-            expired_deferred,
-        } = self.statistics;
-        let wide = [
-            self.cycles,
-            counted,
-            saturated,
-            rejected,
-            gated_out,
-            events,
-            deferred,
-            expired,
-            expired_deferred,
-            self.unaddressed,
-        ];
-        let LinkCounters {
-            frames,
-            corrupt,
-            oversized,
-            foreign,
-            out_of_order,
-            duplicate,
-            retransmitted,
-        } = self.link;
-        let narrow = [
-            self.overrun,
-            self.unknown,
-            self.sensor_errors,
-            frames,
-            corrupt,
-            oversized,
-            foreign,
-            out_of_order,
-            duplicate,
-            retransmitted,
-        ];
-        let wide = wide.into_iter().flat_map(u64::to_le_bytes);
-        let narrow = narrow.into_iter().flat_map(u32::to_le_bytes);
+    pub fn to_le_bytes(mut self) -> Vec<u8, { Self::BYTES }> {
         let last = [self.last_sensor_error];
+        let (wide, narrow) = self.numbers();
+        let wide = wide.into_iter().flat_map(|number| number.to_le_bytes());
+        let narrow = narrow.into_iter().flat_map(|number| number.to_le_bytes());
         wide.chain(narrow).chain(last).collect()
     }
 
     /// As it was received, or `None` if it is not as long as the record.
     #[must_use]
     pub fn from_le_bytes(bytes: &[u8]) -> Option<Self> {
+        let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;
         let (&last_sensor_error, numbers) = bytes.split_last()?;
-        let (wide, narrow) = numbers.split_at_checked(10 * 8)?;
-        let mut wide = wide
-            .chunks_exact(8)
-            .filter_map(|eight| Some(u64::from_le_bytes(eight.try_into().ok()?)));
-        let mut narrow = narrow
-            .chunks_exact(4)
-            .filter_map(|four| Some(u32::from_le_bytes(four.try_into().ok()?)));
-        // Fields are read in the order they are written.
-        let report = Self {
-            cycles: wide.next()?,
-            statistics: Statistics {
-                counted: wide.next()?,
-                saturated: wide.next()?,
-                rejected: wide.next()?,
-                gated_out: wide.next()?,
-                events: wide.next()?,
-                deferred: wide.next()?,
-                expired: wide.next()?,
-                expired_deferred: wide.next()?,
-            },
-            unaddressed: wide.next()?,
-            overrun: narrow.next()?,
-            unknown: narrow.next()?,
-            sensor_errors: narrow.next()?,
+        let (eights, fours) = numbers.split_at_checked(10 * 8)?;
+        let mut report = Self {
             last_sensor_error,
-            link: LinkCounters {
-                frames: narrow.next()?,
-                corrupt: narrow.next()?,
-                oversized: narrow.next()?,
-                foreign: narrow.next()?,
-                out_of_order: narrow.next()?,
-                duplicate: narrow.next()?,
-                retransmitted: narrow.next()?,
-            },
+            ..Self::default()
         };
-        (bytes.len() == Self::BYTES).then_some(report)
+        let (wide, narrow) = report.numbers();
+        for (number, bytes) in wide.into_iter().zip(eights.as_chunks().0) {
+            *number = u64::from_le_bytes(*bytes);
+        }
+        for (number, bytes) in narrow.into_iter().zip(fours.as_chunks().0) {
+            *number = u32::from_le_bytes(*bytes);
+        }
+        Some(report)
     }
 }

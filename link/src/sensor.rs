@@ -1,8 +1,8 @@
 //! What a device says of its sensor and of what is wrong with it.
 
-use core::fmt;
-
 use dtof_core::fixed::types::{I24F8, U16F16};
+
+use crate::numbered::numbered;
 
 /// A sensor, as the device describes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,67 +58,28 @@ impl SensorRecord {
     }
 }
 
-/// The kind of a sensor's error. The drivers' own errors say more; each is of one
-/// of these kinds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[repr(u8)]
-pub enum FaultRecord {
-    /// Nobody is on the bus: unplugged, without power, or another address.
-    NoAnswer = 1,
-    /// The bus failed otherwise.
-    Bus = 2,
-    /// A pin failed.
-    Pin = 3,
-    /// Another chip, or another program on it, than the driver is for.
-    WrongChip = 4,
-    /// The sensor does not take a command or a setting, or is never done with it.
-    NotTaken = 5,
-    /// No data in time: the laser or its START does not come, or the sensor is
-    /// gone.
-    Timeout = 6,
-    /// The interrupt pin stays active for no reason the sensor names.
-    StuckInterrupt = 7,
-    /// The sensor has to be loaded with its program, and there is none.
-    NoImage = 8,
-    /// Data that cannot be. They are given up.
-    Data = 9,
-}
-
-impl FaultRecord {
-    const ALL: [Self; 9] = [
-        Self::NoAnswer,
-        Self::Bus,
-        Self::Pin,
-        Self::WrongChip,
-        Self::NotTaken,
-        Self::Timeout,
-        Self::StuckInterrupt,
-        Self::NoImage,
-        Self::Data,
-    ];
-
-    /// From its number on the wire.
-    #[must_use]
-    pub fn from_number(number: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|&fault| fault as u8 == number)
+numbered! {
+    /// The kind of a sensor's error. The drivers' own errors say more; each is of one
+    /// of these kinds.
+    FaultRecord {
+        /// Nobody is on the bus: unplugged, without power, or another address.
+        NoAnswer = 1: "no answer",
+        /// The bus failed otherwise.
+        Bus = 2: "bus error",
+        /// A pin failed.
+        Pin = 3: "pin error",
+        /// Another chip, or another program on it, than the driver is for.
+        WrongChip = 4: "wrong chip or program",
+        /// The sensor does not take a command or a setting, or is never done with it.
+        NotTaken = 5: "command or setting not taken",
+        /// No data in time: the laser or its START does not come, or the sensor is
+        /// gone.
+        Timeout = 6: "no data in time",
+        /// The interrupt pin stays active for no reason the sensor names.
+        StuckInterrupt = 7: "stuck interrupt",
+        /// The sensor has to be loaded with its program, and there is none.
+        NoImage = 8: "no image to load",
+        /// Data that cannot be. They are given up.
+        Data = 9: "damaged data",
     }
 }
-
-impl fmt::Display for FaultRecord {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NoAnswer => "no answer",
-            Self::Bus => "bus error",
-            Self::Pin => "pin error",
-            Self::WrongChip => "wrong chip or program",
-            Self::NotTaken => "command or setting not taken",
-            Self::Timeout => "no data in time",
-            Self::StuckInterrupt => "stuck interrupt",
-            Self::NoImage => "no image to load",
-            Self::Data => "damaged data",
-        })
-    }
-}
-
-impl core::error::Error for FaultRecord {}

@@ -38,30 +38,41 @@ impl SpiDevice for Plug {
     }
 }
 
+fn transaction<const N: usize>(accesses: [Access; N]) -> Vec<Access> {
+    let start = [Access::transaction_start()].into_iter();
+    let ended = start.chain(accesses).chain([Access::transaction_end()]);
+    ended.collect()
+}
+
 fn write(register: u8, value: u8) -> Vec<Access> {
-    vec![
-        Access::transaction_start(),
-        Access::write_vec(vec![0x40 | register, value]),
-        Access::transaction_end(),
-    ]
+    transaction([Access::write_vec(vec![0x40 | register, value])])
 }
 
 fn read(command: u8, bytes: &[u8]) -> Vec<Access> {
-    vec![
-        Access::transaction_start(),
-        Access::write(command),
-        Access::read_vec(bytes.to_vec()),
-        Access::transaction_end(),
-    ]
+    transaction([Access::write(command), Access::read_vec(bytes.to_vec())])
 }
 
 /// 24-bit registers, most significant byte first, with auto-increment.
 fn read_results(first: u8, values: &[u32]) -> Vec<Access> {
-    let bytes: Vec<u8> = values
+    let bytes = values
         .iter()
-        .flat_map(|value| value.to_be_bytes()[1..].to_vec())
-        .collect();
-    read(0x80 | first, &bytes)
+        .flat_map(|value| value.to_be_bytes()[1..].to_vec());
+    read(0x80 | first, &bytes.collect::<Vec<u8>>())
+}
+
+/// A measurement that is over: `INT_STATUS`, the results and the calibrations.
+fn over(status: u8, results: &[u32], calibrations: [u32; 2]) -> Vec<Access> {
+    [
+        read(0x02, &[status]),
+        read_results(0x10, results),
+        read_results(0x1b, &calibrations),
+    ]
+    .concat()
+}
+
+/// The data sheet's example, 247.061 ns, and the next `START_MEAS`.
+fn example() -> Vec<Access> {
+    [over(0x19, &[4175], CALIBRATIONS), write(0x00, ARM_1)].concat()
 }
 
 /// The registers 0x01 and 0x03 to 0x09 as they should be configured, then
@@ -84,6 +95,8 @@ const MODE_1: [(u8, u8); 8] = [
     (0x09, 0),
 ];
 const ARM_1: u8 = 0b1000_0001;
+/// The registers of the data sheet's example.
+const CALIBRATIONS: [u32; 2] = [2110, 21121];
 
 fn mode_1() -> Settings {
     Settings {
@@ -129,37 +142,32 @@ impl<const CHUNK: usize> Bench<CHUNK> {
         polled
     }
 
+    /// Polls after so many milliseconds, without an access.
+    fn wait(&mut self, ms: u32) -> Result<Polled, Error<ErrorKind, Broken>> {
+        self.now_ms = self.now_ms.wrapping_add(ms);
+        self.poll(&[])
+    }
+
     /// From off to armed.
     fn bring_up(&mut self, registers: [(u8, u8); 8], config1: u8) {
         self.enable.driven.take();
-        assert_eq!(self.poll(&[]), Ok(Polled::Working));
+        assert_eq!(self.wait(0), Ok(Polled::Working));
         assert_eq!(*self.enable.driven.borrow(), [false]);
-        self.now_ms = self.now_ms.wrapping_add(1);
-        assert_eq!(self.poll(&[]), Ok(Polled::Idle));
-        self.now_ms = self.now_ms.wrapping_add(1);
-        assert_eq!(self.poll(&[]), Ok(Polled::Working));
+        assert_eq!(self.wait(1), Ok(Polled::Idle));
+        assert_eq!(self.wait(1), Ok(Polled::Working));
         assert_eq!(*self.enable.driven.borrow(), [false, true]);
-        self.now_ms = self.now_ms.wrapping_add(2);
-        assert_eq!(self.poll(&[]), Ok(Polled::Idle));
+        assert_eq!(self.wait(2), Ok(Polled::Idle));
         self.now_ms = self.now_ms.wrapping_add(1);
-        assert_eq!(
-            self.poll(&configure(registers, config1)),
-            Ok(Polled::Working)
-        );
+        let polled = self.poll(&configure(registers, config1));
+        assert_eq!(polled, Ok(Polled::Working));
         assert!(self.sensor.is_armed());
-        assert_eq!(self.poll(&[]), Ok(Polled::Idle));
+        assert_eq!(self.wait(0), Ok(Polled::Idle));
     }
 
     /// One measurement of mode 1 with one stop, as the data sheet's example.
     fn measure(&mut self) {
         self.interrupt.set(false);
-        let accesses = [
-            read(0x02, &[0x19]),
-            read_results(0x10, &[4175]),
-            read_results(0x1b, &[2110, 21121]),
-            write(0x00, ARM_1),
-        ];
-        assert_eq!(self.poll(&accesses.concat()), Ok(Polled::Data));
+        assert_eq!(self.poll(&example()), Ok(Polled::Data));
         // 247.061 ns are 7.061 ns into the histogram: bin 28.
         assert_eq!(self.sink.take(), [Given::Photon(7, 28), Given::End(1)]);
         self.interrupt.set(true);
@@ -204,13 +212,7 @@ fn each_start_brings_it_up_with_bins_of_its_width() {
         assert!(!bench.sensor.is_armed());
         bench.bring_up(MODE_1, ARM_1);
         bench.interrupt.set(false);
-        let accesses = [
-            read(0x02, &[0x19]),
-            read_results(0x10, &[4175]),
-            read_results(0x1b, &[2110, 21121]),
-            write(0x00, ARM_1),
-        ];
-        assert_eq!(bench.poll(&accesses.concat()), Ok(Polled::Data));
+        assert_eq!(bench.poll(&example()), Ok(Polled::Data));
         assert_eq!(bench.sink.take(), [Given::Photon(7, code), Given::End(1)]);
         bench.interrupt.set(true);
     }
@@ -337,14 +339,10 @@ fn a_bin_past_the_histogram_is_passed_on_and_one_before_it_is_rejected() {
     registers[0] = (0x01, 0x42);
     bench.bring_up(registers, ARM_1);
     bench.interrupt.set(false);
-    let accesses = [
-        read(0x02, &[0x19]),
-        // 236.7 ns, 473.4 ns and 0.496 ms.
-        read_results(0x10, &[4000, 0, 8_000, 0, 0x7f_ffff]),
-        read_results(0x1b, &[2110, 21121]),
-        write(0x00, ARM_1),
-    ];
-    assert_eq!(bench.poll(&accesses.concat()), Ok(Polled::Data));
+    // 236.7 ns, 473.4 ns and 0.496 ms.
+    let results = over(0x19, &[4000, 0, 8_000, 0, 0x7f_ffff], CALIBRATIONS);
+    let accesses = [results, write(0x00, ARM_1)].concat();
+    assert_eq!(bench.poll(&accesses), Ok(Polled::Data));
     let expected = [
         Given::Photon(7, u16::MAX),
         Given::Photon(7, 933),
@@ -358,13 +356,8 @@ fn a_bin_past_the_histogram_is_passed_on_and_one_before_it_is_rejected() {
 fn a_laser_cycle_without_a_stop_is_empty_and_needs_no_calibration() {
     let mut bench = armed();
     bench.interrupt.set(false);
-    let accesses = [
-        read(0x02, &[0x0a]),
-        read_results(0x10, &[0]),
-        read_results(0x1b, &[0, 0]),
-        write(0x00, ARM_1),
-    ];
-    assert_eq!(bench.poll(&accesses.concat()), Ok(Polled::Data));
+    let accesses = [over(0x0a, &[0], [0; 2]), write(0x00, ARM_1)].concat();
+    assert_eq!(bench.poll(&accesses), Ok(Polled::Data));
     assert_eq!(bench.sink.take(), [Given::End(1)]);
     let counts = Counts {
         cycles: 1,
@@ -387,21 +380,13 @@ fn parity_is_not_part_of_the_value_and_is_checked() {
     bench.bring_up(MODE_1, arm);
     bench.interrupt.set(false);
     let even = |value: u32| value | (value.count_ones() & 1) << 23;
-    let accesses = [
-        read(0x02, &[0x19]),
-        read_results(0x10, &[even(4175)]),
-        read_results(0x1b, &[even(2110), even(21121)]),
-        write(0x00, arm),
-    ];
-    assert_eq!(bench.poll(&accesses.concat()), Ok(Polled::Data));
+    let right = over(0x19, &[even(4175)], CALIBRATIONS.map(even));
+    let accesses = [right, write(0x00, arm)].concat();
+    assert_eq!(bench.poll(&accesses), Ok(Polled::Data));
     assert_eq!(bench.sink.take(), [Given::Photon(7, 28), Given::End(1)]);
 
-    let accesses = [
-        read(0x02, &[0x19]),
-        read_results(0x10, &[even(4175)]),
-        read_results(0x1b, &[even(2110), even(21121) ^ 0x80_0000]),
-    ];
-    let polled = bench.poll(&accesses.concat());
+    let calibrations = [even(2110), even(21121) ^ 0x80_0000];
+    let polled = bench.poll(&over(0x19, &[even(4175)], calibrations));
     assert_eq!(polled, Err(Error::Parity { register: 0x1c }));
     assert_eq!(bench.sink.take(), []);
     bench.interrupt.set(true);
@@ -413,8 +398,7 @@ fn a_wrong_chip_is_an_error_each_time_and_a_right_one_works_afterwards() {
     let mut bench = Bench::<13>::new(mode_1());
     for _ in 0..2 {
         for _ in 0..2 {
-            bench.now_ms = bench.now_ms.wrapping_add(3);
-            assert_eq!(bench.poll(&[]), Ok(Polled::Working));
+            assert_eq!(bench.wait(3), Ok(Polled::Working));
         }
         bench.now_ms = bench.now_ms.wrapping_add(3);
         let accesses = [read(0x01, &[0xff]), read(0x03, &[0xff])].concat();
@@ -432,8 +416,7 @@ fn a_wrong_chip_is_an_error_each_time_and_a_right_one_works_afterwards() {
 fn a_register_that_does_not_take_its_value_is_an_error() {
     let mut bench = Bench::<13>::new(mode_1());
     for _ in 0..2 {
-        bench.now_ms = bench.now_ms.wrapping_add(3);
-        bench.poll(&[]).unwrap();
+        bench.wait(3).unwrap();
     }
     bench.now_ms = bench.now_ms.wrapping_add(3);
     let accesses = [
@@ -458,10 +441,8 @@ fn a_register_that_does_not_take_its_value_is_an_error() {
 #[test]
 fn a_start_that_does_not_come_times_out() {
     let mut bench = armed();
-    bench.now_ms = bench.now_ms.wrapping_add(100);
-    assert_eq!(bench.poll(&[]), Ok(Polled::Idle));
-    bench.now_ms = bench.now_ms.wrapping_add(1);
-    assert_eq!(bench.poll(&[]), Err(Error::Timeout));
+    assert_eq!(bench.wait(100), Ok(Polled::Idle));
+    assert_eq!(bench.wait(1), Err(Error::Timeout));
     bench.recover();
 }
 
@@ -498,16 +479,12 @@ fn a_bus_that_reads_as_ones_is_no_answer() {
 fn stops_without_a_calibration_are_an_error() {
     let mut bench = armed();
     bench.interrupt.set(false);
-    let accesses = [
-        read(0x02, &[0x19]),
-        read_results(0x10, &[4175]),
-        read_results(0x1b, &[2110, 2110]),
-    ];
     let error = Error::Calibration {
         calibration1: 2110,
         calibration2: 2110,
     };
-    assert_eq!(bench.poll(&accesses.concat()), Err(error));
+    let polled = bench.poll(&over(0x19, &[4175], [2110; 2]));
+    assert_eq!(polled, Err(error));
     bench.recover();
 }
 
@@ -535,32 +512,18 @@ fn an_error_of_a_pin_is_inside() {
 
 #[test]
 fn settings_that_cannot_be_are_refused() {
-    let refused = |settings| Config::new(settings).unwrap_err();
-    let with = mode_1();
-    let clock = |clock_khz| refused(Settings { clock_khz, ..with });
-    assert_eq!(
-        (clock(999), clock(16_001)),
-        (ConfigError::Clock, ConfigError::Clock)
-    );
-    let bin_width = U16F16::ZERO;
-    assert_eq!(
-        refused(Settings { bin_width, ..with }),
-        ConfigError::ZeroBinWidth
-    );
-    assert_eq!(
-        refused(Settings {
-            overflow: 0,
-            ..with
-        }),
-        ConfigError::Overflow
-    );
-    let masked = Settings {
-        mode: Mode::Two,
-        overflow: 5,
-        stop_mask: 5,
-        ..with
+    let refused = |change: fn(&mut Settings)| {
+        let mut settings = mode_1();
+        change(&mut settings);
+        Config::new(settings).unwrap_err()
     };
-    assert_eq!(refused(masked), ConfigError::Overflow);
+    assert_eq!(refused(|bad| bad.clock_khz = 999), ConfigError::Clock);
+    assert_eq!(refused(|bad| bad.clock_khz = 16_001), ConfigError::Clock);
+    let zero = refused(|bad| bad.bin_width = U16F16::ZERO);
+    assert_eq!(zero, ConfigError::ZeroBinWidth);
+    assert_eq!(refused(|bad| bad.overflow = 0), ConfigError::Overflow);
+    let masked = refused(|bad| (bad.mode, bad.overflow, bad.stop_mask) = (Mode::Two, 5, 5));
+    assert_eq!(masked, ConfigError::Overflow);
 }
 
 /// Two of them on one bus, with one chip select each.
@@ -608,13 +571,7 @@ fn two_sensors_share_a_bus() {
     }
     for (sensor, interrupt) in sensors.iter_mut().zip(&interrupts) {
         interrupt.set(false);
-        let accesses = [
-            read(0x02, &[0x19]),
-            read_results(0x10, &[4175]),
-            read_results(0x1b, &[2110, 21121]),
-            write(0x00, ARM_1),
-        ];
-        bus.update_expectations(&plain(accesses.concat()));
+        bus.update_expectations(&plain(example()));
         assert_eq!(sensor.poll(7, &mut sink).unwrap(), Polled::Data);
         assert_eq!(sink.take(), [Given::Photon(7, 28), Given::End(1)]);
         bus.done();

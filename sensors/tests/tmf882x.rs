@@ -493,28 +493,19 @@ fn out_of_order(expected: u8, found: u8) -> Error<ErrorKind, Broken> {
 
 #[test]
 fn settings_that_cannot_be_are_refused() {
-    let refused = |settings| Config::new(settings).unwrap_err();
-    let with = settings();
-    for address in [0x07, 0x78, 0xFF] {
-        assert_eq!(refused(Settings { address, ..with }), ConfigError::Address);
-    }
-    let kilo_iterations = 0;
-    let zero = Settings {
-        kilo_iterations,
-        ..with
+    let refused = |change: fn(&mut Settings)| {
+        let mut settings = settings();
+        change(&mut settings);
+        Config::new(settings).unwrap_err()
     };
-    assert_eq!(refused(zero), ConfigError::ZeroIterations);
-    let first_pixel = PixelAddress(u16::MAX - 7);
-    let pixels = Settings {
-        first_pixel,
-        ..with
-    };
-    assert_eq!(refused(pixels), ConfigError::Pixels);
-    let period_ms = 1000;
-    assert_eq!(
-        refused(Settings { period_ms, ..with }),
-        ConfigError::Timeout
-    );
+    assert_eq!(refused(|bad| bad.address = 0x07), ConfigError::Address);
+    assert_eq!(refused(|bad| bad.address = 0x78), ConfigError::Address);
+    assert_eq!(refused(|bad| bad.address = 0xFF), ConfigError::Address);
+    let zero = refused(|bad| bad.kilo_iterations = 0);
+    assert_eq!(zero, ConfigError::ZeroIterations);
+    let pixels = refused(|bad| bad.first_pixel = PixelAddress(u16::MAX - 7));
+    assert_eq!(pixels, ConfigError::Pixels);
+    assert_eq!(refused(|bad| bad.period_ms = 1000), ConfigError::Timeout);
 }
 
 /// From an application that runs at 0x41 to measuring at `address`.

@@ -44,21 +44,18 @@ impl Board {
             Build::With(Sensor::Tmf882x) => Some(sensor_program()?),
             _ => None,
         };
-        self.link(root, what, &[], program.as_deref())
+        self.link(root, what, None, program.as_deref())
     }
 
     /// The same without the sensor's own program.
     pub fn build_bare(self, root: &Path, what: Build) -> Result<PathBuf> {
-        self.link(root, what, &[], None)
+        self.link(root, what, None, None)
     }
 
     /// The same for QEMU, whose `stm32f405` has no PLL.
     pub fn build_for_emulator(self, root: &Path, what: Build) -> Result<PathBuf> {
-        let features: &[&str] = match self {
-            Self::Mps2An386 => &[],
-            Self::Stm32F405 => &["pll-off"],
-        };
-        self.link(root, what, features, None)
+        let feature = (self == Self::Stm32F405).then_some("pll-off");
+        self.link(root, what, feature, None)
     }
 
     /// Builds the image that counts instructions, `small` or fast.
@@ -71,24 +68,19 @@ impl Board {
         self,
         root: &Path,
         what: Build,
-        more: &[&str],
+        more: Option<&str>,
         program: Option<&Path>,
     ) -> Result<PathBuf> {
         let sidecar = format!("sidecar-{}", self.name());
+        let is_real = self == Self::Stm32F405;
         let (image, feature) = match what {
             Build::Sidecar => (&*sidecar, None),
-            Build::With(sensor) => {
-                ensure!(
-                    self == Self::Stm32F405,
-                    "only stm32f405 has a place for a sensor"
-                );
-                (&*sidecar, Some(sensor.feature()))
-            }
+            Build::With(sensor) if is_real => (&*sidecar, Some(sensor.feature())),
+            Build::With(_) => bail!("only stm32f405 has a place for a sensor"),
             Build::SelfTest => ("self-test", Some("self-test")),
         };
-        let mut features = vec![self.name()];
-        features.extend(feature);
-        features.extend(more);
+        let board = [self.name()].into_iter();
+        let features: Vec<&str> = board.chain(feature).chain(more).collect();
         link(root, image, &features, program, PROFILE)
     }
 }
@@ -124,18 +116,15 @@ pub enum Sensor {
 impl Sensor {
     pub const ALL: [Self; 2] = [Self::Tdc7200, Self::Tmf882x];
 
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Tdc7200 => "tdc7200",
-            Self::Tmf882x => "tmf882x",
-        }
-    }
-
     fn feature(self) -> &'static str {
         match self {
             Self::Tdc7200 => "sensor-tdc7200",
             Self::Tmf882x => "sensor-tmf882x",
         }
+    }
+
+    pub fn name(self) -> &'static str {
+        self.feature().trim_start_matches("sensor-")
     }
 }
 

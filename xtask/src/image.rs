@@ -23,19 +23,8 @@ const PROFILES: [&str; 2] = ["firmware", "firmware-small"];
 const UNDEFINED: &str = "dtof_core_has_a_reachable_panic";
 
 /// The functions of `core_image.rs` that between them use all of dtof-core.
-const PARTS: [&str; 11] = [
-    "units",
-    "roots",
-    "ranges",
-    "words",
-    "products",
-    "texts",
-    "gates",
-    "trees",
-    "thresholds",
-    "histograms",
-    "pixels",
-];
+const PARTS: &str =
+    "units roots ranges words products texts gates trees thresholds histograms pixels";
 
 /// Bytes of code below which something has been optimised away: half of the
 /// smallest image there was when this was written.
@@ -168,7 +157,7 @@ impl Image {
         if !self.symbols.iter().any(|name| name == "_start") {
             problems.push("the entry `_start` is missing".into());
         }
-        for part in PARTS {
+        for part in PARTS.split(' ') {
             // Either mangling writes a name's length before it.
             let mangled = format!("10core_image{}{part}", part.len());
             if !self.symbols.iter().any(|name| name.contains(&mangled)) {
@@ -187,7 +176,8 @@ mod tests {
     use super::*;
 
     fn good() -> Image {
-        let parts = PARTS.map(|part| format!("_ZN10core_image{}{part}17h0123E", part.len()));
+        let parts = PARTS.split(' ');
+        let parts = parts.map(|part| format!("_ZN10core_image{}{part}17h0123E", part.len()));
         let mut symbols = vec!["_start".to_owned(), "__aeabi_memcpy".to_owned()];
         symbols.extend(parts);
         Image {
@@ -217,7 +207,10 @@ mod tests {
                 "{problems:?}"
             );
         }
-        assert_eq!(Image::default().problems().len(), PARTS.len() + 2);
+        assert_eq!(
+            Image::default().problems().len(),
+            PARTS.split(' ').count() + 2
+        );
     }
 
     #[test]

@@ -16,53 +16,35 @@ pub fn forbidden(name: &str) -> Option<&'static str> {
 
 /// The panicking machinery, and what the compiler calls to enter it. These
 /// names come through both manglings as they are.
+const PANICS: &[&str] = &[
+    // core::panicking::*, panic_fmt, panic_bounds_check, panic_const_*,
+    // panic_already_borrowed, rust_panic, begin_panic
+    "panic",
+    // Option and Result
+    "unwrap_failed expect_failed assert_failed",
+    // slices and strings: slice_start_index_len_fail, slice_index_order_fail,
+    // slice_index_fail, slice_error_fail, len_mismatch_fail
+    "index_fail len_fail order_fail slice_error_fail mismatch_fail",
+    // unwinding
+    "rust_begin_unwind rust_eh_personality _Unwind_",
+];
+
 fn is_panic(name: &str) -> bool {
-    const PARTS: &[&str] = &[
-        // core::panicking::*, panic_fmt, panic_bounds_check, panic_const_*,
-        // panic_already_borrowed, rust_panic, begin_panic
-        "panic",
-        // Option and Result
-        "unwrap_failed",
-        "expect_failed",
-        "assert_failed",
-        // slices and strings: slice_start_index_len_fail, slice_index_order_fail,
-        // slice_index_fail, slice_error_fail, len_mismatch_fail
-        "index_fail",
-        "len_fail",
-        "order_fail",
-        "slice_error_fail",
-        "mismatch_fail",
-        // unwinding
-        "rust_begin_unwind",
-        "rust_eh_personality",
-        "_Unwind_",
-    ];
-    PARTS.iter().any(|part| name.contains(part))
+    PANICS.iter().any(|parts| has_part(name, parts))
 }
 
 /// The heap of the alloc crate or of C.
 fn is_allocator(name: &str) -> bool {
-    const PARTS: &[&str] = &[
-        "__rust_alloc",
-        "__rust_dealloc",
-        "__rust_realloc",
-        "__rdl_",
-        "__rg_",
-        "exchange_malloc",
-        "alloc_error",
-        "capacity_overflow",
-    ];
-    const C: &[&str] = &[
-        "malloc", "calloc", "realloc", "free", "memalign", "sbrk", "_sbrk",
-    ];
-    PARTS.iter().any(|part| name.contains(part)) || C.contains(&name)
+    const PARTS: &str = "__rust_alloc __rust_dealloc __rust_realloc __rdl_ __rg_ \
+        exchange_malloc alloc_error capacity_overflow";
+    const C: &str = "malloc calloc realloc free memalign sbrk _sbrk";
+    has_part(name, PARTS) || is_made_of(name, &[C])
 }
 
 /// A routine that stands in for a floating-point instruction, or a function of
 /// the mathematical library.
 fn is_soft_float(name: &str) -> bool {
-    const PARTS: &[&str] = &["compiler_builtins5float", "compiler_builtins4math"];
-    if PARTS.iter().any(|part| name.contains(part)) {
+    if has_part(name, "compiler_builtins5float compiler_builtins4math") {
         return true;
     }
     match name.strip_prefix("__") {
@@ -78,121 +60,70 @@ fn is_soft_float(name: &str) -> bool {
 /// Those of the integers stay: `uidiv`, `uldivmod`, `lmul`, `llsl`, `memcpy`.
 fn is_aeabi_float(name: &str) -> bool {
     // Of one of the types: fadd, dmul, fcmplt, cdcmpeq, cfrcmple, d2iz.
-    const TYPES: &[&str] = &["f", "d", "h", "cf", "cd"];
-    const OPERATIONS: &[&str] = &[
-        "add", "sub", "rsub", "mul", "div", "neg", "cmpeq", "cmplt", "cmple", "cmpge", "cmpgt",
-        "cmpun", "rcmple", "2iz", "2uiz", "2lz", "2ulz", "2f", "2d", "2h", "2f_alt", "2h_alt",
-    ];
+    const TYPES: &str = "f d h cf cd";
+    const OPERATIONS: &str = "add sub rsub mul div neg cmpeq cmplt cmple cmpge cmpgt cmpun \
+        rcmple 2iz 2uiz 2lz 2ulz 2f 2d 2h 2f_alt 2h_alt";
     // From an integer: i2d, ul2f.
-    const FROM: &[&str] = &["i2", "ui2", "l2", "ul2"];
+    const FROM: &str = "i2 ui2 l2 ul2";
     is_made_of(name, &[TYPES, OPERATIONS]) || is_made_of(name, &[FROM, TYPES])
 }
 
 /// The names of GCC's and LLVM's run-time libraries, less `__`. A float is
 /// named by its machine mode: `sf` single, `df` double and so on.
 fn is_gnu_float(name: &str) -> bool {
-    const FLOATS: &[&str] = &["hf", "bf", "sf", "df", "xf", "tf", "kf"];
-    const COMPLEX: &[&str] = &["hc", "sc", "dc", "xc", "tc", "kc"];
-    const INTEGERS: &[&str] = &["qi", "hi", "si", "di", "ti"];
-    const BINARY: &[&str] = &["add", "sub", "mul", "div"];
-    const UNARY_AND_COMPARE: &[&str] = &[
-        "neg", "cmp", "unord", "eq", "ne", "lt", "le", "gt", "ge", "powi",
-    ];
-    const TO: &[&str] = &["fix", "fixuns"];
-    const FROM: &[&str] = &["float", "floatun", "floatuns"];
-    let forms: [&[&[&str]]; 7] = [
+    const FLOATS: &str = "hf bf sf df xf tf kf";
+    const COMPLEX: &str = "hc sc dc xc tc kc";
+    const INTEGERS: &str = "qi hi si di ti";
+    const BINARY: &str = "add sub mul div";
+    const UNARY_AND_COMPARE: &str = "neg cmp unord eq ne lt le gt ge powi";
+    let forms: [&[&str]; 7] = [
         // addsf3; on old Arm with a unit, addsf3vfp
-        &[BINARY, FLOATS, &["3", "3vfp"]],
+        &[BINARY, FLOATS, "3 3vfp"],
         // mulsc3
-        &[BINARY, COMPLEX, &["3"]],
+        &[BINARY, COMPLEX, "3"],
         // negsf2, unorddf2
-        &[UNARY_AND_COMPARE, FLOATS, &["2", "2vfp"]],
+        &[UNARY_AND_COMPARE, FLOATS, "2 2vfp"],
         // extendsfdf2, truncdfsf2
-        &[&["extend", "trunc"], FLOATS, FLOATS, &["2"]],
+        &["extend trunc", FLOATS, FLOATS, "2"],
         // fixsfsi, fixunsdfdi
-        &[TO, FLOATS, INTEGERS],
+        &["fix fixuns", FLOATS, INTEGERS],
         // floatsisf, floatundidf
-        &[FROM, INTEGERS, FLOATS],
-        &[&["gnu_f2h_ieee", "gnu_h2f_ieee"]],
+        &["float floatun floatuns", INTEGERS, FLOATS],
+        &["gnu_f2h_ieee gnu_h2f_ieee"],
     ];
     forms.iter().any(|form| is_made_of(name, form))
 }
 
-/// Whether `name` is one of the first of `parts`, then one of the second, and
+/// Whether one of these words stands in `name`.
+fn has_part(name: &str, words: &str) -> bool {
+    words.split_whitespace().any(|word| name.contains(word))
+}
+
+/// Whether `name` is a word of the first of `parts`, then one of the second, and
 /// so on to its end.
-fn is_made_of(name: &str, parts: &[&[&str]]) -> bool {
-    match parts {
-        [] => name.is_empty(),
-        [first, others @ ..] => first
-            .iter()
-            .filter_map(|part| name.strip_prefix(part))
-            .any(|rest| is_made_of(rest, others)),
-    }
+fn is_made_of(name: &str, parts: &[&str]) -> bool {
+    let [first, others @ ..] = parts else {
+        return name.is_empty();
+    };
+    let mut rests = first
+        .split_whitespace()
+        .filter_map(|word| name.strip_prefix(word));
+    rests.any(|rest| is_made_of(rest, others))
 }
 
 /// Functions of the mathematical library, for `double`, and with `f`, `l`,
 /// `f16` or `f128` at the end for others. The name of an integer square root is
 /// mangled, and so another one.
 fn is_mathematics(name: &str) -> bool {
-    const FUNCTIONS: &[&str] = &[
-        "acos",
-        "acosh",
-        "asin",
-        "asinh",
-        "atan",
-        "atan2",
-        "atanh",
-        "cbrt",
-        "ceil",
-        "copysign",
-        "cos",
-        "cosh",
-        "erf",
-        "erfc",
-        "exp",
-        "exp10",
-        "exp2",
-        "expm1",
-        "fabs",
-        "fdim",
-        "floor",
-        "fma",
-        "fmax",
-        "fmaximum",
-        "fmaximum_num",
-        "fmin",
-        "fminimum",
-        "fminimum_num",
-        "fmod",
-        "frexp",
-        "hypot",
-        "ilogb",
-        "ldexp",
-        "lgamma",
-        "log",
-        "log10",
-        "log1p",
-        "log2",
-        "modf",
-        "nearbyint",
-        "pow",
-        "remainder",
-        "remquo",
-        "rint",
-        "round",
-        "roundeven",
-        "scalbn",
-        "sin",
-        "sincos",
-        "sinh",
-        "sqrt",
-        "tan",
-        "tanh",
-        "tgamma",
-        "trunc",
-    ];
-    const SUFFIXES: &[&str] = &["", "f", "l", "f16", "f128"];
-    is_made_of(name, &[FUNCTIONS, SUFFIXES])
+    const FUNCTIONS: &str = "acos acosh asin asinh atan atan2 atanh cbrt ceil copysign cos cosh \
+        erf erfc exp exp10 exp2 expm1 fabs fdim floor fma fmax fmaximum fmaximum_num fmin \
+        fminimum fminimum_num fmod frexp hypot ilogb ldexp lgamma log log10 log1p log2 modf \
+        nearbyint pow remainder remquo rint round roundeven scalbn sin sincos sinh sqrt tan \
+        tanh tgamma trunc";
+    ["", "f", "l", "f16", "f128"].iter().any(|suffix| {
+        let name = name.strip_suffix(suffix);
+        name.is_some_and(|name| is_made_of(name, &[FUNCTIONS]))
+    })
 }
 
 #[cfg(test)]

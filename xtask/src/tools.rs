@@ -10,74 +10,59 @@ pub struct Tool {
     pub program: &'static str,
     /// What it is asked to find out whether it is there: it prints its version.
     ask: &'static [&'static str],
-    pub install: &'static str,
+    install: Install,
 }
 
-const VERSION: &[&str] = &["--version"];
+enum Install {
+    /// Packages of Debian's.
+    Packages(&'static str),
+    /// A crate.
+    Crate(&'static str),
+    /// The same, but it takes so long that only a user starts it.
+    LargeCrate(&'static str),
+}
 
-pub const QEMU: Tool = Tool {
-    program: "qemu-system-arm",
-    ask: VERSION,
-    install: "sudo apt-get install --yes qemu-system-arm",
-};
+use Install::{Crate, LargeCrate, Packages};
 
-/// For `cargo softcore`.
-pub const QEMU_RISCV: Tool = Tool {
-    program: "qemu-system-riscv32",
-    ask: VERSION,
-    install: "sudo apt-get install --yes qemu-system-misc",
-};
+const fn tool(program: &'static str, install: Install) -> Tool {
+    Tool {
+        program,
+        ask: &["--version"],
+        install,
+    }
+}
 
-/// For `cargo softcore`, with what it calls.
-pub const VERILATOR: Tool = Tool {
-    program: "verilator",
-    ask: VERSION,
-    install: "sudo apt-get install --yes verilator g++ make",
-};
+pub const QEMU: Tool = tool("qemu-system-arm", Packages("qemu-system-arm"));
+pub const DEFMT_PRINT: Tool = tool("defmt-print", Crate("defmt-print"));
+pub const PROBE_RS: Tool = tool("probe-rs", LargeCrate("probe-rs-tools"));
 
-/// For `cargo softcore`: whether a memory becomes block RAM.
-pub const YOSYS: Tool = Tool {
-    program: "yosys",
-    ask: &["-V"],
-    install: "sudo apt-get install --yes yosys",
-};
-
-pub const DEFMT_PRINT: Tool = Tool {
-    program: "defmt-print",
-    ask: VERSION,
-    install: "cargo install --locked defmt-print",
-};
-
-/// For sweeps in parts, as `docs/sweeps.md` has them.
-pub const PARALLEL: Tool = Tool {
-    program: "parallel",
-    ask: VERSION,
-    install: "sudo apt-get install --yes parallel",
-};
-
-/// For the reports, as readers see them.
-pub const CHROMIUM: Tool = Tool {
-    program: "chromium",
-    ask: VERSION,
-    install: "sudo apt-get install --yes chromium",
-};
-
-pub const PROBE_RS: Tool = Tool {
-    program: "probe-rs",
-    ask: VERSION,
-    install: "cargo install --locked probe-rs-tools",
-};
-
-/// For the readers of exported files: with what makes virtual environments, and the headers that a
-/// package may be compiled with, which Debian has apart.
+/// For the readers of exported files: with what makes virtual environments, and the headers
+/// that a package may be compiled with, which Debian has apart.
 pub const PYTHON: Tool = Tool {
-    program: "python3",
     ask: &[
         "-c",
         "import ensurepip, platform, venv; print('Python', platform.python_version())",
     ],
-    install: "sudo apt-get install --yes python3-venv python3-dev",
+    ..tool("python3", Packages("python3-venv python3-dev"))
 };
+
+/// Every tool that [`set_up`] installs.
+const ALL: [Tool; 8] = [
+    QEMU,
+    // For `cargo softcore`, the last for whether a memory becomes block RAM.
+    tool("qemu-system-riscv32", Packages("qemu-system-misc")),
+    tool("verilator", Packages("verilator g++ make")),
+    Tool {
+        ask: &["-V"],
+        ..tool("yosys", Packages("yosys"))
+    },
+    // For sweeps in parts, as `docs/sweeps.md` has them.
+    tool("parallel", Packages("parallel")),
+    // For the reports, as readers see them.
+    tool("chromium", Packages("chromium")),
+    PYTHON,
+    DEFMT_PRINT,
+];
 
 impl Tool {
     /// What it says of its version, if it is there.
@@ -99,7 +84,24 @@ impl Tool {
 
     /// Says how to install it.
     pub fn missing(&self) -> String {
-        format!("{} is missing: {}", self.program, self.install)
+        let install = match self.install {
+            Packages(names) => format!("sudo apt-get install --yes {names}"),
+            Crate(name) | LargeCrate(name) => format!("cargo install --locked {name}"),
+        };
+        format!("{} is missing: {install}", self.program)
+    }
+
+    /// What installs it without a question.
+    fn installer(&self) -> Option<Command> {
+        match self.install {
+            Packages(names) => debian(names),
+            Crate(name) => {
+                let mut cargo = Command::new("cargo");
+                cargo.args(["install", "--locked", "--quiet", name]);
+                Some(cargo)
+            }
+            LargeCrate(_) => None,
+        }
     }
 
     /// Its version, or an error that says how to install it.
@@ -111,22 +113,24 @@ impl Tool {
 /// Installs what is missing if that needs no question; else says what to type. What
 /// needs a tool says so itself, so that this never fails.
 pub fn set_up() {
-    install(&QEMU, || debian_package("qemu-system-arm"));
-    install(&QEMU_RISCV, || debian_package("qemu-system-misc"));
-    install(&VERILATOR, || debian_package("verilator g++ make"));
-    install(&YOSYS, || debian_package("yosys"));
-    install(&PARALLEL, || debian_package("parallel"));
-    install(&CHROMIUM, || debian_package("chromium"));
-    install(&PYTHON, || debian_package("python3-venv python3-dev"));
-    install(&DEFMT_PRINT, || {
-        let mut cargo = Command::new("cargo");
-        cargo.args(["install", "--locked", "--quiet", "defmt-print"]);
-        Some(cargo)
-    });
+    for tool in ALL {
+        if let Some(version) = tool.version() {
+            println!("{version}: there");
+            continue;
+        }
+        if let Some(mut command) = tool.installer() {
+            println!("{}: installing", tool.program);
+            // What goes wrong is said by what is still missing.
+            let _ = command.stdin(Stdio::null()).status();
+        }
+        if !tool.is_there() {
+            println!("{}", tool.missing());
+        }
+    }
 }
 
 /// How root installs packages on Debian.
-fn debian_package(names: &str) -> Option<Command> {
+fn debian(names: &str) -> Option<Command> {
     let is_root = Command::new("id").arg("-u").output().ok()?.stdout == b"0\n";
     if !(is_root && Path::new("/etc/debian_version").exists()) {
         return None;
@@ -140,19 +144,4 @@ fn debian_package(names: &str) -> Option<Command> {
     apt.env("DEBIAN_FRONTEND", "noninteractive");
     apt.args(["-c", &install]);
     Some(apt)
-}
-
-fn install(tool: &Tool, command: impl FnOnce() -> Option<Command>) {
-    if let Some(version) = tool.version() {
-        println!("{version}: there");
-        return;
-    }
-    if let Some(mut command) = command() {
-        println!("{}: installing", tool.program);
-        // What goes wrong is said by what is still missing.
-        let _ = command.stdin(Stdio::null()).status();
-    }
-    if !tool.is_there() {
-        println!("{}", tool.missing());
-    }
 }

@@ -1,15 +1,16 @@
 //! A host on a good wire, and a sensor that gives what a script says.
 
+use std::ops::Range;
+
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
     AerDecoder, AerRecord, AerWord, AnyRule, Count, DepthEstimator, DepthEvent, DynamicDepthEvent,
     PaperRule, PixelAddress,
 };
-use dtof_firmware::sidecar::Sidecar;
+use dtof_firmware::sidecar::{Pixel, Sidecar};
 use dtof_link::endpoint::Endpoint;
-use dtof_link::frame::{Deframer, WIRE_BYTES};
-use dtof_link::message;
-use dtof_link::message::greeting;
+use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
+use dtof_link::message::{self, greeting};
 use dtof_link::{Configuration, Report, Source};
 use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
 
@@ -28,6 +29,30 @@ pub const CONFIGURATION: Configuration = Configuration {
     source: Source::Sensor,
     dynamic_depth: None,
 };
+
+/// A device of some pixels with a sensor, and a host that has configured it.
+pub fn configured<'a, const N: usize>(
+    pixels: &'a mut heapless::Vec<Pixel, N>,
+    wanted: &Configuration,
+) -> (Sidecar<'a>, Host) {
+    let mut device = Sidecar::new(pixels, Some(About::new(256)));
+    let mut host = Host::new(1, 0);
+    host.configure(&mut device, 0, wanted);
+    (device, host)
+}
+
+/// Gives the frames among these bytes to `receive`.
+pub fn deliver<'a>(
+    deframer: &mut Deframer,
+    bytes: impl IntoIterator<Item = &'a u8>,
+    mut receive: impl FnMut(Result<&[u8], FrameError>),
+) {
+    for &byte in bytes {
+        if let Some(frame) = deframer.push(byte) {
+            receive(frame);
+        }
+    }
+}
 
 pub struct Host {
     pub endpoint: Endpoint,
@@ -60,21 +85,38 @@ impl Host {
         let mut wire = [0; WIRE_BYTES];
         loop {
             let length = self.endpoint.transmit(now_ms, &mut wire);
-            for &byte in &wire[..length] {
-                if let Some(frame) = self.down.push(byte) {
-                    device.receive(frame, now_ms);
-                }
-            }
+            deliver(&mut self.down, &wire[..length], |frame| {
+                device.receive(frame, now_ms);
+            });
             device.work(0);
             let answer = device.transmit(now_ms, &mut wire);
-            for &byte in &wire[..answer] {
-                if let Some(frame) = self.up.push(byte) {
-                    self.endpoint.receive(frame, now_ms);
-                }
-            }
+            self.hear(&wire[..answer], now_ms);
             if length + answer == 0 {
                 return;
             }
+        }
+    }
+
+    /// Takes bytes off the wire.
+    pub fn hear<'a>(&mut self, bytes: impl IntoIterator<Item = &'a u8>, now_ms: u32) {
+        deliver(&mut self.up, bytes, |frame| {
+            self.endpoint.receive(frame, now_ms);
+        });
+    }
+
+    /// Each millisecond the device asks its sensor, everything goes over the wire, and
+    /// the host takes up to so many messages.
+    pub fn run(
+        &mut self,
+        device: &mut Sidecar,
+        sensor: &mut impl Sensor,
+        milliseconds: Range<u32>,
+        messages: usize,
+    ) {
+        for now_ms in milliseconds {
+            device.poll_sensor(sensor, now_ms);
+            self.exchange(device, now_ms);
+            self.read(messages);
         }
     }
 
@@ -156,12 +198,8 @@ impl<I: Iterator<Item = Option<Vec<Call>>>> Sensor for Scripted<I> {
     fn stop(&mut self) {}
 
     fn poll(&mut self, _: u32, sink: &mut impl PhotonSink) -> Result<Polled, SensorFault> {
-        for call in self
-            .0
-            .next()
-            .unwrap_or(Some(Vec::new()))
-            .ok_or(SensorFault::Data)?
-        {
+        let calls = self.0.next().unwrap_or(Some(Vec::new()));
+        for call in calls.ok_or(SensorFault::Data)? {
             match call {
                 Call::Photon(pixel, code) => sink.photon(PixelAddress(pixel), code),
                 Call::End(cycles) => sink.end_laser_cycles(cycles),

@@ -6,3 +6,4 @@ pub mod host;
 /// Mocked buses and pins.
 #[path = "../../../sensors/tests/common/mod.rs"]
 pub mod mocks;
+pub mod scene;

@@ -129,13 +129,21 @@ pub enum ConfigError {
     Overflow,
 }
 
-impl fmt::Display for ConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl ConfigError {
+    /// What is wrong, in one line.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
             Self::Clock => "the reference clock must be within 1 and 16 MHz",
             Self::ZeroBinWidth => "the bin width is zero",
             Self::Overflow => "the counter overflows before a stop can count",
-        })
+        }
+    }
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.text())
     }
 }
 

@@ -31,6 +31,7 @@
 mod config;
 mod error;
 mod registers;
+mod results;
 mod time;
 
 use dtof_core::fixed::types::U16F16;
@@ -39,9 +40,10 @@ use embedded_hal::spi::{Operation, SpiDevice};
 
 use self::registers::{
     AUTO_INCREMENT, CALIBRATION1, CALIBRATION2, CLOCK_CNTR_OVF_H, CLOCK_CNTR_STOP_MASK_H,
-    CLOCK_COUNT1, COARSE_CNTR_OVF_H, CONFIG1, CONFIG2, CONFIG2_RESET, INT_MASK, INT_MASK_RESET,
-    INT_STATUS, OVER, RESULTS, START_MEAS, TIME1, VALUE, WRITE,
+    COARSE_CNTR_OVF_H, CONFIG1, CONFIG2, CONFIG2_RESET, INT_MASK, INT_MASK_RESET, INT_STATUS, OVER,
+    RESULTS, START_MEAS, TIME1, WRITE,
 };
+use self::results::Results;
 use crate::timer::Since;
 use crate::{About, PhotonSink, Polled, Sensor};
 
@@ -258,7 +260,16 @@ where
             self.state = State::Armed { since, stuck };
             return Ok(Polled::Idle);
         }
-        let times = self.times()?;
+        let mut results = Results::default();
+        let last = results::last(self.config.settings());
+        self.read_results(&mut results, TIME1, last)?;
+        self.read_results(&mut results, CALIBRATION1, CALIBRATION2)?;
+        let times = results.times(self.config.settings());
+        let [calibration1, calibration2] = results.calibrations();
+        let times = times.ok_or(Error::Calibration {
+            calibration1,
+            calibration2,
+        })?;
         let mut photons = 0;
         for time_ps in times.into_iter().flatten() {
             sink.photon(self.config.settings().pixel, self.config.code(time_ps));
@@ -275,56 +286,6 @@ where
 
         self.arm(now_ms)?;
         Ok(Polled::Data)
-    }
-
-    /// Picoseconds from START to each stop that came.
-    fn times(&mut self) -> Result<[Option<i64>; 5], SPI, INT> {
-        let settings = *self.config.settings();
-        let stops = settings.stops as u8;
-        let mut results = Results::default();
-        // TIME1 to the last stop's, and the clock counts between them.
-        let last = match settings.mode {
-            Mode::One => TIME1 + 2 * (stops - 1),
-            Mode::Two => TIME1 + 2 * stops,
-        };
-        self.read_results(&mut results, TIME1, last)?;
-        self.read_results(&mut results, CALIBRATION1, CALIBRATION2)?;
-
-        let came = |n: u8| match settings.mode {
-            Mode::One => results.get(TIME1 + 2 * n) != 0,
-            Mode::Two => {
-                results.get(TIME1 + 2 * (n + 1)) != 0 || results.get(CLOCK_COUNT1 + 2 * n) != 0
-            }
-        };
-        let mut times = [None; 5];
-        if !(0..stops).any(came) {
-            return Ok(times);
-        }
-        let calibration1 = results.get(CALIBRATION1);
-        let calibration2 = results.get(CALIBRATION2);
-        let calibration = Calibration::new(
-            settings.clock_khz,
-            settings.calibration,
-            calibration1,
-            calibration2,
-        )
-        .ok_or(Error::Calibration {
-            calibration1,
-            calibration2,
-        })?;
-        for (n, time) in (0..stops).zip(&mut times) {
-            if came(n) {
-                *time = Some(match settings.mode {
-                    Mode::One => calibration.mode_1(results.get(TIME1 + 2 * n)),
-                    Mode::Two => calibration.mode_2(
-                        results.get(TIME1),
-                        results.get(TIME1 + 2 * (n + 1)),
-                        results.get(CLOCK_COUNT1 + 2 * n),
-                    ),
-                });
-            }
-        }
-        Ok(times)
     }
 
     /// Reads the result registers `first..=last`, `CHUNK` at a time.
@@ -404,24 +365,5 @@ where
             self.state = State::Off;
         }
         polled
-    }
-}
-
-/// TIME1 to CALIBRATION2 as read, most significant byte first. What was not
-/// read is 0.
-#[derive(Default)]
-struct Results([[u8; 3]; RESULTS]);
-
-impl Results {
-    fn range(&mut self, first: u8, last: u8) -> &mut [[u8; 3]] {
-        let range = usize::from(first - TIME1)..=usize::from(last - TIME1);
-        self.0.get_mut(range).unwrap_or_default()
-    }
-
-    /// The value of a register, without its parity bit.
-    fn get(&self, register: u8) -> u32 {
-        let index = usize::from(register - TIME1);
-        let [high, middle, low] = self.0.get(index).copied().unwrap_or_default();
-        u32::from_be_bytes([0, high, middle, low]) & VALUE
     }
 }

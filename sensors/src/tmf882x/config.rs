@@ -93,14 +93,22 @@ pub enum ConfigError {
     Timeout,
 }
 
-impl fmt::Display for ConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl ConfigError {
+    /// What is wrong, in one line.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
             Self::Address => "the I2C address must be within 0x08 and 0x77",
             Self::ZeroIterations => "a measurement needs at least 1,024 pulses",
             Self::Pixels => "nine pixels do not fit behind the first",
             Self::Timeout => "data would time out within one period",
-        })
+        }
+    }
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.text())
     }
 }
 

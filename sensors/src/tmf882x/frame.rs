@@ -16,6 +16,8 @@
 //! the least significant ones in packets 0 to 9, the most significant ones in
 //! packets 20 to 29. Channel 0 is the reference, 1 to 9 are the zones.
 
+use super::Error;
+
 /// Bytes of a packet.
 pub(super) const PACKET: usize = HEADER + BINS;
 /// Bins of a histogram.
@@ -28,13 +30,6 @@ const HEADER: usize = 7;
 /// Byte 0 of a packet of raw histograms.
 const RAW_HISTOGRAM: u8 = 0x81;
 
-/// Bytes that are not a packet of raw histograms.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum NoPacket {
-    ForeignResult(u8),
-    WrongSize(u8),
-}
-
 /// A packet of raw histograms.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Packet<'a> {
@@ -43,25 +38,20 @@ pub(super) struct Packet<'a> {
 }
 
 impl<'a> Packet<'a> {
-    pub(super) fn of(bytes: &'a [u8; PACKET]) -> Result<Self, NoPacket> {
+    /// # Errors
+    /// If the bytes are not a packet of raw histograms.
+    pub(super) fn of<B, P>(bytes: &'a [u8; PACKET]) -> Result<Self, Error<B, P>> {
         let (&[result, _, _, _, number, size, _], data) = bytes
             .split_first_chunk::<HEADER>()
-            .ok_or(NoPacket::WrongSize(0))?;
+            .ok_or(Error::WrongSize { size: 0 })?;
         if result != RAW_HISTOGRAM {
-            return Err(NoPacket::ForeignResult(result));
+            return Err(Error::ForeignResult { result });
         }
         if usize::from(size) != BINS {
-            return Err(NoPacket::WrongSize(size));
+            return Err(Error::WrongSize { size });
         }
         Ok(Self { number, data })
     }
-}
-
-/// A packet that is not the one that should have come.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct OutOfOrder {
-    pub(super) expected: u8,
-    pub(super) found: u8,
 }
 
 /// Puts packets together to histograms. 2.5 KiB: two bytes of every count.
@@ -96,16 +86,18 @@ impl Assembly {
     /// most significant bytes are there.
     ///
     /// # Errors
-    /// [`OutOfOrder`]: the set is given up. A packet 0 begins the next one.
-    pub(super) fn take(&mut self, packet: Packet) -> Result<Taken, OutOfOrder> {
+    /// [`Error::OutOfOrder`]: the set is given up. A packet 0 begins the next one.
+    pub(super) fn take<B, P>(&mut self, packet: Packet) -> Result<Taken, Error<B, P>> {
         let found = packet.number;
         let result = match self.next {
-            Next::Packet(expected) if found != expected => Err(OutOfOrder { expected, found }),
-            Next::Set if found >= PACKETS => Err(OutOfOrder { expected: 0, found }),
+            Next::Packet(expected) if found != expected => {
+                Err(Error::OutOfOrder { expected, found })
+            }
+            Next::Set if found >= PACKETS => Err(Error::OutOfOrder { expected: 0, found }),
             Next::Set if found != 0 => Ok(Taken::LeftOut),
             Next::Set | Next::Packet(_) => Ok(Taken::Part),
         };
-        if result != Ok(Taken::Part) && found != 0 {
+        if !matches!(result, Ok(Taken::Part)) && found != 0 {
             self.next = Next::Set;
             return result;
         }
@@ -113,30 +105,21 @@ impl Assembly {
             PACKETS => Next::Set,
             next => Next::Packet(next),
         };
-        let channel = found % CHANNELS;
+        let (plane, channel) = (found / CHANNELS, found % CHANNELS);
         let Some(low) = self.low.get_mut(usize::from(channel)) else {
             return result;
         };
-        match found / CHANNELS {
-            0 => {
-                for (low, &byte) in low.iter_mut().zip(packet.data) {
-                    *low = u16::from(byte);
-                }
+        if plane < 2 {
+            for (low, &byte) in low.iter_mut().zip(packet.data) {
+                *low = if plane == 0 { 0 } else { *low } | u16::from(byte) << (8 * plane);
             }
-            1 => {
-                for (low, &byte) in low.iter_mut().zip(packet.data) {
-                    *low |= u16::from(byte) << 8;
-                }
-            }
-            _ => {
-                let mut counts = [0; BINS];
-                for ((count, &low), &byte) in counts.iter_mut().zip(&*low).zip(packet.data) {
-                    *count = u32::from(byte) << 16 | u32::from(low);
-                }
-                return Ok(Taken::Histogram { channel, counts });
-            }
+            return result;
         }
-        result
+        let mut counts = [0; BINS];
+        for ((count, &low), &byte) in counts.iter_mut().zip(&*low).zip(packet.data) {
+            *count = u32::from(byte) << 16 | u32::from(low);
+        }
+        Ok(Taken::Histogram { channel, counts })
     }
 }
 

@@ -51,26 +51,24 @@
 //! # Cost
 //!
 //! A packet takes 145 bytes on the bus, addresses included, and three more for
-//! every chunk after the first: 3.3 ms at 400 kHz. A set has 30 of them. The driver has 2.6 KiB of RAM for the counts of a set.
+//! every chunk after the first: 3.3 ms at 400 kHz. A set has 30 of them.
+//! The driver has 2.6 KiB of RAM for the counts of a set.
 
 mod bootloader;
+mod bring_up;
 mod config;
 mod error;
 mod frame;
+mod packets;
 mod registers;
 
 use dtof_core::fixed::types::{I24F8, U16F16};
 use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
 use embedded_hal::i2c::{ErrorKind, ErrorType, I2c, NoAcknowledgeSource};
 
-use self::bootloader::{Answer, MAX_DATA, Message, SEED};
-use self::frame::{Assembly, NoPacket, OutOfOrder, PACKET, Packet, Taken};
-use self::registers::{
-    APPID, APPLICATION, BOOTLOADER, CHIP_ID, CHIP_ID_BITS, CMD_STAT, CONFIG_RESULT, CPU_READY,
-    DEFAULT_ADDRESS, ENABLE, FIRST_COMMAND, HIST_DUMP, HISTOGRAM_INT, I2C_ADDR_CHANGE,
-    I2C_SLAVE_ADDRESS, ID, INT_ENAB, INT_STATUS, PERIOD_MS, PON, RAW_HISTOGRAMS, RESULT_INT,
-    SPAD_MAP_ID,
-};
+use self::bootloader::Answer;
+use self::frame::{Assembly, PACKET};
+use self::registers::{APPID, APPLICATION, CMD_STAT, DEFAULT_ADDRESS, FIRST_COMMAND};
 use crate::timer::Since;
 use crate::{About, PhotonSink, Polled, Sensor};
 
@@ -284,208 +282,6 @@ where
             State::Measuring { since, stuck } => return self.serve(since, stuck, now_ms, sink),
         }
         Ok(Polled::Working)
-    }
-
-    /// Waits for the processor, then sees what runs.
-    fn wake(&mut self, since: Since, now_ms: u32) -> Result<Polled, I2C, INT> {
-        let [enable] = self.read_register(ENABLE)?;
-        if enable & CPU_READY == 0 {
-            if since.is_over(self.config.settings().command_timeout_ms, now_ms) {
-                return Err(Error::Timeout(Waiting::PowerUp));
-            }
-            if enable & PON == 0 {
-                self.write(&[ENABLE, enable | PON])?;
-            }
-            return Ok(Polled::Idle);
-        }
-        let [id] = self.read_register(ID)?;
-        if id & CHIP_ID_BITS != CHIP_ID {
-            return Err(Error::WrongChip { id });
-        }
-        let now = Since::new(now_ms);
-        match self.read_register(APPID)? {
-            // It may be measuring.
-            [APPLICATION] => self.command(Command::Stop, now)?,
-            [BOOTLOADER] if self.image.is_empty() => return Err(Error::NoImage),
-            [BOOTLOADER] => self.load(BootCommand::DownloadInit, &[SEED], 0, now)?,
-            [id] => return Err(Error::WrongApplication { id }),
-        }
-        Ok(Polled::Working)
-    }
-
-    /// The bootloader has done `command`, and `sent` bytes of the image are in
-    /// RAM.
-    fn load_more(&mut self, command: BootCommand, sent: usize, now: Since) -> Result<(), I2C, INT> {
-        if command == BootCommand::DownloadInit {
-            return self.load(BootCommand::SetRamAddress, &[0, 0], sent, now);
-        }
-        let rest = self.image.get(sent..).unwrap_or_default();
-        if let Some(chunk) = rest.chunks(CHUNK.min(MAX_DATA)).next() {
-            return self.load(BootCommand::WriteRam, chunk, sent + chunk.len(), now);
-        }
-        // It does not answer this one: the application does.
-        self.load(BootCommand::RamRemapReset, &[], sent, now)?;
-        self.state = State::Booting { since: now };
-        Ok(())
-    }
-
-    fn load(
-        &mut self,
-        command: BootCommand,
-        data: &[u8],
-        sent: usize,
-        since: Since,
-    ) -> Result<(), I2C, INT> {
-        self.write(Message::new(command, data).bytes())?;
-        self.state = State::Loading {
-            since,
-            command,
-            sent,
-        };
-        Ok(())
-    }
-
-    /// The application has done `command`.
-    fn go_on_after(&mut self, command: Command, now: Since) -> Result<(), I2C, INT> {
-        let wanted = self.config.settings().address;
-        match command {
-            Command::Stop => self.command(Command::LoadConfigPageCommon, now),
-            Command::LoadConfigPageCommon => {
-                self.configure()?;
-                self.command(Command::WriteConfigPage, now)
-            }
-            Command::WriteConfigPage if self.address != wanted => {
-                self.command(Command::I2cSlaveAddress, now)?;
-                // Its status stands at the new address.
-                self.address = wanted;
-                Ok(())
-            }
-            Command::WriteConfigPage | Command::I2cSlaveAddress => {
-                self.write(&[INT_STATUS, 0xFF])?;
-                self.write(&[INT_ENAB, RESULT_INT | HISTOGRAM_INT])?;
-                self.command(Command::Measure, now)
-            }
-            Command::Measure => {
-                self.assembly.restart();
-                self.state = State::Measuring {
-                    since: now,
-                    stuck: 0,
-                };
-                Ok(())
-            }
-        }
-    }
-
-    fn command(&mut self, command: Command, since: Since) -> Result<(), I2C, INT> {
-        self.write(&[CMD_STAT, command as u8])?;
-        self.state = State::Commanded { since, command };
-        Ok(())
-    }
-
-    /// Writes what is configured to the common configuration page.
-    fn configure(&mut self) -> Result<(), I2C, INT> {
-        let [page] = self.read_register(CONFIG_RESULT)?;
-        if page != Command::LoadConfigPageCommon as u8 {
-            return Err(Error::WrongPage { page });
-        }
-        let settings = *self.config.settings();
-        let [period_l, period_h] = settings.period_ms.to_le_bytes();
-        let [iterations_l, iterations_h] = settings.kilo_iterations.to_le_bytes();
-        self.write(&[PERIOD_MS, period_l, period_h, iterations_l, iterations_h])?;
-        self.write(&[SPAD_MAP_ID, settings.spad_map as u8])?;
-        self.write(&[HIST_DUMP, RAW_HISTOGRAMS])?;
-        if self.address != settings.address {
-            self.write(&[I2C_SLAVE_ADDRESS, settings.address << 1])?;
-            self.write(&[I2C_ADDR_CHANGE, 0])?;
-        }
-        Ok(())
-    }
-
-    /// Sees whether a packet came, and takes it.
-    fn serve(
-        &mut self,
-        since: Since,
-        stuck: u8,
-        now_ms: u32,
-        sink: &mut impl PhotonSink,
-    ) -> Result<Polled, I2C, INT> {
-        let settings = self.config.settings();
-        let silent = since.is_over(settings.data_timeout_ms, now_ms);
-        if self.interrupt.is_high().map_err(Error::Pin)? {
-            if silent {
-                return Err(Error::Timeout(Waiting::Histogram));
-            }
-            self.state = State::Measuring { since, stuck: 0 };
-            return Ok(Polled::Idle);
-        }
-        let limit = settings.stuck_limit;
-        let [status] = self.read_register(INT_STATUS)?;
-        let reasons = status & (RESULT_INT | HISTOGRAM_INT);
-        if reasons & HISTOGRAM_INT == 0 {
-            // A result now and then is no reason to worry; more in a row are.
-            let stuck = stuck.saturating_add(1);
-            if stuck >= limit {
-                return Err(Error::StuckInterrupt { status });
-            }
-            if silent {
-                return Err(Error::Timeout(Waiting::Histogram));
-            }
-            self.state = State::Measuring { since, stuck };
-            if reasons == 0 {
-                return Ok(Polled::Idle);
-            }
-            self.write(&[INT_STATUS, reasons])?;
-            return Ok(Polled::Working);
-        }
-        self.write(&[INT_STATUS, reasons])?;
-        let taken = self.take_packet(sink)?;
-        if taken != Polled::Idle || !silent {
-            let since = if taken == Polled::Idle {
-                since
-            } else {
-                Since::new(now_ms)
-            };
-            self.state = State::Measuring { since, stuck: 0 };
-            return Ok(taken);
-        }
-        Err(Error::Timeout(Waiting::Histogram))
-    }
-
-    /// Reads a packet. [`Polled::Idle`] if it is left out.
-    fn take_packet(&mut self, sink: &mut impl PhotonSink) -> Result<Polled, I2C, INT> {
-        let mut bytes = [0; PACKET];
-        let mut register = CONFIG_RESULT;
-        for chunk in bytes.chunks_mut(CHUNK) {
-            self.i2c
-                .write_read(self.address, &[register], chunk)
-                .map_err(bus_error)?;
-            // 0x20 + 135 bytes end at 0xA7.
-            register += u8::try_from(chunk.len()).unwrap_or(0);
-        }
-        let packet = Packet::of(&bytes).map_err(|error| {
-            self.assembly.restart();
-            match error {
-                NoPacket::ForeignResult(result) => Error::ForeignResult { result },
-                NoPacket::WrongSize(size) => Error::WrongSize { size },
-            }
-        })?;
-        count(&mut self.counts.packets);
-        match self.assembly.take(packet) {
-            Ok(Taken::Histogram { channel, counts }) => {
-                let Some(pixel) = self.config.pixel(channel) else {
-                    return Ok(Polled::Working);
-                };
-                sink.histogram(pixel, &counts);
-                count(&mut self.counts.histograms);
-                Ok(Polled::Data)
-            }
-            Ok(Taken::Part) => Ok(Polled::Working),
-            Ok(Taken::LeftOut) => {
-                count(&mut self.counts.left_out);
-                Ok(Polled::Idle)
-            }
-            Err(OutOfOrder { expected, found }) => Err(Error::OutOfOrder { expected, found }),
-        }
     }
 
     fn read_register<const N: usize>(&mut self, register: u8) -> Result<[u8; N], I2C, INT> {

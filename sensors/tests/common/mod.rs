@@ -3,6 +3,12 @@
 
 #![allow(dead_code, reason = "no test uses all of it")]
 
+/// The chips of the examples.
+#[path = "../../examples/chip"]
+pub mod chips {
+    pub mod tdc7200;
+    pub mod tmf882x;
+}
 pub mod plug;
 pub mod tmf882x;
 

@@ -7,7 +7,8 @@ use embedded_hal::i2c::{self, I2c, NoAcknowledgeSource};
 use embedded_hal::spi::{self, SpiDevice};
 
 use super::Line;
-use super::tmf882x::packets;
+pub use super::chips::tdc7200::Chip as Tdc;
+pub use super::chips::tmf882x::Chip as Tmf;
 
 /// How a bus answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,12 +59,6 @@ impl<Chip: Default> Bus<Chip> {
     }
 }
 
-/// A TDC7200 that measures one stop at 247.061 ns at once.
-#[derive(Clone, Default)]
-pub struct Tdc {
-    written: [u8; 10],
-}
-
 impl<C> spi::ErrorType for Bus<C> {
     type Error = spi::ErrorKind;
 }
@@ -73,51 +68,17 @@ impl SpiDevice for Bus<Tdc> {
         &mut self,
         operations: &mut [spi::Operation<'_, u8>],
     ) -> Result<(), spi::ErrorKind> {
-        let answers = self.begin();
-        let written = &mut self.chip.borrow_mut().written;
-        match (answers, operations) {
+        match (self.begin(), &mut *operations) {
             (Answers::Error, _) => return Err(spi::ErrorKind::Other),
             (Answers::Ones, [_, spi::Operation::Read(bytes)]) => bytes.fill(0xff),
-            (Answers::Sensor, [spi::Operation::Write([command, value])]) => {
-                let register = command & 0x3f;
-                written[usize::from(register)] = *value;
-                if (register, value & 1) == (0, 1) {
-                    self.interrupt.set(false);
-                }
+            (Answers::Ones, _) => {}
+            (Answers::Sensor, _) => {
+                let is_low = self.chip.borrow_mut().answer(operations);
+                self.interrupt.set(!is_low);
             }
-            (
-                Answers::Sensor,
-                [
-                    spi::Operation::Write([command]),
-                    spi::Operation::Read(bytes),
-                ],
-            ) => {
-                match (command & 0x3f, &mut **bytes) {
-                    (0x02, [status]) => *status = 0x19,
-                    // What is there after a reset is what is written later.
-                    (0x01, [config2]) => *config2 = 0x40,
-                    (0x03, [mask]) => *mask = 0x07,
-                    (register, [value]) => *value = written[usize::from(register)],
-                    (0x10, bytes) => bytes.copy_from_slice(&4175u32.to_be_bytes()[1..]),
-                    (_, bytes) => {
-                        let (first, second) = bytes.split_at_mut(3);
-                        first.copy_from_slice(&2110u32.to_be_bytes()[1..]);
-                        second.copy_from_slice(&21121u32.to_be_bytes()[1..]);
-                    }
-                }
-            }
-            (_, _) => {}
         }
         Ok(())
     }
-}
-
-/// A TMF8820 that runs its application and, when it measures, always has the next
-/// packet of histograms with a peak in bin 40.
-#[derive(Clone, Default)]
-pub struct Tmf {
-    status: u8,
-    packet: usize,
 }
 
 impl<C> i2c::ErrorType for Bus<C> {
@@ -134,36 +95,8 @@ impl I2c for Bus<Tmf> {
             let source = NoAcknowledgeSource::Address;
             return Err(i2c::ErrorKind::NoAcknowledge(source));
         }
-        let chip = &mut *self.chip.borrow_mut();
-        match operations {
-            [i2c::Operation::Write([0x08, command])] => {
-                let measures = *command == 0x10;
-                chip.status = u8::from(measures);
-                chip.packet = 0;
-                self.interrupt.set(!measures);
-            }
-            [
-                i2c::Operation::Write([register]),
-                i2c::Operation::Read(bytes),
-            ] => match (*register, &mut **bytes) {
-                (0x00, [application]) => *application = 0x03,
-                (0x08, [status]) => *status = chip.status,
-                (0x20, [page]) => *page = 0x16,
-                (0xE0, [enable]) => *enable = 0x41,
-                (0xE1, [interrupt]) => *interrupt = 0x08,
-                (0xE3, [id]) => *id = 0x08,
-                (0x20, bytes) => {
-                    let mut counts = [[10; 128]; 10];
-                    for counts in &mut counts {
-                        counts[40] = 1000;
-                    }
-                    bytes.copy_from_slice(&packets(&counts)[chip.packet]);
-                    chip.packet = (chip.packet + 1) % 30;
-                }
-                (register, _) => panic!("register {register:#04x}"),
-            },
-            _ => {}
-        }
+        let is_low = self.chip.borrow_mut().answer(operations);
+        self.interrupt.set(!is_low);
         Ok(())
     }
 }

@@ -11,14 +11,17 @@ compile_error!("an image for a soft-core: cargo softcore");
 #[path = "../../../firmware/src/bin/bench/scene.rs"]
 #[allow(dead_code, reason = "not every operation is measured here")]
 mod scene;
+#[path = "../../../firmware/src/bin/bench/ways.rs"]
+mod ways;
 
 use core::arch::asm;
 use core::hint::black_box;
 
-use dtof_core::{AerEncoder, AsyncPixel, LaserCycle, Look, PixelAddress, isqrt};
+use dtof_core::{AerEncoder, AsyncPixel, Look, PixelAddress, PixelConfig, isqrt};
 use dtof_softcore::{cache, io, println, program};
 
-use scene::{CYCLES, PHOTONS, PHOTONS_A_CYCLE, State};
+use scene::{BINS, CYCLES, PHOTONS, State};
+use ways::{add_batch, clear, count_batch, exposure, kept, look, pack, whole};
 
 /// Exposures of each kind: fewer than an emulator would do, as the bit-serial
 /// processor takes a second for each.
@@ -36,7 +39,7 @@ type Prepare = fn(&mut State);
 /// One operation.
 struct Row {
     name: &'static str,
-    /// Whether on exposures with a target, without, or both.
+    /// Whether on exposures with a target, or without.
     target: bool,
     prepare: Prepare,
     way: Operation,
@@ -44,65 +47,48 @@ struct Row {
     each: u32,
 }
 
-const fn row(name: &'static str, target: bool, prepare: Prepare, way: Operation, each: u32) -> Row {
+const fn row(name: &'static str, prepare: Prepare, way: Operation, each: u32) -> Row {
     Row {
         name,
-        target,
+        target: true,
         prepare,
         way,
         each,
     }
 }
 
+const fn photons(name: &'static str, way: Operation) -> Row {
+    row(name, empty, way, PHOTONS)
+}
+
+/// On exposures without a target.
+const fn without(name: &'static str, prepare: Prepare, way: Operation) -> Row {
+    Row {
+        target: false,
+        ..row(name, prepare, way, 1)
+    }
+}
+
 /// The first is taken off all others.
 const ROWS: [Row; 16] = [
-    row("call", true, empty, call, 1),
-    row("photon: AsyncPixel::count", true, empty, count, PHOTONS),
-    row(
-        "photon: AsyncPixel::count_batch",
-        true,
-        empty,
-        count_batch,
-        PHOTONS,
-    ),
-    row(
-        "photon: Histogram::add_batch",
-        true,
-        empty,
-        add_batch,
-        PHOTONS,
-    ),
-    row("decision: kept peak; no event", false, counted, kept, 1),
-    row(
-        "decision: kept peak; event and depth",
-        true,
-        counted,
-        kept,
-        1,
-    ),
-    row("decision: look; no event", false, counted, look, 1),
-    row(
-        "decision: whole histogram; no event",
-        false,
-        arrived,
-        whole,
-        1,
-    ),
-    row(
-        "decision: whole histogram; event and depth",
-        true,
-        arrived,
-        whole,
-        1,
-    ),
-    row("event: look to packed word", true, counted, event, 1),
-    row("pack: encode and to_le_bytes", true, at_event, pack, 1),
-    row("clear: Histogram::clear", true, counted, clear, 1),
-    row("exposure: count_batch", true, empty, exposure, 1),
-    row("root: isqrt::<5>", true, empty, root, 1),
-    row("access: load", true, empty, load, ACCESSES),
-    row("access: store", true, empty, store, ACCESSES),
+    row("call", empty, call, 1),
+    photons("photon: AsyncPixel::count", count),
+    photons("photon: AsyncPixel::count_batch", count_batch),
+    photons("photon: Histogram::add_batch", add_batch),
+    without("decision: kept peak; no event", counted, kept),
+    row("decision: kept peak; event and depth", counted, kept, 1),
+    without("decision: look; no event", counted, look),
+    without("decision: whole histogram; no event", arrived, whole),
+    row(WHOLE_EVENT, arrived, whole, 1),
+    row("event: look to packed word", counted, event, 1),
+    row("pack: encode and to_le_bytes", at_event, pack, 1),
+    row("clear: Histogram::clear", counted, clear, 1),
+    row("exposure: count_batch", empty, exposure, 1),
+    row("root: isqrt::<5>", empty, root, 1),
+    row("access: load", empty, load, ACCESSES),
+    row("access: store", empty, store, ACCESSES),
 ];
+const WHOLE_EVENT: &str = "decision: whole histogram; event and depth";
 
 fn run() -> bool {
     let (Some(mut state), Some(mut other)) = (State::new(), State::new()) else {
@@ -115,7 +101,7 @@ fn run() -> bool {
             state.empty(number, target);
             other.codes = state.codes;
             counted(&mut state);
-            let fires = fires(&state);
+            let fires = state.config.detect(state.pixel.histogram()).is_some();
             for (index, (row, times)) in ROWS.iter().zip(&mut times).enumerate() {
                 let is_decision = row.name.starts_with("decision") || row.name.starts_with("event");
                 // Noise may fire, if seldom.
@@ -157,10 +143,6 @@ fn measure(number: usize, operation: Operation, state: &mut State, argument: u32
     io::mark(after - 1);
     black_box(operation(state, argument));
     io::mark(after);
-}
-
-fn fires(state: &State) -> bool {
-    kept_event(state).is_some()
 }
 
 fn empty(state: &mut State) {
@@ -206,84 +188,13 @@ extern "C" fn count(state: &mut State, _: u32) -> u32 {
 }
 
 #[inline(never)]
-fn one(
-    pixel: &mut AsyncPixel<{ scene::BINS }>,
-    config: &dtof_core::PixelConfig<{ scene::BINS }>,
-    code: u16,
-) {
+fn one(pixel: &mut AsyncPixel<BINS>, config: &PixelConfig<BINS>, code: u16) {
     pixel.count(config, code);
-}
-
-extern "C" fn count_batch(state: &mut State, _: u32) -> u32 {
-    state.pixel.count_batch(&state.config, &state.codes);
-    0
-}
-
-extern "C" fn add_batch(state: &mut State, _: u32) -> u32 {
-    state.histogram.add_batch(&state.codes);
-    0
-}
-
-#[inline(always)]
-fn kept_event(state: &State) -> Option<dtof_core::Detection> {
-    state.config.detect(state.pixel.histogram())
-}
-
-extern "C" fn kept(state: &mut State, _: u32) -> u32 {
-    match kept_event(state) {
-        Some(detection) => detection.depth.offset.raw().unsigned_abs().into(),
-        None => 0,
-    }
-}
-
-extern "C" fn look(state: &mut State, cycle: u32) -> u32 {
-    state.end_laser_cycle(cycle) as u32
-}
-
-extern "C" fn whole(state: &mut State, _: u32) -> u32 {
-    state
-        .histogram
-        .add_frame(&state.foreign, state.config.gate());
-    match state.config.detect(&state.histogram) {
-        Some(detection) => detection.depth.offset.raw().unsigned_abs().into(),
-        None => 0,
-    }
 }
 
 extern "C" fn event(state: &mut State, cycle: u32) -> u32 {
     if state.end_laser_cycle(cycle) == Look::Event {
         state.event = state.pixel.acknowledge();
-    }
-    pack(state, 0)
-}
-
-extern "C" fn pack(state: &mut State, _: u32) -> u32 {
-    let Some(event) = &state.event else {
-        return 0;
-    };
-    let (_, word) = state.encoder.encode(event);
-    black_box(word.to_le_bytes());
-    1
-}
-
-extern "C" fn clear(state: &mut State, _: u32) -> u32 {
-    state.histogram.clear();
-    0
-}
-
-extern "C" fn exposure(state: &mut State, _: u32) -> u32 {
-    let mut photons = state.codes.chunks(PHOTONS_A_CYCLE);
-    for cycle in 0..CYCLES {
-        let photons = photons.next().unwrap_or_default();
-        state.pixel.count_batch(&state.config, photons);
-        let (statistics, cycle) = (&mut state.statistics, LaserCycle(cycle.into()));
-        if state
-            .pixel
-            .end_laser_cycle(&state.config, statistics, cycle)
-            == Look::Event
-        {
-            state.event = state.pixel.acknowledge();
-        }
     }
     pack(state, 0)
 }

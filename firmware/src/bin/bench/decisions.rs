@@ -4,6 +4,7 @@
 use crate::counter::{Counter, Operation};
 use crate::report::Report;
 use crate::scene::{CYCLES, EXPOSURES, State};
+use crate::ways::{kept, look, whole};
 
 const WITH_GATE: &str = "kept peak; no event; gate";
 
@@ -45,26 +46,4 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
 
 fn fires(state: &State) -> bool {
     state.config.detect(state.pixel.histogram()).is_some()
-}
-
-extern "C" fn kept(state: &mut State, _: u32) -> u32 {
-    match state.config.detect(state.pixel.histogram()) {
-        Some(detection) => detection.depth.offset.raw().unsigned_abs().into(),
-        None => 0,
-    }
-}
-
-extern "C" fn look(state: &mut State, cycle: u32) -> u32 {
-    state.end_laser_cycle(cycle) as u32
-}
-
-/// From counts that come from elsewhere to the decision.
-extern "C" fn whole(state: &mut State, _: u32) -> u32 {
-    state
-        .histogram
-        .add_frame(&state.foreign, state.config.gate());
-    match state.config.detect(&state.histogram) {
-        Some(detection) => detection.depth.offset.raw().unsigned_abs().into(),
-        None => 0,
-    }
 }

@@ -17,6 +17,7 @@ mod products;
 mod report;
 mod roots;
 mod scene;
+mod ways;
 mod windows;
 
 use core::panic::PanicInfo;

@@ -1,13 +1,12 @@
 //! The operations, each called as a program would call it.
 
-use core::hint::black_box;
-
 use dtof_core::fixed::types::U24F8;
 use dtof_core::{LaserCycle, Look, centroid};
 
 use crate::counter::{Counter, Operation};
 use crate::report::Report;
 use crate::scene::{CYCLES, EXPOSURES, PHOTONS, PHOTONS_A_CYCLE, State};
+use crate::ways::{add_batch, clear, count_batch, exposure, look, pack};
 
 /// Measures all.
 pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
@@ -20,45 +19,38 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
         }
     }
     report.line("photon", "AsyncPixel::count", total, photons);
-
-    let rows: [(&str, &str, Operation, Prepare, u32); 10] = [
-        (
-            "photon",
-            "AsyncPixel::count_batch",
-            count_batch,
-            empty,
-            photons,
-        ),
-        (
-            "photon",
-            "AsyncPixel::count_batch; gate",
-            count_batch,
-            gated,
-            photons,
-        ),
-        ("photon", "Histogram::add_batch", add_batch, empty, photons),
-        ("frame", "Histogram::add_frame", add_frame, frame, EXPOSURES),
-        ("depth", "centroid", depth, with_target, EXPOSURES),
-        (
-            "pack",
-            "encode and to_le_bytes",
-            pack,
-            with_event,
-            EXPOSURES,
-        ),
-        ("clear", "Histogram::clear", clear, with_target, EXPOSURES),
-        ("clear", "look at L2", end_laser_cycle, at_l2, EXPOSURES),
-        ("exposure", "count_batch", exposure, empty, EXPOSURES),
-        ("exposure", "count", exposure_single, empty, EXPOSURES),
+    let of_photons: [(&str, Operation, Prepare); 3] = [
+        ("AsyncPixel::count_batch", count_batch, empty),
+        ("AsyncPixel::count_batch; gate", count_batch, gated),
+        ("Histogram::add_batch", add_batch, empty),
     ];
-    for (operation, variant, way, prepare, runs) in rows {
-        let mut total = 0;
-        for number in 0..EXPOSURES {
-            prepare(state, number);
-            total += counter.measure(way, state, number);
-        }
-        report.line(operation, variant, total, runs);
+    for (variant, way, prepare) in of_photons {
+        let total = exposures(counter, state, way, prepare);
+        report.line("photon", variant, total, photons);
     }
+    let rows: [(&str, &str, Operation, Prepare); 7] = [
+        ("frame", "Histogram::add_frame", add_frame, frame),
+        ("depth", "centroid", depth, with_target),
+        ("pack", "encode and to_le_bytes", pack, with_event),
+        ("clear", "Histogram::clear", clear, with_target),
+        ("clear", "look at L2", look, at_l2),
+        ("exposure", "count_batch", exposure, empty),
+        ("exposure", "count", exposure_single, empty),
+    ];
+    for (operation, variant, way, prepare) in rows {
+        let total = exposures(counter, state, way, prepare);
+        report.line(operation, variant, total, EXPOSURES);
+    }
+}
+
+/// All exposures together.
+fn exposures(counter: &Counter, state: &mut State, way: Operation, prepare: Prepare) -> u32 {
+    let mut total = 0;
+    for number in 0..EXPOSURES {
+        prepare(state, number);
+        total += counter.measure(way, state, number);
+    }
+    total
 }
 
 /// Brings the state to where the operation begins.
@@ -99,16 +91,6 @@ extern "C" fn count(state: &mut State, index: u32) -> u32 {
     0
 }
 
-extern "C" fn count_batch(state: &mut State, _: u32) -> u32 {
-    state.pixel.count_batch(&state.config, &state.codes);
-    0
-}
-
-extern "C" fn add_batch(state: &mut State, _: u32) -> u32 {
-    state.histogram.add_batch(&state.codes);
-    0
-}
-
 extern "C" fn add_frame(state: &mut State, _: u32) -> u32 {
     state
         .histogram
@@ -123,41 +105,6 @@ extern "C" fn depth(state: &mut State, _: u32) -> u32 {
     depth.offset.raw().unsigned_abs().into()
 }
 
-extern "C" fn pack(state: &mut State, _: u32) -> u32 {
-    let Some(event) = &state.event else {
-        return 0;
-    };
-    let (_, word) = state.encoder.encode(event);
-    black_box(word.to_le_bytes());
-    1
-}
-
-extern "C" fn clear(state: &mut State, _: u32) -> u32 {
-    state.histogram.clear();
-    0
-}
-
-extern "C" fn end_laser_cycle(state: &mut State, cycle: u32) -> u32 {
-    state.end_laser_cycle(cycle) as u32
-}
-
-extern "C" fn exposure(state: &mut State, _: u32) -> u32 {
-    let mut photons = state.codes.chunks(PHOTONS_A_CYCLE);
-    for cycle in 0..CYCLES {
-        let photons = photons.next().unwrap_or_default();
-        state.pixel.count_batch(&state.config, photons);
-        let (statistics, cycle) = (&mut state.statistics, LaserCycle(cycle.into()));
-        if state
-            .pixel
-            .end_laser_cycle(&state.config, statistics, cycle)
-            == Look::Event
-        {
-            state.event = state.pixel.acknowledge();
-        }
-    }
-    pack(state, 0)
-}
-
 extern "C" fn exposure_single(state: &mut State, _: u32) -> u32 {
     let mut photons = state.codes.chunks(PHOTONS_A_CYCLE);
     for cycle in 0..CYCLES {
@@ -165,11 +112,8 @@ extern "C" fn exposure_single(state: &mut State, _: u32) -> u32 {
             state.pixel.count(&state.config, code);
         }
         let (statistics, cycle) = (&mut state.statistics, LaserCycle(cycle.into()));
-        if state
-            .pixel
-            .end_laser_cycle(&state.config, statistics, cycle)
-            == Look::Event
-        {
+        let look = (state.pixel).end_laser_cycle(&state.config, statistics, cycle);
+        if look == Look::Event {
             state.event = state.pixel.acknowledge();
         }
     }

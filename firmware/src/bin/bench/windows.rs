@@ -2,11 +2,14 @@
 //! program runs.
 
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
-use dtof_core::{AnyRule, Count, DepthEstimator, RangeGate, WindowRule, detect};
+use dtof_core::{
+    AnyRule, Count, DepthEstimator, Detection, DetectionRule, RangeGate, WindowRule, detect,
+};
 
-use crate::counter::Counter;
+use crate::counter::{Counter, Operation};
 use crate::report::Report;
 use crate::scene::{EXPOSURES, State};
+use crate::ways::offset;
 
 const RULES: [(u8, &str); 5] = [
     (1, "window of 1; no event"),
@@ -26,42 +29,21 @@ const PULSES: [(U8F8, &str); 4] = [
 /// Measures all.
 pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
     for (width, variant) in RULES {
-        let z = const { U4F12::lit("4.4") };
-        let Ok(rule) = WindowRule::new(width, z, Count::saturating(5)) else {
-            continue;
-        };
-        state.window = rule;
-        let (mut total, mut runs) = (0, 0);
-        for number in 0..EXPOSURES {
-            state.counted(number, false);
-            if !fires(state) {
-                total += counter.measure(decide, state, 0);
-                runs += 1;
-            }
+        if let Some(rule) = window(width) {
+            state.window = rule;
+            undecided(report, counter, state, variant, decide, fires);
         }
-        report.line("decision", variant, total, runs);
     }
-    let Ok(window) = WindowRule::new(3, const { U4F12::lit("4.4") }, Count::saturating(5)) else {
+    let Some(window) = window(3) else {
         return;
     };
-    let rules = [
-        (
-            AnyRule::from(*state.config.rule()),
-            "any rule: the paper's; no event",
-        ),
+    let paper = AnyRule::from(*state.config.rule());
+    for (rule, variant) in [
+        (paper, "any rule: the paper's; no event"),
         (AnyRule::from(window), "any rule: window of 3; no event"),
-    ];
-    for (rule, variant) in rules {
+    ] {
         state.any_rule = rule;
-        let (mut total, mut runs) = (0, 0);
-        for number in 0..EXPOSURES {
-            state.counted(number, false);
-            if decided_by_any(state).is_none() {
-                total += counter.measure(decide_by_any, state, 0);
-                runs += 1;
-            }
-        }
-        report.line("decision", variant, total, runs);
+        undecided(report, counter, state, variant, decide_by_any, any_fires);
     }
     for (sigma, variant) in PULSES {
         state.estimator = DepthEstimator::for_pulse(sigma);
@@ -74,40 +56,51 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
     }
 }
 
-fn fires(state: &State) -> bool {
-    decided(state).is_some()
+fn window(width: u8) -> Option<WindowRule> {
+    let z = const { U4F12::lit("4.4") };
+    WindowRule::new(width, z, Count::saturating(5)).ok()
+}
+
+/// Measures decisions without an event.
+fn undecided(
+    report: &mut Report,
+    counter: &Counter,
+    state: &mut State,
+    variant: &str,
+    decide: Operation,
+    fires: fn(&State) -> bool,
+) {
+    let (mut total, mut runs) = (0, 0);
+    for number in 0..EXPOSURES {
+        state.counted(number, false);
+        if !fires(state) {
+            total += counter.measure(decide, state, 0);
+            runs += 1;
+        }
+    }
+    report.line("decision", variant, total, runs);
 }
 
 #[inline(always)]
-fn decided(state: &State) -> Option<dtof_core::Detection> {
-    detect(
-        state.pixel.histogram(),
-        &RangeGate::full(),
-        &state.window,
-        &state.estimator,
-    )
+fn decided(state: &State, rule: &impl DetectionRule) -> Option<Detection> {
+    let (gate, estimator) = (&RangeGate::full(), &state.estimator);
+    detect(state.pixel.histogram(), gate, rule, estimator)
+}
+
+fn fires(state: &State) -> bool {
+    decided(state, &state.window).is_some()
+}
+
+fn any_fires(state: &State) -> bool {
+    decided(state, &state.any_rule).is_some()
 }
 
 extern "C" fn decide(state: &mut State, _: u32) -> u32 {
-    decided(state).map_or(0, |detection| {
-        detection.depth.offset.raw().unsigned_abs().into()
-    })
-}
-
-#[inline(always)]
-fn decided_by_any(state: &State) -> Option<dtof_core::Detection> {
-    detect(
-        state.pixel.histogram(),
-        &RangeGate::full(),
-        &state.any_rule,
-        &state.estimator,
-    )
+    offset(decided(state, &state.window))
 }
 
 extern "C" fn decide_by_any(state: &mut State, _: u32) -> u32 {
-    decided_by_any(state).map_or(0, |detection| {
-        detection.depth.offset.raw().unsigned_abs().into()
-    })
+    offset(decided(state, &state.any_rule))
 }
 
 extern "C" fn estimate(state: &mut State, _: u32) -> u32 {

@@ -18,8 +18,8 @@
 //! most modules have.
 
 use cortex_m::peripheral::SYST;
-use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
+use dtof_core::{PixelAddress, checked};
 use embedded_hal_bus::spi::ExclusiveDevice;
 use stm32f4xx_hal::gpio::{Input, OpenDrain, Output, Pin, Pull, Speed};
 use stm32f4xx_hal::pac::SPI2;
@@ -53,22 +53,16 @@ impl SensorPort {
     /// measure. Its photons are those of pixel 0.
     #[must_use]
     pub fn tdc7200(mut self) -> impl Sensor {
-        const CONFIG: tdc7200::Config = {
-            let settings = tdc7200::Settings::new(PixelAddress(0), 8_000, U16F16::lit("250"));
-            match tdc7200::Config::new(tdc7200::Settings {
-                // A bin that can never hold a photon would be taken for one without
-                // background.
-                first_bin_ps: 12_000,
-                // 500 ns, if a turn of the ring oscillator takes 3.5.
-                overflow: 143,
-                // A bit that is lost on the way is an error, not another depth.
-                parity: true,
-                ..settings
-            }) {
-                Ok(config) => config,
-                Err(_) => panic!("not a configuration"),
-            }
-        };
+        const CONFIG: tdc7200::Config = checked!(tdc7200::Config::new(tdc7200::Settings {
+            // A bin that can never hold a photon would be taken for one without
+            // background.
+            first_bin_ps: 12_000,
+            // 500 ns, if a turn of the ring oscillator takes 3.5.
+            overflow: 143,
+            // A bit that is lost on the way is an error, not another depth.
+            parity: true,
+            ..tdc7200::Settings::new(PixelAddress(0), 8_000, U16F16::lit("250"))
+        }));
         const MODE_0: Mode = Mode {
             polarity: Polarity::IdleLow,
             phase: Phase::CaptureOnFirstTransition,
@@ -91,11 +85,9 @@ impl SensorPort {
     /// zones are pixels 0 to 8. `image` is the vendor's.
     #[must_use]
     pub fn tmf882x(self, image: &'static [u8]) -> impl Sensor {
-        const CONFIG: tmf882x::Config =
-            match tmf882x::Config::new(tmf882x::Settings::new(PixelAddress(0))) {
-                Ok(config) => config,
-                Err(_) => panic!("not a configuration"),
-            };
+        const CONFIG: tmf882x::Config = checked!(tmf882x::Config::new(tmf882x::Settings::new(
+            PixelAddress(0)
+        )));
         // The timer runs since the board has started.
         let delay = SystickDelay::new(SYST::get_current, self.rcc.clocks.hclk().raw());
         let bus = SoftwareI2c::new(self.scl, self.sda, delay);

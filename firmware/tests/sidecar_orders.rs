@@ -1,0 +1,175 @@
+//! What a sidecar orders its sensor to do, and what a host is told of the sensor.
+
+mod common;
+
+use common::host::{CONFIGURATION, Call, Host, Scripted, configured};
+use dtof_core::Flags;
+use dtof_core::fixed::types::U16F16;
+use dtof_firmware::sidecar::{Pixel, Sidecar};
+use dtof_link::{Configuration, Refusal, SensorRecord, Source, message};
+use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
+
+type Pixels = heapless::Vec<Pixel, 8>;
+
+/// A sensor that notes what it is told.
+#[derive(Default)]
+struct Told(Vec<Order>);
+
+#[derive(Debug, PartialEq)]
+enum Order {
+    Start(U16F16),
+    Poll,
+    Stop,
+}
+
+impl Sensor for Told {
+    type Error = SensorFault;
+
+    fn about(&self) -> About {
+        About {
+            bin_width: Some(U16F16::lit("160")),
+            ..About::new(3)
+        }
+    }
+
+    fn start(&mut self, bin_width: U16F16) {
+        self.0.push(Order::Start(bin_width));
+    }
+
+    fn stop(&mut self) {
+        self.0.push(Order::Stop);
+    }
+
+    fn poll(&mut self, _: u32, _: &mut impl PhotonSink) -> Result<Polled, SensorFault> {
+        self.0.push(Order::Poll);
+        Ok(Polled::Idle)
+    }
+}
+
+#[test]
+fn a_sensor_is_started_for_each_configuration_and_stopped_once() {
+    let mut pixels = Pixels::new();
+    let mut sensor = Told::default();
+    let mut device = Sidecar::new(&mut pixels, Some(sensor.about()));
+    let mut host = Host::new(1, 0);
+    device.poll_sensor(&mut sensor, 0);
+    let wanted = |bin_width: u32, source| Configuration {
+        bin_width_ps: U16F16::from_num(bin_width),
+        source,
+        ..CONFIGURATION
+    };
+    let (link, sensor_of) = (Source::Link, Source::Sensor);
+    for (bin_width, source) in [(160, sensor_of), (150, sensor_of), (250, link), (250, link)] {
+        host.configure(&mut device, 0, &wanted(bin_width, source));
+        device.poll_sensor(&mut sensor, 0);
+        device.poll_sensor(&mut sensor, 1);
+    }
+    let start = |bin_width| Order::Start(U16F16::from_num(bin_width));
+    let (poll, stop) = (|| Order::Poll, Order::Stop);
+    let expected = [start(160), poll(), poll(), start(150), poll(), poll(), stop];
+    assert_eq!(sensor.0, expected);
+
+    // A new session stops it, too.
+    host.configure(&mut device, 0, &wanted(160, sensor_of));
+    device.poll_sensor(&mut sensor, 2);
+    sensor.0.clear();
+    let mut next = Host::new(2, 0);
+    next.report(&mut device, 3);
+    device.poll_sensor(&mut sensor, 3);
+    assert_eq!(sensor.0, [Order::Stop]);
+}
+
+#[test]
+fn bins_that_are_not_the_sensors_are_refused() {
+    let mut pixels = Pixels::new();
+    let mut device = Sidecar::new(&mut pixels, Some(Told::default().about()));
+    let mut host = Host::new(1, 0);
+    // A sixteenth of 160 ps to either side.
+    for (bin_width, taken) in [(149, false), (150, true), (170, true), (171, false)] {
+        let wanted = Configuration {
+            bin_width_ps: U16F16::from_num(bin_width),
+            source: Source::Sensor,
+            ..CONFIGURATION
+        };
+        let answer = host.answer(&mut device, 0, message::CONFIGURE, &wanted.to_le_bytes());
+        let refusal = [Refusal::BinWidth as u8];
+        assert_eq!(answer, refusal[..usize::from(!taken)], "{bin_width} ps");
+        // Photons of the link have the bins of whoever sends them.
+        let wanted = Configuration {
+            source: Source::Link,
+            ..wanted
+        };
+        host.configure(&mut device, 0, &wanted);
+    }
+}
+
+#[test]
+fn the_host_is_told_what_the_sensor_is() {
+    let told = Told::default().about();
+    let told_record = SensorRecord {
+        pixels: told.pixels,
+        bin_width: told.bin_width,
+        offset: told.offset,
+    };
+    let mut pixels = Pixels::new();
+    let mut host = Host::new(1, 0);
+    let mut device = Sidecar::new(&mut pixels, Some(told));
+    let body = host.answer(&mut device, 0, message::SENSOR_REQUEST, &[]);
+    assert_eq!(body, [3, 0, 0, 0, 160, 0, 0, 0, 0, 0]);
+    assert_eq!(SensorRecord::from_le_bytes(&body), Some(Some(told_record)));
+
+    let mut pixels = Pixels::new();
+    let mut host = Host::new(1, 0);
+    let mut device = Sidecar::new(&mut pixels, None);
+    let body = host.answer(&mut device, 0, message::SENSOR_REQUEST, &[]);
+    assert_eq!(SensorRecord::from_le_bytes(&body), Some(None));
+    assert_eq!(SensorRecord::from_le_bytes(&body[1..]), None);
+}
+
+/// A sensor that does or does not give the first photon of a laser cycle only.
+struct Hits<'a, S>(&'a mut S, bool);
+
+impl<S: Sensor> Sensor for Hits<'_, S> {
+    type Error = S::Error;
+
+    fn about(&self) -> About {
+        self.0.about()
+    }
+
+    fn is_one_hit(&self) -> bool {
+        self.1
+    }
+
+    fn start(&mut self, bin_width: U16F16) {
+        self.0.start(bin_width);
+    }
+
+    fn stop(&mut self) {
+        self.0.stop();
+    }
+
+    fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, S::Error> {
+        self.0.poll(now_ms, sink)
+    }
+}
+
+#[test]
+fn events_of_a_sensor_that_gives_one_photon_a_laser_cycle_say_so_at_high_rates() {
+    for is_one_hit in [false, true] {
+        // A photon in 20 of 24 laser cycles, then in 11 of 24.
+        let call = |cycle: u64| {
+            let is_dark = if cycle < 24 { cycle < 4 } else { cycle < 37 };
+            let mut calls = vec![Call::Photon(0, 40), Call::End(1)];
+            calls.drain(..usize::from(is_dark));
+            calls
+        };
+        let mut script = Scripted((0..48).map(call).map(Some));
+        let mut pixels = Pixels::new();
+        let (mut device, mut host) = configured(&mut pixels, &CONFIGURATION);
+        let mut sensor = Hits(&mut script, is_one_hit);
+        host.run(&mut device, &mut sensor, 0..100, 4);
+        let flags: Vec<Flags> = host.events.iter().map(|event| event.flags).collect();
+        let first = [Flags::NONE, Flags::PILE_UP][usize::from(is_one_hit)];
+        assert_eq!(flags, [first, Flags::NONE]);
+    }
+}

@@ -1,0 +1,121 @@
+//! What an end does with a frame.
+
+use heapless::Vec;
+
+use super::{
+    BODY_BYTES, Endpoint, FIRST_UNNUMBERED, GREETING_BYTES, HEADER_BYTES, HELLO, KEEP_ALIVE,
+    Message, NO_SESSION, PATIENCE, RETRANSMIT_MS, WELCOME,
+};
+use crate::frame::FrameError;
+
+impl Endpoint {
+    /// Takes what a [`Deframer`](crate::frame::Deframer) found on the wire.
+    pub fn receive(&mut self, frame: Result<&[u8], FrameError>, now_ms: u32) {
+        match frame {
+            Ok(payload) => self.frame(payload, now_ms),
+            Err(FrameError::Corrupt) => self.counters.corrupt += 1,
+            Err(FrameError::Oversized) => self.counters.oversized += 1,
+        }
+    }
+
+    fn frame(&mut self, payload: &[u8], now_ms: u32) {
+        let Some((&[kind, session0, session1, number, expects, limit], body)) =
+            payload.split_first_chunk::<HEADER_BYTES>()
+        else {
+            self.counters.corrupt += 1;
+            return;
+        };
+        if body.len() > BODY_BYTES {
+            self.counters.oversized += 1;
+            return;
+        }
+        self.counters.frames += 1;
+        let session = u16::from_le_bytes([session0, session1]);
+        let ours = self.open && session == self.session;
+        match kind {
+            HELLO if !self.host => {
+                let Some(greeting) = body.first_chunk() else {
+                    self.counters.corrupt += 1;
+                    return;
+                };
+                // After a message of the session, only from another host that has
+                // drawn the same number.
+                if !ours || self.expected != 0 {
+                    self.begin(session, *greeting);
+                }
+                self.reply = Some((WELCOME, session));
+            }
+            WELCOME if self.host && session == self.session => {
+                if let (false, Some(greeting)) = (self.open, body.first_chunk()) {
+                    self.begin(session, *greeting);
+                }
+            }
+            NO_SESSION if self.host && ours => self.lost = true,
+            KEEP_ALIVE if ours => self.acknowledged(expects, limit, now_ms),
+            0..FIRST_UNNUMBERED if ours => {
+                self.acknowledged(expects, limit, now_ms);
+                self.numbered(kind, number, body);
+            }
+            _ => {
+                self.counters.foreign += 1;
+                // Only what is known to be wrong is answered, and never an answer.
+                if !self.host && kind <= KEEP_ALIVE {
+                    self.reply = Some((NO_SESSION, session));
+                }
+                return;
+            }
+        }
+        self.heard_ms = now_ms;
+    }
+
+    fn begin(&mut self, session: u16, peer_greeting: [u8; GREETING_BYTES]) {
+        *self = Self {
+            host: self.host,
+            session,
+            open: true,
+            began: true,
+            peer_greeting,
+            counters: self.counters,
+            ..Self::closed(self.greeting)
+        };
+    }
+
+    /// The other end has all messages before `expects`, and room up to `limit`.
+    fn acknowledged(&mut self, expects: u8, limit: u8, now_ms: u32) {
+        let arrived = expects.wrapping_sub(self.first);
+        if arrived > self.sent_before {
+            return; // older than what is known
+        }
+        for _ in 0..arrived {
+            self.outbox.pop_front();
+        }
+        if arrived > 0 {
+            self.progress_ms = now_ms;
+            self.alone = false;
+            self.quiet = self.quiet.saturating_add(arrived);
+            if self.quiet >= PATIENCE {
+                self.quiet = 0;
+                self.wait_ms = RETRANSMIT_MS.max(self.wait_ms / 2);
+            }
+        }
+        self.first = expects;
+        self.sent = self.sent.saturating_sub(arrived);
+        self.sent_before = self.sent_before.saturating_sub(arrived);
+        self.peer_limit = limit;
+    }
+
+    fn numbered(&mut self, kind: u8, number: u8, body: &[u8]) {
+        let ahead = number.wrapping_sub(self.expected);
+        self.acknowledge = true;
+        if ahead >= 128 {
+            self.counters.duplicate += 1;
+            return;
+        }
+        let body = Vec::from_slice(body).unwrap_or_default();
+        if ahead > 0 || self.inbox.push_back(Message { kind, body }).is_err() {
+            self.counters.out_of_order += 1;
+            return;
+        }
+        self.expected = self.expected.wrapping_add(1);
+    }
+}

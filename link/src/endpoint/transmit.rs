@@ -1,0 +1,91 @@
+//! What an end sends, and when.
+
+use super::{
+    Endpoint, HEADER_BYTES, HELLO, KEEP_ALIVE, KEEP_ALIVE_MS, RETRANSMIT_MOST_MS, RETRANSMIT_MS,
+    WELCOME, WINDOW,
+};
+use crate::frame::{self, WIRE_BYTES};
+
+impl Endpoint {
+    /// The next frame to put on the wire, or 0 bytes if none is due.
+    pub fn transmit(&mut self, now_ms: u32, wire: &mut [u8; WIRE_BYTES]) -> usize {
+        if let Some((kind, session)) = self.reply.take() {
+            return self.unnumbered(kind, session, now_ms, wire);
+        }
+        let waited_ms = now_ms.wrapping_sub(self.progress_ms);
+        if !self.open {
+            if self.host && waited_ms >= RETRANSMIT_MS {
+                self.progress_ms = now_ms;
+                return self.unnumbered(HELLO, self.session, now_ms, wire);
+            }
+            return 0;
+        }
+        if self.sent > 0 && waited_ms >= self.wait_ms {
+            self.sent = 0;
+            self.wait_ms = RETRANSMIT_MOST_MS.min(2 * self.wait_ms);
+            self.quiet = 0;
+            self.alone = true;
+        }
+        let number = self.first.wrapping_add(self.sent);
+        let room = self.peer_limit.wrapping_sub(number);
+        let next = self.outbox.iter().nth(self.sent.into());
+        // What is sent again goes alone until it arrives: a line that is slow
+        // rather than bad is not filled with repetitions.
+        let held = self.alone && self.sent > 0;
+        if let Some(message) = next.filter(|_| (1..128).contains(&room) && !held) {
+            let header = self.header(message.kind, self.session, number);
+            let length = frame::encode([&header, &message.body], wire);
+            if self.sent == 0 {
+                self.progress_ms = now_ms;
+            }
+            self.sent += 1;
+            if self.sent <= self.sent_before {
+                self.counters.retransmitted += 1;
+            } else {
+                self.sent_before = self.sent;
+            }
+            self.acknowledge = false;
+            self.spoke_ms = now_ms;
+            return length;
+        }
+        if self.acknowledge || now_ms.wrapping_sub(self.spoke_ms) >= KEEP_ALIVE_MS {
+            return self.unnumbered(KEEP_ALIVE, self.session, now_ms, wire);
+        }
+        0
+    }
+
+    fn unnumbered(
+        &mut self,
+        kind: u8,
+        session: u16,
+        now_ms: u32,
+        wire: &mut [u8; WIRE_BYTES],
+    ) -> usize {
+        if kind == KEEP_ALIVE {
+            self.spoke_ms = now_ms;
+            self.acknowledge = false;
+        }
+        let header = self.header(kind, session, 0);
+        let greeting: &[u8] = if matches!(kind, HELLO | WELCOME) {
+            &self.greeting
+        } else {
+            &[]
+        };
+        frame::encode([&header, greeting], wire)
+    }
+
+    fn header(&self, kind: u8, session: u16, number: u8) -> [u8; HEADER_BYTES] {
+        let [session0, session1] = session.to_le_bytes();
+        // At most WINDOW.
+        #[allow(clippy::cast_possible_truncation)]
+        let free = (WINDOW - self.inbox.len()) as u8;
+        [
+            kind,
+            session0,
+            session1,
+            number,
+            self.expected,
+            self.expected.wrapping_add(free),
+        ]
+    }
+}
