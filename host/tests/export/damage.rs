@@ -1,9 +1,7 @@
 //! `dtof export` of files that are damaged, or are no AER files.
 
-mod common;
-
-use common::Scratch;
-use common::aer::{HEADER, byte_of, depth, dynamic, events, exported, file, folder};
+use crate::common::Scratch;
+use crate::common::aer::{HEADER, byte_of, depth, dynamic, events, exported, file, folder};
 use dtof::events::aer_file::{Event, Header};
 use dtof::export::{Format, Options};
 use dtof::input::source::Geometry;
@@ -104,7 +102,7 @@ fn damage_is_named_with_its_byte_after_the_events_before_it_are_written() {
 fn the_program_says_what_is_damaged_and_fails() {
     let scratch = Scratch::new();
     scratch.file("cut.aer", &file(&HEADER, &events())[..100]);
-    let output = scratch.dtof(&["export", "cut.aer", "--format", "csv", "--out", "x.csv"]);
+    let output = scratch.run("export cut.aer --format csv --out x.csv");
     scratch.refused(
         &output,
         &["cut.aer: byte 96: the file ends inside a word; x.csv holds what came before: 1 events"],
@@ -135,8 +133,10 @@ fn what_is_no_aer_file_leaves_the_output_as_it_was() {
         (&no_bins, "bin width is zero"),
     ] {
         scratch.file("events.aer", bytes);
-        let output = scratch.dtof(&["export", "events.aer", "--format", "pcd", "--out", "x.pcd"]);
-        scratch.refused(&output, &["events.aer: ", part]);
+        scratch.refused(
+            &scratch.run("export events.aer --format pcd --out x.pcd"),
+            &["events.aer: ", part],
+        );
         assert_eq!(scratch.read("x.pcd"), "kept");
         assert_eq!(folder(&scratch.path("")).len(), 2);
     }
@@ -181,9 +181,8 @@ fn a_whole_file_of_times_that_the_format_cannot_hold_is_refused() {
         "late.aer",
         file(&HEADER, &[depth(0, 5, 5), depth(0, 1 << 60, 5)]),
     );
-    let output = scratch.dtof(&["export", "late.aer", "--format", "pcd", "--out", "x.pcd"]);
     scratch.refused(
-        &output,
+        &scratch.run("export late.aer --format pcd --out x.pcd"),
         &["late.aer: laser cycle 1152921504606846976 lies beyond"],
     );
     assert!(!scratch.path("x.pcd").exists());

@@ -1,11 +1,9 @@
 //! `dtof simulate`: scene files and what comes of them.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::Scratch;
+use crate::common::Scratch;
 use dtof::input::source::Geometry;
 use dtof::simulate::scene::Scene;
 use dtof_core::PixelAddress;
@@ -19,7 +17,7 @@ fn simulated(scratch: &Scratch, scene: &Path, more: &[&str]) -> serde_json::Valu
     let output = scratch.simulate(scene, more);
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{}: {message}", scene.display());
-    serde_json::from_str(&scratch.read("out/summary.json")).unwrap()
+    scratch.summary()
 }
 
 #[test]
@@ -272,8 +270,7 @@ fn the_options_that_export_needs_are_said() {
         assert!(output.status.success());
         let printed = String::from_utf8(output.stdout).unwrap();
         let row = printed.lines().find(|line| line.contains("export with"));
-        let summary: serde_json::Value =
-            serde_json::from_str(&scratch.read("out/summary.json")).unwrap();
+        let summary: serde_json::Value = scratch.summary();
         assert_eq!(summary["laser_hz"], hz);
         for (is, said) in degrees.iter().enumerate() {
             let there = summary["field_of_view_degrees"][is].as_f64().unwrap();

@@ -1,13 +1,11 @@
 //! Numbers, names and devices of the command line: read alike by every command, and refused in
 //! one line.
 
-mod common;
-
 use std::fs;
 use std::process::{Command, Stdio};
 
-use common::Scratch;
-use common::aer::{HEADER, events, file};
+use crate::common::Scratch;
+use crate::common::aer::{HEADER, events, file};
 
 const PHOTONS: &str = "pixel,cycle,bin\n0,0,0\n";
 
@@ -107,7 +105,7 @@ fn decode_reads_standard_input() {
     };
     let output = decode(fs::File::open(&aer).unwrap());
     assert!(output.status.success());
-    let of_file = scratch.dtof(&["decode", "events.aer"]);
+    let of_file = scratch.run("decode events.aer");
     assert_eq!(output.stdout, of_file.stdout);
     let other = scratch.file("photons.csv", PHOTONS);
     let output = decode(fs::File::open(other).unwrap());

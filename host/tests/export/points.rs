@@ -1,9 +1,7 @@
 //! `dtof export`: points, kinds of event, the result line, links.
 
-mod common;
-
-use common::Scratch;
-use common::aer::{HEADER, depth, dynamic, events, exported, file};
+use crate::common::Scratch;
+use crate::common::aer::{HEADER, depth, dynamic, events, exported, file};
 use dtof::events::aer_file::EventKind;
 use dtof::export::{Format, Options};
 
@@ -22,20 +20,13 @@ fn record(bytes: &[u8]) -> ([f32; 4], u32, u8, f64) {
 fn csv_has_time_and_point_before_the_columns_of_decode() {
     let scratch = Scratch::new();
     scratch.file("events.aer", file(&HEADER, &events()));
-    let output = scratch.dtof(&[
-        "export",
-        "events.aer",
-        "--format",
-        "csv",
-        "--out",
-        "points.csv",
-    ]);
+    let output = scratch.run("export events.aer --format csv --out points.csv");
     assert!(output.status.success());
     assert_eq!(
         output.stdout,
         b"points.csv: 12 events (60x32.2 degrees, 10 MHz)\n"
     );
-    let decoded = String::from_utf8(scratch.dtof(&["decode", "events.aer"]).stdout).unwrap();
+    let decoded = String::from_utf8(scratch.run("decode events.aer").stdout).unwrap();
     let text = scratch.read("points.csv");
     let cut = |line: &str| line.splitn(5, ',').nth(4).unwrap().to_owned();
     let rest: Vec<String> = text.lines().map(cut).collect();
@@ -150,18 +141,12 @@ fn a_file_of_both_kinds_needs_to_be_told_which() {
     }
     let scratch = Scratch::new();
     scratch.file("events.aer", bytes);
-    let output = scratch.dtof(&[
-        "export",
-        "events.aer",
-        "--format",
-        "ply",
-        "--out",
-        "out/x.ply",
-    ]);
-    scratch.refused(&output, &["there is no folder out"]);
-    let output = scratch.dtof(&["export", "events.aer", "--format", "ply", "--out", "x.ply"]);
     scratch.refused(
-        &output,
+        &scratch.run("export events.aer --format ply --out out/x.ply"),
+        &["there is no folder out"],
+    );
+    scratch.refused(
+        &scratch.run("export events.aer --format ply --out x.ply"),
         &["2 depth events and 1 dynamic depth events", "--events"],
     );
     assert!(!scratch.path("x.ply").exists());
@@ -227,26 +212,14 @@ fn a_link_stays_and_what_it_leads_to_is_replaced() {
     scratch.file("folder/points.csv", "old");
     symlink("folder/points.csv", scratch.path("link.csv")).unwrap();
     symlink("folder/none.csv", scratch.path("lost.csv")).unwrap();
-    let output = scratch.dtof(&[
-        "export",
-        "events.aer",
-        "--format",
-        "csv",
-        "--out",
-        "link.csv",
-    ]);
+    let output = scratch.run("export events.aer --format csv --out link.csv");
     assert!(output.status.success());
     assert!(scratch.path("link.csv").is_symlink());
     assert_eq!(scratch.read("folder/points.csv").lines().count(), 13);
-    let output = scratch.dtof(&[
-        "export",
-        "events.aer",
-        "--format",
-        "csv",
-        "--out",
-        "lost.csv",
-    ]);
-    scratch.refused(&output, &["lost.csv: is a link to what is not there"]);
+    scratch.refused(
+        &scratch.run("export events.aer --format csv --out lost.csv"),
+        &["lost.csv: is a link to what is not there"],
+    );
     assert!(scratch.path("lost.csv").is_symlink());
 }
 
@@ -255,7 +228,7 @@ fn the_commands_of_the_readme_run() {
     let scratch = Scratch::new();
     std::fs::create_dir_all(scratch.path("out/demo")).unwrap();
     scratch.file("out/demo/events.aer", file(&HEADER, &events()));
-    let readme = include_str!("../../README.md");
+    let readme = include_str!("../../../README.md");
     let start = "cargo run --release -- export out/demo/";
     let mut commands = 0;
     for line in readme.lines().filter(|line| line.starts_with(start)) {

@@ -1,8 +1,6 @@
 //! A capture log has zones and captures, where other arrays have columns and rows.
 
-mod common;
-
-use common::Scratch;
+use crate::common::Scratch;
 
 #[test]
 fn the_report_of_a_capture_log_calls_them_so() {

@@ -1,10 +1,8 @@
 //! `dtof export --format evt2` and `mcap`: order, slices, damaged files. What is in them
 //! is checked with other projects' readers by the test `readers` of `dtof-host-tests`.
 
-mod common;
-
-use common::Scratch;
-use common::aer::{HEADER, byte_of, depth, dynamic, exported, file};
+use crate::common::Scratch;
+use crate::common::aer::{HEADER, byte_of, depth, dynamic, exported, file};
 use dtof::events::aer_file::{Event, Header};
 use dtof::export::{Format, LaserClock, Options};
 use dtof::input::source::Geometry;

@@ -1,12 +1,10 @@
 //! No command replaces a file that it reads, nor one in its folder that it did not write.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::Scratch;
-use common::aer::{HEADER, events, file};
+use crate::common::Scratch;
+use crate::common::aer::{HEADER, events, file};
 use dtof::events::output::Output;
 use dtof::events::summary::Summary;
 use dtof::input::photon_csv::PhotonCsv;

@@ -1,10 +1,8 @@
 //! Replays that must succeed, end to end.
 
-mod common;
-
 use std::fmt::Write;
 
-use common::Scratch;
+use crate::common::Scratch;
 
 const HEADER: &str =
     "cycle,pixel,exposure,peak_bin,depth_bins,range_mm,peak_count,background,flags\n";
@@ -54,7 +52,7 @@ fn decode_prints_what_replay_wrote() {
     let input = scratch.file("photons.csv", steady(7, 60, 1000));
     let more = ["--bin-width-ps", "92.1", "--offset-mm", "-179.5"];
     scratch.replayed(&input, &more);
-    let decoded = scratch.dtof(&["decode", "out/events.aer"]);
+    let decoded = scratch.run("decode out/events.aer");
     assert!(decoded.status.success());
     assert_eq!(
         String::from_utf8(decoded.stdout).unwrap(),
@@ -74,7 +72,7 @@ fn a_damaged_aer_file_is_named_with_its_offset() {
     let events = (whole.len() - 64 - 32) / 16;
     let decode = |bytes: &[u8]| {
         scratch.file("damaged.aer", bytes);
-        scratch.dtof(&["decode", "damaged.aer"])
+        scratch.run("decode damaged.aer")
     };
     let rows =
         |output: &std::process::Output| String::from_utf8_lossy(&output.stdout).lines().count();
@@ -98,7 +96,7 @@ fn a_damaged_aer_file_is_named_with_its_offset() {
         &["byte 64", "unknown control word"],
     );
     scratch.refused(
-        &scratch.dtof(&["decode", "none.aer"]),
+        &scratch.run("decode none.aer"),
         &["none.aer", "No such file"],
     );
     // Whatever bit is flipped, the file is never taken for whole.
@@ -276,7 +274,7 @@ fn a_gate_leaves_the_cover_glass_out() {
 #[test]
 fn the_demo_is_the_papers_static_scene() {
     let scratch = Scratch::new();
-    assert!(scratch.dtof(&["demo", "--quiet"]).status.success());
+    scratch.printed("demo --quiet");
     let summary: serde_json::Value =
         serde_json::from_str(&scratch.read("out/demo/summary.json")).unwrap();
     // Section III-B: α = 8, L1 = 100, L2 = 2000, X = 10, 10,000 laser cycles.
@@ -313,8 +311,7 @@ fn replay_takes_the_stated_defaults_and_keeps_quiet() {
     let input = scratch.file("photons.csv", steady(0, 60, 100));
     let output = scratch.replay(&input, &["--quiet"]);
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
-    let summary: serde_json::Value =
-        serde_json::from_str(&scratch.read("out/summary.json")).unwrap();
+    let summary: serde_json::Value = scratch.summary();
     let settings = serde_json::json!({
         "bins": 128, "bin_width_ps": 250.0, "offset_mm": 0.0, "gate": null, "rule": "paper", "alpha": 4.0, "estimator": "centroid",
         "min_count": 5, "l1": 40, "l2": 2000, "x": 4, "one_hit_tdc": false, "seed": 1
@@ -349,7 +346,7 @@ fn an_exposure_without_an_event_is_counted() {
 #[test]
 fn the_demo_reports_every_pixel_and_is_silent_when_asked() {
     let scratch = Scratch::new();
-    let output = scratch.dtof(&["demo", "--quiet"]);
+    let output = scratch.run("demo --quiet");
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
     let summary: serde_json::Value =
         serde_json::from_str(&scratch.read("out/demo/summary.json")).unwrap();

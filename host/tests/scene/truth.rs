@@ -1,8 +1,6 @@
 //! Events of a simulated scene against what its pixels saw.
 
-mod common;
-
-use common::Scratch;
+use crate::common::Scratch;
 use dtof::rows::grouped;
 
 #[test]
