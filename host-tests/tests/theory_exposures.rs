@@ -314,10 +314,7 @@ fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec
         frame: None,
         seed: 11,
     };
-    let geometry = Geometry {
-        columns: side,
-        rows: side,
-    };
+    let geometry = Geometry::new(side, side);
     let pixels = (0..side * side).map(|pixel| {
         let rates = Rates {
             background: request.background,

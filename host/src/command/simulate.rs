@@ -178,8 +178,5 @@ pub fn array(text: &str) -> Result<Geometry, String> {
         Some((side(columns).ok()?, side(rows).ok()?))
     });
     let (columns, rows) = sides.ok_or("must be COLUMNSxROWS, as 64x32")?;
-    Ok(Geometry {
-        columns: columns.into(),
-        rows: rows.into(),
-    })
+    Ok(Geometry::new(columns.into(), rows.into()))
 }

@@ -129,10 +129,7 @@ impl Header {
             u16_at(10) == HEADER_BYTES && bytes[32..].iter().all(|&byte| byte == 0),
             "the header is damaged"
         );
-        let geometry = Geometry {
-            columns: u32_at(16),
-            rows: u32_at(20),
-        };
+        let geometry = Geometry::new(u32_at(16), u32_at(20));
         ensure!(
             (1..=1 << 16).contains(&addresses(geometry)),
             "the header says {}x{} pixels: must be 1 to 65,536",

@@ -13,6 +13,12 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    /// An array of so many columns and rows.
+    #[must_use]
+    pub const fn new(columns: u32, rows: u32) -> Self {
+        Self { columns, rows }
+    }
+
     /// How many addresses the array has.
     #[must_use]
     pub fn addresses(&self) -> usize {

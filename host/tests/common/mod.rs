@@ -101,11 +101,17 @@ impl Scratch {
         assert_eq!(message.lines().count(), 1, "not one line: {message}");
         assert!(!message.contains("panicked"), "{message}");
         for part in parts {
-            assert!(message.contains(part), "{message:?} does not say {part:?}");
+            says(&message, part);
         }
         let left = std::fs::read_dir(self.path("out")).map_or(0, Iterator::count);
         assert_eq!(left, 0, "files were left in the output folder");
     }
+}
+
+/// `text` must have `part` in it.
+#[track_caller]
+pub fn says(text: &str, part: &str) {
+    assert!(text.contains(part), "{text:?} does not say {part:?}");
 }
 
 /// What a program printed that must have succeeded.

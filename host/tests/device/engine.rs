@@ -6,6 +6,7 @@ use std::net::TcpListener;
 use std::path::Path;
 use std::time::Duration;
 
+use crate::common::says;
 use crate::{listen, serve};
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::Engine;
@@ -55,10 +56,7 @@ fn device(lives: Option<Duration>) -> String {
 /// All events of `cycles` laser cycles of the demo's scene, which is the same with all
 /// settings.
 fn events(engine: &mut dyn Engine, cycles: u64) -> anyhow::Result<Vec<DepthEvent>> {
-    let geometry = Geometry {
-        columns: 8,
-        rows: 8,
-    };
+    let geometry = Geometry::new(8, 8);
     let mut photons = scene::photons(geometry, &settings(), cycles)?;
     let mut events = Vec::new();
     for _ in 0..cycles / 250 {
@@ -149,10 +147,7 @@ fn a_configuration_the_device_cannot_take_is_refused_with_its_reason() {
         "{reason}"
     );
     let reason = refused(&settings(), 65);
-    assert!(
-        reason.contains("does not have that many pixels"),
-        "{reason}"
-    );
+    says(&reason, "does not have that many pixels");
 }
 
 #[test]

@@ -1,5 +1,8 @@
 //! Devices at the other end of a port: the engine, the monitor and its recordings.
 
+#[path = "../common/mod.rs"]
+mod common;
+
 mod engine;
 mod monitor;
 mod recording;

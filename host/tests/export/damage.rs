@@ -192,10 +192,7 @@ fn a_whole_file_of_times_that_the_format_cannot_hold_is_refused() {
 fn what_export_takes_for_damage_decode_does_too() {
     let beyond = Header { bins: 32, ..HEADER };
     let narrow = Header {
-        geometry: Geometry {
-            columns: 8,
-            rows: 2,
-        },
+        geometry: Geometry::new(8, 2),
         ..HEADER
     };
     let scratch = Scratch::new();

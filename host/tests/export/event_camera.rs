@@ -162,10 +162,7 @@ fn changes_that_are_too_late_are_left_out_and_said() {
 fn what_evt2_cannot_hold_is_refused() {
     let scratch = Scratch::new();
     let wide = Header {
-        geometry: Geometry {
-            columns: 2049,
-            rows: 1,
-        },
+        geometry: Geometry::new(2049, 1),
         ..HEADER
     };
     scratch.file("wide.aer", file(&wide, &[]));

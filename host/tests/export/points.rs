@@ -1,7 +1,7 @@
 //! `dtof export`: points, kinds of event, the result line, links.
 
-use crate::common::Scratch;
 use crate::common::aer::{HEADER, depth, dynamic, events, exported, file};
+use crate::common::{Scratch, says};
 use dtof::events::aer_file::EventKind;
 use dtof::export::{Format, Options};
 
@@ -113,10 +113,7 @@ fn changes_of_depth_are_points_at_the_mean() {
     let (_, pcd) = exported(&file(&HEADER, &events), Format::Pcd, &Options::default());
     let (_, csv) = exported(&file(&HEADER, &events), Format::Csv, &Options::default());
     let header = String::from_utf8_lossy(&pcd);
-    assert!(
-        header.contains("FIELDS x y z change pixel flags t_ns"),
-        "{header}"
-    );
+    says(&header, "FIELDS x y z change pixel flags t_ns");
     let ([x, y, z, change], pixel, ..) = record(&pcd[pcd.len() - 58..]);
     let metres = (40.0 * 250.0 * 0.149_896_229 - 12.5) / 1000.0;
     assert!((f64::from(x.hypot(y).hypot(z)) - metres).abs() < 1e-5);

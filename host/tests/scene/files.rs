@@ -62,10 +62,7 @@ fn the_file_says_how_long_and_the_command_line_may_say_otherwise() {
          [[surface]]\nrange_mm = 500\nreflectivity = 0.5\n",
     );
     let summary = simulated(&scratch, &scene, &[]);
-    assert_eq!(
-        (&summary["cycles"], &summary["pixels"]),
-        (&300.into(), &24.into())
-    );
+    assert_eq!([&summary["cycles"], &summary["pixels"]], [300, 24]);
     assert_eq!(summary["settings"]["bins"], 64);
     let width = summary["settings"]["bin_width_ps"].as_f64().unwrap();
     assert!((width - 92.1).abs() < 1.0 / 65_536.0, "{width}");
@@ -81,10 +78,7 @@ fn the_file_says_how_long_and_the_command_line_may_say_otherwise() {
         .unwrap();
     assert!((range - 500.0).abs() < 20.0, "{range}");
     let summary = simulated(&scratch, &scene, &["--cycles", "200", "--array", "3x2"]);
-    assert_eq!(
-        (&summary["cycles"], &summary["pixels"]),
-        (&200.into(), &6.into())
-    );
+    assert_eq!([&summary["cycles"], &summary["pixels"]], [200, 6]);
 }
 
 /// Motion that the events follow: they are compared with where the target was.
@@ -298,10 +292,7 @@ fn another_array_sees_as_much_of_a_plane() {
                 plane = { normal = [0.5, 0.3, 1] }\n";
     let scene = Scene::parse(text).unwrap();
     let square = Scene {
-        geometry: Geometry {
-            columns: 8,
-            rows: 8,
-        },
+        geometry: Geometry::new(8, 8),
         ..scene.clone()
     };
     let range = |scene: &Scene, column: u16, row: u16| {

@@ -36,10 +36,7 @@ fn sample(limit: usize, count: u32) -> Sample {
 fn page(sample: &Sample, cycles: u64, sections: &[Section], figures: &[Figure]) -> String {
     let events = Cloud {
         sides: ["zone", "capture"],
-        geometry: Geometry {
-            columns: 2,
-            rows: 2,
-        },
+        geometry: Geometry::new(2, 2),
         cycles,
         sample,
         pixels: &[PixelAddress(2), PixelAddress(0)],
@@ -69,10 +66,7 @@ fn all_texts_are_escaped() {
     let none = Sample::new(1);
     let events = Cloud {
         sides: ["zone", "capture"],
-        geometry: Geometry {
-            columns: 1,
-            rows: 1,
-        },
+        geometry: Geometry::new(1, 1),
         cycles: 1,
         sample: &none,
         pixels: &[],
@@ -190,10 +184,7 @@ fn a_report_on_frames_speaks_of_readings() {
     let sample = sample(10, 10);
     let events = Cloud {
         sides: ["column", "row"],
-        geometry: Geometry {
-            columns: 2,
-            rows: 2,
-        },
+        geometry: Geometry::new(2, 2),
         cycles: 10,
         sample: &sample,
         pixels: &[],
