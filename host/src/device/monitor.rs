@@ -327,19 +327,19 @@ mod tests {
             let Geometry { columns, rows } = array(pixels, columns);
             (columns, rows)
         };
-        let squarest = [1, 2, 4, 9, 64, 128, 2048, 7, 0].map(|pixels| array(pixels, None));
-        let expected = [
-            (1, 1),
-            (2, 1),
-            (2, 2),
-            (3, 3),
-            (8, 8),
-            (16, 8),
-            (64, 32),
-            (7, 1),
-            (1, 0),
-        ];
-        assert_eq!(squarest, expected);
+        for (pixels, squarest) in [1, 2, 4, 9, 64, 128, 2048, 7, 0].into_iter().zip([
+            [1, 1],
+            [2, 1],
+            [2, 2],
+            [3, 3],
+            [8, 8],
+            [16, 8],
+            [64, 32],
+            [7, 1],
+            [1, 0],
+        ]) {
+            assert_eq!(array(pixels, None), squarest.into());
+        }
         assert_eq!(array(64, Some(10)), (10, 7));
     }
 }

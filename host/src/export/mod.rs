@@ -34,6 +34,7 @@ use crate::progress::Progress;
 
 pub use clock::LaserClock;
 use events::Survey;
+use points::Points;
 use projection::Projection;
 
 /// What a file is written as.
@@ -170,9 +171,9 @@ pub fn export(
     let points = survey.events(kind);
     let to = || out.display().to_string();
     let sink: Result<Box<dyn Sink>> = match format {
-        Format::Csv => csv::Csv::new(file, projection, kind).map(boxed),
-        Format::Pcd => pcd::begin(file, projection, kind, points).map(boxed),
-        Format::Ply => ply::begin(file, projection, kind, points).map(boxed),
+        Format::Csv => csv::begin(file, projection, kind).map(boxed),
+        Format::Pcd => Points::packed(file, projection, &pcd::header(kind, points)).map(boxed),
+        Format::Ply => Points::packed(file, projection, &ply::header(kind, points)).map(boxed),
         Format::Mcap => {
             let _ = write!(assumed, ", clouds every {} µs", slice_ns as f64 / 1000.0);
             mcap::Mcap::new(file, projection, array, kind, [slice_ns, end_ns]).map(boxed)

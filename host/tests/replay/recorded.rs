@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::common::{Scratch, says};
+use crate::common::{Scratch, says, succeeded};
 
 const HEADER: &str =
     "cycle,pixel,exposure,peak_bin,depth_bins,range_mm,peak_count,background,flags\n";
@@ -83,18 +83,22 @@ fn a_damaged_aer_file_is_named_with_its_offset() {
     let cut = decode(&whole[..whole.len() - 16]);
     scratch.refused(&cut, &["damaged.aer", "ends without an end word"]);
     assert_eq!(rows(&cut), 1 + events);
-    scratch.refused(
-        &decode(&[&whole[..], b"x"].concat()),
-        &["bytes follow the end word"],
-    );
-    scratch.refused(
-        &decode(&whole[..63]),
-        &["damaged.aer", "shorter than its header"],
-    );
-    scratch.refused(
-        &decode(&[&whole[..64], &[0; 16]].concat()),
-        &["byte 64", "unknown control word"],
-    );
+    for (bytes, parts) in [
+        (
+            [&whole[..], b"x"].concat(),
+            ["damaged.aer", "bytes follow the end word"],
+        ),
+        (
+            whole[..63].to_vec(),
+            ["damaged.aer", "shorter than its header"],
+        ),
+        (
+            [&whole[..64], &[0; 16]].concat(),
+            ["byte 64", "unknown control word"],
+        ),
+    ] {
+        scratch.refused(&decode(&bytes), &parts);
+    }
     scratch.refused(
         &scratch.run("decode none.aer"),
         &["none.aer", "No such file"],
@@ -206,29 +210,22 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
         .for_each(|peak| *peak = 90);
     scratch.file("recorded.npy", npy("|u1", "(8, 8, 16)", &data));
     let run = |threads: &str, seed: &str, out: &str| {
-        let output = std::process::Command::new(env!("CARGO_BIN_EXE_dtof"))
-            .current_dir(scratch.path("."))
-            .env("RAYON_NUM_THREADS", threads)
-            .args([
-                "replay",
-                "--input",
-                "recorded.npy",
-                "--out",
-                out,
-                "--seed",
-                seed,
-            ])
-            .output()
-            .unwrap();
-        assert!(output.status.success());
-        [
-            "events.csv",
-            "events.aer",
-            "summary.json",
-            "report.html",
-            "depth-last.svg",
-        ]
-        .map(|name| std::fs::read(scratch.path(out).join(name)).unwrap())
+        let mut dtof = std::process::Command::new(env!("CARGO_BIN_EXE_dtof"));
+        dtof.current_dir(scratch.path("."))
+            .env("RAYON_NUM_THREADS", threads);
+        dtof.args([
+            "replay",
+            "--input",
+            "recorded.npy",
+            "--out",
+            out,
+            "--seed",
+            seed,
+        ]);
+        succeeded(dtof.output().unwrap());
+        let names = "events.csv events.aer summary.json report.html depth-last.svg";
+        let read = |name| std::fs::read(scratch.path(out).join(name)).unwrap();
+        names.split(' ').map(read).collect::<Vec<_>>()
     };
     let one = run("1", "5", "a");
     assert!(one == run("2", "5", "b") && one == run("7", "5", "c"));
@@ -253,29 +250,39 @@ fn a_gate_leaves_the_cover_glass_out() {
     assert_eq!([&summary["photons"], &summary["gated_out"]], [4040, 4000]);
     let events = scratch.read("out/events.csv");
     assert!(events.lines().count() > 1);
-    assert!(
-        events
-            .lines()
-            .skip(1)
-            .all(|event| event.split(',').nth(3) == Some("40")),
-        "{events}"
-    );
+    let mut bins = events.lines().skip(1).map(|event| event.split(',').nth(3));
+    assert!(bins.all(|bin| bin == Some("40")), "{events}");
 }
 
 #[test]
-fn the_demo_is_the_papers_static_scene() {
+fn the_demo_is_the_papers_static_scene_and_every_pixel_reports() {
     let scratch = Scratch::new();
-    scratch.printed("demo --quiet");
-    let summary: serde_json::Value =
-        serde_json::from_str(&scratch.read("out/demo/summary.json")).unwrap();
+    let output = scratch.run("demo --quiet");
+    assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
+    let read = |name: &str| scratch.read(&format!("out/demo/{name}"));
+    let summary: serde_json::Value = serde_json::from_str(&read("summary.json")).unwrap();
     // Section III-B: α = 8, L1 = 100, L2 = 2000, X = 10, 10,000 laser cycles.
     let settings = &summary["settings"];
     assert_eq!(settings["alpha"], 8.0);
     assert_eq!(
-        (&settings["l1"], &settings["l2"], &settings["x"]),
-        (&100.into(), &2000.into(), &10.into())
+        ["l1", "l2", "x"].map(|name| &settings[name]),
+        [100, 2000, 10]
     );
-    assert_eq!([&summary["cycles"], &summary["pixels"]], [10_000, 2048]);
+    let counts = ["cycles", "pixels", "pixels_reporting"].map(|name| &summary[name]);
+    assert_eq!(counts, [10_000, 2048, 2048]);
+    let events = read("events.csv");
+    let first = events.lines().nth(1).unwrap();
+    assert!(
+        first.starts_with("109,"),
+        "not the first look above L1, N = 110: {first}"
+    );
+    let report = read("report.html");
+    assert!(report.contains("</html>") && report.matches("<svg").count() == 3);
+    // As documented: the report stays small enough to send.
+    assert!(report.len() < 5_000_000 && report.contains("All 53,534 events are shown."));
+    for picture in ["depth-mean", "reflectivity-events", "reflectivity-signal"] {
+        assert!(read(&format!("{picture}.svg")).ends_with("</svg>\n"));
+    }
     // The array of the AER file's header: 64 columns, 32 rows.
     let aer = std::fs::read(scratch.path("out/demo/events.aer")).unwrap();
     assert_eq!(aer[12..24], [128, 0, 0, 0, 64, 0, 0, 0, 32, 0, 0, 0]);
@@ -286,10 +293,7 @@ fn the_demo_is_the_papers_static_scene() {
     ] {
         let path = format!("{}/../docs/figures/{shown}.svg", env!("CARGO_MANIFEST_DIR"));
         let committed = std::fs::read_to_string(path).unwrap();
-        assert!(
-            scratch.read(&format!("out/demo/{picture}.svg")) == committed,
-            "{shown}"
-        );
+        assert!(read(&format!("{picture}.svg")) == committed, "{shown}");
     }
 }
 
@@ -309,10 +313,8 @@ fn replay_takes_the_stated_defaults_and_keeps_quiet() {
     let input = scratch.file("recorded.npy", histogram);
     let summary = scratch.replayed(&input, &[]);
     // One photon a laser cycle, the first 10,000 laser cycles.
-    assert_eq!(
-        summary["recorded_cycles"],
-        serde_json::json!([80_000, 80_000])
-    );
+    assert_eq!(summary["recorded_cycles"][0], 80_000);
+    assert_eq!(summary["recorded_cycles"][1], 80_000);
     assert_eq!(summary["cycles"], 10_000);
 }
 
@@ -326,40 +328,6 @@ fn an_exposure_without_an_event_is_counted() {
     let input = scratch.file("photons.csv", format!("pixel,cycle,bin\n{rows}"));
     let summary = scratch.replayed(&input, &["--l2", "200"]);
     assert_eq!([&summary["events"], &summary["expired"]], [0, 2]);
-}
-
-#[test]
-fn the_demo_reports_every_pixel_and_is_silent_when_asked() {
-    let scratch = Scratch::new();
-    let output = scratch.run("demo --quiet");
-    assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
-    let summary: serde_json::Value =
-        serde_json::from_str(&scratch.read("out/demo/summary.json")).unwrap();
-    assert_eq!(
-        [&summary["pixels"], &summary["pixels_reporting"]],
-        [2048, 2048]
-    );
-    let first = scratch
-        .read("out/demo/events.csv")
-        .lines()
-        .nth(1)
-        .map(str::to_owned)
-        .unwrap();
-    assert!(
-        first.starts_with("109,"),
-        "no event before N = 110, the first look above L1: {first}"
-    );
-    let report = scratch.read("out/demo/report.html");
-    assert!(report.contains("</html>") && report.matches("<svg").count() == 3);
-    // As documented: the report stays small enough to send.
-    assert!(report.len() < 5_000_000 && report.contains("All 53,534 events are shown."));
-    for picture in ["depth-mean", "reflectivity-events", "reflectivity-signal"] {
-        assert!(
-            scratch
-                .read(&format!("out/demo/{picture}.svg"))
-                .ends_with("</svg>\n")
-        );
-    }
 }
 
 #[test]
