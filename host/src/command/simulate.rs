@@ -125,7 +125,7 @@ impl Simulation<'_> {
         summary.field_of_view_degrees = Some(self.scene.view().degrees());
         summary.export_with = export_with(self.scene);
         let against_truth = comparison.finish();
-        let surfaces = against_truth.rows();
+        let surfaces = against_truth.rows(self.settings.reports());
         summary.against_truth = Some(against_truth);
         let sections = [Section {
             heading: "Surfaces",

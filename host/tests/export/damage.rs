@@ -1,5 +1,6 @@
 //! `dtof export` of files that are damaged, or are no AER files.
 
+use super::event_camera::{changes, evt2, mcap};
 use crate::common::Scratch;
 use crate::common::aer::{HEADER, byte_of, depth, dynamic, events, exported, file, folder};
 use dtof::events::aer_file::{Event, Header};
@@ -34,25 +35,33 @@ fn points(format: Format, bytes: &[u8]) -> u64 {
 
 const FORMATS: [Format; 3] = [Format::Csv, Format::Pcd, Format::Ply];
 
-#[test]
-fn what_comes_before_the_end_of_a_cut_file_is_exported_whole() {
-    let whole = file(&HEADER, &events());
-    // A time word, eleven events, a time word, an event, the end word.
-    assert_eq!(whole.len(), byte_of(15));
-    for format in FORMATS {
-        for length in 64..whole.len() {
-            let (exported, written) = exported(&whole[..length], format, &Options::default());
-            let words = (length - 64) / 16;
-            let events = words.saturating_sub(1) - usize::from(words >= 13);
-            assert_eq!(exported.written, events as u64, "{length} bytes");
-            assert_eq!(points(format, &written), events as u64);
+/// Cuts the file of `events` at each byte. Its last event follows a time word of its own.
+fn cut_anywhere(events: &[Event], formats: &[Format], count: impl Fn(Format, &[u8]) -> u64) {
+    let whole = file(&HEADER, events);
+    // A time word, all events but one, a time word, an event, the end word.
+    assert_eq!(whole.len(), byte_of(events.len() + 3));
+    for length in 64..whole.len() {
+        let words = (length - 64) / 16;
+        let before = words.saturating_sub(1) - usize::from(words > events.len());
+        for &format in formats {
+            let (exported, out) = exported(&whole[..length], format, &Options::default());
+            let written = [exported.written, count(format, &out)];
+            assert_eq!(written, [before as u64; 2], "{length} bytes");
             let damage = exported.damage.unwrap();
-            assert!(
-                damage.starts_with(&format!("byte {}: ", byte_of(words))),
-                "{damage}"
-            );
+            let place = format!("byte {}: ", byte_of(words));
+            assert!(damage.starts_with(&place), "{damage}");
         }
     }
+}
+
+#[test]
+fn what_comes_before_the_end_of_a_cut_file_is_exported_whole() {
+    cut_anywhere(&events(), &FORMATS, points);
+    let count = |format, out: &[u8]| match format {
+        Format::Evt2 => evt2(out).len() as u64,
+        _ => mcap(out).0,
+    };
+    cut_anywhere(&changes(), &[Format::Evt2, Format::Mcap], count);
 }
 
 #[test]
