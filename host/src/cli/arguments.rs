@@ -1,7 +1,7 @@
 //! How numbers and paths are read from the command line, the same for every option.
 //!
-//! A number is decimal, with an exponent if one likes: `0.5`, `10e6`, `1e5`. A whole number
-//! may be written so, too, if it is one.
+//! A number is decimal, with or without an exponent: `0.5`, `10e6`. A whole number may have an
+//! exponent, too: `1e5`.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;

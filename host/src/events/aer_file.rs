@@ -74,7 +74,7 @@ impl Event {
         }
     }
 
-    /// What is to be said against it.
+    /// Its flags.
     #[must_use]
     pub fn flags(&self) -> Flags {
         match self {
@@ -84,7 +84,7 @@ impl Event {
     }
 }
 
-/// What a reader must know to turn words into ranges.
+/// Everything a reader needs to turn words into ranges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Header {
     /// Bins of a histogram.

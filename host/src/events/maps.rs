@@ -1,4 +1,4 @@
-//! What the events of a run look like, pixel by pixel.
+//! The events of a run, pixel by pixel.
 
 use std::collections::VecDeque;
 

@@ -24,7 +24,7 @@ const MOST_POINTS: usize = 1 << 16;
 /// The frame that points are in.
 const FRAME: &str = "dtof_optical";
 
-/// What happened in a slice of time.
+/// Counts of a slice of time.
 #[derive(Clone, Debug, Default, Serialize)]
 struct Statistics {
     /// When the slice begins.

@@ -37,7 +37,7 @@ use events::Survey;
 use points::Points;
 use projection::Projection;
 
-/// What a file is written as.
+/// The format of an exported file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// Comma-separated values
@@ -103,7 +103,7 @@ impl Default for Options {
     }
 }
 
-/// What came of it.
+/// The result of an export.
 #[derive(Debug)]
 pub struct Exported {
     /// Events or points in the file.
@@ -112,7 +112,7 @@ pub struct Exported {
     pub late: u64,
     /// Where the AER file is damaged and how, if it is. What came before is written.
     pub damage: Option<String>,
-    /// What points and times rest on, for people: "60x32.2 degrees, 10 MHz".
+    /// The assumptions behind points and times: "60x32.2 degrees, 10 MHz".
     pub assumed: String,
 }
 

@@ -8,7 +8,7 @@ use super::projection::Projection;
 use super::{Finished, Out, Sink};
 use crate::events::aer_file::{Event, EventKind};
 
-/// What a field of a record holds, little-endian.
+/// The type of a field, little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Number {
     U8,

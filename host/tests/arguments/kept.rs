@@ -52,7 +52,6 @@ const READ: &str = "is the file that is read";
 fn a_recording_in_the_output_folder_is_kept() {
     for name in RESULTS {
         let scratch = Scratch::new();
-        fs::create_dir(scratch.path("out")).unwrap();
         // Photon lists end in .csv; other names are reached through a link.
         let arguments = |input| ["replay", "--input", input, "--out", "out"];
         scratch.file("out/photons.csv", PHOTONS);
@@ -66,7 +65,6 @@ fn a_recording_in_the_output_folder_is_kept() {
         assert_eq!(names(&scratch.path("out")).len(), 2);
     }
     let scratch = Scratch::new();
-    fs::create_dir(scratch.path("out")).unwrap();
     scratch.file("out/events.csv", PHOTONS);
     let arguments = ["replay", "--input", "out/events.csv", "--out", "out/../out"];
     let output = scratch.dtof(&arguments);
@@ -97,7 +95,6 @@ fn links_hide_no_input() {
 #[test]
 fn a_scene_in_the_output_folder_is_kept() {
     let scratch = Scratch::new();
-    fs::create_dir(scratch.path("out")).unwrap();
     scratch.file("out/summary.json", SCENE);
     let arguments = ["simulate", "--scene", "out/summary.json", "--out", "out"];
     kept(&scratch, &arguments, "out/summary.json", READ);
@@ -109,7 +106,6 @@ fn a_file_of_somebody_else_is_kept() {
         // Of the same kind, and empty.
         for text in ["{}\n", "<svg></svg>\n", "<!DOCTYPE html>\n", PHOTONS, ""] {
             let scratch = Scratch::new();
-            fs::create_dir(scratch.path("out")).unwrap();
             let result = format!("out/{name}");
             scratch.file(&result, text);
             scratch.file("photons.csv", PHOTONS);
@@ -124,7 +120,6 @@ fn a_file_of_somebody_else_is_kept() {
         }
     }
     let scratch = Scratch::new();
-    fs::create_dir_all(scratch.path("out/demo")).unwrap();
     scratch.file("out/demo/report.html", "mine\n");
     let arguments = ["demo", "--cycles", "200"];
     kept(

@@ -30,9 +30,10 @@ impl Scratch {
         self.0.path().join(name)
     }
 
-    /// Writes an input file.
+    /// Writes an input file, and makes its folder.
     pub fn file(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
         let path = self.path(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(&path, bytes).unwrap();
         path
     }

@@ -172,38 +172,18 @@ fn what_evt2_cannot_hold_is_refused() {
         "late.aer",
         file(&HEADER, &[dynamic(0, (1 << 34) * 10, 40, 1)]),
     );
-    let evt2_of = |name: &str, more: &[&str]| {
-        scratch.dtof(
-            &[
-                &["export", name, "--format", "evt2", "--out", "x.raw"],
-                more,
-            ]
-            .concat(),
-        )
-    };
-    for (name, more, part) in [
-        (
-            "wide.aer",
-            &[][..],
-            "an array of 2049x1: EVT2 holds at most 2048x2048",
-        ),
-        (
-            "late.aer",
-            &[],
-            "late.aer: laser cycle 171798691840 lies beyond, 17179 s after the start: EVT2 holds",
-        ),
-        (
-            "last.aer",
-            &["--threshold-mm", "0.004"],
-            "--threshold-mm 0.004: the threshold of dynamic",
-        ),
-        ("last.aer", &["--threshold-mm", "-1"], "--threshold-mm"),
-        ("last.aer", &["--reference", "next"], "--reference"),
-    ] {
-        scratch.refused(&evt2_of(name, more), &[part]);
-        assert!(!scratch.path("x.raw").exists());
-    }
-    assert!(evt2_of("last.aer", &[]).status.success());
+    scratch.all_refused(
+        "export --format evt2 --out x.raw",
+        "
+            wide.aer | an array of 2049x1: EVT2 holds at most 2048x2048
+            late.aer | late.aer: laser cycle 171798691840 lies beyond, 17179 s after the start: EVT2 holds
+            last.aer --threshold-mm 0.004 | --threshold-mm 0.004: the threshold of dynamic
+            last.aer --threshold-mm -1 | --threshold-mm
+            last.aer --reference next | --reference
+        ",
+    );
+    assert!(!scratch.path("x.raw").exists());
+    scratch.printed("export last.aer --format evt2 --out x.raw");
     let last = evt2(&std::fs::read(scratch.path("x.raw")).unwrap());
     assert_eq!(last, [((1 << 34) - 1, 0, 0, true)]);
 }

@@ -22,7 +22,7 @@ pub struct AgainstTruth {
     pub all: Errors,
     /// Surface by surface, and events of pixels that see none.
     pub surfaces: Vec<OfSurface>,
-    /// What looks like the cover glass, if anything does.
+    /// False alarms that look like the cover glass, if there are any.
     pub cover_glass: Option<CoverGlass>,
 }
 

@@ -136,7 +136,7 @@ impl Comparison<'_> {
         }
     }
 
-    /// What looks like the cover glass: more than half of all false alarms, in as many bins
+    /// False alarms that look like the cover glass: more than half of all false alarms, in as many bins
     /// as an event may lie from the truth, nearer than every surface.
     #[allow(
         clippy::cast_possible_truncation,
