@@ -52,12 +52,8 @@ fn decode_prints_what_replay_wrote() {
     let input = scratch.file("photons.csv", steady(7, 60, 1000));
     let more = ["--bin-width-ps", "92.1", "--offset-mm", "-179.5"];
     scratch.replayed(&input, &more);
-    let decoded = scratch.run("decode out/events.aer");
-    assert!(decoded.status.success());
-    assert_eq!(
-        String::from_utf8(decoded.stdout).unwrap(),
-        scratch.read("out/events.csv")
-    );
+    let decoded = scratch.printed("decode out/events.aer");
+    assert_eq!(decoded, scratch.read("out/events.csv"));
     assert!(scratch.read("out/events.csv").lines().count() > 10);
 }
 
@@ -303,7 +299,7 @@ fn replay_takes_the_stated_defaults_and_keeps_quiet() {
     let input = scratch.file("photons.csv", steady(0, 60, 100));
     let output = scratch.replay(&input, &["--quiet"]);
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
-    let summary: serde_json::Value = scratch.summary();
+    let summary = scratch.summary();
     let settings = serde_json::json!({
         "bins": 128, "bin_width_ps": 250.0, "offset_mm": 0.0, "gate": null, "rule": "paper", "alpha": 4.0, "estimator": "centroid",
         "min_count": 5, "l1": 40, "l2": 2000, "x": 4, "one_hit_tdc": false, "seed": 1
