@@ -11,6 +11,7 @@ use dtof::engine::settings::Settings;
 use dtof::input::recorded::{RecordedHistograms, RecordingLength};
 use dtof::input::source::PhotonSource;
 use dtof::input::tmf8820;
+use dtof::simulate::scene;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, PaperRule};
 
@@ -32,15 +33,10 @@ fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES
         bins: tmf8820::BINS,
         bin_width_ps: tmf8820::BIN_WIDTH_PS,
         offset_mm: tmf8820::OFFSET_MM,
-        gate: None,
         rule: PaperRule::new(U8F8::lit("4"), Count::saturating(min_count.into())).into(),
-        sigma_bins: None,
         l1: 40,
-        l2: 2000,
         x: 4,
-        one_hit_tdc: false,
-        frame: None,
-        seed: 1,
+        ..scene::settings(1)
     };
     let truth = ground_truth(log);
     let recorded = tmf8820::read(log).unwrap();

@@ -41,10 +41,7 @@ fn mps2_an386_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     let image = board.image(&[])?;
     let mut used = ends(board, &image)?;
     // A million photons of 64 macropixels.
-    let array = Geometry {
-        columns: 8,
-        rows: 8,
-    };
+    let array = Geometry::new(8, 8);
     for (settings, reads_every) in [(settings(), 0), (with_windows(), 150)] {
         let reads_every = Duration::from_millis(reads_every);
         used.push(agrees(board, &image, &settings, array, 5300, reads_every)?);
@@ -71,10 +68,7 @@ fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     }
     let board = Board::Stm32F405;
     let image = board.image(&[])?;
-    let array = Geometry {
-        columns: 4,
-        rows: 2,
-    };
+    let array = Geometry::new(4, 2);
     let used = [
         agrees(board, &image, &settings(), array, 200, Duration::ZERO)?,
         agrees(board, &image, &with_windows(), array, 200, Duration::ZERO)?,

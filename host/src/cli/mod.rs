@@ -1,5 +1,5 @@
-//! What every program of this project does with its command line: help is printed
-//! whole, an error is one line and a failure.
+//! Command lines, alike in every program of this project: help is printed whole, an
+//! error is one line and a failure.
 
 pub mod arguments;
 
@@ -18,7 +18,7 @@ pub fn run<C: Parser>(run: impl FnOnce(C) -> Result<()>) -> ExitCode {
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        // Whoever reads the output has seen enough.
+        // The reader of the output has seen enough.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             complain(&format!("error: {error:#}"));

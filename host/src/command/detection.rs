@@ -9,7 +9,7 @@ use dtof_core::{AnyRule, CentredWindow, Count, PaperRule, WindowRule};
 
 #[derive(Args)]
 pub struct Detection {
-    /// What decides whether a peak stands clear of the background
+    /// The rule that decides whether a peak stands clear of the background
     #[arg(long, value_enum, default_value_t = RuleName::Paper)]
     rule: RuleName,
     /// Paper's rule: standard deviations of the background a peak must exceed it by, 0 to 255.996,
@@ -27,8 +27,8 @@ pub struct Detection {
     /// event, at most 0.1 [default: 0.01]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     false_alarm: Option<f64>,
-    /// Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256: takes the depth from a window that
-    /// suits it [default: depth from three bins, whatever the pulse]
+    /// Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. The depth then
+    /// comes from a window that suits it [default: the centroid of three bins]
     #[arg(long, value_name = "S", value_parser = sigma, allow_hyphen_values = true)]
     pub sigma_bins: Option<U8F8>,
 }

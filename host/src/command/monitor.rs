@@ -43,13 +43,13 @@ pub struct Monitor {
     /// Millimetres added to every range, rounded to 1/256 [default: as the device says]
     #[arg(long, value_name = "MM", value_parser = fixed::<I24F8>, allow_hyphen_values = true)]
     offset_mm: Option<I24F8>,
-    /// Have the device send changes of depth only, with a polarity
+    /// The device sends only changes of depth, with a polarity
     #[arg(long)]
     dynamic_depth: bool,
     #[command(flatten)]
     of_dynamic_depth: dynamic_depth::Options,
-    /// Draw the ranges of all pixels on the terminal that is standard error; the events are
-    /// written where standard output goes, unless that is a terminal, too
+    /// Draw the ranges of all pixels on standard error, which must be a terminal. Events still
+    /// go to standard output, unless that is a terminal, too
     #[arg(long)]
     map: bool,
     /// Write the events into an AER file as well, for `dtof decode` and `dtof export`

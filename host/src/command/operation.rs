@@ -31,11 +31,11 @@ pub struct Operation {
     x: u16,
 }
 
-/// The option of what is no device: a device reports events.
+/// The option of commands that run on this computer: a device reports events.
 #[derive(Args)]
 pub struct Frames {
-    /// A frame-based sensor instead, to compare with: every pixel reads its highest bin every N
-    /// laser cycles, if that stands above the background at all
+    /// Simulate a frame-based sensor for comparison: every N laser cycles each pixel reads its
+    /// highest bin, if that stands above the background
     #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX),
         conflicts_with_all = ["rule", "alpha", "window", "z", "false_alarm", "min_count", "l1", "l2", "x"])]
     pub frame: Option<u16>,

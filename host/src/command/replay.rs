@@ -24,7 +24,7 @@ pub struct Replay {
     /// pixel,cycle,bin)
     #[arg(long, value_name = "FILE", value_parser = path())]
     input: PathBuf,
-    /// Where the results go
+    /// The folder of the results
     #[arg(long, value_name = "DIR", value_parser = path())]
     out: PathBuf,
     /// Photon lists: columns of the array, pixel = row × columns + column [default: one row]

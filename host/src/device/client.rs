@@ -115,7 +115,7 @@ impl Client {
         }
     }
 
-    /// What the device's sensor is, if it has one.
+    /// The device's sensor, if it has one.
     ///
     /// # Errors
     /// If the device is gone.
@@ -145,7 +145,7 @@ impl Client {
         Ok(self.take_events())
     }
 
-    /// What the device has done so far.
+    /// The report of the device so far.
     ///
     /// # Errors
     /// If the device is gone.

@@ -66,7 +66,7 @@ impl DeviceEngine {
         })
     }
 
-    /// What the device said of itself after the last slice.
+    /// The report of the device after the last slice.
     #[must_use]
     pub fn report(&self) -> &Report {
         &self.report

@@ -23,7 +23,7 @@ pub use recording::Recording;
 /// How often there are statistics.
 const EVERY: Duration = Duration::from_secs(1);
 
-/// What the device is to do.
+/// The task of the device.
 #[derive(Clone, Copy, Debug)]
 pub struct Task<'a> {
     /// How its pixels operate.
@@ -219,13 +219,13 @@ fn still_open(written: io::Result<()>) -> io::Result<bool> {
     }
 }
 
-/// What the lines of statistics are worked out from.
+/// The basis of the lines of statistics.
 struct Figures {
     /// When the last line was.
     since: Instant,
-    /// What this end had counted at the beginning.
+    /// The counts of this end at the beginning.
     here: LinkCounters,
-    /// What the device had counted at the beginning.
+    /// The counts of the device at the beginning.
     first: Report,
     /// Events and photons at the last line.
     last: Statistics,
@@ -250,8 +250,8 @@ impl Figures {
     }
 }
 
-/// What went wrong since the device had counted `first`, each with a comma before
-/// it; what did not is left out. `here` is what this end of the link has counted.
+/// The losses and errors since the device had counted `first`, each with a comma before
+/// it. Counts of 0 are left out. `here` is what this end of the link has counted.
 #[must_use]
 pub fn losses(report: &Report, first: &Report, here: &LinkCounters) -> String {
     let Statistics {
@@ -304,7 +304,7 @@ pub fn losses(report: &Report, first: &Report, here: &LinkCounters) -> String {
     line
 }
 
-/// What was counted since `first`.
+/// The counts since `first`.
 fn since(now: &LinkCounters, first: &LinkCounters) -> LinkCounters {
     LinkCounters {
         frames: now.frames.wrapping_sub(first.frames),
@@ -327,19 +327,19 @@ mod tests {
             let Geometry { columns, rows } = array(pixels, columns);
             (columns, rows)
         };
-        let squarest = [1, 2, 4, 9, 64, 128, 2048, 7, 0].map(|pixels| array(pixels, None));
-        let expected = [
-            (1, 1),
-            (2, 1),
-            (2, 2),
-            (3, 3),
-            (8, 8),
-            (16, 8),
-            (64, 32),
-            (7, 1),
-            (1, 0),
-        ];
-        assert_eq!(squarest, expected);
+        for (pixels, squarest) in [1, 2, 4, 9, 64, 128, 2048, 7, 0].into_iter().zip([
+            [1, 1],
+            [2, 1],
+            [2, 2],
+            [3, 3],
+            [8, 8],
+            [16, 8],
+            [64, 32],
+            [7, 1],
+            [1, 0],
+        ]) {
+            assert_eq!(array(pixels, None), squarest.into());
+        }
         assert_eq!(array(64, Some(10)), (10, 7));
     }
 }

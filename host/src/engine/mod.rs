@@ -20,6 +20,6 @@ pub trait Engine {
     /// If the engine could not be reached.
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>>;
 
-    /// What all pixels together have done so far.
+    /// The counts of all pixels so far.
     fn statistics(&self) -> Statistics;
 }

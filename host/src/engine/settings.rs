@@ -20,7 +20,7 @@ pub struct Settings {
     pub offset_mm: I24F8,
     /// First and last bin that may hold the peak, both inclusive.
     pub gate: Option<(u16, u16)>,
-    /// What decides whether a peak stands clear.
+    /// The rule that decides whether a peak stands clear.
     #[serde(flatten, serialize_with = "rule")]
     pub rule: AnyRule,
     /// The standard deviation of the pulse in bins, if the depth is to come from a window
@@ -100,7 +100,7 @@ impl Settings {
             .with_context(|| format!("--x {} --l1 {} --l2 {}", self.x, self.l1, self.l2))
     }
 
-    /// What finds the depth of a peak.
+    /// The estimator of the depth of a peak.
     #[must_use]
     pub fn estimator(&self) -> DepthEstimator {
         self.sigma_bins

@@ -1,4 +1,4 @@
-//! What becomes of events: tables, words, maps, a folder of results.
+//! The output of events: tables, words, maps, a folder of results.
 
 pub mod aer_file;
 pub mod events_csv;

@@ -29,7 +29,7 @@ use pictures::pictures;
 const CSV: &str = "events.csv";
 const AER: &str = "events.aer";
 const REPORT: &str = "report.html";
-/// What makes a folder complete: moved to its place last.
+/// Makes a folder complete: moved to its place last.
 const SUMMARY: &str = "summary.json";
 /// Names of files of a run that are not complete begin so.
 const OF_A_RUN: &str = ".dtof-run-";
@@ -136,18 +136,10 @@ impl Output {
         self.sample.limit(report::room_for_events(bytes));
         let totals = summary.rows();
         let settings = summary.settings.rows();
-        let mut all = vec![Section {
-            heading: "Totals",
-            rows: &totals,
-        }];
-        all.extend(sections.iter().map(|section| Section {
-            heading: section.heading,
-            rows: section.rows,
-        }));
-        all.push(Section {
-            heading: "Settings",
-            rows: &settings,
-        });
+        let section = |heading, rows| Section { heading, rows };
+        let mut all = vec![section("Totals", &totals[..])];
+        all.extend(sections);
+        all.push(section("Settings", &settings));
         let cloud = Cloud {
             geometry: self.maps.geometry,
             sides: self.sides,
@@ -206,7 +198,7 @@ fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
     ])
 }
 
-/// What a run that was killed has left, and nothing of an export or a recording, which
+/// Removes what a killed run has left, and nothing of an export or a recording, which
 /// may be under way. None of it is worth an error.
 fn remove_leftovers(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {

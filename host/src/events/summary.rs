@@ -1,4 +1,4 @@
-//! What came out of a run: `summary.json`, and the same on the terminal and in
+//! The summary of a run: `summary.json`, and the same on the terminal and in
 //! the report.
 
 pub mod truth;
@@ -14,7 +14,7 @@ use truth::AgainstTruth;
 /// Every `summary.json` begins with it, less the version.
 pub(crate) const MARK: &str = "\"program\": \"dtof ";
 
-/// What came out, as `summary.json` has it.
+/// The summary, as in `summary.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// This program and its version.
@@ -23,7 +23,7 @@ pub struct Summary {
     pub input: Option<String>,
     /// Laser cycles a second of a simulated scene.
     pub laser_hz: Option<u64>,
-    /// What the array sees of a simulated scene: horizontal and vertical angle.
+    /// The field of view of a simulated scene: horizontal and vertical angle.
     pub field_of_view_degrees: Option<[f64; 2]>,
     /// The options that `dtof export` needs for the scene, if any.
     pub export_with: Option<String>,
@@ -193,7 +193,7 @@ impl Settings {
         rows
     }
 
-    /// What the report is of.
+    /// The title of the report.
     #[must_use]
     pub fn title(&self) -> &'static str {
         match self.frame {
@@ -202,7 +202,7 @@ impl Settings {
         }
     }
 
-    /// What a pixel reports: one of them, and several.
+    /// The name of what a pixel reports: one of them, and several.
     #[must_use]
     pub const fn reports(&self) -> [&'static str; 2] {
         match self.frame {
@@ -237,7 +237,7 @@ impl Settings {
     }
 }
 
-/// What a detection exceeds.
+/// The threshold that a detection exceeds.
 fn threshold(rule: &AnyRule) -> String {
     match rule {
         AnyRule::Paper(rule) => {

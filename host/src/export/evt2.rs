@@ -179,10 +179,7 @@ mod tests {
         b"% evt 2.0\n% format EVT2;height=720;width=1280\n% geometry 1280x720\n% end\n";
 
     fn words(changes: &[Change]) -> Vec<u32> {
-        let array = Geometry {
-            columns: 1280,
-            rows: 720,
-        };
+        let array = Geometry::new(1280, 720);
         let mut encoder = Encoder::new(Vec::new(), array).unwrap();
         for change in changes {
             encoder.write(change).unwrap();

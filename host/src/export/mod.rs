@@ -34,9 +34,10 @@ use crate::progress::Progress;
 
 pub use clock::LaserClock;
 use events::Survey;
+use points::Points;
 use projection::Projection;
 
-/// What a file is written as.
+/// The format of an exported file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// Comma-separated values
@@ -102,7 +103,7 @@ impl Default for Options {
     }
 }
 
-/// What came of it.
+/// The result of an export.
 #[derive(Debug)]
 pub struct Exported {
     /// Events or points in the file.
@@ -111,7 +112,7 @@ pub struct Exported {
     pub late: u64,
     /// Where the AER file is damaged and how, if it is. What came before is written.
     pub damage: Option<String>,
-    /// What points and times rest on, for people: "60x32.2 degrees, 10 MHz".
+    /// The assumptions behind points and times: "60x32.2 degrees, 10 MHz".
     pub assumed: String,
 }
 
@@ -170,9 +171,9 @@ pub fn export(
     let points = survey.events(kind);
     let to = || out.display().to_string();
     let sink: Result<Box<dyn Sink>> = match format {
-        Format::Csv => csv::Csv::new(file, projection, kind).map(boxed),
-        Format::Pcd => pcd::begin(file, projection, kind, points).map(boxed),
-        Format::Ply => ply::begin(file, projection, kind, points).map(boxed),
+        Format::Csv => csv::begin(file, projection, kind).map(boxed),
+        Format::Pcd => Points::packed(file, projection, &pcd::header(kind, points)).map(boxed),
+        Format::Ply => Points::packed(file, projection, &ply::header(kind, points)).map(boxed),
         Format::Mcap => {
             let _ = write!(assumed, ", clouds every {} µs", slice_ns as f64 / 1000.0);
             mcap::Mcap::new(file, projection, array, kind, [slice_ns, end_ns]).map(boxed)

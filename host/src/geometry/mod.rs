@@ -55,7 +55,7 @@ impl FieldOfView {
         Ok(Self { half })
     }
 
-    /// What an array sees unless said otherwise: 60 degrees across its longer side,
+    /// The default field of view of an array: 60 degrees across its longer side,
     /// with square pixels. For 64×32 pixels that is 60×32.2 degrees.
     #[must_use]
     pub fn of(array: Geometry) -> Self {
@@ -115,7 +115,7 @@ impl FromStr for FieldOfView {
 pub struct Ray {
     /// Of length 1.
     pub direction: [f64; 3],
-    /// What the pixel's ranges are too much by, in millimetres.
+    /// The range bias of the pixel in millimetres, positive if its ranges are too long.
     pub bias_mm: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What the numbers in a file may be.
+//! The limits of the numbers in a file.
 
 use std::ops::RangeInclusive;
 

@@ -40,7 +40,7 @@ pub struct Scene {
     pub geometry: Geometry,
     /// The array that the places in `surfaces` are given in.
     pub layout: Geometry,
-    /// What the array sees; [`FieldOfView::of`] the layout unless given. Planes need it.
+    /// The field of view; [`FieldOfView::of`] the layout unless given. Planes need it.
     pub field_of_view: Option<FieldOfView>,
     /// Laser cycles.
     pub cycles: u64,
@@ -58,11 +58,11 @@ pub struct Scene {
     pub signal_at_one_metre: f64,
     /// In the order of the file.
     pub surfaces: Vec<Surface>,
-    /// What is not plain.
+    /// Everything beyond the plain model.
     pub effects: Effects,
 }
 
-/// What a pixel sees.
+/// The surface that a pixel sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Which of [`Scene::surfaces`].
@@ -80,7 +80,7 @@ impl Scene {
         Self::parse(include_str!("../../../scenes/demo.toml"))
     }
 
-    /// What `pixel` sees in laser cycle `cycle`: the truth its events are
+    /// The view of `pixel` in laser cycle `cycle`: the truth its events are
     /// compared with. None if there is nothing at its place.
     #[must_use]
     pub fn truth(&self, pixel: PixelAddress, cycle: u64) -> Option<View> {
@@ -101,7 +101,7 @@ impl Scene {
         nearest
     }
 
-    /// What `pixel` receives in laser cycle `cycle`.
+    /// The rates of `pixel` in laser cycle `cycle`.
     #[must_use]
     pub fn rates(&self, pixel: PixelAddress, cycle: u64) -> Rates {
         let view = self.truth(pixel, cycle);
@@ -184,7 +184,7 @@ impl Scene {
         [column * across, row * down]
     }
 
-    /// What the array sees, whichever it is.
+    /// The field of view: the one given, or the default.
     #[must_use]
     pub fn view(&self) -> FieldOfView {
         let view = self.field_of_view;

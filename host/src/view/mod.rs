@@ -1,3 +1,3 @@
-//! What people look at.
+//! Pages to look at.
 
 pub mod report;

@@ -19,14 +19,14 @@ pub struct Figure<'a> {
     /// An SVG document. It is placed in the page as it is, so it has to come
     /// from a trusted source.
     pub svg: &'a str,
-    /// What can be seen.
+    /// The text below it.
     pub caption: &'a str,
 }
 
 /// A table of names and values, such as settings or totals.
 #[derive(Clone, Copy, Debug)]
 pub struct Section<'a> {
-    /// What the table is about.
+    /// The heading of the table.
     pub heading: &'a str,
     /// Names and values.
     pub rows: &'a [(String, String)],

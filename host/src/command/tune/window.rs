@@ -19,46 +19,26 @@ impl Tune {
         );
         let tuned = window::tune(request)?;
         let (exposures, events) = tuned.false_alarms;
+        let z = format!(
+            "for a false alarm in {} exposures; simulation: table",
+            tuned.one_in
+        );
+        let window = "formula: 2 up to σ = 0.6 bins, 3 up to 1.25, 5 above";
         let mut lines = vec![
-            Line(
-                "z",
-                "z",
-                tuned.z.to_num(),
-                "",
-                format!(
-                    "for a false alarm in {} exposures; simulation: table",
-                    tuned.one_in
-                ),
-            ),
-            Line(
-                "window",
-                "window",
-                tuned.window.into(),
-                "bins",
-                "formula: 2 up to σ = 0.6 bins, 3 up to 1.25, 5 above".to_owned(),
-            ),
+            Line("z", tuned.z.to_num(), z),
+            Line("window", tuned.window.into(), window.to_owned()),
         ];
         if let DepthEstimator::CentredWindow(window) = tuned.estimator {
-            lines.push(Line(
-                "half_width",
-                "depth from, ±",
-                window.half_width().to_num(),
-                "bins",
-                "formula: 2σ + 1/2, from 1 to 4; centred window".to_owned(),
-            ));
+            let source = "formula: 2σ + 1/2, from 1 to 4; centred window".to_owned();
+            lines.push(Line("half_width", window.half_width().to_num(), source));
         }
+        let source = format!(
+            "simulation: seed {}, {events} events in {exposures} exposures without a target",
+            self.seed
+        );
         lines.extend([
             self.l1(tuned.l1, &tuned.detections),
-            Line(
-                "false_alarms",
-                "false alarms",
-                events as f64 / exposures as f64,
-                "an exposure",
-                format!(
-                    "simulation: seed {}, {events} events in {exposures} exposures without a target",
-                    self.seed
-                ),
-            ),
+            Line("false_alarms", events as f64 / exposures as f64, source),
         ]);
         lines.extend(self.expected(request, &tuned.detections));
         // All digits: fewer may be another multiple of the smallest step.

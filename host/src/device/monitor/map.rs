@@ -16,7 +16,7 @@ use dtof_draw::picture::{levels, span};
 const EVERY: Duration = Duration::from_millis(200);
 
 const HIDE_CURSOR: &str = "\x1b[?25l";
-/// What undoes it, also for who ends the program in another way.
+/// Shows it again, however the program ends.
 pub const SHOW_CURSOR: &str = "\x1b[?25h";
 const PLAIN: &str = "\x1b[0m";
 const CLEAR_REST: &str = "\x1b[K";
@@ -32,7 +32,7 @@ pub struct LiveMap {
     room: Room,
     columns: usize,
     ranges: Vec<Option<f64>>,
-    /// What stands below the picture.
+    /// The text below the picture.
     line: String,
     /// Lines that are there from the last time, and the room there was.
     lines: usize,
@@ -66,7 +66,7 @@ impl LiveMap {
         }
     }
 
-    /// What is to stand below the picture from now on.
+    /// Sets the text below the picture.
     pub fn tell(&mut self, line: String) {
         self.line = line;
     }
@@ -179,7 +179,7 @@ fn block(upper: Option<u8>, lower: Option<u8>) -> String {
     }
 }
 
-/// What the colours mean.
+/// The legend of the colours.
 fn legend(ranges: &[Option<f64>]) -> String {
     let reporting = ranges.iter().flatten().count();
     let pixels = ranges.len();

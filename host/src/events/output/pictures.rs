@@ -105,10 +105,7 @@ mod tests {
 
     #[test]
     fn every_picture_has_its_name_and_mark() {
-        let maps = Maps::new(Geometry {
-            columns: 1,
-            rows: 1,
-        });
+        let maps = Maps::new(Geometry::new(1, 1));
         let pictures = pictures(&maps, ["column", "row"], ["event", "events"]).unwrap();
         assert_eq!(pictures.each_ref().map(|picture| picture.name), NAMES);
         for picture in pictures {

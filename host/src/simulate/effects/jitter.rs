@@ -37,7 +37,7 @@ impl TimingError {
         })
     }
 
-    /// What is measured for `time`. An error across a laser pulse counts for
+    /// The measured time of `time`. An error across a laser pulse counts for
     /// the laser cycle beside, which is as good as this one: the pulses come
     /// `period` apart.
     pub(in crate::simulate) fn measured(&mut self, time: f64, period: f64) -> f64 {

@@ -1,11 +1,11 @@
-//! What the numbers of effects may be, and their time base.
+//! The limits of the numbers of effects, and their time base.
 
 use std::ops::RangeInclusive;
 
 /// The most picoseconds an effect may last: 100 µs.
 pub(in crate::simulate) const LONGEST_PS: f64 = 1e8;
 
-/// What a share may be.
+/// The limits of a share.
 pub(in crate::simulate) const SHARE: RangeInclusive<f64> = 0.0..=1.0;
 
 /// Avalanches that have an afterpulse: all of them would never end.

@@ -140,10 +140,7 @@ impl SceneFile {
             let name = name.unwrap_or_else(|| format!("surface {number}"));
             entry.surface(&name, mm_per_bin).context(name)
         });
-        let geometry = Geometry {
-            columns: self.columns.into(),
-            rows: self.rows.into(),
-        };
+        let geometry = Geometry::new(self.columns.into(), self.rows.into());
         let view = self.field_of_view_degrees.map(FieldOfView::new);
         let scene = Scene {
             geometry,

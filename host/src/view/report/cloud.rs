@@ -16,7 +16,7 @@ use dtof_draw::{palette, picture};
 pub struct Cloud<'a> {
     /// The array.
     pub geometry: Geometry,
-    /// What its columns and rows are.
+    /// The names of its columns and rows.
     pub sides: [&'a str; 2],
     /// Laser cycles of the run.
     pub cycles: u64,
@@ -24,7 +24,7 @@ pub struct Cloud<'a> {
     pub sample: &'a Sample,
     /// Pixels whose spikes are shown first.
     pub pixels: &'a [PixelAddress],
-    /// What they are called: one of them, and several.
+    /// Their name: one of them, and several.
     pub called: [&'static str; 2],
 }
 
@@ -42,7 +42,7 @@ pub(super) const SCRIPT: &str = concat!(
     include_str!("controls.js"),
 );
 
-/// What the script works on, hidden until it runs.
+/// The elements of the script, hidden until it runs.
 const CARDS: &str = include_str!("cloud.html");
 
 impl Cloud<'_> {

@@ -32,19 +32,21 @@ fn sample(limit: usize, count: u32) -> Sample {
     sample
 }
 
-/// A page with the events of `sample`, nothing else that varies.
-fn page(sample: &Sample, cycles: u64, sections: &[Section], figures: &[Figure]) -> String {
-    let events = Cloud {
+/// The events of `sample`, on an array of four pixels.
+fn cloud<'a>(sample: &'a Sample, cycles: u64, called: [&'static str; 2]) -> Cloud<'a> {
+    Cloud {
         sides: ["zone", "capture"],
-        geometry: Geometry {
-            columns: 2,
-            rows: 2,
-        },
+        geometry: Geometry::new(2, 2),
         cycles,
         sample,
         pixels: &[PixelAddress(2), PixelAddress(0)],
-        called: ["event", "events"],
-    };
+        called,
+    }
+}
+
+/// A page with the events of `sample`, nothing else that varies.
+fn page(sample: &Sample, cycles: u64, sections: &[Section], figures: &[Figure]) -> String {
+    let events = cloud(sample, cycles, ["event", "events"]);
     html("t", "l", sections, figures, &events)
 }
 
@@ -67,17 +69,7 @@ fn all_texts_are_escaped() {
         caption: "a </figure> & b",
     }];
     let none = Sample::new(1);
-    let events = Cloud {
-        sides: ["zone", "capture"],
-        geometry: Geometry {
-            columns: 1,
-            rows: 1,
-        },
-        cycles: 1,
-        sample: &none,
-        pixels: &[],
-        called: ["event", "events"],
-    };
+    let events = cloud(&none, 1, ["event", "events"]);
     let page = html("</title><script>", "<lead>", &sections, &figures, &events);
 
     assert!(page.contains("<title>&lt;/title&gt;&lt;script&gt;</title>"));
@@ -109,19 +101,8 @@ fn page_loads_nothing() {
     let page = page(&sample(10, 10), 10, &[], &figures);
 
     assert_eq!(page.matches("<svg").count(), 3);
-    let reaching_out = [
-        "src=",
-        "href",
-        "@import",
-        "url(",
-        "<link",
-        "fetch",
-        "import ",
-        "XMLHttp",
-        "eval",
-        "innerHTML",
-    ];
-    for word in reaching_out {
+    let reaching_out = "src=|href|@import|url(|<link|fetch|import |XMLHttp|eval|innerHTML";
+    for word in reaching_out.split('|') {
         assert!(!page.contains(word), "{word}");
     }
     let addresses = page.matches("http://").count() + page.matches("https://").count();
@@ -188,17 +169,7 @@ fn a_page_says_how_many_of_the_events_it_shows() {
 #[test]
 fn a_report_on_frames_speaks_of_readings() {
     let sample = sample(10, 10);
-    let events = Cloud {
-        sides: ["column", "row"],
-        geometry: Geometry {
-            columns: 2,
-            rows: 2,
-        },
-        cycles: 10,
-        sample: &sample,
-        pixels: &[],
-        called: ["reading", "readings"],
-    };
+    let events = cloud(&sample, 10, ["reading", "readings"]);
     let page = html("t", "l", &[], &[], &events);
     assert!(page.contains("All 10 readings are shown."));
     assert!(page.contains(">Readings in space and time<"));

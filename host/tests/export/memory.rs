@@ -1,17 +1,13 @@
 //! The memory that `dtof export` takes does not grow with the file.
 
-#![cfg(target_os = "linux")]
-
-mod common;
-
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use common::Scratch;
-use common::aer::{HEADER, depth};
+use crate::common::Scratch;
+use crate::common::aer::{HEADER, depth};
 use dtof::events::aer_file::Writer;
 
 const FORMATS: [&str; 5] = ["csv", "pcd", "ply", "mcap", "evt2"];
@@ -69,7 +65,7 @@ fn five_times_the_events_take_no_more_memory() {
     }
 }
 
-/// Prints the figures of the documentation: `cargo test --release --test export_memory -- --ignored
+/// Prints the figures of the documentation: `cargo test --release --test export memory -- --ignored
 /// --nocapture`.
 #[test]
 #[ignore = "prints figures; half a minute with --release, some minutes without"]

@@ -1,10 +1,8 @@
 //! A flat wall at an angle comes back from `dtof export` as a plane.
 
-mod common;
-
 use std::path::Path;
 
-use common::Scratch;
+use crate::common::Scratch;
 use dtof::simulate::scene::{Scene, Shape};
 use dtof_core::PixelAddress;
 
@@ -34,17 +32,7 @@ fn events(scene: &Path, scratch: &Scratch) -> (Vec<Seen>, usize) {
     let truth = Scene::read(scene).unwrap();
     let settings = ["--alpha", "8", "--l1", "100", "--l2", "2000", "--x", "10"];
     assert!(scratch.simulate(scene, &settings).status.success());
-    let output = scratch.dtof(&[
-        "export",
-        "out/events.aer",
-        "--format",
-        "csv",
-        "--out",
-        "wall.csv",
-        "--fov",
-        "60x32",
-    ]);
-    assert!(output.status.success());
+    scratch.printed("export out/events.aer --format csv --out wall.csv --fov 60x32");
     let text = scratch.read("wall.csv");
     let column = |name| {
         text.lines()

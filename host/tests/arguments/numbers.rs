@@ -1,13 +1,11 @@
 //! Numbers, names and devices of the command line: read alike by every command, and refused in
 //! one line.
 
-mod common;
-
 use std::fs;
 use std::process::{Command, Stdio};
 
-use common::Scratch;
-use common::aer::{HEADER, events, file};
+use crate::common::aer::{HEADER, events, file};
+use crate::common::{Scratch, table};
 
 const PHOTONS: &str = "pixel,cycle,bin\n0,0,0\n";
 
@@ -40,58 +38,44 @@ fn numbers_may_have_exponents() {
 fn numbers_that_cannot_be_are_refused_in_one_line() {
     let scratch = Scratch::new();
     let input = scratch.file("photons.csv", PHOTONS);
-    let whole = "must be a whole number from ";
-    for (arguments, part) in [
-        (["--cycles", "1.5"], whole),
-        (["--cycles", "1e-1"], whole),
-        (["--cycles", "1e20"], whole),
-        (["--cycles", "1_000"], whole),
-        (["--seed", "many"], whole),
-        (["--l2", "1e5"], "from 0 to 65535"),
-        (["--bins", "1e2"], "must be a power of two from 8 to 1024"),
-        (["--gate", "1..x"], "FIRST..LAST"),
-        (["--sigma-bins", "0"], "must be above 0 and at most 1.75"),
-        (["--sigma-bins", "1.76"], "must be above 0 and at most 1.75"),
-        (["--sigma-bins", "255"], "must be above 0 and at most 1.75"),
-    ] {
-        let output = scratch.replay(&input, &arguments);
-        scratch.refused(&output, &[arguments[0], part]);
-    }
+    scratch.all_refused(
+        &format!("replay --out out --input {}", input.display()),
+        "
+            --cycles 1.5 | --cycles | must be a whole number from
+            --cycles 1e-1 | --cycles | must be a whole number from
+            --cycles 1e20 | --cycles | must be a whole number from
+            --cycles 1_000 | --cycles | must be a whole number from
+            --seed many | --seed | must be a whole number from
+            --l2 1e5 | --l2 | from 0 to 65535
+            --bins 1e2 | --bins | must be a power of two from 8 to 1024
+            --gate 1..x | --gate | FIRST..LAST
+            --sigma-bins 0 | --sigma-bins | must be above 0 and at most 1.75
+            --sigma-bins 1.76 | --sigma-bins | must be above 0 and at most 1.75
+            --sigma-bins 255 | --sigma-bins | must be above 0 and at most 1.75
+        ",
+    );
     let tune = "tune --rule window --background 0.1 --signal 1 --sigma-bins 2";
-    let tune: Vec<&str> = tune.split(' ').collect();
-    scratch.refused(&scratch.dtof(&tune), &["σ = 2 bins", "up to 1.75"]);
+    scratch.refused(&scratch.run(tune), &["σ = 2 bins", "up to 1.75"]);
 }
 
 #[test]
 fn standard_input_and_output_are_no_files_of_that_name() {
     let scratch = Scratch::new();
-    for arguments in [
-        "replay --input - --out out",
-        "replay --input photons.csv --out -",
-        "simulate --scene - --out out",
-        "simulate --scene scene.toml --out -",
-        "demo --out -",
-        "export - --format csv --out x",
-        "export events.aer --format csv --out -",
-        "export events.aer --format csv --out x --calibration -",
-        "monitor --device tcp:localhost:1 --record -",
-    ] {
-        let output = scratch.dtof(&arguments.split(' ').collect::<Vec<_>>());
-        let before = arguments
-            .split(" - ")
-            .next()
-            .unwrap()
-            .trim_end_matches(" -");
-        let option = before.rsplit(' ').next().unwrap();
-        let option = if option.starts_with("--") {
-            option
-        } else {
-            "'<"
-        };
-        scratch.refused(
-            &output,
-            &[option, "standard input and output are not supported here"],
-        );
+    for row in table(
+        "
+            --input | replay --input - --out out
+            --out | replay --input photons.csv --out -
+            --scene | simulate --scene - --out out
+            --out | simulate --scene scene.toml --out -
+            --out | demo --out -
+            '< | export - --format csv --out x
+            --out | export events.aer --format csv --out -
+            --calibration | export events.aer --format csv --out x --calibration -
+            --record | monitor --device tcp:localhost:1 --record -
+        ",
+    ) {
+        let said = "standard input and output are not supported here";
+        scratch.refused(&scratch.run(&row[1]), &[&row[0], said]);
     }
     assert!(!scratch.path("-").exists());
 }
@@ -107,7 +91,7 @@ fn decode_reads_standard_input() {
     };
     let output = decode(fs::File::open(&aer).unwrap());
     assert!(output.status.success());
-    let of_file = scratch.dtof(&["decode", "events.aer"]);
+    let of_file = scratch.run("decode events.aer");
     assert_eq!(output.stdout, of_file.stdout);
     let other = scratch.file("photons.csv", PHOTONS);
     let output = decode(fs::File::open(other).unwrap());

@@ -1,12 +1,10 @@
 //! The options that choose the rule and the estimator, end to end.
 
-mod common;
-
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::Output;
 
-use common::Scratch;
+use crate::common::Scratch;
 use serde_json::Value;
 
 /// A pulse over bins 60 and 61, and a background photon every third laser cycle.
@@ -133,65 +131,33 @@ fn what_was_used_is_printed_and_in_the_report() {
 
 #[test]
 fn options_that_contradict_each_other_are_refused_in_one_line() {
-    for (options, parts) in [
-        (
-            "--rule window --window 3 --alpha 4",
-            &["--alpha", "--rule paper"][..],
-        ),
-        ("--z 4", &["--z is for --rule window"]),
-        ("--window 3", &["--window is for --rule window"]),
-        (
-            "--false-alarm 0.02",
-            &["--false-alarm is for --rule window"],
-        ),
-        (
-            "--rule window --window 3 --z 4 --false-alarm 0.02",
-            &["--z", "--false-alarm"],
-        ),
-        ("--rule window", &["--window", "--sigma-bins"]),
-        ("--rule window --window 0", &["--window", "from 1 to 7"]),
-        ("--rule window --window 8", &["--window", "from 1 to 7"]),
-        ("--rule window --window -1", &["--window", "from 1 to 7"]),
-        (
-            "--rule window --window 3 --z 16",
-            &["--z", "a number from 0"],
-        ),
-        (
-            "--rule window --window 3 --z -1",
-            &["--z", "a number from 0"],
-        ),
-        (
-            "--rule window --window 3 --false-alarm 0.11",
-            &["--false-alarm", "at most 0.1"],
-        ),
-        (
-            "--rule window --window 3 --false-alarm 0",
-            &["--false-alarm", "above 0"],
-        ),
-        (
-            "--rule window --window 3 --false-alarm 1e-9",
-            &["--false-alarm 0.000000001", "no z for so few"],
-        ),
-        ("--sigma-bins 0", &["--sigma-bins", "above 0"]),
-        ("--sigma-bins -1", &["--sigma-bins"]),
-        ("--sigma-bins 0.0001", &["--sigma-bins", "smallest step"]),
-        ("--rule other", &["--rule", "paper", "window"]),
-        ("--rule window --window 3 --gate 0..3", &["--gate 0..3"]),
-        (
-            "--rule window --window 3 --gate 100..200",
-            &["--gate 100..200", "128 bins"],
-        ),
-        (
-            "--rule window --window 3 --bins 100",
-            &["--bins", "power of two"],
-        ),
-        (
-            "--rule window --window 3 --bins 5",
-            &["--bins", "power of two"],
-        ),
-    ] {
-        let scratch = Scratch::new();
-        let output = replay(&scratch, options);
-        scratch.refused(&output, parts);
-    }
+    let scratch = Scratch::new();
+    photons(&scratch);
+    scratch.all_refused(
+        "replay --input photons.csv --out out",
+        r#"
+            --rule window --window 3 --alpha 4 | --alpha | --rule paper
+            --z 4 | --z is for --rule window
+            --window 3 | --window is for --rule window
+            --false-alarm 0.02 | --false-alarm is for --rule window
+            --rule window --window 3 --z 4 --false-alarm 0.02 | --z | --false-alarm
+            --rule window | --window | --sigma-bins
+            --rule window --window 0 | --window | from 1 to 7
+            --rule window --window 8 | --window | from 1 to 7
+            --rule window --window -1 | --window | from 1 to 7
+            --rule window --window 3 --z 16 | --z | a number from 0
+            --rule window --window 3 --z -1 | --z | a number from 0
+            --rule window --window 3 --false-alarm 0.11 | --false-alarm | at most 0.1
+            --rule window --window 3 --false-alarm 0 | --false-alarm | above 0
+            --rule window --window 3 --false-alarm 1e-9 | --false-alarm 0.000000001 | no z for so few
+            --sigma-bins 0 | --sigma-bins | above 0
+            --sigma-bins -1 | --sigma-bins
+            --sigma-bins 0.0001 | --sigma-bins | smallest step
+            --rule other | --rule | paper | window
+            --rule window --window 3 --gate 0..3 | --gate 0..3
+            --rule window --window 3 --gate 100..200 | --gate 100..200 | 128 bins
+            --rule window --window 3 --bins 100 | --bins | power of two
+            --rule window --window 3 --bins 5 | --bins | power of two
+        "#,
+    );
 }

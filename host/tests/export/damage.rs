@@ -1,9 +1,8 @@
 //! `dtof export` of files that are damaged, or are no AER files.
 
-mod common;
-
-use common::Scratch;
-use common::aer::{HEADER, byte_of, depth, dynamic, events, exported, file, folder};
+use super::event_camera::{changes, evt2, mcap};
+use crate::common::Scratch;
+use crate::common::aer::{HEADER, byte_of, depth, dynamic, events, exported, file, folder};
 use dtof::events::aer_file::{Event, Header};
 use dtof::export::{Format, Options};
 use dtof::input::source::Geometry;
@@ -36,25 +35,33 @@ fn points(format: Format, bytes: &[u8]) -> u64 {
 
 const FORMATS: [Format; 3] = [Format::Csv, Format::Pcd, Format::Ply];
 
-#[test]
-fn what_comes_before_the_end_of_a_cut_file_is_exported_whole() {
-    let whole = file(&HEADER, &events());
-    // A time word, eleven events, a time word, an event, the end word.
-    assert_eq!(whole.len(), byte_of(15));
-    for format in FORMATS {
-        for length in 64..whole.len() {
-            let (exported, written) = exported(&whole[..length], format, &Options::default());
-            let words = (length - 64) / 16;
-            let events = words.saturating_sub(1) - usize::from(words >= 13);
-            assert_eq!(exported.written, events as u64, "{length} bytes");
-            assert_eq!(points(format, &written), events as u64);
+/// Cuts the file of `events` at each byte. Its last event follows a time word of its own.
+fn cut_anywhere(events: &[Event], formats: &[Format], count: impl Fn(Format, &[u8]) -> u64) {
+    let whole = file(&HEADER, events);
+    // A time word, all events but one, a time word, an event, the end word.
+    assert_eq!(whole.len(), byte_of(events.len() + 3));
+    for length in 64..whole.len() {
+        let words = (length - 64) / 16;
+        let before = words.saturating_sub(1) - usize::from(words > events.len());
+        for &format in formats {
+            let (exported, out) = exported(&whole[..length], format, &Options::default());
+            let written = [exported.written, count(format, &out)];
+            assert_eq!(written, [before as u64; 2], "{length} bytes");
             let damage = exported.damage.unwrap();
-            assert!(
-                damage.starts_with(&format!("byte {}: ", byte_of(words))),
-                "{damage}"
-            );
+            let place = format!("byte {}: ", byte_of(words));
+            assert!(damage.starts_with(&place), "{damage}");
         }
     }
+}
+
+#[test]
+fn what_comes_before_the_end_of_a_cut_file_is_exported_whole() {
+    cut_anywhere(&events(), &FORMATS, points);
+    let count = |format, out: &[u8]| match format {
+        Format::Evt2 => evt2(out).len() as u64,
+        _ => mcap(out).0,
+    };
+    cut_anywhere(&changes(), &[Format::Evt2, Format::Mcap], count);
 }
 
 #[test]
@@ -104,7 +111,7 @@ fn damage_is_named_with_its_byte_after_the_events_before_it_are_written() {
 fn the_program_says_what_is_damaged_and_fails() {
     let scratch = Scratch::new();
     scratch.file("cut.aer", &file(&HEADER, &events())[..100]);
-    let output = scratch.dtof(&["export", "cut.aer", "--format", "csv", "--out", "x.csv"]);
+    let output = scratch.run("export cut.aer --format csv --out x.csv");
     scratch.refused(
         &output,
         &["cut.aer: byte 96: the file ends inside a word; x.csv holds what came before: 1 events"],
@@ -135,8 +142,10 @@ fn what_is_no_aer_file_leaves_the_output_as_it_was() {
         (&no_bins, "bin width is zero"),
     ] {
         scratch.file("events.aer", bytes);
-        let output = scratch.dtof(&["export", "events.aer", "--format", "pcd", "--out", "x.pcd"]);
-        scratch.refused(&output, &["events.aer: ", part]);
+        scratch.refused(
+            &scratch.run("export events.aer --format pcd --out x.pcd"),
+            &["events.aer: ", part],
+        );
         assert_eq!(scratch.read("x.pcd"), "kept");
         assert_eq!(folder(&scratch.path("")).len(), 2);
     }
@@ -181,9 +190,8 @@ fn a_whole_file_of_times_that_the_format_cannot_hold_is_refused() {
         "late.aer",
         file(&HEADER, &[depth(0, 5, 5), depth(0, 1 << 60, 5)]),
     );
-    let output = scratch.dtof(&["export", "late.aer", "--format", "pcd", "--out", "x.pcd"]);
     scratch.refused(
-        &output,
+        &scratch.run("export late.aer --format pcd --out x.pcd"),
         &["late.aer: laser cycle 1152921504606846976 lies beyond"],
     );
     assert!(!scratch.path("x.pcd").exists());
@@ -193,10 +201,7 @@ fn a_whole_file_of_times_that_the_format_cannot_hold_is_refused() {
 fn what_export_takes_for_damage_decode_does_too() {
     let beyond = Header { bins: 32, ..HEADER };
     let narrow = Header {
-        geometry: Geometry {
-            columns: 8,
-            rows: 2,
-        },
+        geometry: Geometry::new(8, 2),
         ..HEADER
     };
     let scratch = Scratch::new();

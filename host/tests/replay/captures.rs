@@ -1,8 +1,6 @@
 //! A capture log has zones and captures, where other arrays have columns and rows.
 
-mod common;
-
-use common::Scratch;
+use crate::common::{Scratch, says};
 
 #[test]
 fn the_report_of_a_capture_log_calls_them_so() {
@@ -22,7 +20,7 @@ fn the_report_of_a_capture_log_calls_them_so() {
         let map = scratch.read("out/event-counts.svg");
         let report = scratch.read("out/report.html");
         for side in [across, down] {
-            assert!(map.lines().any(|line| line.trim() == side), "{map}");
+            says(&map, &format!(">{side}<"));
         }
         let sides = format!("\"sides\":[\"{across}\",\"{down}\"]");
         assert_eq!(report.contains(&sides), has_events);

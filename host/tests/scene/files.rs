@@ -1,11 +1,9 @@
 //! `dtof simulate`: scene files and what comes of them.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::Scratch;
+use crate::common::{Scratch, succeeded};
 use dtof::input::source::Geometry;
 use dtof::simulate::scene::Scene;
 use dtof_core::PixelAddress;
@@ -16,21 +14,16 @@ fn repository(path: &str) -> PathBuf {
 
 #[track_caller]
 fn simulated(scratch: &Scratch, scene: &Path, more: &[&str]) -> serde_json::Value {
-    let output = scratch.simulate(scene, more);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{}: {message}", scene.display());
-    serde_json::from_str(&scratch.read("out/summary.json")).unwrap()
+    succeeded(scratch.simulate(scene, more));
+    scratch.summary()
 }
 
 #[test]
 fn the_demos_scene_and_settings_give_the_demos_events() {
     let scratch = Scratch::new();
-    let demo = ["demo", "--cycles", "2000", "--seed", "7", "--quiet"];
-    assert!(scratch.dtof(&demo).status.success());
-    let settings = [
-        "--alpha", "8", "--l1", "100", "--l2", "2000", "--x", "10", "--cycles", "2000", "--seed",
-        "7", "--quiet",
-    ];
+    scratch.printed("demo --cycles 2000 --seed 7 --quiet");
+    let settings = "--alpha 8 --l1 100 --l2 2000 --x 10 --cycles 2000 --seed 7 --quiet";
+    let settings: Vec<&str> = settings.split(' ').collect();
     let output = scratch.simulate(&repository("scenes/demo.toml"), &settings);
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
     for name in ["events.csv", "events.aer", "depth-last.svg"] {
@@ -64,35 +57,18 @@ fn the_file_says_how_long_and_the_command_line_may_say_otherwise() {
          [[surface]]\nrange_mm = 500\nreflectivity = 0.5\n",
     );
     let summary = simulated(&scratch, &scene, &[]);
-    assert_eq!(
-        (&summary["cycles"], &summary["pixels"]),
-        (&300.into(), &24.into())
-    );
+    assert_eq!([&summary["cycles"], &summary["pixels"]], [300, 24]);
     assert_eq!(summary["settings"]["bins"], 64);
     let width = summary["settings"]["bin_width_ps"].as_f64().unwrap();
     assert!((width - 92.1).abs() < 1.0 / 65_536.0, "{width}");
-    let range: f64 = scratch
-        .read("out/events.csv")
-        .lines()
-        .nth(1)
-        .unwrap()
-        .split(',')
-        .nth(5)
-        .unwrap()
-        .parse()
-        .unwrap();
+    let events = scratch.read("out/events.csv");
+    let range = events.lines().nth(1).unwrap().split(',').nth(5).unwrap();
+    let range: f64 = range.parse().unwrap();
     assert!((range - 500.0).abs() < 20.0, "{range}");
     let summary = simulated(&scratch, &scene, &["--cycles", "200", "--array", "3x2"]);
-    assert_eq!(
-        (&summary["cycles"], &summary["pixels"]),
-        (&200.into(), &6.into())
-    );
+    assert_eq!([&summary["cycles"], &summary["pixels"]], [200, 6]);
 }
 
-/// Motion that the events follow: they are compared with where the target was.
-/// What is said of the events is what they say themselves.
-/// Events of pixels that look past every surface are false alarms, too.
-/// The gate that is named leaves out the glass and keeps the target.
 #[test]
 fn a_surface_beyond_the_last_bin_is_named() {
     let scratch = Scratch::new();
@@ -103,11 +79,7 @@ fn a_surface_beyond_the_last_bin_is_named() {
             format!("cycles = 100\ncolumns = 4\n{surface}{range}"),
         )
     };
-    let printed = |range| {
-        let output = scratch.simulate(&file(range), &[]);
-        assert!(output.status.success());
-        String::from_utf8(output.stdout).unwrap()
-    };
+    let printed = |range| succeeded(scratch.simulate(&file(range), &[]));
     // 128 bins of 250 ps are 4797 mm.
     let far = printed("range_mm = 4790\nrange_right_mm = 4800\n");
     let expected = "1 of 4 pixels at the start or the end: no photons from 4797 mm on";
@@ -237,6 +209,7 @@ fn frames_read_all_pixels_at_once() {
     assert!(rows.len() <= 2 * 32 * 16);
     let report = scratch.read("out/report.html");
     assert!(report.contains("Readings in space and time") && !report.contains(" events are shown"));
+    assert!(report.contains(" readings of ") && !report.contains(" events of "));
 
     for more in [["--l1", "20"], ["--alpha", "4"], ["--device", "qemu"]] {
         let refused = scratch.simulate(&scene, &[&frames[..], &more].concat());
@@ -268,12 +241,9 @@ fn the_options_that_export_needs_are_said() {
         ),
     ] {
         let scene = scratch.file("scene.toml", format!("{keys}{more}{wall}"));
-        let output = scratch.simulate(&scene, &["--array", array]);
-        assert!(output.status.success());
-        let printed = String::from_utf8(output.stdout).unwrap();
+        let printed = succeeded(scratch.simulate(&scene, &["--array", array]));
         let row = printed.lines().find(|line| line.contains("export with"));
-        let summary: serde_json::Value =
-            serde_json::from_str(&scratch.read("out/summary.json")).unwrap();
+        let summary = scratch.summary();
         assert_eq!(summary["laser_hz"], hz);
         for (is, said) in degrees.iter().enumerate() {
             let there = summary["field_of_view_degrees"][is].as_f64().unwrap();
@@ -283,14 +253,9 @@ fn the_options_that_export_needs_are_said() {
         assert_eq!(row.is_some(), options.is_some(), "{printed}");
         let Some(options) = options else { continue };
         assert!(row.unwrap().ends_with(options), "{printed}");
-        let export = ["export", "out/events.aer", "--format", "csv", "--out", "x"];
-        let options: Vec<&str> = options.split(' ').collect();
-        assert!(
-            scratch
-                .dtof(&[&export[..], &options].concat())
-                .status
-                .success()
-        );
+        scratch.printed(&format!(
+            "export out/events.aer --format csv --out x {options}"
+        ));
     }
 }
 
@@ -301,10 +266,7 @@ fn another_array_sees_as_much_of_a_plane() {
                 plane = { normal = [0.5, 0.3, 1] }\n";
     let scene = Scene::parse(text).unwrap();
     let square = Scene {
-        geometry: Geometry {
-            columns: 8,
-            rows: 8,
-        },
+        geometry: Geometry::new(8, 8),
         ..scene.clone()
     };
     let range = |scene: &Scene, column: u16, row: u16| {

@@ -1,42 +1,31 @@
 //! `dtof monitor` on the firmware's sidecar with a simulated sensor, behind a TCP
 //! port of this computer.
 
-use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::num::NonZeroU16;
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use crate::{Closing, listen, serve, settings};
 use anyhow::Result;
 use dtof::device::monitor::{Outputs, Task, losses, monitor};
 use dtof::device::{self, Client};
-use dtof::engine::settings::Settings;
 use dtof::events::events_csv;
-use dtof_core::fixed::types::{U0F32, U8F8, U8F24, U16F16, U24F8};
+use dtof_core::fixed::types::{U0F32, U8F24, U16F16, U24F8};
 use dtof_core::{
-    AnyRule, AsyncPixel, Count, DepthEvent, DynamicDepthPixel, LaserCycle, PaperRule, PixelAddress,
-    PixelConfig, Reference, Statistics,
+    AnyRule, AsyncPixel, DepthEvent, DynamicDepthPixel, LaserCycle, PixelAddress, PixelConfig,
+    Reference, Statistics,
 };
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::endpoint::LinkCounters;
-use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::{DynamicDepth, Report};
 use dtof_sensors::simulated::{self, Pulse, Simulated, SimulatedPixel};
 use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
 
 const PIXELS: u16 = 4;
 const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
-
-fn settings() -> Settings {
-    Settings {
-        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
-        l1: 40,
-        x: 4,
-        ..dtof::simulate::scene::settings(0)
-    }
-}
 
 fn scene() -> Vec<SimulatedPixel> {
     let (signal, background) = (U8F24::lit("0.5"), U8F24::lit("0.5"));
@@ -117,65 +106,24 @@ fn device_of(
     has_sensor: bool,
     lives: Duration,
 ) -> (String, Receiver<bool>) {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let name = format!("tcp:{}", listener.local_addr().unwrap());
     let (sender, rests) = mpsc::channel();
-    thread::spawn(move || {
-        let (mut stream, _) = listener.accept().unwrap();
-        let sensor = Noted {
-            sensor,
-            asked: false,
+    let mut sensor = Noted {
+        sensor,
+        asked: false,
+    };
+    let name = listen(move |stream| {
+        let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
+        let mut sidecar = Sidecar::new(&mut pixels, has_sensor.then(|| sensor.about()));
+        let poll = |sidecar: &mut Sidecar<'_>, now| {
+            sensor.asked = false;
+            sidecar.poll_sensor(&mut sensor, now);
         };
-        if let Ok(resting) = serve(&mut stream, sensor, has_sensor, lives) {
-            let _ = sender.send(resting);
+        if let Ok(false) = serve(stream, &mut sidecar, lives, poll) {
+            let _ = sender.send(!sensor.asked);
         }
+        false
     });
     (name, rests)
-}
-
-/// Until the host is gone; says whether the sensor is asked no more then.
-fn serve<S: Sensor>(
-    stream: &mut TcpStream,
-    mut sensor: Noted<S>,
-    has_sensor: bool,
-    lives: Duration,
-) -> io::Result<bool> {
-    stream.set_nodelay(true)?;
-    stream.set_read_timeout(Some(Duration::from_millis(1)))?;
-    let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
-    let mut sidecar = Sidecar::new(&mut pixels, has_sensor.then(|| sensor.about()));
-    let mut deframer = Deframer::new();
-    let started = Instant::now();
-    while started.elapsed() < lives {
-        let now = u32::try_from(started.elapsed().as_millis()).unwrap();
-        let mut bytes = [0; 1024];
-        let length = match stream.read(&mut bytes) {
-            Ok(0) => {
-                sensor.asked = false;
-                sidecar.poll_sensor(&mut sensor, now);
-                return Ok(!sensor.asked);
-            }
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => 0,
-            read => read?,
-        };
-        for &byte in &bytes[..length] {
-            if let Some(frame) = deframer.push(byte) {
-                sidecar.receive(frame, now);
-            }
-        }
-        sidecar.work(0);
-        sidecar.poll_sensor(&mut sensor, now);
-        sidecar.work(0);
-        let mut wire = [0; WIRE_BYTES];
-        loop {
-            let length = sidecar.transmit(now, &mut wire);
-            if length == 0 {
-                break;
-            }
-            stream.write_all(&wire[..length])?;
-        }
-    }
-    Err(ErrorKind::TimedOut.into())
 }
 
 /// Pixels whose link takes every event at once.
@@ -235,11 +183,22 @@ fn reference(cycles: u64) -> String {
     String::from_utf8(csv).unwrap()
 }
 
-/// What the device does, without a picture.
+/// What the device does for so long, without a picture: events, statistics, and how it ended.
+fn watched(
+    client: &mut Client,
+    dynamic_depth: Option<DynamicDepth>,
+    length: Duration,
+) -> (String, String, Result<()>) {
+    let (mut events, mut statistics) = (Vec::new(), Vec::new());
+    let ended = watch(client, dynamic_depth, length, &mut events, &mut statistics);
+    let [events, statistics] = [events, statistics].map(|text| String::from_utf8(text).unwrap());
+    (events, statistics, ended)
+}
+
 fn watch(
     client: &mut Client,
     dynamic_depth: Option<DynamicDepth>,
-    done: impl Fn(Duration) -> bool,
+    length: Duration,
     events: &mut dyn Write,
     statistics: &mut dyn Write,
 ) -> Result<()> {
@@ -254,7 +213,7 @@ fn watch(
         map: None,
         recording: None,
     };
-    monitor(client, &task, done, &mut outputs)
+    monitor(client, &task, |elapsed| elapsed >= length, &mut outputs)
 }
 
 fn client(name: &str) -> Client {
@@ -264,26 +223,14 @@ fn client(name: &str) -> Client {
 #[test]
 fn events_come_out_as_the_pixels_report_them_and_statistics_once_a_second() {
     let mut client = client(&device(true, Duration::from_secs(60)));
-    let (mut events, mut statistics) = (Vec::new(), Vec::new());
-    let length = Duration::from_millis(3_800);
     let started = Instant::now();
-    watch(
-        &mut client,
-        None,
-        |elapsed| elapsed >= length,
-        &mut events,
-        &mut statistics,
-    )
-    .unwrap();
+    let (events, statistics, ended) = watched(&mut client, None, Duration::from_millis(3_800));
+    ended.unwrap();
     assert!((3.8..8.0).contains(&started.elapsed().as_secs_f64()));
-    let events = String::from_utf8(events).unwrap();
     assert!(events.lines().count() > 50, "{events}");
     assert!(reference(5_000).starts_with(&events), "{events}");
-    let statistics = String::from_utf8(statistics).unwrap();
-    assert!(
-        (3..=4).contains(&statistics.lines().count()),
-        "{statistics}"
-    );
+    let lines = statistics.lines().count();
+    assert!((3..=4).contains(&lines), "{statistics}");
     for line in statistics.lines() {
         let rates = line.strip_prefix("events/s ").unwrap();
         let rate: u32 = rates.split(',').next().unwrap().parse().unwrap();
@@ -343,36 +290,12 @@ fn every_loss_is_shown_and_only_losses() {
 #[test]
 fn a_sensor_that_does_not_answer_is_named() {
     let (name, _rests) = device_of(Unplugged, true, Duration::from_secs(60));
-    let (mut events, mut statistics) = (Vec::new(), Vec::new());
-    watch(
-        &mut client(&name),
-        None,
-        |elapsed| elapsed >= Duration::from_secs(1),
-        &mut events,
-        &mut statistics,
-    )
-    .unwrap();
-    let statistics = String::from_utf8(statistics).unwrap();
+    let (_, statistics, ended) = watched(&mut client(&name), None, Duration::from_secs(1));
+    ended.unwrap();
     let line = statistics.lines().next().unwrap();
     assert!(line.starts_with("events/s 0, photons/s 0, "), "{line}");
     assert!(line.contains(", sensor errors "), "{line}");
     assert!(line.ends_with(" (last: no answer)"), "{line}");
-}
-
-/// Takes so many bytes, then nobody reads any more.
-struct Closing(usize);
-
-impl Write for Closing {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0 = self
-            .0
-            .checked_sub(bytes.len())
-            .ok_or(ErrorKind::BrokenPipe)?;
-        Ok(bytes.len())
-    }
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
 }
 
 #[test]
@@ -380,22 +303,28 @@ fn a_reader_that_has_seen_enough_ends_it() {
     for (events, statistics) in [(10, 10_000), (500, 10_000), (100_000, 10)] {
         let mut client = client(&device(true, Duration::from_secs(60)));
         let (mut events, mut statistics) = (Closing(events), Closing(statistics));
-        watch(&mut client, None, |_| false, &mut events, &mut statistics).unwrap();
+        watch(
+            &mut client,
+            None,
+            Duration::MAX,
+            &mut events,
+            &mut statistics,
+        )
+        .unwrap();
     }
 }
 
 #[test]
 fn a_device_that_goes_or_has_no_sensor_is_an_error() {
     let mut gone = client(&device(true, Duration::from_millis(700)));
-    let (mut events, mut statistics) = (Vec::new(), Vec::new());
-    let error = watch(&mut gone, None, |_| false, &mut events, &mut statistics);
+    let (events, _, error) = watched(&mut gone, None, Duration::MAX);
     let error = format!("{:#}", error.unwrap_err());
     assert!(error.contains("the device cannot be"), "{error}");
     // What came before is there.
     assert!(events.len() > 200);
 
     let mut without = client(&device(false, Duration::from_secs(60)));
-    let error = watch(&mut without, None, |_| false, &mut events, &mut statistics);
+    let (.., error) = watched(&mut without, None, Duration::MAX);
     let error = format!("{:#}", error.unwrap_err());
     assert!(error.contains("the device has no sensor"), "{error}");
 }
@@ -408,15 +337,8 @@ fn changes_of_depth_are_those_of_the_events() {
         reference: Reference::Reported,
     };
     let name = device(true, Duration::from_secs(60));
-    let (mut events, mut statistics) = (Vec::new(), Vec::new());
-    watch(
-        &mut client(&name),
-        Some(wanted),
-        |elapsed| elapsed >= Duration::from_secs(2),
-        &mut events,
-        &mut statistics,
-    )
-    .unwrap();
+    let (events, _, ended) = watched(&mut client(&name), Some(wanted), Duration::from_secs(2));
+    ended.unwrap();
     let scale = settings().range_scale().unwrap();
     let config = wanted.config(&scale).unwrap();
     let mut pixels = [const { DynamicDepthPixel::<{ DynamicDepth::MEAN_OF }>::new() }; 4];
@@ -427,12 +349,15 @@ fn changes_of_depth_are_those_of_the_events() {
             events_csv::write_dynamic_depth(&mut csv, &change, &scale).unwrap();
         }
     }
-    assert!(events.iter().filter(|&&byte| byte == b'\n').count() > 5);
-    assert!(
-        csv.starts_with(&events),
-        "{}",
-        String::from_utf8(events).unwrap()
-    );
+    assert!(events.lines().count() > 5);
+    assert!(csv.starts_with(events.as_bytes()), "{events}");
+}
+
+/// `dtof LINE`.
+fn dtof(line: &str) -> Command {
+    let mut dtof = Command::new(env!("CARGO_BIN_EXE_dtof"));
+    dtof.args(line.split(' '));
+    dtof
 }
 
 #[cfg(unix)]
@@ -441,8 +366,7 @@ fn ctrl_c_stops_the_sensor() {
     for signal in ["-INT", "-TERM"] {
         let lives = Duration::from_secs(60);
         let (name, rests) = device_of(sensor(scene().leak()), true, lives);
-        let mut monitor = Command::new(env!("CARGO_BIN_EXE_dtof"))
-            .args(["monitor", "--pixels", "4", "--device", &name])
+        let mut monitor = dtof(&format!("monitor --pixels 4 --device {name}"))
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
@@ -468,24 +392,10 @@ fn what_is_recorded_is_what_is_printed_also_when_the_device_is_gone() {
     let file = folder.path().join("events.aer");
     for (lives, seconds, whole) in [(60_000, "1", true), (1_000, "30", false)] {
         let name = device(true, Duration::from_millis(lives));
-        let mut monitor = Command::new(env!("CARGO_BIN_EXE_dtof"));
-        monitor.args([
-            "monitor",
-            "--pixels",
-            "4",
-            "--columns",
-            "2",
-            "--device",
-            &name,
-        ]);
-        monitor.args(["--seconds", seconds, "--record"]).arg(&file);
-        let output = monitor.output().unwrap();
+        let line = format!("monitor --pixels 4 --columns 2 --device {name} --seconds {seconds}");
+        let output = dtof(&line).arg("--record").arg(&file).output().unwrap();
         assert_eq!(output.status.success(), whole, "{output:?}");
-        let decoded = Command::new(env!("CARGO_BIN_EXE_dtof"))
-            .arg("decode")
-            .arg(&file)
-            .output()
-            .unwrap();
+        let decoded = dtof("decode").arg(&file).output().unwrap();
         assert!(decoded.status.success(), "{decoded:?}");
         assert!(decoded.stdout == output.stdout && decoded.stdout.len() > 500);
     }
@@ -498,13 +408,9 @@ fn a_device_that_refuses_leaves_an_older_recording_as_it_is() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("events.aer");
     std::fs::write(&file, b"older").unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_dtof"))
-        .args(["monitor", "--device"])
-        .arg(device(false, Duration::from_secs(60)))
-        .arg("--record")
-        .arg(&file)
-        .output()
-        .unwrap();
+    let name = device(false, Duration::from_secs(60));
+    let mut monitor = dtof(&format!("monitor --device {name} --record"));
+    let output = monitor.arg(&file).output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     assert_eq!(std::fs::read(&file).unwrap(), b"older");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
@@ -514,19 +420,8 @@ fn a_device_that_refuses_leaves_an_older_recording_as_it_is() {
 fn the_command_prints_rows_and_says_when_the_device_is_gone() {
     let run = |lives, seconds| {
         let name = device(true, Duration::from_millis(lives));
-        let pixels = PIXELS.to_string();
-        Command::new(env!("CARGO_BIN_EXE_dtof"))
-            .args([
-                "monitor",
-                "--device",
-                &name,
-                "--pixels",
-                &pixels,
-                "--seconds",
-                seconds,
-            ])
-            .output()
-            .unwrap()
+        let line = format!("monitor --device {name} --pixels {PIXELS} --seconds {seconds}");
+        dtof(&line).output().unwrap()
     };
     let output = run(60_000, "1");
     assert!(output.status.success(), "{output:?}");
@@ -543,10 +438,8 @@ fn the_command_prints_rows_and_says_when_the_device_is_gone() {
 
 #[test]
 fn a_map_needs_a_terminal() {
-    let output = Command::new(env!("CARGO_BIN_EXE_dtof"))
-        .args(["monitor", "--device", "tcp:127.0.0.1:1", "--map"])
-        .output()
-        .unwrap();
+    let mut monitor = dtof("monitor --device tcp:127.0.0.1:1 --map");
+    let output = monitor.output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert_eq!(
         String::from_utf8(output.stderr).unwrap(),

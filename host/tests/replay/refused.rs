@@ -1,9 +1,7 @@
 //! Bad input gives one clear line and a failure, never a panic and never a
 //! half-written result.
 
-mod common;
-
-use common::Scratch;
+use crate::common::{Scratch, table};
 
 const CSV_HEADER: &str = "pixel,cycle,bin\n";
 
@@ -16,29 +14,27 @@ fn csv_refused(rows: &str, parts: &[&str]) {
 
 #[test]
 fn csv_rows_that_are_not_photons_are_named_by_line() {
-    csv_refused("0,1,2\n0,2\n", &["photons.csv:3:", "2 fields, not 3"]);
-    csv_refused("0,1,2\n0,2,3,4\n", &["photons.csv:3:", "4 fields"]);
-    csv_refused(
-        "0,1,2\n0,2,",
-        &["photons.csv:3:", "bin \"\"", "whole number"],
-    );
-    csv_refused("0,1,2\n\n\n0,2\n\n", &["photons.csv:5:", "2 fields, not 3"]);
-    csv_refused("+1,0,2\n", &["photons.csv:2:", "pixel \"+1\""]);
+    for row in table(
+        r#"
+        0,1,2\n0,2\n | photons.csv:3: | 2 fields, not 3
+        0,1,2\n0,2,3,4\n | photons.csv:3: | 4 fields
+        0,1,2\n0,2, | photons.csv:3: | bin "" | whole number
+        0,1,2\n\n\n0,2\n\n | photons.csv:5: | 2 fields, not 3
+        +1,0,2\n | photons.csv:2: | pixel "+1"
+        0,x,2\n | photons.csv:2: | cycle "x" | whole number
+        -1,0,2\n | photons.csv:2: | pixel "-1"
+        0,0,2.5\n | photons.csv:2: | bin "2.5"
+        0,99999999999999999999,2\n | photons.csv:2: | cycle
+        65536,0,2\n | photons.csv:2: | pixel 65536 | 65535
+        0,5,2\n0,4,2\n | photons.csv:3: | cycle 4 comes after cycle 5
+        0,5,128\n | photons.csv:2: | bin 128 | 128 bins
+        0,5,65664\n | photons.csv:2: | bin 65664
+    "#,
+    ) {
+        let parts: Vec<&str> = row[1..].iter().map(String::as_str).collect();
+        csv_refused(&row[0], &parts);
+    }
     csv_refused(&"0,".repeat(1000), &["photons.csv:2:", "fields, not 3"]);
-    csv_refused(
-        "0,x,2\n",
-        &["photons.csv:2:", "cycle \"x\"", "whole number"],
-    );
-    csv_refused("-1,0,2\n", &["photons.csv:2:", "pixel \"-1\""]);
-    csv_refused("0,0,2.5\n", &["photons.csv:2:", "bin \"2.5\""]);
-    csv_refused("0,99999999999999999999,2\n", &["photons.csv:2:", "cycle"]);
-    csv_refused("65536,0,2\n", &["photons.csv:2:", "pixel 65536", "65535"]);
-    csv_refused(
-        "0,5,2\n0,4,2\n",
-        &["photons.csv:3:", "cycle 4 comes after cycle 5"],
-    );
-    csv_refused("0,5,128\n", &["photons.csv:2:", "bin 128", "128 bins"]);
-    csv_refused("0,5,65664\n", &["photons.csv:2:", "bin 65664"]);
     csv_refused("", &["photons.csv:2:", "no photons"]);
 }
 
@@ -99,43 +95,30 @@ fn npy_refused(header: &str, data: &[u8], parts: &[&str]) {
 #[test]
 fn npy_files_that_are_not_integer_histograms_are_refused() {
     let zeros = [0; 128];
-    npy_refused(
-        &described("<f4", "False", "(2, 16)"),
-        &zeros,
-        &["<f4", "not integers"],
-    );
-    npy_refused(
-        &described("|b1", "False", "(2, 64)"),
-        &zeros,
-        &["not integers"],
-    );
-    npy_refused(
-        &described("<c8", "False", "(2, 8)"),
-        &zeros,
-        &["not integers"],
-    );
-    npy_refused(
-        &described("<u4", "True", "(4, 8)"),
-        &zeros,
-        &["Fortran order"],
-    );
-    npy_refused(
-        &described("<i4", "False", "(4, 8)"),
-        &[255; 128],
-        &["element 0 is negative"],
-    );
-    npy_refused(&described("<u4", "False", "()"), &zeros[..4], &["no axis"]);
-    npy_refused(&described("<u1", "False", "(0, 8)"), &[], &["empty"]);
-    npy_refused(
-        &described("<u1", "False", "(32, 4)"),
-        &zeros,
-        &["4 bins", "power of two"],
-    );
-    npy_refused(
-        &described("<u1", "False", "(8, 12)"),
-        &zeros[..96],
-        &["12 bins"],
-    );
+    for row in table(
+        "
+            <f4 | False | (2, 16) | <f4 | not integers
+            |b1 | False | (2, 64) | not integers
+            <c8 | False | (2, 8) | not integers
+            <u4 | True | (4, 8) | Fortran order
+            <u1 | False | (32, 4) | 4 bins | power of two
+        ",
+    ) {
+        let cells: Vec<&str> = row.iter().map(String::as_str).collect();
+        npy_refused(
+            &described(cells[0], cells[1], cells[2]),
+            &zeros,
+            &cells[3..],
+        );
+    }
+    for (descr, shape, data, part) in [
+        ("<i4", "(4, 8)", &[255; 128][..], "element 0 is negative"),
+        ("<u4", "()", &zeros[..4], "no axis"),
+        ("<u1", "(0, 8)", &[], "empty"),
+        ("<u1", "(8, 12)", &zeros[..96], "12 bins"),
+    ] {
+        npy_refused(&described(descr, "False", shape), data, &[part]);
+    }
     npy_refused(
         "{'descr': [('a', '<u4')], 'fortran_order': False, 'shape': (32,), }",
         &zeros,
@@ -201,83 +184,69 @@ fn json_files_that_are_not_capture_logs_are_refused() {
 #[test]
 fn settings_that_cannot_be_are_refused() {
     let scratch = Scratch::new();
-    let input = scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
-    for (arguments, part) in [
-        (
-            &["--l1", "100", "--l2", "100"][..],
-            "L2 must be greater than L1",
-        ),
-        (&["--x", "0"], "X must be at least 1"),
-        (&["--x", "50"], "X must not be greater than L1"),
-        (&["--x", "30", "--l2", "50"], "no multiple of X"),
-        (&["--l2", "65536"], "65536"),
-        (&["--alpha", "256"], "--alpha"),
-        (&["--alpha", "-1"], "must be a number from 0 to"),
-        (&["--alpha", "NaN"], "--alpha"),
-        (&["--alpha", "0.001"], "less than half"),
-        (&["--bins", "100"], "power of two"),
-        (&["--bins", "4"], "power of two"),
-        (&["--bins", "2048"], "power of two"),
-        (&["--columns", "0"], "--columns"),
-        (&["--gate", "0..128"], "past the last bin"),
-        (&["--gate", "20..26"], "fewer than 8 bins"),
-        (&["--gate", "30..20"], "fewer than 8 bins"),
-        (&["--gate", "20"], "FIRST..LAST"),
-        (&["--min-count", "0"], "--min-count"),
-        (&["--min-count", "1024"], "--min-count"),
-        (&["--bin-width-ps", "0"], "bin width is zero"),
-        (&["--bin-width-ps", "0.00003"], "bin width is zero"),
-        (&["--bin-width-ps", "65535"], "8388 m"),
-        (&["--bin-width-ps", "wide"], "--bin-width-ps"),
-        (&["--offset-mm", "9e9"], "--offset-mm"),
-        (&["--cycles", "0"], "--cycles"),
-        (&["--photons-per-cycle", "1"], "are for histograms"),
-        (&["--recorded-cycles", "0"], "--recorded-cycles"),
-        (&["--nonsense"], "--nonsense"),
-        (&["--apha", "4"], "a similar argument exists: '--alpha'"),
-    ] {
-        scratch.refused(&scratch.replay(&input, arguments), &[part]);
-    }
-    let histograms = scratch.file("h.npy", npy(&described("<u1", "False", "(8,)"), &[1; 8]));
-    for (arguments, part) in [
-        (&["--photons-per-cycle", "0"][..], "--photons-per-cycle"),
-        (&["--photons-per-cycle", "inf"], "--photons-per-cycle"),
-        (&["--photons-per-cycle", "1e-300"], "longer than 2^40"),
-        (&["--bins", "16"], "--bins 16, but the file has 8"),
-        (
-            &["--photons-per-cycle", "1", "--recorded-cycles", "5"],
-            "cannot be used with",
-        ),
-    ] {
-        scratch.refused(&scratch.replay(&histograms, arguments), &[part]);
-    }
+    scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
+    scratch.all_refused(
+        "replay --out out --input photons.csv",
+        r#"
+            --l1 100 --l2 100 | L2 must be greater than L1
+            --x 0 | X must be at least 1
+            --x 50 | X must not be greater than L1
+            --x 30 --l2 50 | no multiple of X
+            --l2 65536 | 65536
+            --alpha 256 | --alpha
+            --alpha -1 | must be a number from 0 to
+            --alpha NaN | --alpha
+            --alpha 0.001 | less than half
+            --bins 100 | power of two
+            --bins 4 | power of two
+            --bins 2048 | power of two
+            --columns 0 | --columns
+            --gate 0..128 | past the last bin
+            --gate 20..26 | fewer than 8 bins
+            --gate 30..20 | fewer than 8 bins
+            --gate 20 | FIRST..LAST
+            --min-count 0 | --min-count
+            --min-count 1024 | --min-count
+            --bin-width-ps 0 | bin width is zero
+            --bin-width-ps 0.00003 | bin width is zero
+            --bin-width-ps 65535 | 8388 m
+            --bin-width-ps wide | --bin-width-ps
+            --offset-mm 9e9 | --offset-mm
+            --cycles 0 | --cycles
+            --photons-per-cycle 1 | are for histograms
+            --recorded-cycles 0 | --recorded-cycles
+            --nonsense | --nonsense
+            --apha 4 | a similar argument exists: '--alpha'
+        "#,
+    );
+    scratch.file("h.npy", npy(&described("<u1", "False", "(8,)"), &[1; 8]));
+    scratch.all_refused(
+        "replay --out out --input h.npy",
+        r#"
+            --photons-per-cycle 0 | --photons-per-cycle
+            --photons-per-cycle inf | --photons-per-cycle
+            --photons-per-cycle 1e-300 | longer than 2^40
+            --bins 16 | --bins 16, but the file has 8
+            --photons-per-cycle 1 --recorded-cycles 5 | cannot be used with
+        "#,
+    );
 }
 
 #[test]
 fn files_that_are_not_there_or_not_known_are_refused() {
     let scratch = Scratch::new();
-    scratch.refused(
-        &scratch.replay(&scratch.path("none.csv"), &[]),
-        &["none.csv", "No such file"],
-    );
-    scratch.refused(
-        &scratch.replay(&scratch.path("none.npy"), &[]),
-        &["none.npy", "No such file"],
-    );
-    scratch.refused(
-        &scratch.replay(&scratch.path("none.json"), &[]),
-        &["none.json", "No such file"],
-    );
-    scratch.refused(
-        &scratch.replay(&scratch.path("a.txt"), &[]),
-        &["a.txt", ".npy, .json or .csv"],
-    );
     std::fs::create_dir(scratch.path("folder.csv")).unwrap();
-    scratch.refused(
-        &scratch.replay(&scratch.path("folder.csv"), &[]),
-        &["folder.csv"],
+    scratch.all_refused(
+        "replay --out out --input",
+        "
+            none.csv | none.csv | No such file
+            none.npy | none.npy | No such file
+            none.json | none.json | No such file
+            a.txt | a.txt | .npy, .json or .csv
+            folder.csv | folder.csv
+        ",
     );
-    scratch.refused(&scratch.dtof(&["replay"]), &["--input"]);
+    scratch.refused(&scratch.run("replay"), &["--input"]);
 }
 
 #[test]

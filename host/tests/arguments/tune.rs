@@ -1,10 +1,8 @@
 //! `dtof tune` as a user runs it.
 
-mod common;
-
 use std::process::Output;
 
-use common::Scratch;
+use crate::common::Scratch;
 use serde_json::Value;
 
 /// `dtof tune` with the options in `line`.
@@ -30,10 +28,11 @@ fn value(result: &Value, name: &str) -> f64 {
     result[name]["value"].as_f64().unwrap()
 }
 
+/// Each row: options, and parts of why they are refused.
 #[track_caller]
-fn refused(line: &str, parts: &[&str]) {
-    let scratch = Scratch::new();
-    scratch.refused(&tune(line), parts);
+fn refused(rows: &str) {
+    let rows = rows.replace("PIXEL", PIXEL).replace("WINDOW", WINDOW);
+    Scratch::new().all_refused("tune", &rows);
 }
 
 const PIXEL: &str = "--background 0.05 --signal 0.4 --sigma-bins 0.8";
@@ -46,14 +45,7 @@ fn every_line_says_where_it_comes_from() {
         let sources = ["formula: ", "simulation: "];
         assert!(sources.iter().any(|source| line.contains(source)), "{line}");
     }
-    for part in [
-        "seed 1",
-        "exposures a point",
-        "Eq. 11",
-        "mm rms",
-        "laser cycles",
-        " s ",
-    ] {
+    for part in "seed 1|exposures a point|Eq. 11|mm rms|laser cycles| s ".split('|') {
         assert!(results.contains(part), "{part}: {results}");
     }
     // What `dtof replay` takes.
@@ -144,20 +136,19 @@ fn other_numbers_of_bins_are_bounded_by_formula() {
 #[test]
 fn what_cannot_be_met_is_refused_in_one_line() {
     refused(
-        "--background 0.05 --signal 0.001 --sigma-bins 0.8",
-        &["the signal is too weak", "L2 = 2000"],
-    );
-    refused(
-        "--background 1 --signal 1 --sigma-bins 0.8",
-        &["fills the 10-bit counters", "lower --l2 to 860"],
-    );
-    refused(
-        "--background 1e300 --signal 1 --sigma-bins 0.8",
-        &["fills the 10-bit counters"],
-    );
-    refused(
-        "--background 0.05 --signal 1e12 --sigma-bins 0.8",
-        &["fills a 10-bit counter within a laser cycle"],
+        "
+            --background 0.05 --signal 0.001 --sigma-bins 0.8 | the signal is too weak | L2 = 2000
+            --background 1 --signal 1 --sigma-bins 0.8 | fills the 10-bit counters | lower --l2 to 860
+            --background 1e300 --signal 1 --sigma-bins 0.8 | fills the 10-bit counters
+            --background 0.05 --signal 1e12 --sigma-bins 0.8 | fills a 10-bit counter within a laser cycle
+            --background 0.01 --signal 1 --sigma-bins 0.8 --min-count 1 --l1 8 --false-alarm 1e-9 | no α | --min-count
+            PIXEL --l1 2000 | L2 must be greater than L1
+            PIXEL --l1 3 | X must not be greater than L1
+            PIXEL --l2 8 | --l2 8 | greater than 2 X
+            PIXEL --bins 100 | --bins | power of two
+            PIXEL --false-alarm 1 | less than 1
+            --background 0.05 --signal 1 --sigma-bins 100 | does not fit 128 bins
+        ",
     );
     // However large, in one short line, and without advice that does not help.
     for line in [
@@ -171,43 +162,23 @@ fn what_cannot_be_met_is_refused_in_one_line() {
         assert!(!output.status.success(), "{line}");
         assert!(error.len() < 160 && !error.contains("--l2"), "{error}");
     }
-    // One photon and an empty background: no α helps.
-    refused(
-        "--background 0.01 --signal 1 --sigma-bins 0.8 --min-count 1 --l1 8 --false-alarm 1e-9",
-        &["no α", "--min-count"],
-    );
-    refused(
-        &format!("{PIXEL} --l1 2000"),
-        &["L2 must be greater than L1"],
-    );
-    refused(
-        &format!("{PIXEL} --l1 3"),
-        &["X must not be greater than L1"],
-    );
-    refused(&format!("{PIXEL} --l2 8"), &["--l2 8", "greater than 2 X"]);
-    refused(&format!("{PIXEL} --bins 100"), &["--bins", "power of two"]);
-    refused(&format!("{PIXEL} --false-alarm 1"), &["less than 1"]);
-    refused(
-        "--background 0.05 --signal 1 --sigma-bins 100",
-        &["does not fit 128 bins"],
-    );
 }
 
 #[test]
 fn options_that_are_missing_or_no_numbers_are_named() {
-    refused("--background 0.05 --sigma-bins 1", &["--signal"]);
-    refused("--background 0.05 --signal 1", &["--sigma-bins"]);
-    refused("--signal 1 --sigma-bins 1", &["--background"]);
-    refused(&format!("{PIXEL} --snr 5"), &["--snr", "--signal"]);
     refused(
-        &format!("{PIXEL} --false-alarms-per-second 1"),
-        &["--laser-hz"],
+        "
+            --background 0.05 --sigma-bins 1 | --signal
+            --background 0.05 --signal 1 | --sigma-bins
+            --signal 1 --sigma-bins 1 | --background
+            PIXEL --snr 5 | --snr | --signal
+            PIXEL --false-alarms-per-second 1 | --laser-hz
+        ",
     );
     for bad in ["0", "-1", "nan", "inf", "x"] {
-        refused(
-            &format!("--background={bad} --signal 1 --sigma-bins 1"),
-            &["--background", "a number above 0"],
-        );
+        refused(&format!(
+            "--background={bad} --signal 1 --sigma-bins 1 | --background | a number above 0"
+        ));
     }
 }
 
@@ -276,23 +247,15 @@ fn the_window_rule_is_faster_and_nearer() {
 #[test]
 fn the_window_rule_refuses_what_the_papers_does() {
     refused(
-        "--background 0.05 --signal 0.001 --sigma-bins 0.8 --rule window",
-        &["the signal is too weak", "L2 = 2000"],
+        "
+            --background 0.05 --signal 0.001 --sigma-bins 0.8 --rule window | the signal is too weak | L2 = 2000
+            --background 1 --signal 1 --sigma-bins 0.8 --rule window | fills the 10-bit counters | lower --l2 to 860
+            WINDOW --l1 2000 | L2 must be greater than L1
+            WINDOW --bins 100 | --bins | power of two
+            WINDOW --l1 40 --false-alarm 1e-300 | there is no z for so few
+        ",
     );
-    refused(
-        "--background 1 --signal 1 --sigma-bins 0.8 --rule window",
-        &["fills the 10-bit counters", "lower --l2 to 860"],
-    );
-    refused(
-        &format!("{WINDOW} --l1 2000"),
-        &["L2 must be greater than L1"],
-    );
-    refused(&format!("{WINDOW} --bins 100"), &["--bins", "power of two"]);
-    // z goes on for ever, its table does not.
-    refused(
-        &format!("{WINDOW} --l1 40 --false-alarm 1e-300"),
-        &["there is no z for so few"],
-    );
+    // What the table still holds.
     let rare = json(&format!("{WINDOW} --l1 40 --false-alarm 1e-6"));
     assert!((6.0..6.44).contains(&value(&rare, "z")));
 }

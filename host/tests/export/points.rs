@@ -1,9 +1,7 @@
 //! `dtof export`: points, kinds of event, the result line, links.
 
-mod common;
-
-use common::Scratch;
-use common::aer::{HEADER, depth, dynamic, events, exported, file};
+use crate::common::aer::{HEADER, depth, dynamic, events, exported, file};
+use crate::common::{Scratch, says, table};
 use dtof::events::aer_file::EventKind;
 use dtof::export::{Format, Options};
 
@@ -22,20 +20,9 @@ fn record(bytes: &[u8]) -> ([f32; 4], u32, u8, f64) {
 fn csv_has_time_and_point_before_the_columns_of_decode() {
     let scratch = Scratch::new();
     scratch.file("events.aer", file(&HEADER, &events()));
-    let output = scratch.dtof(&[
-        "export",
-        "events.aer",
-        "--format",
-        "csv",
-        "--out",
-        "points.csv",
-    ]);
-    assert!(output.status.success());
-    assert_eq!(
-        output.stdout,
-        b"points.csv: 12 events (60x32.2 degrees, 10 MHz)\n"
-    );
-    let decoded = String::from_utf8(scratch.dtof(&["decode", "events.aer"]).stdout).unwrap();
+    let printed = scratch.printed("export events.aer --format csv --out points.csv");
+    assert_eq!(printed, "points.csv: 12 events (60x32.2 degrees, 10 MHz)\n");
+    let decoded = scratch.printed("decode events.aer");
     let text = scratch.read("points.csv");
     let cut = |line: &str| line.splitn(5, ',').nth(4).unwrap().to_owned();
     let rest: Vec<String> = text.lines().map(cut).collect();
@@ -122,10 +109,7 @@ fn changes_of_depth_are_points_at_the_mean() {
     let (_, pcd) = exported(&file(&HEADER, &events), Format::Pcd, &Options::default());
     let (_, csv) = exported(&file(&HEADER, &events), Format::Csv, &Options::default());
     let header = String::from_utf8_lossy(&pcd);
-    assert!(
-        header.contains("FIELDS x y z change pixel flags t_ns"),
-        "{header}"
-    );
+    says(&header, "FIELDS x y z change pixel flags t_ns");
     let ([x, y, z, change], pixel, ..) = record(&pcd[pcd.len() - 58..]);
     let metres = (40.0 * 250.0 * 0.149_896_229 - 12.5) / 1000.0;
     assert!((f64::from(x.hypot(y).hypot(z)) - metres).abs() < 1e-5);
@@ -150,18 +134,12 @@ fn a_file_of_both_kinds_needs_to_be_told_which() {
     }
     let scratch = Scratch::new();
     scratch.file("events.aer", bytes);
-    let output = scratch.dtof(&[
-        "export",
-        "events.aer",
-        "--format",
-        "ply",
-        "--out",
-        "out/x.ply",
-    ]);
-    scratch.refused(&output, &["there is no folder out"]);
-    let output = scratch.dtof(&["export", "events.aer", "--format", "ply", "--out", "x.ply"]);
     scratch.refused(
-        &output,
+        &scratch.run("export events.aer --format ply --out out/x.ply"),
+        &["there is no folder out"],
+    );
+    scratch.refused(
+        &scratch.run("export events.aer --format ply --out x.ply"),
         &["2 depth events and 1 dynamic depth events", "--events"],
     );
     assert!(!scratch.path("x.ply").exists());
@@ -175,44 +153,22 @@ fn the_result_line_says_what_points_and_times_rest_on() {
     let rays = "[0, 0, 1, 0],\n".repeat(2048);
     let calibration = format!("columns = 64\nrows = 32\npixels = [\n{rays}]\n");
     scratch.file("rays.toml", calibration);
-    let khz = ["--laser-hz", "12500"];
-    for (name, format, more, said) in [
-        (
-            "events",
-            "ply",
-            &["--fov", "45x24.5"][..],
-            "12 events (45x24.5 degrees, 10 MHz)",
-        ),
-        (
-            "events",
-            "pcd",
-            &["--calibration", "rays.toml"],
-            "12 events (rays.toml, 10 MHz)",
-        ),
-        ("events", "evt2", &khz, "0 events (0.0125 MHz)"),
-        // The run lasts 105 ms, or no time.
-        (
-            "events",
-            "mcap",
-            &[],
-            "12 events (60x32.2 degrees, 10 MHz, clouds every 1049 µs)",
-        ),
-        ("events", "mcap", &["--slice-us", "5"], "clouds every 5 µs)"),
-        (
-            "none",
-            "mcap",
-            &["--events", "depth"],
-            "0 events (60x32.2 degrees, 10 MHz, clouds every 10 µs)",
-        ),
-    ] {
-        let name = format!("{name}.aer");
-        let arguments = ["export", &name, "--format", format, "--out", "x"];
-        let output = scratch.dtof(&[&arguments, more].concat());
-        let line = String::from_utf8(output.stdout).unwrap();
-        assert!(output.status.success() && line.starts_with("x: "), "{line}");
-        assert!(line.ends_with(&format!("{said}\n")), "{line}");
-        let output = scratch.dtof(&[&arguments, more, &["--quiet"]].concat());
-        assert!(output.status.success() && output.stdout.is_empty());
+    // The run lasts 105 ms, or no time.
+    for row in table(
+        "
+            events.aer --format ply --fov 45x24.5 | 12 events (45x24.5 degrees, 10 MHz)
+            events.aer --format pcd --calibration rays.toml | 12 events (rays.toml, 10 MHz)
+            events.aer --format evt2 --laser-hz 12500 | 0 events (0.0125 MHz)
+            events.aer --format mcap | 12 events (60x32.2 degrees, 10 MHz, clouds every 1049 µs)
+            events.aer --format mcap --slice-us 5 | clouds every 5 µs)
+            none.aer --format mcap --events depth | 0 events (60x32.2 degrees, 10 MHz, clouds every 10 µs)
+        ",
+    ) {
+        let line = format!("export --out x {}", row[0]);
+        let printed = scratch.printed(&line);
+        assert!(printed.starts_with("x: "), "{printed}");
+        assert!(printed.ends_with(&format!("{}\n", row[1])), "{printed}");
+        assert_eq!(scratch.printed(&format!("{line} --quiet")), "");
     }
 }
 
@@ -223,46 +179,30 @@ fn a_link_stays_and_what_it_leads_to_is_replaced() {
 
     let scratch = Scratch::new();
     scratch.file("events.aer", file(&HEADER, &events()));
-    std::fs::create_dir(scratch.path("folder")).unwrap();
     scratch.file("folder/points.csv", "old");
     symlink("folder/points.csv", scratch.path("link.csv")).unwrap();
     symlink("folder/none.csv", scratch.path("lost.csv")).unwrap();
-    let output = scratch.dtof(&[
-        "export",
-        "events.aer",
-        "--format",
-        "csv",
-        "--out",
-        "link.csv",
-    ]);
-    assert!(output.status.success());
+    scratch.printed("export events.aer --format csv --out link.csv");
     assert!(scratch.path("link.csv").is_symlink());
     assert_eq!(scratch.read("folder/points.csv").lines().count(), 13);
-    let output = scratch.dtof(&[
-        "export",
-        "events.aer",
-        "--format",
-        "csv",
-        "--out",
-        "lost.csv",
-    ]);
-    scratch.refused(&output, &["lost.csv: is a link to what is not there"]);
+    scratch.refused(
+        &scratch.run("export events.aer --format csv --out lost.csv"),
+        &["lost.csv: is a link to what is not there"],
+    );
     assert!(scratch.path("lost.csv").is_symlink());
 }
 
 #[test]
 fn the_commands_of_the_readme_run() {
     let scratch = Scratch::new();
-    std::fs::create_dir_all(scratch.path("out/demo")).unwrap();
     scratch.file("out/demo/events.aer", file(&HEADER, &events()));
-    let readme = include_str!("../../README.md");
+    let readme = include_str!("../../../README.md");
     let start = "cargo run --release -- export out/demo/";
     let mut commands = 0;
     for line in readme.lines().filter(|line| line.starts_with(start)) {
         let (command, _) = line.split_once('#').unwrap();
         let arguments: Vec<&str> = command.split_whitespace().skip(4).collect();
-        let output = scratch.dtof(&arguments);
-        assert!(output.status.success(), "{line}");
+        scratch.printed(&arguments.join(" "));
         assert!(scratch.path(arguments[arguments.len() - 1]).exists());
         commands += 1;
     }

@@ -1,8 +1,6 @@
 //! Events of a simulated scene against what its pixels saw.
 
-mod common;
-
-use common::Scratch;
+use crate::common::{Scratch, succeeded};
 use dtof::rows::grouped;
 
 #[test]
@@ -13,8 +11,7 @@ fn events_of_a_moving_target_are_compared_with_the_truth_of_their_laser_cycle() 
         "cycles = 100_000\nbackground = 0.01\n\
          [[surface]]\nname = \"rocket\"\nrange_mm = 1000\nsignal = 2\nvelocity_m_per_s = 100\n",
     );
-    let output = scratch.simulate(&scene, &[]);
-    let printed = String::from_utf8(output.stdout).unwrap();
+    let printed = succeeded(scratch.simulate(&scene, &[]));
     let row = |name: &str| {
         let found = printed.lines().find(|line| line.contains(name));
         found.unwrap_or_else(|| panic!("{printed}"))
@@ -51,8 +48,7 @@ fn every_event_is_compared_with_the_truth() {
         "columns = 8\nrows = 8\ncycles = 2000\nbackground = 0.05\n\
          [[surface]]\nname = \"wall\"\nrange_mm = 1000\nsignal = 0.3\n",
     );
-    let output = scratch.simulate(&scene, &["--alpha", "0.5", "--l1", "4"]);
-    let printed = String::from_utf8(output.stdout).unwrap();
+    let printed = succeeded(scratch.simulate(&scene, &["--alpha", "0.5", "--l1", "4"]));
     let events = scratch.read("out/events.csv");
     let error = |row: &str| row.split(',').nth(5).unwrap().parse::<f64>().unwrap() - 1000.0;
     let errors: Vec<f64> = events.lines().skip(1).map(error).collect();

@@ -2,12 +2,12 @@
 //! photons, word for word the same events. The device is the sidecar of the
 //! firmware behind a TCP port of this computer.
 
-use std::io::{ErrorKind, Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::TcpListener;
 use std::path::Path;
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use crate::common::says;
+use crate::{listen, serve};
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::Engine;
 use dtof::engine::host::host_engine;
@@ -17,7 +17,6 @@ use dtof::simulate::scene;
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{Count, DepthEvent, WindowRule};
 use dtof_firmware::sidecar::Sidecar;
-use dtof_link::frame::{Deframer, WIRE_BYTES};
 
 const PIXELS: usize = 64;
 
@@ -39,64 +38,25 @@ fn with_windows() -> Settings {
 /// Serves one connection after the other, each with a sidecar fresh from
 /// power-on; a connection ends when the host is gone or after `lives`.
 fn device(lives: Option<Duration>) -> String {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let name = format!("tcp:{}", listener.local_addr().unwrap());
-    thread::spawn(move || {
-        while let Ok((mut stream, _)) = listener.accept() {
-            serve(&mut stream, lives);
+    let mut lives = lives.unwrap_or(Duration::MAX);
+    listen(move |stream| {
+        let mut pixels = heapless::Vec::<_, PIXELS>::new();
+        while let Ok(true) = serve(
+            stream,
+            &mut Sidecar::new(&mut pixels, None),
+            lives,
+            |_, _| {},
+        ) {
+            lives = Duration::MAX; // switched off and on
         }
-    });
-    name
-}
-
-fn serve(stream: &mut TcpStream, lives: Option<Duration>) {
-    stream.set_nodelay(true).unwrap();
-    stream
-        .set_read_timeout(Some(Duration::from_millis(1)))
-        .unwrap();
-    let mut pixels = heapless::Vec::<_, PIXELS>::new();
-    let mut sidecar = Sidecar::new(&mut pixels, None);
-    let mut deframer = Deframer::new();
-    let started = Instant::now();
-    loop {
-        let now = u32::try_from(started.elapsed().as_millis()).unwrap();
-        if lives.is_some_and(|lives| started.elapsed() > lives) {
-            return serve(stream, None); // switched off and on
-        }
-        let mut bytes = [0; 1024];
-        match stream.read(&mut bytes) {
-            Ok(0) => return,
-            Ok(length) => {
-                for &byte in &bytes[..length] {
-                    if let Some(frame) = deframer.push(byte) {
-                        sidecar.receive(frame, now);
-                    }
-                }
-            }
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
-            Err(_) => return,
-        }
-        sidecar.work(0);
-        let mut wire = [0; WIRE_BYTES];
-        loop {
-            let length = sidecar.transmit(now, &mut wire);
-            if length == 0 {
-                break;
-            }
-            if stream.write_all(&wire[..length]).is_err() {
-                return;
-            }
-        }
-    }
+        true
+    })
 }
 
 /// All events of `cycles` laser cycles of the demo's scene, which is the same with all
 /// settings.
 fn events(engine: &mut dyn Engine, cycles: u64) -> anyhow::Result<Vec<DepthEvent>> {
-    let geometry = Geometry {
-        columns: 8,
-        rows: 8,
-    };
+    let geometry = Geometry::new(8, 8);
     let mut photons = scene::photons(geometry, &settings(), cycles)?;
     let mut events = Vec::new();
     for _ in 0..cycles / 250 {
@@ -187,10 +147,7 @@ fn a_configuration_the_device_cannot_take_is_refused_with_its_reason() {
         "{reason}"
     );
     let reason = refused(&settings(), 65);
-    assert!(
-        reason.contains("does not have that many pixels"),
-        "{reason}"
-    );
+    says(&reason, "does not have that many pixels");
 }
 
 #[test]

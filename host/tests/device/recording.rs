@@ -8,16 +8,14 @@ use std::path::Path;
 use std::rc::Rc;
 use std::time::Duration;
 
+use crate::{Closing, settings};
 use dtof::device::monitor::map::LiveMap;
 use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::device::{Client, Port};
-use dtof::engine::settings::Settings;
 use dtof::events::aer_file::{Event, Header, Reader};
-use dtof::simulate::scene;
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
-    AerEncoder, BinIndex, Count, DepthEvent, Flags, LaserCycle, PaperRule, PixelAddress,
-    SubBinOffset,
+    AerEncoder, BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, SubBinOffset,
 };
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
@@ -25,15 +23,6 @@ use dtof_link::message::greeting;
 use dtof_link::{Configuration, Report, Source, message};
 
 const PIXELS: u16 = 4;
-
-fn settings() -> Settings {
-    Settings {
-        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
-        l1: 40,
-        x: 4,
-        ..scene::settings(0)
-    }
-}
 
 fn event(pixel: u16, cycle: u64) -> DepthEvent {
     DepthEvent {
@@ -159,22 +148,6 @@ struct Screen(Rc<RefCell<Vec<u8>>>);
 impl Write for Screen {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.0.borrow_mut().write(bytes)
-    }
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-/// Takes so many bytes, then nobody reads any more.
-struct Closing(usize);
-
-impl Write for Closing {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0 = self
-            .0
-            .checked_sub(bytes.len())
-            .ok_or(ErrorKind::BrokenPipe)?;
-        Ok(bytes.len())
     }
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
