@@ -282,7 +282,7 @@ fn the_demo_is_the_papers_static_scene_and_every_pixel_reports() {
     // The array of the AER file's header: 64 columns, 32 rows.
     let aer = std::fs::read(scratch.path("out/demo/events.aer")).unwrap();
     assert_eq!(aer[12..24], [128, 0, 0, 0, 64, 0, 0, 0, 32, 0, 0, 0]);
-    // The pictures of the README are those of the demo.
+    // The maps of the documentation are those of the demo.
     for (picture, shown) in [
         ("depth-last", "demo-depth"),
         ("event-counts", "demo-events"),
