@@ -3,24 +3,19 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The pages below `folder`, itself included.
+/// The pages in `folder`, and in `docs` below it.
 fn pages(folder: &Path, pages: &mut Vec<PathBuf>) {
     for path in fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().path())
     {
         if path.is_dir() {
-            pages_below(&path, pages);
+            if path.ends_with("docs") || folder.ends_with("docs") || folder.ends_with("results") {
+                self::pages(&path, pages);
+            }
         } else if path.extension().is_some_and(|extension| extension == "md") {
             pages.push(path);
         }
-    }
-}
-
-/// Of the folders, `docs` alone has pages of the project.
-fn pages_below(folder: &Path, found: &mut Vec<PathBuf>) {
-    if folder.components().any(|part| part.as_os_str() == "docs") {
-        pages(folder, found);
     }
 }
 

@@ -16,6 +16,11 @@ fn rows(page: &str) -> Vec<[&str; 5]> {
     let rows = page.lines().filter(|line| line.starts_with('|'));
     let rows = rows.map(|line| line.trim_matches('|').split('|').map(str::trim).collect());
     let rows: Vec<Vec<&str>> = rows.collect();
+    // That of the verdicts has two cells.
+    assert!(
+        rows.iter().all(|row| matches!(row.len(), 2 | 5)),
+        "a | in a cell"
+    );
     let rows = rows
         .iter()
         .filter_map(|row| <[&str; 5]>::try_from(row.as_slice()).ok());

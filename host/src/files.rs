@@ -93,7 +93,7 @@ fn is_no_input(file: &Path, inputs: &[&Path]) -> Result<bool> {
 
 /// Whether two names lead to one file, also through links of either kind.
 #[cfg(unix)]
-fn are_same(one: &Path, other: &Path) -> bool {
+pub(crate) fn are_same(one: &Path, other: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
     let identity = |path| fs::metadata(path).map(|file| (file.dev(), file.ino()));
     matches!((identity(one), identity(other)), (Ok(one), Ok(other)) if one == other)
@@ -101,7 +101,7 @@ fn are_same(one: &Path, other: &Path) -> bool {
 
 /// Whether two names lead to one file.
 #[cfg(not(unix))]
-fn are_same(one: &Path, other: &Path) -> bool {
+pub(crate) fn are_same(one: &Path, other: &Path) -> bool {
     matches!((fs::canonicalize(one), fs::canonicalize(other)), (Ok(one), Ok(other)) if one == other)
 }
 

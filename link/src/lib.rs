@@ -15,6 +15,13 @@
 
 #![no_std]
 #![forbid(unsafe_code)]
+#![deny(
+    clippy::expect_used,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used
+)]
 
 mod configuration;
 mod dynamic_depth;

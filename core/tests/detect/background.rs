@@ -150,10 +150,16 @@ proptest! {
         let highest = wide.iter().copied().max().unwrap_or(0);
         prop_assert_eq!(u16::highest(&counts), highest);
         prop_assert_eq!(u32::highest(&wide), highest);
+        let sum = wide.iter().sum();
+        prop_assert_eq!(u16::highest_and_sum(&counts), (highest, sum));
+        prop_assert_eq!(u32::highest_and_sum(&wide), (highest, sum));
         for level in [level.into(), highest] {
             let expected = wide.iter().any(|&count| count >= level);
             prop_assert_eq!(u16::any_reaches(&counts, level), expected);
             prop_assert_eq!(u32::any_reaches(&wide, level), expected);
+            let first = wide.iter().position(|&count| count >= level);
+            prop_assert_eq!(u16::first_reaching(&counts, level), first);
+            prop_assert_eq!(u32::first_reaching(&wide, level), first);
         }
     }
 

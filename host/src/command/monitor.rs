@@ -128,7 +128,11 @@ impl Monitor {
                     bin_width_ps: settings.bin_width_ps,
                     offset_mm: settings.offset_mm,
                 };
-                Some(Recording::new(file, &header)?)
+                Some(Recording::new(
+                    file,
+                    self.image.as_deref().as_slice(),
+                    &header,
+                )?)
             }
         };
         let task = Task {

@@ -229,6 +229,13 @@ impl Client {
                     pixel < pixels,
                     "the device sends an event of pixel {pixel}, and has {pixels} pixels"
                 );
+                if let Event::Depth(event) = &event {
+                    let (bin, bins) = (event.peak_bin.raw(), self.bins());
+                    ensure!(
+                        bin < bins,
+                        "the device sends an event of bin {bin}, and has {bins} bins"
+                    );
+                }
                 self.events.push(event);
             }
         }

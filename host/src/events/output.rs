@@ -20,7 +20,7 @@ use crate::events::events_csv::{self, range_mm};
 use crate::events::maps::Maps;
 use crate::events::sample::Sample;
 use crate::events::summary::{self, Summary};
-use crate::files::{ASIDE, aside, flushed, may_replace};
+use crate::files::{ASIDE, are_same, aside, flushed, may_replace};
 use crate::input::source::PhotonSource;
 use crate::view::report::{self, Cloud, Figure, Section};
 use dtof_draw::svg;
@@ -37,6 +37,8 @@ const OF_A_RUN: &str = ".dtof-run-";
 /// Files on their way into the output folder.
 pub struct Output {
     folder: PathBuf,
+    /// What is read, and so stays.
+    input: Option<PathBuf>,
     csv: BufWriter<NamedTempFile>,
     aer: aer_file::Writer<BufWriter<NamedTempFile>>,
     scale: RangeScale,
@@ -64,7 +66,7 @@ impl Output {
         for (name, mark) in results() {
             may_replace(&folder.join(name), mark, input.as_slice())?;
         }
-        remove_leftovers(folder);
+        remove_leftovers(folder, input);
         let geometry = source.geometry();
         let mut csv = BufWriter::new(aside(folder, OF_A_RUN)?);
         writeln!(csv, "{}", events_csv::HEADER)?;
@@ -77,6 +79,7 @@ impl Output {
         let aer = aer_file::Writer::new(BufWriter::new(aside(folder, OF_A_RUN)?), &header)?;
         Ok(Self {
             folder: folder.to_owned(),
+            input: input.map(Path::to_owned),
             csv,
             aer,
             scale,
@@ -170,6 +173,14 @@ impl Output {
             SUMMARY,
         ));
 
+        // Something may have come there since.
+        for (name, mark) in results() {
+            may_replace(
+                &self.folder.join(name),
+                mark,
+                self.input.as_deref().as_slice(),
+            )?;
+        }
         // Without a summary the folder does not look complete.
         let old = self.folder.join(SUMMARY);
         match fs::remove_file(&old) {
@@ -200,11 +211,12 @@ fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
 
 /// Removes what a killed run has left, and nothing of an export or a recording, which
 /// may be under way. None of it is worth an error.
-fn remove_leftovers(folder: &Path) {
+fn remove_leftovers(folder: &Path, input: Option<&Path>) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        if name.starts_with(OF_A_RUN) && name.ends_with(ASIDE) {
+        let is_read = input.is_some_and(|input| are_same(input, &entry.path()));
+        if name.starts_with(OF_A_RUN) && name.ends_with(ASIDE) && !is_read {
             let _ = fs::remove_file(entry.path());
         }
     }

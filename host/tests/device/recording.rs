@@ -184,7 +184,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
         sent: Rc::clone(&sent),
     }))
     .unwrap();
-    let mut recording = Recording::new(&path, &header).unwrap();
+    let mut recording = Recording::new(&path, &[], &header).unwrap();
     let screen = Screen::default();
     let room = Box::new(|| (24, 80));
     let mut map = LiveMap::new(Box::new(screen.clone()), room, PIXELS, 2);

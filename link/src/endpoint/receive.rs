@@ -8,13 +8,18 @@ use super::{
 };
 use crate::frame::FrameError;
 
+/// One more; after 2³² of them from 0 again, as differences are what is looked at.
+pub(super) const fn count(counter: &mut u32) {
+    *counter = counter.wrapping_add(1);
+}
+
 impl Endpoint {
     /// Takes what a [`Deframer`](crate::frame::Deframer) found on the wire.
     pub fn receive(&mut self, frame: Result<&[u8], FrameError>, now_ms: u32) {
         match frame {
             Ok(payload) => self.frame(payload, now_ms),
-            Err(FrameError::Corrupt) => self.counters.corrupt += 1,
-            Err(FrameError::Oversized) => self.counters.oversized += 1,
+            Err(FrameError::Corrupt) => count(&mut self.counters.corrupt),
+            Err(FrameError::Oversized) => count(&mut self.counters.oversized),
         }
     }
 
@@ -22,20 +27,20 @@ impl Endpoint {
         let Some((&[kind, session0, session1, number, expects, limit], body)) =
             payload.split_first_chunk::<HEADER_BYTES>()
         else {
-            self.counters.corrupt += 1;
+            count(&mut self.counters.corrupt);
             return;
         };
         if body.len() > BODY_BYTES {
-            self.counters.oversized += 1;
+            count(&mut self.counters.oversized);
             return;
         }
-        self.counters.frames += 1;
+        count(&mut self.counters.frames);
         let session = u16::from_le_bytes([session0, session1]);
         let ours = self.open && session == self.session;
         match kind {
             HELLO if !self.host => {
                 let Some(greeting) = body.first_chunk() else {
-                    self.counters.corrupt += 1;
+                    count(&mut self.counters.corrupt);
                     return;
                 };
                 // After a message of the session, only from another host that has
@@ -57,7 +62,7 @@ impl Endpoint {
                 self.numbered(kind, number, body);
             }
             _ => {
-                self.counters.foreign += 1;
+                count(&mut self.counters.foreign);
                 // Only what is known to be wrong is answered, and never an answer.
                 if !self.host && kind <= KEEP_ALIVE {
                     self.reply = Some((NO_SESSION, session));
@@ -108,12 +113,12 @@ impl Endpoint {
         let ahead = number.wrapping_sub(self.expected);
         self.acknowledge = true;
         if ahead >= 128 {
-            self.counters.duplicate += 1;
+            count(&mut self.counters.duplicate);
             return;
         }
         let body = Vec::from_slice(body).unwrap_or_default();
         if ahead > 0 || self.inbox.push_back(Message { kind, body }).is_err() {
-            self.counters.out_of_order += 1;
+            count(&mut self.counters.out_of_order);
             return;
         }
         self.expected = self.expected.wrapping_add(1);

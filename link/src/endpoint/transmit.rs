@@ -1,5 +1,6 @@
 //! What an end sends, and when.
 
+use super::receive::count;
 use super::{
     Endpoint, HEADER_BYTES, HELLO, KEEP_ALIVE, KEEP_ALIVE_MS, RETRANSMIT_MOST_MS, RETRANSMIT_MS,
     WELCOME, WINDOW,
@@ -40,7 +41,7 @@ impl Endpoint {
             }
             self.sent += 1;
             if self.sent <= self.sent_before {
-                self.counters.retransmitted += 1;
+                count(&mut self.counters.retransmitted);
             } else {
                 self.sent_before = self.sent;
             }

@@ -20,12 +20,12 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Begins a file.
+    /// Begins a file, which replaces none of `inputs`.
     ///
     /// # Errors
     /// If nothing can be written in its folder, or what is at `path` is no file.
-    pub fn new(path: &Path, header: &Header) -> Result<Self> {
-        let place = place_of(path, &[])?;
+    pub fn new(path: &Path, inputs: &[&Path], header: &Header) -> Result<Self> {
+        let place = place_of(path, inputs)?;
         let name = || path.display().to_string();
         let mut file = aside(&place.folder, ".dtof-recording-").with_context(name)?;
         file.disable_cleanup(true);
@@ -105,7 +105,7 @@ mod tests {
             (folder.path(), ": is there, and is no file"),
             (&gone, ": there is no folder "),
         ] {
-            let error = Recording::new(path, &HEADER).map(|_| ()).unwrap_err();
+            let error = Recording::new(path, &[], &HEADER).map(|_| ()).unwrap_err();
             assert!(format!("{error:#}").contains(part), "{error:#}");
         }
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
@@ -115,7 +115,7 @@ mod tests {
     fn what_cannot_be_moved_to_its_place_stays_and_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("events.aer");
-        let recording = Recording::new(&path, &HEADER).unwrap();
+        let recording = Recording::new(&path, &[], &HEADER).unwrap();
         let aside = recording.aside.clone();
         fs::create_dir(&path).unwrap();
         let error = format!("{:#}", recording.finish().unwrap_err());

@@ -30,7 +30,8 @@ pub struct Comparison<'a> {
     scale: RangeScale,
     /// Laser cycles of the run.
     cycles: u64,
-    /// The last bin of the range gate.
+    /// The first bin that may hold the peak, and the last.
+    first_bin: usize,
     last_bin: usize,
     /// One a surface, and one for pixels that see none.
     tallies: Vec<Tally>,
@@ -63,6 +64,7 @@ impl Scene {
             scene: self,
             scale: settings.range_scale()?,
             cycles,
+            first_bin: settings.gate.map_or(0, |(first, _)| first.into()),
             last_bin: settings.gate.map_or(bins - 1, |(_, last)| last.into()),
             tallies: vec![Tally::new(self.geometry.addresses()); self.surfaces.len() + 1],
             false_peaks: vec![0; bins],
@@ -99,8 +101,9 @@ impl Comparison<'_> {
             let right = error_mm.filter(|error| error.abs() <= limit_mm);
             let surface = view.map_or(self.scene.surfaces.len(), |view| view.surface);
             self.tallies[surface].add(event, right.map(|error| (error, error.abs() / limit_mm)));
-            if right.is_none() {
-                self.false_peaks[usize::from(event.peak_bin.raw())] += 1;
+            let bin = usize::from(event.peak_bin.raw());
+            if let (None, Some(count)) = (right, self.false_peaks.get_mut(bin)) {
+                *count += 1;
             }
         }
     }
@@ -148,10 +151,11 @@ impl Comparison<'_> {
         let reach = FALSE_BEYOND_BINS as usize;
         let most = self.false_peaks.iter().max()?;
         let middle = self.false_peaks.iter().position(|count| count == most)?;
-        let first = middle.saturating_sub(reach);
+        let first = middle.saturating_sub(reach).max(self.first_bin);
         let last = (middle + reach).min(self.last_bin);
         let here: u64 = self.false_peaks.get(first..=last)?.iter().sum();
-        let even = false_alarms * (last + 1 - first) as u64 / self.false_peaks.len() as u64;
+        let bins = self.last_bin + 1 - self.first_bin;
+        let even = false_alarms * (last + 1 - first) as u64 / bins as u64;
         let is_glass = 2 * here > false_alarms
             && here >= GLASS_AT_LEAST
             && here >= events / GLASS_ONE_IN
