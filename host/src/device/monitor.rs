@@ -327,19 +327,11 @@ mod tests {
             let Geometry { columns, rows } = array(pixels, columns);
             (columns, rows)
         };
-        for (pixels, squarest) in [1, 2, 4, 9, 64, 128, 2048, 7, 0].into_iter().zip([
-            [1, 1],
-            [2, 1],
-            [2, 2],
-            [3, 3],
-            [8, 8],
-            [16, 8],
-            [64, 32],
-            [7, 1],
-            [1, 0],
-        ]) {
-            assert_eq!(array(pixels, None), squarest.into());
-        }
+        let pixels = [1, 2, 4, 9, 64, 128, 2048, 7, 0];
+        let columns = [1, 2, 2, 3, 8, 16, 64, 7, 1];
+        assert_eq!(pixels.map(|pixels| array(pixels, None).0), columns);
+        let rows = [1, 1, 2, 3, 8, 8, 32, 1, 0];
+        assert_eq!(pixels.map(|pixels| array(pixels, None).1), rows);
         assert_eq!(array(64, Some(10)), (10, 7));
     }
 }
