@@ -113,6 +113,7 @@ impl fmt::Display for Verdict {
 }
 
 /// The least and the greatest of values from 0 on.
+#[must_use]
 pub fn ends(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let ends = (f64::INFINITY, 0.0f64);
     let values = values.into_iter();

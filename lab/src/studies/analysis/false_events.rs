@@ -1,7 +1,7 @@
 //! False events of the rule, which has to estimate the background, at one look and
 //! over an exposure: what `dtof tune` interpolates.
 
-use crate::sweep::results::{Claim, Comparison, Figure, Results, Share, Table, Verdict};
+use crate::sweep::results::{Claim, Comparison, Figure, Results, Share, Table, Verdict, ends};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use anyhow::{Context, Result};
 use dtof::rows::grouped;
@@ -162,9 +162,7 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
     let range = |last| -> Result<(f64, f64)> {
         let shares = shares(part, last, 4)?;
         let values = shares.iter().map(|(_, share)| share.value);
-        Ok(values.fold((f64::INFINITY, 0.0), |(low, high), value| {
-            (value.min(low), value.max(high))
-        }))
+        Ok(ends(values))
     };
     let (look, exposure) = (range(LOOKS.0)?, range(LOOKS.1)?);
     // To a factor of 2 over all backgrounds.
@@ -227,9 +225,7 @@ fn chart(part: &Part, last: u32) -> Result<Chart> {
     }
     let shares = shares(part, last, 4)?;
     let at_4 = shares.iter().map(|(_, share)| share.value);
-    let (low, high) = at_4.fold((f64::INFINITY, 0.0f64), |(low, high), value| {
-        (value.min(low), value.max(high))
-    });
+    let (low, high) = ends(at_4);
     let spread = low * 30.0 < printed(4) && high > printed(4);
     let (finding, key) = if is_look {
         let text =

@@ -2,7 +2,7 @@
 //! (Eq. 10) is off by, with the background known.
 
 use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target};
-use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
+use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict, ends};
 use crate::sweep::{Part, Point, Study, Tally, point};
 use anyhow::Result;
 use dtof::rows::grouped;
@@ -147,14 +147,8 @@ fn claims(part: &Part) -> Vec<Claim> {
             .map(|background| times(background, alpha))
             .fold(0.0, f64::max)
     };
-    let at_4: Vec<f64> = BACKGROUNDS
-        .map(|background| Rate::FalsePositive.exact(background, 4))
-        .into();
-    let (low, high) = at_4
-        .iter()
-        .fold((f64::INFINITY, 0.0), |(low, high), &rate| {
-            (rate.min(low), rate.max(high))
-        });
+    let at_4 = BACKGROUNDS.map(|background| Rate::FalsePositive.exact(background, 4));
+    let (low, high) = ends(at_4);
     let root_error = (0..=1023u32)
         .map(|value| f64::from(value).sqrt() - f64::from(isqrt::<5>(value)))
         .fold(0.0, f64::max);
