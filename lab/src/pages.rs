@@ -11,15 +11,18 @@ mod movie;
 
 use crate::studies::failures::STUDY as FAILURES;
 use crate::studies::methods::{depth_error, event_depth, time_to_detect};
-use crate::sweep::results::{Figure, Results};
+use crate::sweep::results::{Claim, Figure};
+use crate::sweep::values::Values;
 use crate::sweep::{Part, SeedRange, Study};
 use crate::{studies, sweep};
 use anyhow::{Context, Result, ensure};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+
+const FIGURES: &str = include_str!("pages/figures.md");
+const CLAIMS: &str = include_str!("pages/paper-claims.md");
 
 /// What is done anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,11 +119,41 @@ pub fn documents(
     let (counts, recorded) = (read(methods::INSTRUCTIONS)?, read(methods::RECORDED)?);
     let methods = methods::documents(&counts, &recorded, time?, depth?, events?)?;
     documents.extend(methods);
-    let failures = failures::document(part(FAILURES)?)?;
-    documents.push(("results/failures.md".into(), failures));
+    let mut values = Values::default();
+    for (study, results) in &all {
+        values.add(study.name, &results.values);
+        values.set(format!("{}.about", study.name), study.about);
+        values.set(format!("{}.seeds", study.name), study.all_seeds);
+        for Claim {
+            name,
+            here,
+            verdict,
+        } in &results.claims
+        {
+            values.set(format!("{}.{name}", study.name), verdict);
+            values.set(format!("{}.{name}.here", study.name), here);
+            ensure!(
+                CLAIMS.contains(&format!("{{{}.{name}.here}}", study.name)),
+                "{}: the page has no claim {name}",
+                study.name
+            );
+        }
+        for Figure { name, .. } in &results.figures {
+            ensure!(
+                FIGURES.contains(&format!("(../figures/{name}.svg)")),
+                "the page has no figure {name}"
+            );
+        }
+    }
+    values.add(FAILURES.name, &failures::tables(part(FAILURES)?)?);
+    for (page, template) in [
+        ("results/failures.md", include_str!("pages/failures.md")),
+        ("results/figures.md", FIGURES),
+        ("results/paper-claims.md", CLAIMS),
+    ] {
+        documents.push((page.into(), values.fill(template)?));
+    }
     documents.push(("figures/demo.svg".into(), movie::demo()?));
-    documents.push(("results/figures.md".into(), captions(&all)?));
-    documents.push(("results/paper-claims.md".into(), claims(&all)?));
     Ok(documents)
 }
 
@@ -159,51 +192,4 @@ pub fn different(docs: &Path, documents: &[(PathBuf, String)]) -> Vec<PathBuf> {
     };
     let different = documents.iter().filter(differs);
     different.map(|(path, _)| docs.join(path)).collect()
-}
-
-/// Figures by study. A caption that several have in common stands below the last of them.
-fn captions(all: &[(&Study, Results)]) -> Result<String> {
-    let mut text = "# Figures\n\n\
-        Made by `cargo lab figures`; do not edit. `--all` works out every seed again.\n"
-        .to_owned();
-    for (study, results) in all {
-        let (name, about) = (study.name, study.about);
-        if !results.figures.is_empty() {
-            let seeds = study.all_seeds;
-            write!(text, "\n## {name}\n\nStudy of {about}; {seeds} seeds.\n")?;
-        }
-        for same in results.figures.chunk_by(|a, b| a.caption == b.caption) {
-            for Figure { name, .. } in same {
-                write!(text, "\n![{name}](../figures/{name}.svg)\n")?;
-            }
-            if let [Figure { caption, .. }, ..] = same {
-                write!(text, "\n{caption}\n")?;
-            }
-        }
-    }
-    Ok(text)
-}
-
-fn claims(all: &[(&Study, Results)]) -> Result<String> {
-    let mut text = "# The paper's claims\n\n\
-        Made by `cargo lab figures`; do not edit. Each claim of the paper, its number, ours, and a verdict. The \
-        [figures](figures.md) show more; [the paper, line by line](../paper.md) has the rest of the paper.\n\n\
-        | verdict | meaning |\n|---|---|\n\
-        | agrees | the same here, in all that was tried |\n\
-        | differs | in part, or with another number |\n\
-        | refuted | not so in anything that was tried, or not as stated |\n\
-        | not decided | the sample is too small to tell |\n\n\
-        The criterion stands with the claim, or in its study in `lab/src/studies`.\n\n\
-        | claim | the paper | here | verdict | why | study |\n|---|---|---|---|---|---|\n"
-        .to_owned();
-    for (study, results) in all {
-        for claim in &results.claims {
-            writeln!(
-                text,
-                "| {} | {} | {} | **{}** | {} | `{}` |",
-                claim.claim, claim.paper, claim.here, claim.verdict, claim.why, study.name
-            )?;
-        }
-    }
-    Ok(text)
 }

@@ -16,6 +16,7 @@ pub mod mean;
 mod part;
 pub mod results;
 mod run;
+pub mod values;
 
 use std::collections::BTreeMap;
 

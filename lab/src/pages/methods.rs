@@ -11,6 +11,7 @@ use crate::studies::methods::passage::Method as Rule;
 use crate::studies::methods::time_to_detect::Outcome;
 use crate::studies::methods::{depth_error, time_to_detect};
 use crate::sweep::mean::Measured;
+use crate::sweep::values::Values;
 use crate::sweep::{Part, PointTally};
 use anyhow::{Context, Result, ensure};
 use dtof_draw::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style, chart};
@@ -315,31 +316,19 @@ pub fn documents(
         &recorded,
     )?;
     let (worst, elsewhere) = depth_error::elsewhere(depth)?;
-    let [sigma, signal, background] =
-        ["sigma", "signal", "background"].map(|name| worst.parameter(name));
-    let mut text = format!(
-        "# Which method for which scene\n\n\
-         Made by `cargo xtask figures` from the studies `time-to-detect`, `depth-error` and `event-depth` and from the\n\
-         [instruction counts](../bench/README.md); do not edit. The tables name the cheapest method whose 99 % interval\n\
-         ends no more than {:.0} % above the best one's figure, or the best.\n\n\
-         ## What it costs\n\n\
-         A photon takes {photon:.1} instructions whatever the method. A dot is the mean over all scenes of the studies,\n\
-         its bar from the best scene to the worst; the line is the frontier, methods that no other is both cheaper and\n\
-         better than.\n\n\
-         ![Cost of a decision against time to an event](../figures/cost-time-to-detect.svg)\n\n\
-         ![Cost of a depth against its error](../figures/cost-depth-error.svg)\n\n\
-         Errors are those of peaks in the pulse. Peaks farther than 2 σ + 1 bins from it are false events and left out:\n\
-         at most {:.1} %, with σ {sigma}, {signal} signal photons and {background} background counts a bin.\n\n\
-         On recorded photons, all rules set to one false event in 100 exposures, and the minimum count of window rules\n\
-         so that they take no more photons an event than the paper's ([all rows](data/recorded_rules.csv), made by the\n\
-         test `recorded_rules`):\n\n\
-         ![Recorded photons: cost against error](../figures/cost-recorded.svg)\n\n",
-        MARGIN * 100.0,
-        elsewhere * 100.0
-    );
-    tables::decision(&mut text, &counts, &outcomes)?;
-    tables::depth(&mut text, &counts, depth)?;
-    events::section(&mut text, events)?;
+    let mut values = Values::from([
+        ("margin", format!("{:.0}", MARGIN * 100.0)),
+        ("photon", format!("{photon:.1}")),
+        ("elsewhere", format!("{:.1}", elsewhere * 100.0)),
+        ("rules", tables::rules(&counts, &outcomes)?),
+        ("estimators", tables::estimators(&all_estimators)),
+        ("depths", tables::depths(&counts, depth)?),
+    ]);
+    for name in ["sigma", "signal", "background"] {
+        values.set(name, worst.parameter(name));
+    }
+    events::section(&mut values, events)?;
+    let text = values.fill(include_str!("methods.md"))?;
     Ok(vec![
         ("figures/cost-time-to-detect.svg".into(), decision_svg),
         ("figures/cost-depth-error.svg".into(), depth_svg),

@@ -1,5 +1,6 @@
 //! What a study comes to: figures, and verdicts on what the paper claims.
 
+use super::values::Values;
 use super::{Part, PointTally};
 use anyhow::{Context, Result};
 use dtof_draw::chart;
@@ -15,6 +16,8 @@ pub struct Results {
     pub figures: Vec<Figure>,
     /// In the order of the paper.
     pub claims: Vec<Claim>,
+    /// What the pages say of it beside these.
+    pub values: Values,
     /// For programs.
     pub tables: Vec<Table>,
 }
@@ -37,8 +40,6 @@ pub struct Figure {
     pub holds: bool,
     /// An SVG document.
     pub svg: String,
-    /// How it was found; what it shows, it says itself.
-    pub caption: String,
 }
 
 impl Figure {
@@ -46,29 +47,37 @@ impl Figure {
     ///
     /// # Errors
     /// If there is nothing to draw.
-    pub fn new(name: &'static str, chart: &Chart, caption: impl Into<String>) -> Result<Self> {
+    pub fn new(name: &'static str, chart: &Chart) -> Result<Self> {
         Ok(Self {
             name,
             holds: chart.finding.holds,
             svg: chart::chart(chart)?,
-            caption: caption.into(),
         })
     }
 }
 
-/// Something the paper says, and whether it is so.
+/// Something the paper says, and whether it is so. The page of claims has the rest.
 #[derive(Clone, Debug)]
 pub struct Claim {
-    /// What is claimed, and where in the paper.
-    pub claim: &'static str,
-    /// The paper's figure or number.
-    pub paper: &'static str,
-    /// Ours, with its interval or sample size.
+    /// Its name in the page.
+    pub name: &'static str,
+    /// Our figure or number, with its interval or sample size.
     pub here: String,
-    /// Whether they go together.
+    /// Whether it goes together with the paper's.
     pub verdict: Verdict,
-    /// Why, or under what condition.
-    pub why: &'static str,
+}
+
+impl Claim {
+    /// The claim of this name.
+    #[must_use]
+    pub fn new(name: &'static str, here: impl Into<String>, verdict: Verdict) -> Self {
+        let here = here.into();
+        Self {
+            name,
+            here,
+            verdict,
+        }
+    }
 }
 
 /// How a claim fares.
@@ -101,6 +110,14 @@ impl fmt::Display for Verdict {
             Self::NotDecided => "not decided",
         })
     }
+}
+
+/// The least and the greatest of values from 0 on.
+#[must_use]
+pub fn ends(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    let ends = (f64::INFINITY, 0.0f64);
+    let values = values.into_iter();
+    values.fold(ends, |(low, high), value| (value.min(low), value.max(high)))
 }
 
 /// Standard deviations of an interval that holds 99 %.

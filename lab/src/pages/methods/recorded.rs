@@ -9,7 +9,7 @@ use crate::sweep::mean::Measured;
 /// `host-tests` makes it from the public capture log.
 pub const RECORDED: &str = "results/data/recorded_rules.csv";
 
-/// The methods on recorded photons at equal rates of false events, without added
+/// The methods on recorded photons at equal rates of false alarms, without added
 /// background: the paper's rule, and window rules that take as many photons an event.
 pub(super) fn recorded(counts: &Instructions, csv: &str) -> Result<Vec<Entry>> {
     let mut entries = Vec::new();

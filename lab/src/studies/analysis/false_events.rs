@@ -1,7 +1,7 @@
 //! False events of the rule, which has to estimate the background, at one look and
 //! over an exposure: what `dtof tune` interpolates.
 
-use crate::sweep::results::{Claim, Comparison, Figure, Results, Share, Table, Verdict};
+use crate::sweep::results::{Claim, Comparison, Figure, Results, Share, Table, Verdict, ends};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use anyhow::{Context, Result};
 use dtof::rows::grouped;
@@ -10,9 +10,7 @@ use dtof_core::{Count, Threshold};
 use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::alpha as pen;
 use dtof_theory::gaussian::false_positive_rate;
-use dtof_theory::looks::repeated_looks::{
-    ALPHA_STEPS, BINS, FalseAlarms, MINIMUM_COUNT, alpha_bits,
-};
+use dtof_theory::looks::repeated_looks::{ALPHA_STEPS, FalseAlarms, MINIMUM_COUNT, alpha_bits};
 use dtof_theory::looks::single_look::SingleLook;
 use dtof_theory::looks::{repeated_looks, table};
 use rand_pcg::Pcg64;
@@ -136,19 +134,13 @@ fn results(part: &Part) -> Result<Results> {
     let tallies = part.points().iter().map(false_events);
     let tallies: Vec<_> = tallies.collect::<Result<_>>()?;
     let exposures = grouped(part.points()[0].count("exposures"));
-    let caption = format!(
-        "Background only, {BINS} bins, quadrant background, at least {MINIMUM_COUNT} photons; {exposures} exposures a dot."
-    );
     Ok(Results {
         figures: vec![
-            Figure::new(
-                "false-events-look",
-                &chart(part, LOOKS.0)?,
-                caption.as_str(),
-            )?,
-            Figure::new("false-events-exposure", &chart(part, LOOKS.1)?, caption)?,
+            Figure::new("false-events-look", &chart(part, LOOKS.0)?)?,
+            Figure::new("false-events-exposure", &chart(part, LOOKS.1)?)?,
         ],
         claims: claims(part)?,
+        values: [("exposures", exposures)].into(),
         tables: vec![Table {
             path: "../theory/data/repeated_looks.csv",
             csv: table::csv(&tallies)?,
@@ -170,9 +162,7 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
     let range = |last| -> Result<(f64, f64)> {
         let shares = shares(part, last, 4)?;
         let values = shares.iter().map(|(_, share)| share.value);
-        Ok(values.fold((f64::INFINITY, 0.0), |(low, high), value| {
-            (value.min(low), value.max(high))
-        }))
+        Ok(ends(values))
     };
     let (look, exposure) = (range(LOOKS.0)?, range(LOOKS.1)?);
     // To a factor of 2 over all backgrounds.
@@ -181,10 +171,9 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
         Verdict::of(printed / 2.0 < low && high < 2.0 * printed)
     };
     Ok(vec![
-        Claim {
-            claim: "Eq. 10 is the false positive rate of a look, with the background estimated (II-C, IV)",
-            paper: "0.40 % at α = 4, M_B = 127",
-            here: format!(
+        Claim::new(
+            "look",
+            format!(
                 "{:.2} to {:.2} % over 0.1 to 300 background counts a bin; exact form and simulation differ \
                  at {} of {} points",
                 look.0 * 100.0,
@@ -192,22 +181,18 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
                 compared.outside,
                 compared.points
             ),
-            verdict: is_printed(look),
-            why: "the smaller of two quadrant maxima lies above the mean, so that α is measured from a \
-                  higher level; few counts are not Gaussian",
-        },
-        Claim {
-            claim: "Eq. 10 is the false positive rate of the asynchronous operation (II-C)",
-            paper: "0.40 % at α = 4, M_B = 127",
-            here: format!(
+            is_printed(look),
+        ),
+        Claim::new(
+            "exposure",
+            format!(
                 "{:.2} to {:.2} % of exposures of {} looks over 0.1 to 200 background counts a bin",
                 exposure.0 * 100.0,
                 exposure.1 * 100.0,
                 LOOKS.1 - LOOKS.0 + 1
             ),
-            verdict: is_printed(exposure),
-            why: "an exposure looks until L2, and each look may fire",
-        },
+            is_printed(exposure),
+        ),
     ])
 }
 
@@ -240,9 +225,7 @@ fn chart(part: &Part, last: u32) -> Result<Chart> {
     }
     let shares = shares(part, last, 4)?;
     let at_4 = shares.iter().map(|(_, share)| share.value);
-    let (low, high) = at_4.fold((f64::INFINITY, 0.0f64), |(low, high), value| {
-        (value.min(low), value.max(high))
-    });
+    let (low, high) = ends(at_4);
     let spread = low * 30.0 < printed(4) && high > printed(4);
     let (finding, key) = if is_look {
         let text =

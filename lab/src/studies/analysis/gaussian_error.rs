@@ -2,7 +2,7 @@
 //! (Eq. 10) is off by, with the background known.
 
 use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target};
-use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
+use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict, ends};
 use crate::sweep::{Part, Point, Study, Tally, point};
 use anyhow::Result;
 use dtof::rows::grouped;
@@ -115,18 +115,15 @@ fn fine_backgrounds() -> impl Iterator<Item = f64> + Clone {
 
 fn results(part: &Part) -> Result<Results> {
     let histograms = grouped(part.points()[0].count("histograms"));
-    let caption = format!(
-        "Background known, 7 bins of it; pulse of SNR 18, σ = 1.5 bins; {histograms} histograms a dot."
-    );
-    let figure = |name, chart: &Chart| Figure::new(name, chart, caption.as_str());
     Ok(Results {
         figures: vec![
-            figure("gaussian-error-false", &rates(part, Rate::FalsePositive))?,
-            figure("gaussian-error-ratio", &ratio())?,
-            figure("gaussian-error-pass", &rates(part, Rate::Pass))?,
+            Figure::new("gaussian-error-false", &rates(part, Rate::FalsePositive))?,
+            Figure::new("gaussian-error-ratio", &ratio())?,
+            Figure::new("gaussian-error-pass", &rates(part, Rate::Pass))?,
         ],
         claims: claims(part),
-        tables: Vec::new(),
+        values: [("histograms", histograms)].into(),
+        ..Results::default()
     })
 }
 
@@ -150,22 +147,15 @@ fn claims(part: &Part) -> Vec<Claim> {
             .map(|background| times(background, alpha))
             .fold(0.0, f64::max)
     };
-    let at_4: Vec<f64> = BACKGROUNDS
-        .map(|background| Rate::FalsePositive.exact(background, 4))
-        .into();
-    let (low, high) = at_4
-        .iter()
-        .fold((f64::INFINITY, 0.0), |(low, high), &rate| {
-            (rate.min(low), rate.max(high))
-        });
+    let at_4 = BACKGROUNDS.map(|background| Rate::FalsePositive.exact(background, 4));
+    let (low, high) = ends(at_4);
     let root_error = (0..=1023u32)
         .map(|value| f64::from(value).sqrt() - f64::from(isqrt::<5>(value)))
         .fold(0.0, f64::max);
     vec![
-        Claim {
-            claim: "from 30 background counts a bin on, counts are as good as Gaussian (II-C, effect of L1)",
-            paper: "λ_b ≥ 30",
-            here: format!(
+        Claim::new(
+            "enough",
+            format!(
                 "from 30 to 300: Eq. 8 off by up to {pass_off:.3}; Eq. 10 too low by a factor of up to \
                  {:.1}, {:.1}, {:.1}, {:.0} for α = 2, 3, 4, 5",
                 false_off(2),
@@ -175,7 +165,7 @@ fn claims(part: &Part) -> Vec<Claim> {
             ),
             // Both equations: probabilities to a twentieth, the rare ones to a factor
             // of 2; one of the two is a part.
-            verdict: match (
+            match (
                 pass_off < 0.05,
                 ALPHAS.iter().all(|&alpha| false_off(alpha) < 2.0),
             ) {
@@ -183,27 +173,22 @@ fn claims(part: &Part) -> Vec<Claim> {
                 (false, false) => Verdict::Refuted,
                 _ => Verdict::Differs,
             },
-            why: "a false positive asks for the tail, where a Poisson count has more weight than a Gaussian",
-        },
-        Claim {
-            claim: "the false positive rate depends on α alone (Eq. 10)",
-            paper: "2.2e-4 at α = 4, M_B = 7",
-            here: format!(
+        ),
+        Claim::new(
+            "alpha",
+            format!(
                 "{low:.1e} to {high:.1e} over 0.1 to 300 background counts a bin; exact and simulated \
                  differ at {} of {} points",
                 exact.outside, exact.points
             ),
             // To a factor of 2.
-            verdict: Verdict::of(high / low < 2.0),
-            why: "with few counts the threshold falls between whole numbers, and the tail is longer",
-        },
-        Claim {
-            claim: "five iterations give the square root with an error below one (IV)",
-            paper: "< 1",
-            here: format!("at most {root_error:.3} over all counts from 0 to 1023"),
-            verdict: Verdict::of(root_error < 1.0),
-            why: "the root is rounded down exactly; all 10-bit counts were tried",
-        },
+            Verdict::of(high / low < 2.0),
+        ),
+        Claim::new(
+            "root",
+            format!("at most {root_error:.3} over all counts from 0 to 1023"),
+            Verdict::of(root_error < 1.0),
+        ),
     ]
 }
 

@@ -114,17 +114,14 @@ fn comparison(part: &Part, backgrounds: &[f64], predicted: impl Fn(f64, f64) -> 
 
 fn results(part: &Part) -> Result<Results> {
     let histograms = part.one([("snr", 1.0)])?.count("histograms");
-    let caption = format!(
-        "8 bins, pulse of σ = 1.5 bins on the edge of two; {} histograms a dot.",
-        grouped(histograms)
-    );
     Ok(Results {
         figures: vec![
-            Figure::new("hit-rate", &chart(part, 0.0)?, caption.as_str())?,
-            Figure::new("hit-rate-neighbours", &chart(part, 1.0)?, caption)?,
+            Figure::new("hit-rate", &chart(part, 0.0)?)?,
+            Figure::new("hit-rate-neighbours", &chart(part, 1.0)?)?,
         ],
         claims: claims(part)?,
-        tables: Vec::new(),
+        values: [("histograms", grouped(histograms))].into(),
+        ..Results::default()
     })
 }
 
@@ -157,36 +154,30 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
     // The last of the backgrounds is the largest, where a Gaussian does best.
     let best = found.last().context("no backgrounds")?;
     Ok(vec![
-        Claim {
-            claim: "Eq. 7 and its Monte-Carlo simulation match closely (II-C)",
-            paper: "\"closely\", M_B = 7, B = 0.05",
-            here: format!("99 % intervals by background counts a bin: {misses}"),
+        Claim::new(
+            "eq7",
+            format!("99 % intervals by background counts a bin: {misses}"),
             // Within the interval everywhere; or at least to what can be told apart
             // on a plot, a fiftieth, at the largest background.
-            verdict: if found.iter().all(Comparison::is_chance) {
+            if found.iter().all(Comparison::is_chance) {
                 Verdict::Agrees
             } else if best.largest < 0.02 {
                 Verdict::Differs
             } else {
                 Verdict::Refuted
             },
-            why: "counts are Poisson; with few photons a Gaussian of the same variance gives low \
-                  counts, even negative ones, too high a probability",
-        },
-        Claim {
-            claim: "Eq. 7 with Poisson counts instead of Gaussian ones",
-            paper: "not considered",
-            here: format!(
+        ),
+        Claim::new(
+            "poisson",
+            format!(
                 "{} of {} points outside their 99 % interval, off by up to {:.4}",
                 exact.outside, exact.points, exact.largest
             ),
-            verdict: Verdict::of(exact.is_chance()),
-            why: "exact, ties included: the lower bin wins",
-        },
-        Claim {
-            claim: "a 99 % hit rate takes an SNR around 18 (II-C)",
-            paper: "18",
-            here: format!(
+            Verdict::of(exact.is_chance()),
+        ),
+        Claim::new(
+            "snr18",
+            format!(
                 "at {} background counts a bin: Eq. 7 {}; exact {}; either bin at the edge, whole \
                  pulse {}",
                 by_background(&|index| BACKGROUNDS[index].to_string()),
@@ -194,14 +185,12 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
                 of_level(0),
                 of_level(2)
             ),
-            verdict: match near_18.iter().filter(|&&near| near).count() {
+            match near_18.iter().filter(|&&near| near).count() {
                 0 => Verdict::Refuted,
                 near if near == near_18.len() => Verdict::Agrees,
                 _ => Verdict::Differs,
             },
-            why: "it falls with the background; with the whole pulse two bins are equally high, so \
-                  that one of them alone is the peak in at most half of all histograms",
-        },
+        ),
     ])
 }
 

@@ -285,16 +285,12 @@ pub fn cases() -> Result<Vec<Case>> {
         }),
     ]);
     cases.extend(pile_up());
-    let glass = "the histogram is that of a bright target at 3.5 bins before another one: only who knows of the glass \
-                 can tell, with a gate";
-    let moved = "the histogram is that of a still target: while it is exposed it moves by less than the pulse is wide, and \
-                 lies where it was on average. The event says how long the exposure was";
-    let smeared = "the event says how long the exposure was, and that times the speed is how far the target went. In 390 \
-                   laser cycles, the window's, that is 2 bins, which widen the pulse from σ 1 to 1.15; its 47 signal \
-                   photons would tell the width to 10 % at best (σ/√(2n)) were there no background. Longer exposures, those \
-                   of α = 4, smear it more; no test of the width is built";
-    let hot = "one exposure in 100 may bring a false event, by the threshold, and here hardly any brings another: no single \
-               histogram tells, but that events are so rare does";
+    let glass = "The histogram is that of a bright target at 3.5 bins before another one. A gate needs to know of the glass";
+    let moved = "The histogram is that of a still target, where it was on average. The event tells its exposure";
+    let smeared = "In 390 laser cycles, the window's, the target goes 2 bins. That widens the pulse from σ 1 to 1.15, and \
+                   its 47 signal photons tell the width to 10 % at best. No test of the width is built";
+    let hot = "The threshold lets one exposure in 100 bring a false alarm, and hardly any brings another event. That events \
+               are so rare tells, no single histogram does";
     cases.extend([
         Case::new("hot pixel, 100 × background")
             .with_background(100.0 * BACKGROUND)

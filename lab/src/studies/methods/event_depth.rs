@@ -139,31 +139,14 @@ fn results(part: &Part) -> Result<Results> {
     let outcomes = outcomes(part)?;
     let exposures = part.at([("target", 1.0)]).next();
     let exposures = exposures.map_or(0, |point| point.count("exposures"));
-    let better = |number: usize, is_paper: bool| {
-        let those = outcomes
-            .iter()
-            .filter(|outcome| (outcome.method == Method::Paper) == is_paper);
-        let those = those.filter(|outcome| outcome.better() == Some(number));
-        those.count()
-    };
-    let half = outcomes.len() / 2;
-    let caption = format!(
-        "About 1 % false alarms, first look after {} laser cycles; {} exposures a scene. With this look or one after {}, the centred window is surely better in {} of {half} cases with the paper's rule (worse in {}), in {} with the window rule (worse in {}).",
-        FIRST_LOOKS[0],
-        grouped(exposures),
-        FIRST_LOOKS[1],
-        better(1, true),
-        better(0, true),
-        better(1, false),
-        better(0, false),
-    );
     Ok(Results {
-        figures: vec![Figure::new("event-depth", &chart(&outcomes), caption)?],
-        claims: Vec::new(),
+        figures: vec![Figure::new("event-depth", &chart(&outcomes))?],
+        values: [("exposures", grouped(exposures))].into(),
         tables: vec![Table {
             path: "results/data/event_depth.csv",
             csv: csv(&outcomes)?,
         }],
+        ..Results::default()
     })
 }
 

@@ -265,22 +265,16 @@ fn results(part: &Part) -> Result<Results> {
             columns: 2,
             panels: panels.into(),
         };
-        figures.push(Figure::new(
-            name,
-            &chart,
-            format!(
-                "1 % false alarms in 1000 laser cycles. The likelihood ratio knows the scene. {} exposures a dot.",
-                grouped(exposures)
-            ),
-        )?);
+        figures.push(Figure::new(name, &chart)?);
     }
     Ok(Results {
         figures,
-        claims: Vec::new(),
+        values: [("exposures", grouped(exposures))].into(),
         tables: vec![Table {
             path: "results/data/time_to_detect.csv",
             csv: csv(&outcomes)?,
         }],
+        ..Results::default()
     })
 }
 

@@ -135,46 +135,36 @@ fn results(part: &Part) -> Result<Results> {
     };
     let verdict = |holds: fn(Setting) -> Option<bool>| in_all(Setting::all(part).map(holds));
     let claims = vec![
-        Claim {
-            claim: "the false positive rate does not depend on the SNR (III-C, Eq. 10)",
-            paper: "figure",
-            here: format!(
+        Claim::new(
+            "snr",
+            format!(
                 "share of events that are false, α = 4, L1 = 20: {}",
                 settings(|setting| setting.list(4, 20, percent))
             ),
-            verdict: verdict(|setting| setting.false_events_ignore_snr()),
-            why: "Eq. 10 is the rate of a look at background; of the events of a board fewer are false \
-                  the more its signal brings",
-        },
-        Claim {
-            claim: "RMSE falls with the SNR for L1 above 20 (III-C)",
-            paper: "figure",
-            here: format!(
+            verdict(|setting| setting.false_events_ignore_snr()),
+        ),
+        Claim::new(
+            "error",
+            format!(
                 "RMSE in bins, α = 4, L1 = 40: {}",
                 settings(|setting| setting.list(4, 40, bins))
             ),
-            verdict: verdict(|setting| setting.error_falls_with_snr()),
-            why: "down to what the three bins of the centre of mass leave: with the pulse on an edge \
-                  they hold one side of it more than the other, the wider the more",
-        },
-        Claim {
-            claim: "α has no effect on RMSE for L1 above 20 (III-C)",
-            paper: "none",
-            here: format!(
+            verdict(|setting| setting.error_falls_with_snr()),
+        ),
+        Claim::new(
+            "alpha",
+            format!(
                 "greatest factor between α = 2 and 8 at one SNR, L1 = 40 and 80: {}",
                 settings(|setting| setting
                     .error_by_alpha()
                     .map_or(NOTHING.to_owned(), |factor| format!("{factor:.2}")))
             ),
             // To a tenth.
-            verdict: verdict(|setting| setting.error_by_alpha().map(|factor| factor <= 1.1)),
-            why: "a larger α waits for more photons and lets fewer false events through, both of which \
-                  lower the error where signal is scarce",
-        },
-        Claim {
-            claim: "larger L1 brings little beyond 40 (III-C)",
-            paper: "figure",
-            here: format!(
+            verdict(|setting| setting.error_by_alpha().map(|factor| factor <= 1.1)),
+        ),
+        Claim::new(
+            "l1",
+            format!(
                 "mean RMSE in bins at L1 = 10, 20, 40, 80 over the SNRs that have enough events at each, \
                  α = 4: {}",
                 settings(|setting| match setting.mean_errors([10, 20, 40, 80]) {
@@ -185,29 +175,26 @@ fn results(part: &Part) -> Result<Results> {
                     }
                 })
             ),
-            verdict: verdict(|setting| setting.little_gain_beyond_40()),
-            why: "what is left is the centre of mass's own error where signal is plenty; where it is \
-                  scarce, more photons go on helping",
-        },
-        Claim {
-            claim: "α = 4 with L1 = 20 gives below 0.1 % false events (III-C)",
-            paper: "< 0.1 %",
-            here: format!(
+            verdict(|setting| setting.little_gain_beyond_40()),
+        ),
+        Claim::new(
+            "rate",
+            format!(
                 "events outside ±0.5 bin: {}",
                 settings(|setting| setting.list(4, 20, percent))
             ),
             // At every SNR of every setting, at none of any, or at some.
-            verdict: in_all(Setting::all(part).into_iter().flat_map(|setting| {
+            in_all(Setting::all(part).into_iter().flat_map(|setting| {
                 let shares = setting.shares(4, 20, false_share).into_iter();
                 shares.map(below_a_thousandth)
             })),
-            why: "at B = 0.05 a quadrant of two bins often holds nothing at L1 = 20, and then any peak passes; at B = 1.5 it takes a signal well above the background",
-        },
+        ),
     ];
     Ok(Results {
         figures: figures(main)?,
         claims,
-        tables: Vec::new(),
+        values: [("pixels", grouped(part.seed_count()))].into(),
+        ..Results::default()
     })
 }
 
@@ -248,13 +235,6 @@ fn below_a_thousandth(share: Share) -> Option<bool> {
 }
 
 fn figures(setting: Setting) -> Result<Vec<Figure>> {
-    let pixels = setting.part.seed_count();
-    let caption = format!(
-        "8 bins of 8.75 ns ({METRES_A_BIN:.3} m), B = {}, σ = {} bins, X = 5, L2 = 2000; {} pixels of 10,000 laser cycles a dot.",
-        setting.background,
-        setting.sigma,
-        grouped(pixels)
-    );
     let dots = |points: Vec<&PointTally>, of: fn(&PointTally) -> Share| -> Vec<Dot> {
         let points = points.into_iter();
         points
@@ -315,7 +295,6 @@ fn figures(setting: Setting) -> Result<Vec<Figure>> {
                     .within(0.0, 1.0),
                 false_alarms.into(),
             ),
-            caption.as_str(),
         )?,
         Figure::new(
             "hyperparameters-error",
@@ -325,7 +304,6 @@ fn figures(setting: Setting) -> Result<Vec<Figure>> {
                 metres("α = 4"),
                 errors.into(),
             ),
-            caption.as_str(),
         )?,
         Figure::new(
             "hyperparameters-alpha",
@@ -335,7 +313,6 @@ fn figures(setting: Setting) -> Result<Vec<Figure>> {
                 metres("A/B = 5"),
                 by_l1.into(),
             ),
-            caption.as_str(),
         )?,
     ])
 }

@@ -33,8 +33,6 @@ const MILLION: f64 = 1e6;
 const PIXELS_A_BIN: f64 = 8.0;
 /// The pulse of the figures, in bins.
 const WIDE: f64 = 1.0;
-/// The scenes, as a point names them.
-const SCENES: [&str; 2] = ["scenes/static.toml", "scenes/demo.toml"];
 const DEPTHS: [&str; 3] = ["frame of 2000", "last event", "mean of ten"];
 /// What differs from one of these to the next of the same pixel.
 const NOISES: [&str; 3] = [

@@ -1,7 +1,7 @@
 //! What the static scene comes to.
 
 use super::super::one_pixel::PER_BIN;
-use super::{DEPTHS, ESTIMATES, MILLION, NOISES, SCENES, WIDE, scene};
+use super::{DEPTHS, ESTIMATES, MILLION, NOISES, WIDE, scene};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Figure, Results, Verdict};
 use crate::sweep::{Part, PointTally};
@@ -171,21 +171,16 @@ pub fn results(part: &Part) -> Result<Results> {
             off(&all[1]) < off(&all[0])
         },
     )?;
-    let about = format!(
-        "`{}` and `{}` at 32×16 pixels, α = 8, L1 = 100, L2 = 2000, X = 10, 10,000 laser cycles; {} pixels a scene.",
-        SCENES[0],
-        SCENES[1],
-        grouped(512 * part.seed_count())
-    );
     Ok(Results {
         figures: vec![
-            Figure::new("static-events", &events, about.as_str())?,
-            Figure::new("static-depth", &depth, about.as_str())?,
-            Figure::new("static-noise", &noise, about.as_str())?,
-            Figure::new("static-reflectivity", &reflectivity, about)?,
+            Figure::new("static-events", &events)?,
+            Figure::new("static-depth", &depth)?,
+            Figure::new("static-noise", &noise)?,
+            Figure::new("static-reflectivity", &reflectivity)?,
         ],
         claims: claims(part)?,
-        tables: Vec::new(),
+        values: [("pixels", grouped(512 * part.seed_count()))].into(),
+        ..Results::default()
     })
 }
 
@@ -305,21 +300,18 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
         .map(|error| error.value)
         .fold(0.0, f64::max);
     Ok(vec![
-        Claim {
-            claim: "no event before laser cycle 100 (section III-B)",
-            paper: "an empty region, due to L1 = 100",
-            here: format!(
+        Claim::new(
+            "first",
+            format!(
                 "{by_100} of {} events by 100, {by_109} by 109, {} at 110",
                 grouped(sum("events of all pixels")),
                 grouped(at_110)
             ),
-            verdict: Verdict::of(by_100 == 0 && by_109 == 0 && at_110 > 0),
-            why: "N must exceed L1; the first such look with X = 10 is at 110",
-        },
-        Claim {
-            claim: "bright pixels report more often (section III-B)",
-            paper: "\"a clear correlation\"",
-            here: format!(
+            Verdict::of(by_100 == 0 && by_109 == 0 && at_110 > 0),
+        ),
+        Claim::new(
+            "bright",
+            format!(
                 "rank correlation of events with the signal {}",
                 of_each(part, |point| {
                     Ok(Measured::mean(point, "rank correlation")
@@ -327,33 +319,19 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
                         .text(3))
                 })?
             ),
-            verdict: if lowest > 0.8 {
+            if lowest > 0.8 {
                 Verdict::Agrees
             } else if lowest > 0.5 {
                 Verdict::Differs
             } else {
                 Verdict::Refuted
             },
-            why: "ties lower it: pixels of one board receive the same, and no pixel can report more often than every 110 laser cycles",
-        },
-        Claim {
-            claim: "the last event is noisier than the frame of 2000 laser cycles (section III-B)",
-            paper: "\"noisier\"",
-            here: last,
-            verdict: noisier(&last_ratios),
-            why: "agrees if it is on every surface, with 99 % confidence; an event has as many photons as it takes, a frame all; noise is what differs from one depth of a pixel to its next; with the bias, which the three bins of the centre of mass leave near the edge of a bin in events and frames, the two lie closer together",
-        },
-        Claim {
-            claim: "the mean of ten events is comparable to the frame (section III-B)",
-            paper: "\"comparable\"",
-            here: mean,
-            verdict: comparable(&mean_ratios),
-            why: "by the worst surface, with 99 % confidence: agrees if its noise is at most half as much again, differs if it is more, refuted if it is more than twice as much; ten events of a dim pixel are exposed longer than one frame, those of a bright one about half as long; beside the edge of a bin a frame reads one or the other side of it, and the mean of ten events both, the more so the wider the pulse",
-        },
-        Claim {
-            claim: "events × z² gives the relative reflectivity (section III-B)",
-            paper: "a map, no number",
-            here: format!(
+        ),
+        Claim::new("last", last, noisier(&last_ratios)),
+        Claim::new("mean", mean, comparable(&mean_ratios)),
+        Claim::new(
+            "reflectivity",
+            format!(
                 "rms error after one scale {}",
                 of_each(part, |point| {
                     let percent =
@@ -373,13 +351,12 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
                     ))
                 })?
             ),
-            verdict: match worst {
+            match worst {
                 worst if worst < 10.0 => Verdict::Agrees,
                 worst if worst < 25.0 => Verdict::Differs,
                 _ => Verdict::Refuted,
             },
-            why: "refuted if wrong by a quarter or more in one scene, a pixel without an event counted as black; events grow faster than the signal while the background limits, and stop growing at one every 110 laser cycles; peak count less background over exposure, which every event carries, is linear",
-        },
+        ),
     ])
 }
 
