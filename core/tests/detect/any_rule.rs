@@ -20,10 +20,8 @@ fn decides<const BINS: usize, W: CounterWidth>(
     let alone = detect(histogram, gate, &rule, estimator);
     prop_assert_eq!(detect(histogram, gate, &any, estimator), alone);
     let peak = histogram.peak();
-    prop_assert_eq!(
-        any.detect(histogram, gate, peak),
-        rule.detect(histogram, gate, peak)
-    );
+    let expected = rule.detect(histogram, gate, peak);
+    prop_assert_eq!(any.detect(histogram, gate, peak), expected);
     Ok(alone)
 }
 
@@ -70,10 +68,8 @@ fn both_rules_fire_and_do_not() {
             *fired += u32::from(found);
         }
     }
-    assert!(
-        fired.iter().all(|fired| (20..180).contains(fired)),
-        "{fired:?}"
-    );
+    let often = |fired| (20..180).contains(fired);
+    assert!(fired.iter().all(often), "{fired:?}");
 }
 
 /// Those of `docs/link-format.md`.
@@ -83,8 +79,6 @@ fn the_numbers_of_rules_and_estimators_stay() {
     let window = AnyRule::from(WindowRule::new(3, U4F12::ONE, Count::default()).unwrap());
     assert_eq!((paper.number(), window.number()), (0, 1));
     let centred = DepthEstimator::for_pulse(U8F8::ONE);
-    assert_eq!(
-        (DepthEstimator::Centroid3.number(), centred.number()),
-        (0, 1)
-    );
+    let of_three = DepthEstimator::Centroid3;
+    assert_eq!((of_three.number(), centred.number()), (0, 1));
 }
