@@ -7,7 +7,7 @@ use std::cell::RefCell;
 
 use common::tdc7200::{
     ARM_1, Access, Bench, CALIBRATIONS, MODE_1, configure, example, mode_1, over, read,
-    read_results, write,
+    read_results, write, writes,
 };
 use common::{Broken, Given, Line, Notes};
 use dtof_core::PixelAddress;
@@ -97,17 +97,8 @@ fn every_setting_reaches_its_register() {
         parity: true,
         ..mode_1()
     });
-    let registers = [
-        (0x01, 0b1100_0100),
-        (0x03, 0x07),
-        (0x04, 0xff),
-        (0x05, 0xff),
-        (0x06, 0x12),
-        (0x07, 0x34),
-        (0x08, 0x01),
-        (0x09, 0x23),
-    ];
-    bench.bring_up(registers, 0b1101_1011);
+    let values = [0b1100_0100, 0x07, 0xff, 0xff, 0x12, 0x34, 0x01, 0x23];
+    bench.bring_up(values, 0b1101_1011);
 }
 
 #[test]
@@ -116,10 +107,9 @@ fn the_overflow_of_mode_1_is_the_coarse_counters() {
         overflow: 0x0100,
         ..mode_1()
     });
-    let mut registers = MODE_1;
-    registers[2] = (0x04, 0x01);
-    registers[3] = (0x05, 0x00);
-    bench.bring_up(registers, ARM_1);
+    let mut values = MODE_1;
+    (values[2], values[3]) = (0x01, 0x00);
+    bench.bring_up(values, ARM_1);
 }
 
 /// Mode 2, five stops of which three come before the clock counter overflows,
@@ -133,10 +123,10 @@ fn reads_in_chunks_and_gives_the_stops_that_came() {
             first_bin_ps: 0,
             ..mode_1()
         });
-        let mut registers = MODE_1;
-        registers[0] = (0x01, 0x44);
+        let mut values = MODE_1;
+        values[0] = 0x44;
         assert!(!bench.sensor.is_one_hit());
-        bench.bring_up(registers, ARM_1 | 0b10);
+        bench.bring_up(values, ARM_1 | 0b10);
         bench.interrupt.set(false);
 
         // 59.18 ps a count: 1000 counts are 59.176 ns. The second stop meets an
@@ -170,9 +160,9 @@ fn a_bin_past_the_histogram_is_passed_on_and_one_before_it_is_rejected() {
         stops: Stops::Three,
         ..mode_1()
     });
-    let mut registers = MODE_1;
-    registers[0] = (0x01, 0x42);
-    bench.bring_up(registers, ARM_1);
+    let mut values = MODE_1;
+    values[0] = 0x42;
+    bench.bring_up(values, ARM_1);
     bench.interrupt.set(false);
     // 236.7 ns, 473.4 ns and 0.496 ms.
     let results = over(0x19, &[4000, 0, 8_000, 0, 0x7f_ffff], CALIBRATIONS);
@@ -257,9 +247,7 @@ fn a_register_that_does_not_take_its_value_is_an_error() {
     let accesses = [
         read(0x01, &[0x40]),
         read(0x03, &[0x07]),
-        MODE_1
-            .map(|(register, value)| write(register, value))
-            .concat(),
+        writes(MODE_1),
         read(0x01, &[0x40]),
         read(0x03, &[0x07]),
         read(0x04, &[0xfe]),

@@ -72,25 +72,26 @@ pub fn example() -> Vec<Access> {
     [over(0x19, &[4175], CALIBRATIONS), write(0x00, ARM_1)].concat()
 }
 
-/// The registers 0x01 and 0x03 to 0x09 as they should be configured, then
-/// CONFIG1 with `START_MEAS`.
-pub fn configure(registers: [(u8, u8); 8], config1: u8) -> Vec<Access> {
-    let reset = [read(0x01, &[0x40]), read(0x03, &[0x07])].concat();
-    let writes = registers.map(|(register, value)| write(register, value));
-    let reads = registers.map(|(register, value)| read(register, &[value]));
-    [reset, writes.concat(), reads.concat(), write(0x00, config1)].concat()
+/// Writes all that is configured.
+pub fn writes(values: [u8; 8]) -> Vec<Access> {
+    let registers = REGISTERS.into_iter().zip(values);
+    let writes = registers.flat_map(|(register, value)| write(register, value));
+    writes.collect()
 }
 
-pub const MODE_1: [(u8, u8); 8] = [
-    (0x01, 0x40),
-    (0x03, 0x07),
-    (0x04, 0xff),
-    (0x05, 0xff),
-    (0x06, 0xff),
-    (0x07, 0xff),
-    (0x08, 0),
-    (0x09, 0),
-];
+/// The registers as they should be configured, then CONFIG1 with `START_MEAS`.
+pub fn configure(values: [u8; 8], config1: u8) -> Vec<Access> {
+    let reset = [read(0x01, &[0x40]), read(0x03, &[0x07])].concat();
+    let registers = REGISTERS.into_iter().zip(values);
+    let reads = registers.flat_map(|(register, value)| read(register, &[value]));
+    let arm = write(0x00, config1);
+    [reset, writes(values), reads.collect(), arm].concat()
+}
+
+/// What is configured: the registers 0x01 and 0x03 to 0x09.
+const REGISTERS: [u8; 8] = [0x01, 0x03, 0x04, 0x05, 0x06, 0x07, 0x08, 0x09];
+/// Their values in mode 1.
+pub const MODE_1: [u8; 8] = [0x40, 0x07, 0xff, 0xff, 0xff, 0xff, 0, 0];
 pub const ARM_1: u8 = 0b1000_0001;
 /// The registers of the data sheet's example.
 pub const CALIBRATIONS: [u32; 2] = [2110, 21121];
@@ -146,7 +147,7 @@ impl<const CHUNK: usize> Bench<CHUNK> {
     }
 
     /// From off to armed.
-    pub fn bring_up(&mut self, registers: [(u8, u8); 8], config1: u8) {
+    pub fn bring_up(&mut self, values: [u8; 8], config1: u8) {
         self.enable.driven.take();
         assert_eq!(self.wait(0), Ok(Polled::Working));
         assert_eq!(*self.enable.driven.borrow(), [false]);
@@ -155,7 +156,7 @@ impl<const CHUNK: usize> Bench<CHUNK> {
         assert_eq!(*self.enable.driven.borrow(), [false, true]);
         assert_eq!(self.wait(2), Ok(Polled::Idle));
         self.now_ms = self.now_ms.wrapping_add(1);
-        let polled = self.poll(&configure(registers, config1));
+        let polled = self.poll(&configure(values, config1));
         assert_eq!(polled, Ok(Polled::Working));
         assert!(self.sensor.is_armed());
         assert_eq!(self.wait(0), Ok(Polled::Idle));
