@@ -48,6 +48,17 @@ pub enum Phase {
     },
 }
 
+impl Phase {
+    fn receive(address: bool) -> Self {
+        let (byte, bits) = (0, 0);
+        Self::Receive {
+            byte,
+            bits,
+            address,
+        }
+    }
+}
+
 /// Two wires and a device on them.
 pub struct Wires {
     pub now_ns: u64,
@@ -176,11 +187,7 @@ impl Wires {
             (true, true) if sda && !self.level(SDA) => {
                 self.seen.push(Seen::Start);
                 self.is_plain_period = false;
-                self.phase = Phase::Receive {
-                    byte: 0,
-                    bits: 0,
-                    address: true,
-                };
+                self.phase = Phase::receive(true);
             }
             (true, true) if !sda && self.level(SDA) => {
                 self.seen.push(Seen::Stop);
@@ -253,11 +260,7 @@ impl Wires {
                 if sends {
                     self.send();
                 } else {
-                    self.phase = Phase::Receive {
-                        byte: 0,
-                        bits: 0,
-                        address: false,
-                    };
+                    self.phase = Phase::receive(false);
                 }
             }
             Phase::Send { byte, bits: 8 } => {
