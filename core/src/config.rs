@@ -218,7 +218,7 @@ impl<const BINS: usize, R: DetectionRule> PixelConfigBuilder<BINS, R> {
     ///
     /// At that half, 0.7 photons arrive in a laser cycle. A Gaussian pulse on its own is
     /// then read 0.2 of its standard deviation too near. False alarms begin above four
-    /// fifths (`docs/failures.md`). Photon counting usually keeps to 5 %. That asks for
+    /// fifths (`docs/results/failures.md`). Photon counting usually keeps to 5 %. That asks for
     /// a depth error of a hundredth of the pulse, far below that of an event's few
     /// photons.
     pub const fn one_hit_tdc(mut self, is_one_hit: bool) -> Self {

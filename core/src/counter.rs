@@ -77,10 +77,12 @@ pub trait PhotonCount: Copy + Into<u32> {
         fold(counts, 0, |highest: u32, count| highest.max(count.into()))
     }
 
-    /// The sum of some counts, wrapping.
+    /// The highest of some counts, 0 of none, and their sum, wrapping.
     #[inline(always)]
-    fn sum(counts: &[Self]) -> u32 {
-        fold(counts, 0, |sum: u32, count| sum.wrapping_add(count.into()))
+    fn highest_and_sum(counts: &[Self]) -> (u32, u32) {
+        fold(counts, (0, 0), |(highest, sum): (u32, u32), count| {
+            (highest.max(count.into()), sum.wrapping_add(count.into()))
+        })
     }
 
     /// Whether one of some counts is `level` or more.
@@ -117,6 +119,16 @@ impl PhotonCount for u16 {
             room.saturating_add(count) - count
         });
         (!room).into()
+    }
+
+    #[inline(always)]
+    fn highest_and_sum(counts: &[Self]) -> (u32, u32) {
+        let start = (Self::MAX, 0u32);
+        let (room, sum) = fold(counts, start, |(room, sum), count| {
+            let room = room.saturating_add(count) - count;
+            (room, sum.wrapping_add(count.into()))
+        });
+        ((!room).into(), sum)
     }
 }
 

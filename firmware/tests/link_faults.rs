@@ -14,7 +14,7 @@ use dtof_firmware::sidecar::{Pixel, Sidecar};
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
-use dtof_link::{Configuration, Report, Token};
+use dtof_link::{Configuration, Report, Source, Token};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -155,7 +155,7 @@ fn session(device: &mut Sidecar, number: u16, script: &Script, line: &mut Line) 
     let mut frames = Deframer::new();
     let mut wire = [0; WIRE_BYTES];
     let wanted = Configuration {
-        source: 0,
+        source: Source::Link,
         ..CONFIGURATION
     };
     let configuration = wanted.to_le_bytes();

@@ -6,7 +6,7 @@ use common::host::{CONFIGURATION, Call, Host, Scripted, configured};
 use dtof_core::Flags;
 use dtof_core::fixed::types::U16F16;
 use dtof_firmware::sidecar::{Pixel, Sidecar};
-use dtof_link::{Configuration, Refusal, SensorRecord, message};
+use dtof_link::{Configuration, Refusal, SensorRecord, Source, message};
 use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
 
 type Pixels = heapless::Vec<Pixel, 8>;
@@ -54,11 +54,12 @@ fn a_sensor_is_started_for_each_configuration_and_stopped_once() {
     let mut host = Host::new(1, 0);
     device.poll_sensor(&mut sensor, 0);
     let wanted = |bin_width: u32, source| Configuration {
-        bin_width: bin_width << 16,
+        bin_width_ps: U16F16::from_num(bin_width),
         source,
         ..CONFIGURATION
     };
-    for (bin_width, source) in [(160, 1), (150, 1), (250, 0), (250, 0)] {
+    let (link, sensor_of) = (Source::Link, Source::Sensor);
+    for (bin_width, source) in [(160, sensor_of), (150, sensor_of), (250, link), (250, link)] {
         host.configure(&mut device, 0, &wanted(bin_width, source));
         device.poll_sensor(&mut sensor, 0);
         device.poll_sensor(&mut sensor, 1);
@@ -69,7 +70,7 @@ fn a_sensor_is_started_for_each_configuration_and_stopped_once() {
     assert_eq!(sensor.0, expected);
 
     // A new session stops it, too.
-    host.configure(&mut device, 0, &wanted(160, 1));
+    host.configure(&mut device, 0, &wanted(160, sensor_of));
     device.poll_sensor(&mut sensor, 2);
     sensor.0.clear();
     let mut next = Host::new(2, 0);
@@ -86,8 +87,8 @@ fn bins_that_are_not_the_sensors_are_refused() {
     // A sixteenth of 160 ps to either side.
     for (bin_width, taken) in [(149, false), (150, true), (170, true), (171, false)] {
         let wanted = Configuration {
-            bin_width: bin_width << 16,
-            source: 1,
+            bin_width_ps: U16F16::from_num(bin_width),
+            source: Source::Sensor,
             ..CONFIGURATION
         };
         let answer = host.answer(&mut device, 0, message::CONFIGURE, &wanted.to_le_bytes());
@@ -95,7 +96,7 @@ fn bins_that_are_not_the_sensors_are_refused() {
         assert_eq!(answer, refusal[..usize::from(!taken)], "{bin_width} ps");
         // Photons of the link have the bins of whoever sends them.
         let wanted = Configuration {
-            source: 0,
+            source: Source::Link,
             ..wanted
         };
         host.configure(&mut device, 0, &wanted);

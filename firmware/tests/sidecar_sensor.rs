@@ -15,7 +15,7 @@ use dtof_core::{
 };
 use dtof_firmware::sidecar::{Pixel, Sidecar};
 use dtof_link::frame::WIRE_BYTES;
-use dtof_link::{Configuration, FaultRecord, Report, message};
+use dtof_link::{Configuration, DynamicDepth, FaultRecord, Report, Source, message};
 use dtof_sensors::About;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -30,11 +30,8 @@ fn configurations() -> [(Configuration, PixelConfig<128, AnyRule>); 2] {
     let window = WindowRule::new(3, U4F12::lit("4.5"), minimum_count).unwrap();
     let centred = CentredWindow::new(U8F8::lit("2.5")).unwrap();
     let with_windows = Configuration {
-        rule: 1,
-        window: 3,
-        z: 9 << 11,
-        estimator: 1,
-        half_width: 5 << 7,
+        rule: window.into(),
+        estimator: DepthEstimator::CentredWindow(centred),
         ..CONFIGURATION
     };
     let estimator = DepthEstimator::CentredWindow(centred);
@@ -130,19 +127,20 @@ fn dynamic_depth_sends_what_the_core_makes_of_the_events() {
     let (wanted, config) = configurations()[0];
     let scale = RangeScale::new(U16F16::from_num(250), I24F8::ZERO).unwrap();
     // A twentieth of a bin, so that there are many.
-    let threshold = U24F8::lit("2");
-    for (number, reference) in [(0, Reference::Previous), (1, Reference::Reported)] {
+    let threshold_mm = U24F8::lit("2");
+    for reference in [Reference::Previous, Reference::Reported] {
         let mut pixels = Pixels::new();
         let wanted = Configuration {
-            output: 1,
-            reference: number,
-            threshold: threshold.to_bits(),
+            dynamic_depth: Some(DynamicDepth {
+                threshold_mm,
+                reference,
+            }),
             ..wanted
         };
         let (mut device, mut host) = configured(&mut pixels, &wanted);
         host.run(&mut device, &mut sensor(&script), 0..5_000, 4);
         let report = host.report(&mut device, 5_000);
-        let dynamic_depth = DynamicDepthConfig::new(threshold, &scale, reference).unwrap();
+        let dynamic_depth = DynamicDepthConfig::new(threshold_mm, &scale, reference).unwrap();
         let mut observers = [const { DynamicDepthPixel::<3>::new() }; 8];
         let events = self::reference(&script, &config);
         let observe = |event: &DepthEvent| {
@@ -246,7 +244,7 @@ fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
     // A configuration that takes photons from the link keeps the sensor's out.
     let mut host = Host::new(1, 10_000);
     let wanted = Configuration {
-        source: 0,
+        source: Source::Link,
         ..CONFIGURATION
     };
     host.configure(&mut device, 10_000, &wanted);
@@ -304,8 +302,7 @@ fn a_histogram_is_decided_once_within_the_gate() {
 
 fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<128, AnyRule>) {
     let wanted = Configuration {
-        gate_first: 10,
-        gate_last: 99,
+        gate: (10, 99),
         ..wanted
     };
     let mut pixels = Pixels::new();

@@ -13,7 +13,7 @@ use dtof_core::{DepthEvent, PixelAddress, Statistics};
 use dtof_firmware::sidecar::{Pixel, Sidecar};
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::message;
-use dtof_link::{Configuration, FaultRecord, Refusal, Report, Token};
+use dtof_link::{Configuration, FaultRecord, Refusal, Report, Source, Token};
 use dtof_sensors::tmf882x::{BootCommand, Command, Tmf882x, Waiting};
 use dtof_sensors::{Sensor, SensorFault, tdc7200, tmf882x};
 
@@ -21,7 +21,7 @@ type Pixels = heapless::Vec<Pixel, 9>;
 
 /// One that takes photons from the link.
 const GOOD: Configuration = Configuration {
-    source: 0,
+    source: Source::Link,
     ..CONFIGURATION
 };
 
@@ -190,56 +190,44 @@ fn a_host_that_comes_after_a_minute_gets_what_it_would_have_got_at_once() {
     assert!(late.events == at_once.events);
 }
 
-/// What makes a good configuration bad.
-type Change = fn(&mut Configuration);
-
 /// A configuration of each kind that cannot be, for eight pixels without a sensor.
 fn refused() -> Vec<(Vec<u8>, Refusal)> {
-    let mut all = vec![(GOOD.to_le_bytes()[1..].to_vec(), Refusal::Unknown)];
-    let bad: [(Change, Refusal); 25] = [
-        (|bad| bad.source = 2, Refusal::Unknown),
-        (|bad| bad.rule = 2, Refusal::Unknown),
-        (|bad| bad.rule = 1, Refusal::WindowWidth),
-        (|bad| (bad.rule, bad.window) = (1, 8), Refusal::WindowWidth),
-        (|bad| bad.estimator = 2, Refusal::Unknown),
-        (
-            |bad| (bad.estimator, bad.half_width) = (1, 255),
-            Refusal::HalfWidth,
-        ),
-        (
-            |bad| (bad.estimator, bad.half_width) = (1, 1025),
-            Refusal::HalfWidth,
-        ),
-        (|bad| bad.one_hit = 2, Refusal::Unknown),
-        (|bad| bad.output = 2, Refusal::Unknown),
-        (
-            |bad| (bad.output, bad.reference, bad.threshold) = (1, 2, 256),
-            Refusal::Unknown,
-        ),
-        (|bad| bad.output = 1, Refusal::ZeroThreshold),
-        (
-            // 1/512 of a bin of 37.5 mm is 0.07.
-            |bad| (bad.output, bad.threshold) = (1, 18),
-            Refusal::ZeroThreshold,
-        ),
-        (|bad| bad.x = 0, Refusal::ZeroX),
-        (|bad| bad.x = 21, Refusal::XAboveL1),
-        (|bad| bad.l2 = 20, Refusal::L2NotAboveL1),
-        (|bad| bad.l2 = 24, Refusal::NoLook),
-        (|bad| bad.gate_last = 128, Refusal::GatePastLastBin),
-        (|bad| bad.gate_first = 121, Refusal::GateTooNarrow),
-        (|bad| bad.bin_width = 0, Refusal::Range),
-        (|bad| bad.offset = i32::MAX, Refusal::Range),
-        (|bad| bad.pixels = 0, Refusal::Pixels),
-        (|bad| bad.pixels = 10, Refusal::Pixels),
-        (|bad| bad.minimum_count = 0, Refusal::MinimumCount),
-        (|bad| bad.minimum_count = 1024, Refusal::MinimumCount),
-        (|bad| bad.source = 1, Refusal::NoSensor),
+    let good = GOOD.to_le_bytes();
+    // From which byte on what stands there, as `docs/link-format.md` numbers them.
+    let bad: [(usize, &[u8], Refusal); 25] = [
+        (24, &[2], Refusal::Unknown),
+        (25, &[2], Refusal::Unknown),
+        (29, &[2], Refusal::Unknown),
+        (32, &[2], Refusal::Unknown),
+        (32, &[1, 2, 0, 1, 0, 0], Refusal::Unknown),
+        (38, &[2], Refusal::Unknown),
+        (4, &[0], Refusal::ZeroX),
+        (4, &[21], Refusal::XAboveL1),
+        (8, &[20], Refusal::L2NotAboveL1),
+        (8, &[24], Refusal::NoLook),
+        (12, &[128], Refusal::GatePastLastBin),
+        (10, &[121], Refusal::GateTooNarrow),
+        (16, &[0, 0, 0, 0], Refusal::Range),
+        (20, &[0xff, 0xff, 0xff, 0x7f], Refusal::Range),
+        (14, &[0], Refusal::Pixels),
+        (14, &[10], Refusal::Pixels),
+        (2, &[0, 0], Refusal::MinimumCount),
+        (2, &[0, 4], Refusal::MinimumCount),
+        (24, &[1], Refusal::NoSensor),
+        (25, &[1, 0], Refusal::WindowWidth),
+        (25, &[1, 8], Refusal::WindowWidth),
+        // 255 and 1025 of 256 to 1024.
+        (29, &[1, 0xff, 0], Refusal::HalfWidth),
+        (29, &[1, 1, 4], Refusal::HalfWidth),
+        (32, &[1, 0, 0], Refusal::ZeroThreshold),
+        // 1/512 of a bin of 37.5 mm is 0.07 mm, 18.7 of 1/256 mm.
+        (32, &[1, 0, 18], Refusal::ZeroThreshold),
     ];
-    for (make_bad, refusal) in bad {
-        let mut wanted = GOOD;
-        make_bad(&mut wanted);
-        all.push((wanted.to_le_bytes().to_vec(), refusal));
+    let mut all = vec![(good[1..].to_vec(), Refusal::Unknown)];
+    for (from, fields, refusal) in bad {
+        let mut wanted = good.to_vec();
+        wanted[from..from + fields.len()].copy_from_slice(fields);
+        all.push((wanted, refusal));
     }
     all
 }

@@ -38,7 +38,7 @@ fn is_there(cell: &str) -> bool {
             !next.is_some_and(|next| next.is_alphanumeric() || next == '_')
         })
     };
-    name.is_empty() || kinds.iter().any(|kind| defined(&kind))
+    name.is_empty() || kinds.iter().any(defined)
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn verdicts_of_the_page_are_those_of_the_studies() {
         );
         if !study.is_empty() {
             assert!(
-                studies.contains(&format!("Study `{study}`")),
+                studies.contains(&format!("\n## {study}\n")),
                 "{paper}: no study {study}"
             );
         }

@@ -6,13 +6,14 @@ mod capture_log;
 use std::path::PathBuf;
 
 use capture_log::{ground_truth, log, tell};
-use dtof::engine::detection::{Estimator, Rule};
 use dtof::engine::host::host_engine;
-use dtof::engine::settings::{I24F8Number, Settings, U16F16Number};
+use dtof::engine::settings::Settings;
 use dtof::input::recorded::{RecordedHistograms, RecordingLength};
 use dtof::input::source::PhotonSource;
 use dtof::input::tmf8820;
+use dtof::simulate::scene;
 use dtof_core::fixed::types::U8F8;
+use dtof_core::{Count, PaperRule};
 
 const ZONES: usize = 9;
 const CENTRE: usize = 4;
@@ -30,18 +31,12 @@ struct Zone {
 fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES] {
     let settings = Settings {
         bins: tmf8820::BINS,
-        bin_width_ps: U16F16Number(tmf8820::BIN_WIDTH_PS),
-        offset_mm: I24F8Number(tmf8820::OFFSET_MM),
-        gate: None,
-        rule: Rule::paper(U8F8::lit("4")),
-        estimator: Estimator::default(),
-        min_count,
+        bin_width_ps: tmf8820::BIN_WIDTH_PS,
+        offset_mm: tmf8820::OFFSET_MM,
+        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(min_count.into())).into(),
         l1: 40,
-        l2: 2000,
         x: 4,
-        one_hit_tdc: false,
-        frame: None,
-        seed: 1,
+        ..scene::settings(1)
     };
     let truth = ground_truth(log);
     let recorded = tmf8820::read(log).unwrap();

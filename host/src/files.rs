@@ -124,7 +124,7 @@ pub fn aside(folder: &Path, prefix: &str) -> Result<NamedTempFile> {
         .with_context(|| folder.display().to_string())
 }
 
-/// What was buffered is on disk, or an error says that it is not.
+/// Writes the buffer to disk.
 pub(crate) fn flushed(file: BufWriter<NamedTempFile>) -> Result<NamedTempFile> {
     let file = file
         .into_inner()

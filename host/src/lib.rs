@@ -9,8 +9,6 @@
 //!   → Output         events.csv, events.aer, summary.json, pictures, report
 //! ```
 
-pub mod arguments;
-pub mod chart;
 pub mod cli;
 pub mod device;
 pub mod engine;
@@ -19,7 +17,7 @@ pub mod export;
 pub mod files;
 pub mod geometry;
 pub mod input;
-pub mod picture;
 pub mod progress;
-pub mod report;
+pub mod rows;
 pub mod simulate;
+pub mod view;

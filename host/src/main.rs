@@ -31,7 +31,7 @@ enum Command {
     Export(Box<command::export::Export>),
     /// Print the events of a device with a sensor as CSV, as they come.
     Monitor(Box<command::monitor::Monitor>),
-    /// Find α and L1 for a wanted rate of false events, and say what to expect.
+    /// Find α and L1 for a wanted rate of false alarms, and say what to expect.
     Tune(Box<command::tune::Tune>),
 }
 

@@ -7,20 +7,19 @@
 
 pub mod failures;
 pub mod methods;
+mod movie;
 
+use crate::studies::failures::STUDY as FAILURES;
+use crate::studies::methods::{depth_error, event_depth, time_to_detect};
+use crate::sweep::results::{Figure, Results};
+use crate::sweep::{Part, SeedRange, Study};
+use crate::{studies, sweep};
+use anyhow::{Context, Result, ensure};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-
-use anyhow::{Context, Result, ensure};
-
-use crate::studies;
-use crate::studies::failures::STUDY as FAILURES;
-use crate::studies::methods::{depth_error, event_depth, time_to_detect};
-use crate::sweep::results::Results;
-use crate::sweep::{self, Part, SeedRange, Study};
 
 /// What is done anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +28,8 @@ pub enum Anew {
     Few,
     /// All seeds.
     All,
+    /// None: documents are drawn again from what is kept.
+    None,
 }
 
 /// Works out the seeds and gives every document below `docs` with its content.
@@ -47,14 +48,25 @@ pub fn documents(
     let mut parts = BTreeMap::new();
     for study in studies::ALL {
         progress(study);
-        let few = work_out(study, 0, study.few_seeds)?;
-        let kept = data(study, "rest");
-        let rest = match anew {
-            Anew::Few => Part::load(&docs.join(&kept))?,
-            Anew::All => work_out(study, study.few_seeds, study.all_seeds)?,
-        };
-        documents.push((data(study, "few").into(), few.to_json()?));
-        documents.push((kept.into(), rest.to_json()?));
+        let [few, rest] = [
+            ("few", (0, study.few_seeds), anew != Anew::None),
+            (
+                "rest",
+                (study.few_seeds, study.all_seeds),
+                anew == Anew::All,
+            ),
+        ]
+        .map(|(which, (first, end), is_anew)| {
+            let kept = data(study, which);
+            let part = if is_anew {
+                work_out(study, first, end)?
+            } else {
+                Part::load(&docs.join(&kept))?
+            };
+            documents.push((kept.into(), part.to_json()?));
+            anyhow::Ok(part)
+        });
+        let (few, rest) = (few?, rest?);
         let mut part = few;
         part.add(&rest)
             .with_context(|| format!("{}: the kept rest", study.name))?;
@@ -73,6 +85,14 @@ pub fn documents(
         all.push((study, results));
         parts.insert(study.name, part);
     }
+    let figures = all.iter().flat_map(|(_, results)| &results.figures);
+    let wrong = figures.filter(|figure| !figure.holds);
+    let wrong: Vec<&str> = wrong.map(|figure| figure.name).collect();
+    ensure!(
+        wrong.is_empty(),
+        "the data no longer show what these titles say: {}",
+        wrong.join(", ")
+    );
     for (_, results) in &all {
         for figure in &results.figures {
             let path = format!("figures/{}.svg", figure.name);
@@ -98,6 +118,7 @@ pub fn documents(
     documents.extend(methods);
     let failures = failures::document(part(FAILURES)?)?;
     documents.push(("results/failures.md".into(), failures));
+    documents.push(("figures/demo.svg".into(), movie::demo()?));
     documents.push(("results/figures.md".into(), captions(&all)?));
     documents.push(("results/paper-claims.md".into(), claims(&all)?));
     Ok(documents)
@@ -140,22 +161,24 @@ pub fn different(docs: &Path, documents: &[(PathBuf, String)]) -> Vec<PathBuf> {
     different.map(|(path, _)| docs.join(path)).collect()
 }
 
+/// Figures by study. A caption that several have in common stands below the last of them.
 fn captions(all: &[(&Study, Results)]) -> Result<String> {
     let mut text = "# Figures\n\n\
-        Made by `cargo lab figures`; do not edit. `--all` works out every seed again, which takes \
-        longer. Intervals hold 99 %.\n"
+        Made by `cargo lab figures`; do not edit. `--all` works out every seed again.\n"
         .to_owned();
     for (study, results) in all {
-        for figure in &results.figures {
-            write!(
-                text,
-                "\n## {name}\n\n![{name}](../figures/{name}.svg)\n\n{caption}\n\n\
-                 Study `{study}`, seeds 0 to {last}.\n",
-                name = figure.name,
-                caption = figure.caption,
-                study = study.name,
-                last = study.all_seeds - 1
-            )?;
+        let (name, about) = (study.name, study.about);
+        if !results.figures.is_empty() {
+            let seeds = study.all_seeds;
+            write!(text, "\n## {name}\n\nStudy of {about}; {seeds} seeds.\n")?;
+        }
+        for same in results.figures.chunk_by(|a, b| a.caption == b.caption) {
+            for Figure { name, .. } in same {
+                write!(text, "\n![{name}](../figures/{name}.svg)\n")?;
+            }
+            if let [Figure { caption, .. }, ..] = same {
+                write!(text, "\n{caption}\n")?;
+            }
         }
     }
     Ok(text)

@@ -1,5 +1,11 @@
 //! How the host wants the pixels to operate.
 
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
+use dtof_core::{AnyRule, CentredWindow, Count, DepthEstimator, PaperRule, Reference, WindowRule};
+
+use crate::dynamic_depth::DynamicDepth;
+use crate::refusal::Refusal;
+
 /// Where the device takes its photons from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -10,121 +16,210 @@ pub enum Source {
     Sensor,
 }
 
-/// How the pixels are to operate, not yet validated.
+/// How the pixels are to operate. Rule and estimator are valid by construction. The
+/// device checks the rest, which depends on what it has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Configuration {
-    /// α in 1/256; of the paper's rule.
-    pub alpha: u16,
-    /// Photons a reported peak, or the window around it, holds at least.
-    pub minimum_count: u16,
+    /// What decides whether a peak stands clear.
+    pub rule: AnyRule,
+    /// What finds its depth.
+    pub estimator: DepthEstimator,
     /// Laser cycles between looks.
     pub x: u16,
     /// The exposure a decision must exceed.
     pub l1: u16,
     /// The exposure at which a pixel starts over.
     pub l2: u16,
-    /// First bin that may hold the peak.
-    pub gate_first: u16,
-    /// Last bin that may hold the peak.
-    pub gate_last: u16,
+    /// First and last bin that may hold the peak, both inclusive.
+    pub gate: (u16, u16),
+    /// Whether the TDC takes one photon a laser cycle, so that events say when it piles up.
+    pub one_hit_tdc: bool,
     /// Pixels, addresses 0 up.
     pub pixels: u16,
-    /// Bin width in 1/65,536 ps.
-    pub bin_width: u32,
-    /// Range offset in 1/256 mm.
-    pub offset: i32,
-    /// 0: link, 1: sensor.
-    pub source: u8,
-    /// 0: the paper's rule, 1: a window.
-    pub rule: u8,
-    /// Bins in the window of the rule.
-    pub window: u8,
-    /// z in 1/4096; of the window's rule.
-    pub z: u16,
-    /// 0: centre of mass of three bins, 1: centred window.
-    pub estimator: u8,
-    /// Half the width of the centred window in 1/256 bin.
-    pub half_width: u16,
-    /// 0: depth events, 1: dynamic depth events.
-    pub output: u8,
-    /// What a mean depth is compared with, 0: that of the event before, 1: the one
-    /// reported last; of dynamic depth.
-    pub reference: u8,
-    /// How far a mean depth has to move, in 1/256 mm; of dynamic depth.
-    pub threshold: u32,
-    /// 1: the TDC takes one photon a laser cycle, so that events say when it piles up;
-    /// 0: any number.
-    pub one_hit: u8,
+    /// Picoseconds a bin.
+    pub bin_width_ps: U16F16,
+    /// Millimetres added to every range.
+    pub offset_mm: I24F8,
+    /// Where photons come from.
+    pub source: Source,
+    /// Changes of depth that are sent in place of depth events.
+    pub dynamic_depth: Option<DynamicDepth>,
 }
+
+// What the choices are on the wire.
+const FROM_LINK: u8 = 0;
+const FROM_SENSOR: u8 = 1;
+const PAPER_RULE: u8 = 0;
+const WINDOW_RULE: u8 = 1;
+const CENTROID: u8 = 0;
+const CENTRED_WINDOW: u8 = 1;
+const DEPTH_EVENTS: u8 = 0;
+const DYNAMIC_DEPTH_EVENTS: u8 = 1;
+const PREVIOUS: u8 = 0;
+const REPORTED: u8 = 1;
+const ANY_HITS: u8 = 0;
+const ONE_HIT: u8 = 1;
 
 impl Configuration {
     /// Bytes of the record.
     pub const BYTES: usize = 39;
+    /// What a minimum count may be: photons that a counter of 10 bits holds.
+    const MINIMUM_COUNTS: core::ops::RangeInclusive<u16> = 1..=1023;
 
     /// As it is sent.
     #[must_use]
     pub fn to_le_bytes(&self) -> [u8; Self::BYTES] {
-        let mut bytes = [0; Self::BYTES];
-        let fields = [
-            self.alpha,
-            self.minimum_count,
+        let (rule, alpha, minimum_count, window, z) = match self.rule {
+            AnyRule::Paper(rule) => {
+                let threshold = rule.threshold();
+                let (alpha, minimum_count) = (threshold.alpha(), threshold.minimum_count());
+                (PAPER_RULE, alpha, minimum_count, 0, U4F12::ZERO)
+            }
+            AnyRule::Window(rule) => {
+                let minimum_count = rule.minimum_count();
+                (
+                    WINDOW_RULE,
+                    U8F8::ZERO,
+                    minimum_count,
+                    rule.width(),
+                    rule.z(),
+                )
+            }
+        };
+        let (estimator, half_width) = match self.estimator {
+            DepthEstimator::Centroid3 => (CENTROID, U8F8::ZERO),
+            DepthEstimator::CentredWindow(window) => (CENTRED_WINDOW, window.half_width()),
+        };
+        let (output, reference, threshold) = match self.dynamic_depth {
+            None => (DEPTH_EVENTS, PREVIOUS, U24F8::ZERO),
+            Some(changes) => {
+                let reference = match changes.reference {
+                    Reference::Previous => PREVIOUS,
+                    Reference::Reported => REPORTED,
+                };
+                (DYNAMIC_DEPTH_EVENTS, reference, changes.threshold_mm)
+            }
+        };
+        let source = match self.source {
+            Source::Link => FROM_LINK,
+            Source::Sensor => FROM_SENSOR,
+        };
+        let hits = if self.one_hit_tdc { ONE_HIT } else { ANY_HITS };
+
+        let first = [
+            alpha.to_bits(),
+            // More than the field holds is more than a device takes.
+            u16::try_from(minimum_count.raw()).unwrap_or(u16::MAX),
             self.x,
             self.l1,
             self.l2,
-            self.gate_first,
-            self.gate_last,
+            self.gate.0,
+            self.gate.1,
             self.pixels,
         ];
-        let wide = self
-            .bin_width
-            .to_le_bytes()
-            .into_iter()
-            .chain(self.offset.to_le_bytes());
-        let [z, z_high] = self.z.to_le_bytes();
-        let [half_width, half_width_high] = self.half_width.to_le_bytes();
-        let all = fields
+        let fields = first
             .into_iter()
             .flat_map(u16::to_le_bytes)
-            .chain(wide)
-            .chain([self.source, self.rule, self.window, z, z_high])
-            .chain([self.estimator, half_width, half_width_high])
-            .chain([self.output, self.reference])
-            .chain(self.threshold.to_le_bytes())
-            .chain([self.one_hit]);
-        for (place, byte) in bytes.iter_mut().zip(all) {
+            .chain(self.bin_width_ps.to_le_bytes())
+            .chain(self.offset_mm.to_le_bytes())
+            .chain([source, rule, window])
+            .chain(z.to_le_bytes())
+            .chain([estimator])
+            .chain(half_width.to_le_bytes())
+            .chain([output, reference])
+            .chain(threshold.to_le_bytes())
+            .chain([hits]);
+        let mut bytes = [0; Self::BYTES];
+        for (place, byte) in bytes.iter_mut().zip(fields) {
             *place = byte;
         }
         bytes
     }
 
-    /// As it was received, or `None` if it is not as long as the record.
-    #[must_use]
-    pub fn from_le_bytes(bytes: &[u8]) -> Option<Self> {
-        let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;
-        let two = |at: usize| Some(u16::from_le_bytes(bytes.get(at..at + 2)?.try_into().ok()?));
-        let four = |at: usize| bytes.get(at..at + 4)?.try_into().ok();
-        Some(Self {
-            alpha: two(0)?,
-            minimum_count: two(2)?,
-            x: two(4)?,
-            l1: two(6)?,
-            l2: two(8)?,
-            gate_first: two(10)?,
-            gate_last: two(12)?,
-            pixels: two(14)?,
-            bin_width: u32::from_le_bytes(four(16)?),
-            offset: i32::from_le_bytes(four(20)?),
-            source: *bytes.get(24)?,
-            rule: *bytes.get(25)?,
-            window: *bytes.get(26)?,
-            z: two(27)?,
-            estimator: *bytes.get(29)?,
-            half_width: two(30)?,
-            output: *bytes.get(32)?,
-            reference: *bytes.get(33)?,
-            threshold: u32::from_le_bytes(four(34)?),
-            one_hit: *bytes.get(38)?,
+    /// As it was received. Fields of another rule, estimator or output are not looked at.
+    ///
+    /// # Errors
+    /// The first thing about it that no device takes.
+    pub fn from_le_bytes(bytes: &[u8]) -> Result<Self, Refusal> {
+        let bytes: &[u8; Self::BYTES] = bytes.try_into().map_err(|_| Refusal::Unknown)?;
+        let mut fields = Fields(bytes);
+        let alpha = U8F8::from_le_bytes(fields.next()?);
+        let minimum_count = u16::from_le_bytes(fields.next()?);
+        let x = u16::from_le_bytes(fields.next()?);
+        let l1 = u16::from_le_bytes(fields.next()?);
+        let l2 = u16::from_le_bytes(fields.next()?);
+        let gate_first = u16::from_le_bytes(fields.next()?);
+        let gate_last = u16::from_le_bytes(fields.next()?);
+        let pixels = u16::from_le_bytes(fields.next()?);
+        let bin_width_ps = U16F16::from_le_bytes(fields.next()?);
+        let offset_mm = I24F8::from_le_bytes(fields.next()?);
+        let [source, rule, window] = fields.next()?;
+        let z = U4F12::from_le_bytes(fields.next()?);
+        let [estimator] = fields.next()?;
+        let half_width = U8F8::from_le_bytes(fields.next()?);
+        let [output, reference] = fields.next()?;
+        let threshold_mm = U24F8::from_le_bytes(fields.next()?);
+        let [hits] = fields.next()?;
+
+        if !Self::MINIMUM_COUNTS.contains(&minimum_count) {
+            return Err(Refusal::MinimumCount);
+        }
+        let minimum_count = Count::saturating(minimum_count.into());
+        Ok(Self {
+            rule: match rule {
+                PAPER_RULE => PaperRule::new(alpha, minimum_count).into(),
+                WINDOW_RULE => WindowRule::new(window, z, minimum_count)?.into(),
+                _ => return Err(Refusal::Unknown),
+            },
+            estimator: match estimator {
+                CENTROID => DepthEstimator::Centroid3,
+                CENTRED_WINDOW => CentredWindow::new(half_width)
+                    .map(DepthEstimator::CentredWindow)
+                    .ok_or(Refusal::HalfWidth)?,
+                _ => return Err(Refusal::Unknown),
+            },
+            x,
+            l1,
+            l2,
+            gate: (gate_first, gate_last),
+            one_hit_tdc: match hits {
+                ANY_HITS => false,
+                ONE_HIT => true,
+                _ => return Err(Refusal::Unknown),
+            },
+            pixels,
+            bin_width_ps,
+            offset_mm,
+            source: match source {
+                FROM_LINK => Source::Link,
+                FROM_SENSOR => Source::Sensor,
+                _ => return Err(Refusal::Unknown),
+            },
+            dynamic_depth: match (output, reference) {
+                (DEPTH_EVENTS, _) => None,
+                (DYNAMIC_DEPTH_EVENTS, PREVIOUS) => Some(DynamicDepth {
+                    threshold_mm,
+                    reference: Reference::Previous,
+                }),
+                (DYNAMIC_DEPTH_EVENTS, REPORTED) => Some(DynamicDepth {
+                    threshold_mm,
+                    reference: Reference::Reported,
+                }),
+                _ => return Err(Refusal::Unknown),
+            },
         })
+    }
+}
+
+/// What is left of a record.
+struct Fields<'a>(&'a [u8]);
+
+impl Fields<'_> {
+    /// The next field.
+    fn next<const BYTES: usize>(&mut self) -> Result<[u8; BYTES], Refusal> {
+        let (field, rest) = self.0.split_first_chunk().ok_or(Refusal::Unknown)?;
+        self.0 = rest;
+        Ok(*field)
     }
 }

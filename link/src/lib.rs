@@ -17,6 +17,7 @@
 #![forbid(unsafe_code)]
 
 mod configuration;
+mod dynamic_depth;
 pub mod endpoint;
 pub mod frame;
 pub mod message;
@@ -27,6 +28,7 @@ mod sensor;
 mod token;
 
 pub use self::configuration::{Configuration, Source};
+pub use self::dynamic_depth::DynamicDepth;
 pub use self::refusal::Refusal;
 pub use self::report::Report;
 pub use self::sensor::{FaultRecord, SensorRecord};

@@ -3,12 +3,13 @@
 
 use std::fmt::Display;
 
-use dtof_link::FaultRecord;
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
+use dtof_core::{AnyRule, CentredWindow, Count, DepthEstimator, PaperRule, Reference, WindowRule};
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, FrameError, PAYLOAD_BYTES, WIRE_BYTES, encode};
 use dtof_link::message::greeting;
 use dtof_link::message::{CONFIGURE, PHOTONS};
-use dtof_link::{Configuration, Refusal, Report, Token};
+use dtof_link::{Configuration, DynamicDepth, FaultRecord, Refusal, Report, Source, Token};
 use proptest::prelude::*;
 
 /// The golden frame whose line in the document begins so.
@@ -82,27 +83,25 @@ fn a_host_configures_with_the_golden_frame() {
     let mut host = Endpoint::host(0x1234, greeting(0, 0), 0);
     next(&mut host, 0);
     give(&mut host, &golden("welcome"));
+    let z = U4F12::lit("4.5");
     let configuration = Configuration {
-        alpha: 0,
-        minimum_count: 5,
+        rule: WindowRule::new(3, z, Count::saturating(5)).unwrap().into(),
+        estimator: CentredWindow::new(U8F8::lit("2.5"))
+            .map(DepthEstimator::CentredWindow)
+            .unwrap(),
         x: 4,
         l1: 40,
         l2: 2000,
-        gate_first: 10,
-        gate_last: 119,
+        gate: (10, 119),
+        one_hit_tdc: true,
         pixels: 64,
-        bin_width: 250 << 16,
-        offset: -(359 << 7),
-        source: 0,
-        rule: 1,
-        window: 3,
-        z: 9 << 11,
-        estimator: 1,
-        half_width: 5 << 7,
-        output: 1,
-        reference: 1,
-        threshold: 100 << 8,
-        one_hit: 1,
+        bin_width_ps: U16F16::lit("250"),
+        offset_mm: I24F8::lit("-179.5"),
+        source: Source::Link,
+        dynamic_depth: Some(DynamicDepth {
+            threshold_mm: U24F8::lit("100"),
+            reference: Reference::Reported,
+        }),
     };
     host.offer(CONFIGURE, &configuration.to_le_bytes()).unwrap();
     assert_eq!(hex(&next(&mut host, 0)), hex(&golden("configure 0")));
@@ -175,6 +174,57 @@ fn every_sensor_fault_has_its_own_number_and_words() {
     are_documented(&all, |&fault| fault as u8, "\n| last sensor error | |\n");
 }
 
+/// Every choice with any numbers; x, gate and the like are checked by the device.
+fn configuration() -> impl Strategy<Value = Configuration> {
+    let count = || (1u32..=1023).prop_map(Count::saturating);
+    let paper = (any::<u16>(), count())
+        .prop_map(|(alpha, count)| PaperRule::new(U8F8::from_bits(alpha), count).into());
+    let window = (1u8..=7, any::<u16>(), count()).prop_map(|(width, z, count)| {
+        let window = WindowRule::new(width, U4F12::from_bits(z), count);
+        AnyRule::Window(window.unwrap())
+    });
+    let centred = (256u16..=1024).prop_map(|half| {
+        DepthEstimator::CentredWindow(CentredWindow::new(U8F8::from_bits(half)).unwrap())
+    });
+    let changes = (any::<u32>(), any::<bool>()).prop_map(|(threshold, reported)| DynamicDepth {
+        threshold_mm: U24F8::from_bits(threshold),
+        reference: if reported {
+            Reference::Reported
+        } else {
+            Reference::Previous
+        },
+    });
+    let source = prop_oneof![Just(Source::Link), Just(Source::Sensor)];
+    (
+        prop_oneof![paper, window],
+        prop_oneof![Just(DepthEstimator::Centroid3), centred],
+        prop::option::of(changes),
+        source,
+        any::<bool>(),
+        any::<[u16; 6]>(),
+        any::<(u32, i32)>(),
+    )
+        .prop_map(
+            |(rule, estimator, dynamic_depth, source, one_hit_tdc, words, (width, offset))| {
+                let [x, l1, l2, first, last, pixels] = words;
+                Configuration {
+                    rule,
+                    estimator,
+                    x,
+                    l1,
+                    l2,
+                    gate: (first, last),
+                    one_hit_tdc,
+                    pixels,
+                    bin_width_ps: U16F16::from_bits(width),
+                    offset_mm: I24F8::from_bits(offset),
+                    source,
+                    dynamic_depth,
+                }
+            },
+        )
+}
+
 proptest! {
     #[test]
     fn any_payload_comes_back(payload in prop::collection::vec(any::<u8>(), 0..=PAYLOAD_BYTES)) {
@@ -200,19 +250,39 @@ proptest! {
     }
 
     #[test]
-    fn configurations_come_back(
-        words in any::<[u16; 10]>(), bin_width: u32, offset: i32, bytes in any::<[u8; 7]>(),
-        threshold: u32,
-    ) {
-        let [alpha, minimum_count, x, l1, l2, gate_first, gate_last, pixels, z, half_width] = words;
-        let [source, rule, window, estimator, output, reference, one_hit] = bytes;
-        let configuration = Configuration {
-            alpha, minimum_count, x, l1, l2, gate_first, gate_last, pixels, bin_width, offset,
-            source, rule, window, z, estimator, half_width, output, reference, threshold, one_hit,
-        };
+    fn configurations_come_back(configuration in configuration()) {
         let bytes = configuration.to_le_bytes();
-        prop_assert_eq!(Configuration::from_le_bytes(&bytes), Some(configuration));
-        prop_assert_eq!(Configuration::from_le_bytes(&bytes[1..]), None);
+        prop_assert_eq!(Configuration::from_le_bytes(&bytes), Ok(configuration));
+        prop_assert_eq!(Configuration::from_le_bytes(&bytes[1..]), Err(Refusal::Unknown));
+    }
+
+    #[test]
+    fn what_any_bytes_configure_comes_back(
+        numbers in any::<[u8; Configuration::BYTES]>(), minimum_count in 1u16..=1023,
+        choices in prop::array::uniform6(0u8..3), width in 0u8..9, half_width in 200u16..1100,
+    ) {
+        let mut bytes = numbers;
+        bytes[2..4].copy_from_slice(&minimum_count.to_le_bytes());
+        let [source, rule, estimator, output, reference, hits] = choices;
+        for (at, value) in [
+            (24, source), (25, rule), (26, width), (29, estimator), (32, output),
+            (33, reference), (38, hits),
+        ] {
+            bytes[at] = value;
+        }
+        bytes[30..32].copy_from_slice(&half_width.to_le_bytes());
+        let found = Configuration::from_le_bytes(&bytes);
+        let unknown = source == 2 || rule == 2 || estimator == 2 || output == 2 || hits == 2
+            || (output == 1 && reference == 2);
+        prop_assert_eq!(
+            found.is_err(),
+            unknown || (rule == 1 && !(1..=7).contains(&width))
+                || (estimator == 1 && !(256..=1024).contains(&half_width))
+        );
+        if let Ok(configuration) = found {
+            let again = Configuration::from_le_bytes(&configuration.to_le_bytes());
+            prop_assert_eq!(again, Ok(configuration));
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use core::fmt;
 
 use dtof_core::AerWord;
 
-use crate::stream::Word;
+use crate::word::Word;
 
 const PRINT: *mut u32 = 0xf000_0000 as *mut u32;
 const MARK: *mut u32 = 0xf000_0004 as *mut u32;

@@ -5,7 +5,7 @@ use core::fmt;
 
 use dtof_core::AerWord;
 
-use crate::stream::Word;
+use crate::word::Word;
 
 const UART: *mut u8 = 0x1000_0000 as *mut u8;
 const TEST: *mut u32 = 0x0010_0000 as *mut u32;

@@ -19,6 +19,7 @@ pub mod io;
 #[allow(unsafe_code, reason = "nothing is there yet that could be safe")]
 mod start;
 pub mod stream;
+pub mod word;
 
 /// Makes a function without arguments, which returns whether it succeeded, what the
 /// image runs.

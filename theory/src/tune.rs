@@ -1,7 +1,7 @@
-//! Settings for a wanted rate of false events: α and L1, and what to expect of
+//! Settings for a wanted rate of false alarms: α and L1, and what to expect of
 //! them.
 //!
-//! α is the smallest whose probability of a false event in an exposure is not
+//! α is the smallest whose probability of a false alarm in an exposure is not
 //! above the wanted one. That probability comes from the simulated [`Table`]; its
 //! upper limit has to be below by the table's [`MARGIN`]; where the table saw no events,
 //! or was not made for the settings, from the sum over looks of the exact
@@ -24,7 +24,7 @@ use crate::looks::repeated_looks::{BINS, Bounds, MINIMUM_COUNT, RepeatedLooks, s
 use crate::looks::single_look::SingleLook;
 use crate::looks::table::{MARGIN, Table};
 
-/// The wanted limit on false events of a pixel without a target.
+/// The wanted limit on false alarms of a pixel without a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wanted {
     /// In one exposure.
@@ -67,7 +67,7 @@ pub struct Request {
     pub l1: Option<u16>,
     /// The exposure at which a pixel starts over without an event.
     pub l2: u16,
-    /// The limit on false events.
+    /// The limit on false alarms.
     pub wanted: Wanted,
     /// Seed of the simulated exposures.
     pub seed: u64,
@@ -93,10 +93,10 @@ pub struct Tuned {
     pub l1: u16,
     /// The looks that L1, L2 and X come to.
     pub looks: Looks,
-    /// The wanted probability of a false event in an exposure.
+    /// The wanted probability of a false alarm in an exposure.
     pub wanted: f64,
     /// The probability with this α.
-    pub false_events: f64,
+    pub false_alarms: f64,
     /// Where it comes from.
     pub source: Source,
     /// Between what it lies, exactly.
@@ -137,7 +137,7 @@ pub fn tune(request: &Request, table: &Table) -> Result<Tuned> {
         .collect();
     ensure!(
         !all.is_empty(),
-        "no α keeps false events below the wanted rate with so little background: raise --min-count \
+        "no α keeps false alarms below the wanted rate with so little background: raise --min-count \
          or --l1"
     );
     let (tuned, detections) = shortest(request, &all)?;
@@ -206,7 +206,7 @@ fn check(request: &Request) -> Result<()> {
     let (Wanted::PerExposure(wanted) | Wanted::PerCycle(wanted)) = request.wanted;
     ensure!(
         wanted > 0.0 && wanted < 1.0,
-        "the wanted false events must be more than 0 and less than 1 an exposure or laser cycle"
+        "the wanted false alarms must be more than 0 and less than 1 an exposure or laser cycle"
     );
     Ok(())
 }
@@ -235,7 +235,7 @@ fn candidates(request: &Request) -> Vec<u16> {
     candidates
 }
 
-/// The smallest α that keeps false events down, or `None` if none does.
+/// The smallest α that keeps false alarms down, or `None` if none does.
 fn calibrated(
     request: &Request,
     table: &Table,
@@ -292,13 +292,13 @@ fn calibrated(
             low = middle + 1;
         }
     }
-    let (false_events, _, source, bounds) = probability(high);
+    let (false_alarms, _, source, bounds) = probability(high);
     Some(Tuned {
         alpha: U8F8::from_bits(high),
         l1,
         looks,
         wanted,
-        false_events,
+        false_alarms,
         source,
         bounds,
         detections: Detections::default(),

@@ -229,7 +229,7 @@ fn poisson_forms_against_monte_carlo_from_a_tenth_to_300_counts() {
 }
 
 /// Background only, the core's decision.
-fn false_events<const BINS: usize>(
+fn false_alarms<const BINS: usize>(
     mean: f64,
     rules: &[PaperRule],
     times: u32,
@@ -267,13 +267,13 @@ fn the_quadrant_law_is_that_of_the_core() {
     let mut rng = trial_rng(9, 0);
     for mean in means {
         for (bins, events) in [
-            (8, false_events::<8>(mean, &rules, TIMES, &mut rng)),
-            (32, false_events::<32>(mean, &rules, TIMES, &mut rng)),
-            (128, false_events::<128>(mean, &rules, TIMES, &mut rng)),
+            (8, false_alarms::<8>(mean, &rules, TIMES, &mut rng)),
+            (32, false_alarms::<32>(mean, &rules, TIMES, &mut rng)),
+            (128, false_alarms::<128>(mean, &rules, TIMES, &mut rng)),
         ] {
             let look = SingleLook::new(bins, mean);
             for (rule, &seen) in rules.iter().zip(&events) {
-                let exact = look.false_event_probability(rule.threshold());
+                let exact = look.false_alarm_probability(rule.threshold());
                 assert!(
                     plausible(seen, TIMES, exact, level),
                     "{bins} bins, mean {mean}, {rule:?}: {seen} of {TIMES}, expected {exact}"

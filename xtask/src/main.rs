@@ -78,7 +78,7 @@ fn run() -> Result<()> {
         Some(Value(command)) => command.string()?,
         Some(Short('h') | Long("help")) => "help".to_owned(),
         Some(other) => return Err(other.unexpected().into()),
-        None => bail!("which command?\n\n{HELP}"),
+        None => bail!("which command? `cargo xtask help` lists them"),
     };
     let mut options = Options::default();
     let mut words = Vec::new();
@@ -88,7 +88,11 @@ fn run() -> Result<()> {
             ("bench", Long("check")) => options.check = true,
             ("flash", Long("chip")) => options.chip = Some(parser.value()?.string()?),
             ("image", Long("emulator")) => options.emulator = true,
-            ("emulate", Long("port")) => options.port = Some(parser.value()?.parse()?),
+            ("emulate", Long("port")) => {
+                let number = parser.value()?.string()?;
+                let port = number.parse();
+                options.port = Some(port.with_context(|| format!("no port: `{number}`"))?);
+            }
             (_, Value(word)) => words.push(word.string()?),
             (_, other) => return Err(other.unexpected().into()),
         }
@@ -120,7 +124,10 @@ fn run() -> Result<()> {
         ("python", &[requirements]) => {
             println!("{}", python::environment(root, requirements)?.display());
         }
-        _ => bail!("`{command} {}`: no such command\n\n{HELP}", words.join(" ")),
+        _ => bail!(
+            "no command `{}`: `cargo xtask help` lists them",
+            [&[&*command], &words[..]].concat().join(" ")
+        ),
     }
     Ok(())
 }

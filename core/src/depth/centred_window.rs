@@ -67,6 +67,8 @@ impl CentredWindow {
     pub const MIN: U8F8 = U8F8::lit("1");
     /// The widest half width: 4 bins.
     pub const MAX: U8F8 = U8F8::lit("4");
+    /// The widest pulse that a window suits, as a standard deviation in bins.
+    pub const WIDEST_PULSE: U8F8 = U8F8::lit("1.75");
     /// What the half width is above twice the pulse's standard deviation.
     const MARGIN: U8F8 = U8F8::lit("0.5");
 

@@ -32,20 +32,6 @@ pub enum DepthEstimator {
 }
 
 impl DepthEstimator {
-    /// The number of [`Self::Centroid3`] in links and files, which stays.
-    pub const CENTROID_3: u8 = 0;
-    /// The number of [`Self::CentredWindow`] in links and files, which stays.
-    pub const CENTRED_WINDOW: u8 = 1;
-
-    /// Its number: [`Self::CENTROID_3`] or [`Self::CENTRED_WINDOW`].
-    #[must_use]
-    pub const fn number(&self) -> u8 {
-        match self {
-            Self::Centroid3 => Self::CENTROID_3,
-            Self::CentredWindow(_) => Self::CENTRED_WINDOW,
-        }
-    }
-
     /// What suits a pulse of the standard deviation `sigma` in bins: a
     /// [`CentredWindow::for_pulse`].
     #[must_use]

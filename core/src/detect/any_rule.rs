@@ -41,22 +41,6 @@ pub enum AnyRule {
     Window(WindowRule),
 }
 
-impl AnyRule {
-    /// The number of [`Self::Paper`] in links and files, which stays.
-    pub const PAPER: u8 = 0;
-    /// The number of [`Self::Window`] in links and files, which stays.
-    pub const WINDOW: u8 = 1;
-
-    /// The number of the rule it holds: [`Self::PAPER`] or [`Self::WINDOW`].
-    #[must_use]
-    pub const fn number(&self) -> u8 {
-        match self {
-            Self::Paper(_) => Self::PAPER,
-            Self::Window(_) => Self::WINDOW,
-        }
-    }
-}
-
 impl From<PaperRule> for AnyRule {
     fn from(rule: PaperRule) -> Self {
         Self::Paper(rule)

@@ -59,28 +59,6 @@ pub enum Reference {
     Reported,
 }
 
-impl Reference {
-    /// Its number in links, which stays: 0 for [`Self::Previous`], 1 for
-    /// [`Self::Reported`].
-    #[must_use]
-    pub const fn number(self) -> u8 {
-        match self {
-            Self::Previous => 0,
-            Self::Reported => 1,
-        }
-    }
-
-    /// What has this number, or `None`.
-    #[must_use]
-    pub const fn from_number(number: u8) -> Option<Self> {
-        match number {
-            0 => Some(Self::Previous),
-            1 => Some(Self::Reported),
-            _ => None,
-        }
-    }
-}
-
 /// How dynamic depth is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

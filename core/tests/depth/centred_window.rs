@@ -93,6 +93,14 @@ fn only_widths_that_can_be_used() {
     }
 }
 
+#[test]
+fn the_widest_pulse_has_the_widest_window() {
+    let widest = CentredWindow::WIDEST_PULSE;
+    let width = |sigma| CentredWindow::for_pulse(sigma).half_width();
+    assert_eq!(width(widest), CentredWindow::MAX);
+    assert!(width(widest - U8F8::DELTA) < CentredWindow::MAX);
+}
+
 /// All pulses of four bins of up to 5 photons.
 #[test]
 fn all_small_pulses_are_as_written() {

@@ -71,14 +71,3 @@ fn both_rules_fire_and_do_not() {
     let often = |fired| (20..180).contains(fired);
     assert!(fired.iter().all(often), "{fired:?}");
 }
-
-/// Those of `docs/link-format.md`.
-#[test]
-fn the_numbers_of_rules_and_estimators_stay() {
-    let paper = AnyRule::from(PaperRule::new(U8F8::ONE, Count::default()));
-    let window = AnyRule::from(WindowRule::new(3, U4F12::ONE, Count::default()).unwrap());
-    assert_eq!((paper.number(), window.number()), (0, 1));
-    let centred = DepthEstimator::for_pulse(U8F8::ONE);
-    let of_three = DepthEstimator::Centroid3;
-    assert_eq!((of_three.number(), centred.number()), (0, 1));
-}

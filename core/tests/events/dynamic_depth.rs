@@ -189,14 +189,3 @@ proptest! {
         }
     }
 }
-
-/// Those of `docs/link-format.md`.
-#[test]
-fn the_numbers_of_references_stay() {
-    let all = [Some(Reference::Previous), Some(Reference::Reported), None];
-    for (number, reference) in (0..).zip(all) {
-        assert_eq!(Reference::from_number(number), reference);
-        assert!(reference.is_none_or(|reference| reference.number() == number));
-    }
-    assert_eq!(Reference::from_number(u8::MAX), None);
-}

@@ -144,8 +144,7 @@ fn products_of<const N: usize>() {
         Ok(config) => config,
         Err(error) => return keep(error),
     };
-    keep((config.threshold(), config.reference().number()));
-    keep(Reference::from_number(byte()));
+    keep((config.threshold(), config.reference()));
     let mut pixel = DynamicDepthPixel::<N>::new();
     let mut mean = RunningMean::<N>::new();
     while more() {
@@ -270,7 +269,7 @@ fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(rule: R) {
         Err(error) => return keep(error),
     };
     keep((config.x(), config.l1(), config.l2()));
-    keep((*config.gate(), *config.rule(), config.estimator().number()));
+    keep((*config.gate(), *config.rule(), *config.estimator()));
     keep(config.is_one_hit());
     let config = &config;
     let mut statistics = Statistics::default();

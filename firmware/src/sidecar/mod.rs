@@ -13,18 +13,20 @@
 //! as well.
 
 mod configuration;
+mod events;
 mod photons;
 mod records;
 mod sensor;
+
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{
-    AerEncoder, AerWord, AnyRule, AsyncPixel, DepthEvent, DynamicDepthConfig, DynamicDepthPixel,
-    PixelAddress, PixelConfig, Statistics,
+    AerEncoder, AerWord, AnyRule, AsyncPixel, DynamicDepthConfig, DynamicDepthPixel, PixelAddress,
+    PixelConfig, Statistics,
 };
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, Message};
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
-use dtof_link::{Configuration, Refusal, Report, SensorRecord, Source};
+use dtof_link::{DynamicDepth, Report, SensorRecord, Source};
 use dtof_sensors::{About, SensorFault};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::spsc::Queue;
@@ -39,21 +41,16 @@ pub const BINS: usize = 128;
 const QUEUE: usize = 64;
 /// Times that all pixels look at most before the main loop goes round.
 const LOOKS: u16 = 64;
-/// Words in one message.
-const WORDS: usize = BODY_BYTES / AerWord::BYTES;
 
 /// The kind and the body of a message.
 type Answer = (u8, Vec<u8, BODY_BYTES>);
-
-/// Events of which dynamic depth is the mean: the paper's.
-const MEAN_OF: usize = 3;
 
 /// A macropixel, and what its dynamic depth is compared with: room for one, which the
 /// caller of [`Sidecar::new`] provides.
 #[derive(Debug)]
 pub struct Pixel {
     detector: AsyncPixel<BINS>,
-    dynamic_depth: DynamicDepthPixel<MEAN_OF>,
+    dynamic_depth: DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>,
 }
 
 impl Pixel {
@@ -244,16 +241,10 @@ impl<'a> Sidecar<'a> {
 
     fn act(&mut self, message: Message, overrun: u32) -> Option<Answer> {
         match message.kind {
-            message::CONFIGURE => {
-                let configuration = Configuration::from_le_bytes(&message.body);
-                let configured = configuration.ok_or(Refusal::Unknown);
-                Some(
-                    match configured.and_then(|configuration| self.configure(&configuration)) {
-                        Ok(()) => (message::CONFIGURED, Vec::new()),
-                        Err(refusal) => (message::REFUSED, [refusal as u8].into_iter().collect()),
-                    },
-                )
-            }
+            message::CONFIGURE => Some(match self.configure(&message.body) {
+                Ok(()) => (message::CONFIGURED, Vec::new()),
+                Err(refusal) => (message::REFUSED, [refusal as u8].into_iter().collect()),
+            }),
             message::PHOTONS if self.config.is_some() && self.source == Source::Link => {
                 self.photons = Some(Photons::new(message.body));
                 None
@@ -288,94 +279,6 @@ impl<'a> Sidecar<'a> {
         while self.words.dequeue().is_some() {}
     }
 
-    /// What the host asks, if that is what it has sent next.
-    fn question(&self) -> Option<u8> {
-        let next = self.endpoint.peek()?.kind;
-        (next != message::PHOTONS).then_some(next)
-    }
-
-    /// Whether events stay in their slots for now: photons of a sensor do not
-    /// wait, so that a question would never be answered if all events that come
-    /// meanwhile went before the answer.
-    fn holds_slots(&self) -> bool {
-        self.source == Source::Sensor
-            && self
-                .question()
-                .is_some_and(|kind| kind != message::CONFIGURE)
-    }
-
-    /// Slots to queue, queue to messages, as far as there is room.
-    fn drain(&mut self) {
-        self.send_words();
-        if self.holds_slots() {
-            return;
-        }
-        // From where there was no room for more, so that each pixel has its turn.
-        let turn = core::mem::take(&mut self.turn);
-        let pixels = self.pixels.len();
-        for index in (turn..pixels).chain(0..turn) {
-            let Some(pixel) = self.pixels.get_mut(index) else {
-                break;
-            };
-            if !pixel.detector.request() {
-                continue;
-            }
-            if !has_room_for_event(&self.words) {
-                self.turn = index;
-                break;
-            }
-            if let Some(event) = pixel.detector.acknowledge() {
-                self.enqueue(&event);
-            }
-        }
-        self.send_words();
-    }
-
-    /// Takes an event for which there is room. Of dynamic depth only a change goes on.
-    fn enqueue(&mut self, event: &DepthEvent) {
-        let (time, word) = match &self.dynamic_depth {
-            None => self.encoder.encode(event),
-            Some(config) => {
-                let pixel = self.pixels.get_mut(usize::from(event.pixel.0));
-                let change = pixel.and_then(|pixel| pixel.dynamic_depth.observe(config, event));
-                let Some(change) = change else {
-                    return;
-                };
-                self.encoder.encode_dynamic_depth(&change)
-            }
-        };
-        for word in time.into_iter().chain([word]) {
-            let _ = self.words.enqueue(word);
-        }
-    }
-
-    /// A full message at once, a smaller one only when nothing else is under way
-    /// or an answer waits for it.
-    fn send_words(&mut self) {
-        let all = self.endpoint.is_settled() || self.question().is_some();
-        while self.words.len() >= WORDS || (!self.words.is_empty() && all) {
-            // An answer stands before the events that came after the question.
-            if self.answer.is_some() || !self.endpoint.has_room() {
-                return;
-            }
-            let words = core::iter::from_fn(|| self.words.dequeue()).take(WORDS);
-            let body: Vec<u8, BODY_BYTES> = words.flat_map(AerWord::to_le_bytes).collect();
-            // There is room: asked above.
-            let _ = self.endpoint.offer(message::EVENTS, &body);
-        }
-    }
-
-    /// Whether every event before a question has become a message.
-    fn is_drained(&self) -> bool {
-        self.words.is_empty() && (self.holds_slots() || self.waiting() == 0)
-    }
-
-    /// Events that have not left their slots.
-    fn waiting(&self) -> u64 {
-        let waiting = self.pixels.iter().filter(|pixel| pixel.detector.request());
-        waiting.map(|_| 1).sum()
-    }
-
     fn restart_counts(&mut self) {
         self.cycle = 0;
         self.since_look = 0;
@@ -404,9 +307,4 @@ impl<'a> Sidecar<'a> {
             link: *self.endpoint.counters(),
         }
     }
-}
-
-/// An event may need a time word before it.
-fn has_room_for_event(words: &Queue<AerWord, QUEUE>) -> bool {
-    words.capacity() - words.len() >= 2
 }

@@ -3,7 +3,8 @@
 use dtof_core::{Count24, Histogram, LaserCycle, PixelAddress, PixelConfig};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
-use super::{BINS, Sidecar, has_room_for_event};
+use super::events::has_room_for_event;
+use super::{BINS, Sidecar};
 use dtof_link::Source;
 use dtof_link::message;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault};

@@ -2,37 +2,32 @@
 
 use std::ops::Range;
 
-use dtof_core::fixed::types::U16F16;
-use dtof_core::{AerDecoder, AerRecord, AerWord, DepthEvent, DynamicDepthEvent, PixelAddress};
+use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::{
+    AerDecoder, AerRecord, AerWord, AnyRule, Count, DepthEstimator, DepthEvent, DynamicDepthEvent,
+    PaperRule, PixelAddress,
+};
 use dtof_firmware::sidecar::{Pixel, Sidecar};
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
-use dtof_link::{Configuration, Report};
+use dtof_link::{Configuration, Report, Source};
 use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
 
 /// A configuration that takes photons from the sensor.
 pub const CONFIGURATION: Configuration = Configuration {
-    alpha: 4 << 8,
-    minimum_count: 5,
+    rule: AnyRule::Paper(PaperRule::new(U8F8::lit("4"), Count::saturating(5))),
+    estimator: DepthEstimator::Centroid3,
     x: 4,
     l1: 20,
     l2: 200,
-    gate_first: 0,
-    gate_last: 127,
+    gate: (0, 127),
+    one_hit_tdc: false,
     pixels: 8,
-    bin_width: 250 << 16,
-    offset: 0,
-    source: 1,
-    rule: 0,
-    window: 0,
-    z: 0,
-    estimator: 0,
-    half_width: 0,
-    output: 0,
-    reference: 0,
-    threshold: 0,
-    one_hit: 0,
+    bin_width_ps: U16F16::lit("250"),
+    offset_mm: I24F8::ZERO,
+    source: Source::Sensor,
+    dynamic_depth: None,
 };
 
 /// A device of some pixels with a sensor, and a host that has configured it.

@@ -3,7 +3,7 @@
 /// Speed of light in vacuum, in metres per second.
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
-/// The sub-bin position of a peak, by the centre of mass of the peak bin and
+/// The sub-bin position of a peak, by the centroid of the peak bin and
 /// its two neighbours (the CMM of sec. III-A).
 ///
 /// The background is taken off each of the three counts and what would be
@@ -19,13 +19,7 @@ const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 ///
 /// If `first..=last` does not hold the peak or reaches beyond the histogram.
 #[must_use]
-pub fn centre_of_mass(
-    counts: &[f64],
-    first: usize,
-    last: usize,
-    peak: usize,
-    background: f64,
-) -> f64 {
+pub fn centroid(counts: &[f64], first: usize, last: usize, peak: usize, background: f64) -> f64 {
     assert!(
         first <= peak && peak <= last && last < counts.len(),
         "the peak lies in the window, the window in the histogram"
@@ -63,7 +57,7 @@ mod tests {
         // Signal 4, 8, 4 in bins 1, 2, 3 with centres 1.5, 2.5, 3.5:
         // (6 + 20 + 14) / 16 = 2.5
         let counts = [1.0, 5.0, 9.0, 5.0, 1.0];
-        assert_eq!(centre_of_mass(&counts, 0, 4, 2, 1.0), 2.5);
+        assert_eq!(centroid(&counts, 0, 4, 2, 1.0), 2.5);
     }
 
     #[test]
@@ -71,33 +65,33 @@ mod tests {
         // Signal 0, 6, 2 in bins 1, 2, 3: (15 + 7) / 8 = 2.75; the 9 in bin 4
         // is not among the three bins.
         let counts = [0.0, 2.0, 8.0, 4.0, 9.0];
-        assert_eq!(centre_of_mass(&counts, 0, 4, 2, 2.0), 2.75);
+        assert_eq!(centroid(&counts, 0, 4, 2, 2.0), 2.75);
     }
 
     #[test]
     fn a_count_below_the_background_is_clipped() {
         // Signal 0 (not -3), 6, 2: as above.
         let counts = [0.0, 2.0, 11.0, 7.0, 0.0];
-        assert_eq!(centre_of_mass(&counts, 0, 4, 2, 5.0), 2.75);
+        assert_eq!(centroid(&counts, 0, 4, 2, 5.0), 2.75);
     }
 
     #[test]
     fn bins_outside_the_window_are_zero() {
         let counts = [4.0, 8.0, 8.0, 4.0];
         // Window 1 to 3, peak 1: signal 0, 8, 8: (12 + 20) / 16 = 2
-        assert_eq!(centre_of_mass(&counts, 1, 3, 1, 0.0), 2.0);
+        assert_eq!(centroid(&counts, 1, 3, 1, 0.0), 2.0);
         // Window 0 to 1, peak 1: signal 4, 8, 0: (2 + 12) / 12 = 7 / 6
-        assert!((centre_of_mass(&counts, 0, 1, 1, 0.0) - 7.0 / 6.0).abs() < 1e-15);
+        assert!((centroid(&counts, 0, 1, 1, 0.0) - 7.0 / 6.0).abs() < 1e-15);
         // In the first bin of the histogram, signal 4, 8 in bins 0, 1:
         // (2 + 12) / 12; in the last, signal 8, 4 in bins 2, 3: (20 + 14) / 12
-        assert!((centre_of_mass(&counts, 0, 3, 0, 0.0) - 14.0 / 12.0).abs() < 1e-15);
-        assert!((centre_of_mass(&counts, 0, 3, 3, 0.0) - 34.0 / 12.0).abs() < 1e-15);
+        assert!((centroid(&counts, 0, 3, 0, 0.0) - 14.0 / 12.0).abs() < 1e-15);
+        assert!((centroid(&counts, 0, 3, 3, 0.0) - 34.0 / 12.0).abs() < 1e-15);
     }
 
     #[test]
     fn without_signal_the_peak_lies_in_the_middle_of_its_bin() {
-        assert_eq!(centre_of_mass(&[3.0; 5], 0, 4, 1, 3.0), 1.5);
-        assert_eq!(centre_of_mass(&[3.0; 5], 0, 4, 1, 7.0), 1.5);
+        assert_eq!(centroid(&[3.0; 5], 0, 4, 1, 3.0), 1.5);
+        assert_eq!(centroid(&[3.0; 5], 0, 4, 1, 7.0), 1.5);
     }
 
     #[test]

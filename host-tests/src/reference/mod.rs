@@ -26,7 +26,7 @@ mod square_root;
 mod threshold;
 
 pub use background::quadrant_background;
-pub use depth::{centre_of_mass, range_mm};
+pub use depth::{centroid, range_mm};
 pub use histogram::Histogram;
 pub use peak::peak;
 pub use pixel::{Config, Event, Look, Pixel};

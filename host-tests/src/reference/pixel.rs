@@ -1,7 +1,7 @@
 //! The asynchronous operation of a pixel (sec. II-B and its figure "Pixel
 //! operation flow chart").
 
-use super::{Histogram, centre_of_mass, peak, quadrant_background, stands_clear};
+use super::{Histogram, centroid, peak, quadrant_background, stands_clear};
 
 /// The hyperparameters of a pixel (sec. II-B) and its range gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +42,7 @@ pub struct Event {
     /// `λ_b`: the background the peak was compared with (Eq. 5, sec. IV-B).
     pub background: f64,
     /// The sub-bin position of the peak, in bins from the start of bin 0
-    /// (sec. III-A); see [`centre_of_mass`].
+    /// (sec. III-A); see [`centroid`].
     pub position: f64,
 }
 
@@ -183,7 +183,7 @@ impl Pixel {
             peak_bin: look.peak_bin,
             peak_count: look.peak_count,
             background: look.background,
-            position: centre_of_mass(
+            position: centroid(
                 self.histogram.counts(),
                 self.config.first,
                 self.config.last,

@@ -107,7 +107,9 @@ impl Paths {
                 before.pop();
             }
             syn::UseTree::Group(group) => {
-                group.items.iter().for_each(|tree| self.tree(before, tree))
+                for tree in &group.items {
+                    self.tree(before, tree);
+                }
             }
             syn::UseTree::Name(syn::UseName { ident })
             | syn::UseTree::Rename(syn::UseRename { ident, .. }) => {

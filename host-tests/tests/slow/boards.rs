@@ -5,23 +5,22 @@
 //! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow boards -- --nocapture
 //! ```
 
-use std::fs;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::thread;
 use std::time::{Duration, Instant};
+use std::{fs, thread};
 
 use anyhow::{Context, Result, ensure};
-use dtof::device::monitor;
-use dtof::device::{Client, DeviceEngine, configuration};
-use dtof::engine::detection::{Estimator, Rule};
-use dtof::engine::settings::{Settings, U16F16Number};
-use dtof::engine::{Engine, host::host_engine};
+use dtof::device::{Client, DeviceEngine, configuration, monitor};
+use dtof::engine::Engine;
+use dtof::engine::host::host_engine;
+use dtof::engine::settings::Settings;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::scene;
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_link::FaultRecord;
+use dtof_core::{Count, PaperRule, WindowRule};
+use dtof_link::{FaultRecord, Source};
 
 use crate::emulator::{Board, Emulator, End, QEMU};
 use crate::{dtof, root, skipped, stack, succeed, target_folder, version, wanted};
@@ -42,10 +41,7 @@ fn mps2_an386_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     let image = board.image(&[])?;
     let mut used = ends(board, &image)?;
     // A million photons of 64 macropixels.
-    let array = Geometry {
-        columns: 8,
-        rows: 8,
-    };
+    let array = Geometry::new(8, 8);
     for (settings, reads_every) in [(settings(), 0), (with_windows(), 150)] {
         let reads_every = Duration::from_millis(reads_every);
         used.push(agrees(board, &image, &settings, array, 5300, reads_every)?);
@@ -72,10 +68,7 @@ fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     }
     let board = Board::Stm32F405;
     let image = board.image(&[])?;
-    let array = Geometry {
-        columns: 4,
-        rows: 2,
-    };
+    let array = Geometry::new(4, 2);
     let used = [
         agrees(board, &image, &settings(), array, 200, Duration::ZERO)?,
         agrees(board, &image, &with_windows(), array, 200, Duration::ZERO)?,
@@ -199,7 +192,7 @@ fn log(image: &Path, bytes: Vec<u8>) -> Result<String> {
 /// What decides the events: a setting at which there are many.
 fn settings() -> Settings {
     Settings {
-        rule: Rule::paper(U8F8::lit("4")),
+        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
         l1: 20,
         x: 4,
         ..scene::settings(1)
@@ -209,8 +202,10 @@ fn settings() -> Settings {
 /// The other rule and the other estimator.
 fn with_windows() -> Settings {
     Settings {
-        rule: Rule::window(2, U4F12::lit("4.5")),
-        estimator: Estimator::for_pulse(U8F8::lit("0.55")),
+        rule: WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
+            .unwrap()
+            .into(),
+        sigma_bins: Some(U8F8::lit("0.55")),
         ..settings()
     }
 }
@@ -311,9 +306,9 @@ fn says_unplugged(
     let about = client.sensor()?.context("no sensor")?;
     let mut wanted = settings();
     if let Some(bin_width) = about.bin_width {
-        wanted.bin_width_ps = U16F16Number(bin_width);
+        wanted.bin_width_ps = bin_width;
     }
-    client.configure(&configuration(&wanted, pixels, 1, None)?)?;
+    client.configure(&configuration(&wanted, pixels, Source::Sensor, None)?)?;
     let since = Instant::now();
     let report = loop {
         let report = client.report()?;

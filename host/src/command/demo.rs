@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use dtof::arguments::{path, whole};
+use dtof::cli::arguments::{path, whole};
 use dtof::input::source::Geometry;
 use dtof::simulate::scene::{self, Scene};
 
@@ -13,14 +13,14 @@ use super::simulate::{Simulation, array};
 
 #[derive(Args)]
 pub struct Demo {
-    /// Where the results go.
+    /// The folder of the results
     #[arg(long, default_value = Demo::OUT, value_parser = path())]
     out: PathBuf,
     /// Macropixels of the array [default: 64x32; 8x8 with --device]
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = array)]
     array: Option<Geometry>,
-    /// Decide on a device, not on this computer: `qemu` starts an emulated one, else
-    /// tcp:HOST:PORT or a serial port
+    /// Decide on a device: tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated
+    /// device [default: this computer]
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
     /// Image that `--device qemu` runs [default: what `cargo xtask image mps2-an386` has built]

@@ -3,14 +3,13 @@
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use dtof::arguments::{fixed, whole};
-use dtof::engine::detection::{Estimator, Rule, WIDEST_PULSE};
-use dtof_core::WindowRule;
+use dtof::cli::arguments::{fixed, positive, whole};
 use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::{AnyRule, CentredWindow, Count, PaperRule, WindowRule};
 
 #[derive(Args)]
 pub struct Detection {
-    /// What decides whether a peak stands clear of the background
+    /// The rule that decides whether a peak stands clear of the background
     #[arg(long, value_enum, default_value_t = RuleName::Paper)]
     rule: RuleName,
     /// Paper's rule: standard deviations of the background a peak must exceed it by, 0 to 255.996,
@@ -22,16 +21,16 @@ pub struct Detection {
     window: Option<u8>,
     /// Window rule: standard deviations of the background the photons in the window must exceed it
     /// by, 0 to 15.9998, rounded to 1/4096
-    #[arg(long, value_parser = fixed::<U4F12>, conflicts_with = "false_one_in", allow_hyphen_values = true)]
+    #[arg(long, value_parser = fixed::<U4F12>, conflicts_with = "false_alarm", allow_hyphen_values = true)]
     z: Option<U4F12>,
-    /// Window rule, instead: the z with which one in N exposures without a target brings a false
-    /// event, 10 or more [default: 100]
-    #[arg(long, value_name = "N", value_parser = whole(10..=u32::MAX))]
-    false_one_in: Option<u32>,
-    /// Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256: takes the depth from a window that
-    /// suits it [default: depth from three bins, whatever the pulse]
+    /// Window rule, instead of --z: the share of exposures without a target that may end with an
+    /// event, at most 0.1 [default: 0.01]
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    false_alarm: Option<f64>,
+    /// Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. The depth then
+    /// comes from a window that suits it [default: the centroid of three bins]
     #[arg(long, value_name = "S", value_parser = sigma, allow_hyphen_values = true)]
-    sigma_bins: Option<U8F8>,
+    pub sigma_bins: Option<U8F8>,
 }
 
 /// The rules.
@@ -44,48 +43,55 @@ pub enum RuleName {
 }
 
 impl Detection {
-    /// The rule; `z_for` gives the z for a false event in so many exposures.
-    pub fn rule(&self, z_for: impl FnOnce(u32) -> Result<U4F12>) -> Result<Rule> {
+    /// The rule; `z_for` gives the z for a share of false alarms.
+    pub fn rule(
+        &self,
+        minimum_count: Count,
+        z_for: impl FnOnce(f64) -> Result<U4F12>,
+    ) -> Result<AnyRule> {
         match self.rule {
             RuleName::Paper => {
                 let of_window = [
                     ("--window", self.window.is_some()),
                     ("--z", self.z.is_some()),
-                    ("--false-one-in", self.false_one_in.is_some()),
+                    ("--false-alarm", self.false_alarm.is_some()),
                 ];
                 if let Some((option, _)) = of_window.iter().find(|option| option.1) {
                     bail!("{option} is for --rule window");
                 }
-                Ok(Rule::paper(self.alpha.unwrap_or(const { U8F8::lit("4") })))
+                let alpha = self.alpha.unwrap_or(const { U8F8::lit("4") });
+                Ok(PaperRule::new(alpha, minimum_count).into())
             }
             RuleName::Window => {
                 if self.alpha.is_some() {
-                    bail!("--alpha is for --rule paper; --rule window takes --z or --false-one-in");
+                    bail!("--alpha is for --rule paper; --rule window takes --z or --false-alarm");
                 }
                 let suits = self.sigma_bins.map(WindowRule::width_for_pulse);
-                let window = self
+                let width = self
                     .window
                     .or(suits)
                     .context("--rule window needs --window or --sigma-bins")?;
                 let z = match self.z {
                     Some(z) => z,
-                    None => z_for(self.false_one_in.unwrap_or(100))?,
+                    None => z_for(self.false_alarm.unwrap_or(0.01))?,
                 };
-                Ok(Rule::window(window, z))
+                let rule = WindowRule::new(width, z, minimum_count);
+                Ok(rule.with_context(|| format!("--window {width}"))?.into())
             }
         }
-    }
-
-    pub fn estimator(&self) -> Estimator {
-        self.sigma_bins
-            .map_or(Estimator::CentreOfMass3, Estimator::for_pulse)
     }
 }
 
 fn sigma(text: &str) -> Result<U8F8, String> {
+    const WIDEST: U8F8 = CentredWindow::WIDEST_PULSE;
     let sigma = fixed::<U8F8>(text)?;
-    if sigma == U8F8::ZERO || sigma > WIDEST_PULSE {
-        return Err(format!("must be above 0 and at most {WIDEST_PULSE}"));
+    if sigma == U8F8::ZERO || sigma > WIDEST {
+        return Err(format!("must be above 0 and at most {WIDEST}"));
     }
     Ok(sigma)
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let share = positive(text).ok().filter(|share| *share <= 0.1);
+    share.ok_or("must be a number above 0, at most 0.1".to_owned())
 }

@@ -1,18 +1,18 @@
 //! The options of dynamic depth, the same for every command.
 
 use clap::{Args, ValueEnum};
-use dtof::arguments::fixed;
-use dtof::events::dynamic_depth::DynamicDepth;
+use dtof::cli::arguments::fixed;
 use dtof_core::fixed::types::U24F8;
+use dtof_link::DynamicDepth;
 
 #[derive(Args)]
 pub struct Options {
-    /// How far the mean depth of three events of a pixel has to move to be reported, in
-    /// millimetres, rounded to 1/256 [default: 100]
+    /// Report when the mean depth of three events of a pixel moves by so many millimetres,
+    /// rounded to 1/256 [default: 100]
     #[arg(long, value_name = "MM", value_parser = fixed::<U24F8>, allow_hyphen_values = true)]
     threshold_mm: Option<U24F8>,
-    /// From what: the mean at the event before, as in the paper, which sees steps; or the
-    /// mean that was reported last, which sees slow motion, too [default: previous]
+    /// Compare with the mean at the previous event, as in the paper, which finds steps; or with
+    /// the last reported mean, which also finds slow motion [default: previous]
     #[arg(long, value_enum)]
     reference: Option<Reference>,
 }

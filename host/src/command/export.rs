@@ -5,11 +5,11 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail, ensure};
 use clap::Args;
-use dtof::arguments::{path, whole};
+use dtof::cli::arguments::{path, whole};
 use dtof::events::aer_file::EventKind;
-use dtof::events::summary::grouped;
 use dtof::export::{Format, LaserClock, Optics, Options, export};
 use dtof::geometry::FieldOfView;
+use dtof::rows::grouped;
 
 use super::dynamic_depth;
 
@@ -18,13 +18,13 @@ pub struct Export {
     /// The AER file
     #[arg(value_parser = path())]
     file: PathBuf,
-    /// What to write; docs/export.md says what is in it
+    /// The format; docs/export.md describes each
     #[arg(long, value_enum)]
     format: Format,
-    /// Where to
+    /// The file to write
     #[arg(long, value_name = "FILE", value_parser = path())]
     out: PathBuf,
-    /// What the array sees, in degrees from edge to edge [default: 60 across the longer side,
+    /// The field of view in degrees from edge to edge [default: 60 across the longer side,
     /// square pixels]
     #[arg(
         long,
@@ -39,7 +39,7 @@ pub struct Export {
     /// Laser cycles a second
     #[arg(long, value_name = "HZ", default_value_t = LaserClock::PAPER_HZ, value_parser = whole(1..=u64::MAX))]
     laser_hz: u64,
-    /// Which events of a file that holds both kinds
+    /// The kind of events to export from a file with both
     #[arg(long, value_enum)]
     events: Option<EventKind>,
     /// MCAP: microseconds of a point cloud [default: 1/100 of the run, 10 to 10,000]

@@ -14,9 +14,10 @@ pub mod tune;
 use std::io::{self, Write};
 use std::path::Path;
 
-use dtof::events::summary::{Row, Summary, aligned};
+use dtof::events::summary::Summary;
+use dtof::rows::{Row, aligned};
 
-/// What a run came to, on the terminal.
+/// Prints the summary of a run.
 fn print_summary(summary: &Summary, more: &[Row], folder: &Path) -> io::Result<()> {
     let detection = summary.settings.detection_rows();
     let rows = [&summary.rows()[..], more, &detection].concat();

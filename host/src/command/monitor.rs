@@ -9,7 +9,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use console::Term;
-use dtof::arguments::{fixed, path, whole};
+use dtof::cli::arguments::{fixed, path, whole};
 use dtof::device::monitor::map::{LiveMap, SHOW_CURSOR};
 use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::device::{self, Client};
@@ -43,13 +43,13 @@ pub struct Monitor {
     /// Millimetres added to every range, rounded to 1/256 [default: as the device says]
     #[arg(long, value_name = "MM", value_parser = fixed::<I24F8>, allow_hyphen_values = true)]
     offset_mm: Option<I24F8>,
-    /// Have the device send changes of depth only, with a polarity
+    /// The device sends only changes of depth, with a polarity
     #[arg(long)]
     dynamic_depth: bool,
     #[command(flatten)]
     of_dynamic_depth: dynamic_depth::Options,
-    /// Draw the ranges of all pixels on the terminal that is standard error; the events are
-    /// written where standard output goes, unless that is a terminal, too
+    /// Draw the ranges of all pixels on standard error, which must be a terminal. Events still
+    /// go to standard output, unless that is a terminal, too
     #[arg(long)]
     map: bool,
     /// Write the events into an AER file as well, for `dtof decode` and `dtof export`
@@ -125,8 +125,8 @@ impl Monitor {
                 let header = Header {
                     bins: client.bins().into(),
                     geometry,
-                    bin_width_ps: settings.bin_width_ps.0,
-                    offset_mm: settings.offset_mm.0,
+                    bin_width_ps: settings.bin_width_ps,
+                    offset_mm: settings.offset_mm,
                 };
                 Some(Recording::new(file, &header)?)
             }

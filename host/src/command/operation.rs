@@ -2,10 +2,11 @@
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::arguments::whole;
-use dtof::engine::settings::{I24F8Number, Settings, U16F16Number};
+use dtof::cli::arguments::whole;
+use dtof::engine::settings::Settings;
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{HIGHEST_Z, RangeGate};
+use dtof_core::{Count, HIGHEST_Z, RangeGate};
+use dtof_theory::tune::window::one_in;
 
 use super::detection::Detection;
 
@@ -30,13 +31,13 @@ pub struct Operation {
     x: u16,
 }
 
-/// The option of what is no device: a device reports events.
+/// The option of commands that run on this computer: a device reports events.
 #[derive(Args)]
 pub struct Frames {
-    /// A frame-based sensor instead, to compare with: every pixel reads its highest bin every N
-    /// laser cycles, if that stands above the background at all
+    /// Simulate a frame-based sensor for comparison: every N laser cycles each pixel reads its
+    /// highest bin, if that stands above the background
     #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX),
-        conflicts_with_all = ["rule", "alpha", "window", "z", "false_one_in", "min_count", "l1", "l2", "x"])]
+        conflicts_with_all = ["rule", "alpha", "window", "z", "false_alarm", "min_count", "l1", "l2", "x"])]
     pub frame: Option<u16>,
 }
 
@@ -52,7 +53,7 @@ impl Operation {
         offset_mm: I24F8,
         seed: u64,
     ) -> Result<Settings> {
-        let z_for = |one_in| {
+        let z_for = |share| {
             // Only how many bins the gate leaves counts; a number of bins that cannot be is
             // refused by the engine.
             #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
@@ -60,21 +61,22 @@ impl Operation {
             let (first, last) = self.gate.unwrap_or((0, last_bin));
             let gate = RangeGate::<1024>::new(first, last)
                 .with_context(|| format!("--gate {first}..{last} with {bins} bins"))?;
-            let z = dtof_core::z_for(one_in, &gate, self.x, self.l1, self.l2);
+            let z = dtof_core::z_for(one_in(share), &gate, self.x, self.l1, self.l2);
             ensure!(
                 z < HIGHEST_Z,
-                "--false-one-in {one_in}: there is no z for so few; --z may be up to 15.9998"
+                "--false-alarm {share}: there is no z for so few; --z may be up to 15.9998"
             );
             Ok(z)
         };
         Ok(Settings {
             bins,
-            bin_width_ps: U16F16Number(bin_width_ps),
-            offset_mm: I24F8Number(offset_mm),
+            bin_width_ps,
+            offset_mm,
             gate: self.gate,
-            rule: self.detection.rule(z_for)?,
-            estimator: self.detection.estimator(),
-            min_count: self.min_count,
+            rule: self
+                .detection
+                .rule(Count::saturating(self.min_count.into()), z_for)?,
+            sigma_bins: self.detection.sigma_bins,
             l1: self.l1,
             l2: self.l2,
             x: self.x,

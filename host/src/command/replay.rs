@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use dtof::arguments::{bins, fixed, path, positive, whole};
+use dtof::cli::arguments::{bins, fixed, path, positive, whole};
 use dtof::engine::host::host_engine;
 use dtof::engine::run::run;
 use dtof::engine::settings::Settings;
@@ -24,7 +24,7 @@ pub struct Replay {
     /// pixel,cycle,bin)
     #[arg(long, value_name = "FILE", value_parser = path())]
     input: PathBuf,
-    /// Where the results go
+    /// The folder of the results
     #[arg(long, value_name = "DIR", value_parser = path())]
     out: PathBuf,
     /// Photon lists: columns of the array, pixel = row × columns + column [default: one row]

@@ -4,17 +4,18 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::arguments::{path, whole};
+use dtof::cli::arguments::{path, whole};
 use dtof::device::{self, Client, DeviceEngine};
+use dtof::engine::Engine;
+use dtof::engine::host::host_engine;
 use dtof::engine::run::run;
 use dtof::engine::settings::Settings;
-use dtof::engine::{Engine, host::host_engine};
 use dtof::events::output::Output;
 use dtof::export::LaserClock;
 use dtof::geometry::FieldOfView;
 use dtof::input::source::{Geometry, PhotonSource};
-use dtof::report::Section;
 use dtof::simulate::scene::Scene;
+use dtof::view::report::Section;
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
 
@@ -26,7 +27,7 @@ pub struct Simulate {
     /// The scene, a TOML file; docs/scenes.md lists its keys
     #[arg(long, value_name = "FILE", value_parser = path())]
     scene: PathBuf,
-    /// Where the results go
+    /// The folder of the results
     #[arg(long, value_name = "DIR", value_parser = path())]
     out: PathBuf,
     /// Macropixels of the array that looks at the scene [default: the file's]
@@ -36,8 +37,8 @@ pub struct Simulate {
     operation: Operation,
     #[command(flatten)]
     frames: Frames,
-    /// Decide on a device, not on this computer: `qemu` starts an emulated one, else
-    /// tcp:HOST:PORT or a serial port
+    /// Decide on a device: tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated
+    /// device [default: this computer]
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
     /// Image that `--device qemu` runs [default: what `cargo xtask image mps2-an386` has built]
@@ -85,18 +86,18 @@ impl Simulate {
     }
 }
 
-/// A scene, and what is to be done with its photons.
+/// One run of a scene.
 pub struct Simulation<'a> {
     pub scene: &'a Scene,
-    /// The scene's, if it has one.
+    /// The scene file, if there is one.
     pub file: Option<&'a Path>,
     pub cycles: u64,
     pub settings: &'a Settings,
     pub device: Option<&'a str>,
-    /// What an emulated device runs.
+    /// The image of an emulated device.
     pub image: Option<&'a Path>,
     pub out: &'a Path,
-    /// What stands at the head of the report.
+    /// The first sentence of the report.
     pub lead: &'a str,
     pub quiet: bool,
 }
@@ -124,7 +125,7 @@ impl Simulation<'_> {
         summary.field_of_view_degrees = Some(self.scene.view().degrees());
         summary.export_with = export_with(self.scene);
         let against_truth = comparison.finish();
-        let surfaces = against_truth.rows();
+        let surfaces = against_truth.rows(self.settings.reports());
         summary.against_truth = Some(against_truth);
         let sections = [Section {
             heading: "Surfaces",
@@ -177,8 +178,5 @@ pub fn array(text: &str) -> Result<Geometry, String> {
         Some((side(columns).ok()?, side(rows).ok()?))
     });
     let (columns, rows) = sides.ok_or("must be COLUMNSxROWS, as 64x32")?;
-    Ok(Geometry {
-        columns: columns.into(),
-        rows: rows.into(),
-    })
+    Ok(Geometry::new(columns.into(), rows.into()))
 }

@@ -1,4 +1,4 @@
-//! `dtof tune`: the threshold and L1 for a wanted rate of false events.
+//! `dtof tune`: the threshold and L1 for a wanted rate of false alarms.
 
 mod window;
 
@@ -7,7 +7,7 @@ use std::io::{self, Write};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::arguments::{bins, positive, whole};
+use dtof::cli::arguments::{bins, positive, whole};
 use dtof::simulate::MM_PER_PS;
 use dtof_theory::gaussian;
 use dtof_theory::looks::detections::Detections;
@@ -44,12 +44,12 @@ pub struct Tune {
     /// Picoseconds a bin
     #[arg(long, value_name = "PS", default_value_t = 250.0, value_parser = positive)]
     bin_width_ps: f64,
-    /// False events an exposure of a pixel without a target, at most [default: 0.01]
-    #[arg(long, value_name = "P", value_parser = positive, conflicts_with = "false_per_second")]
-    false_per_exposure: Option<f64>,
-    /// Instead: false events a second
-    #[arg(long, value_name = "R", value_parser = positive, requires = "laser_hz")]
-    false_per_second: Option<f64>,
+    /// The share of exposures without a target that may end with an event [default: 0.01]
+    #[arg(long, value_name = "SHARE", value_parser = positive, conflicts_with = "false_alarms_per_second")]
+    false_alarm: Option<f64>,
+    /// Instead: the false alarms of a pixel a second
+    #[arg(long, value_name = "RATE", value_parser = positive, requires = "laser_hz")]
+    false_alarms_per_second: Option<f64>,
     /// Laser cycles a second
     #[arg(long, value_name = "HZ", value_parser = positive)]
     laser_hz: Option<f64>,
@@ -74,8 +74,34 @@ pub struct Tune {
     json: bool,
 }
 
-/// One result: name in JSON, name for people, value, unit, where it comes from.
-struct Line(&'static str, &'static str, f64, &'static str, String);
+/// One result: its name in JSON, its value and where that comes from.
+struct Line(&'static str, f64, String);
+
+/// Name in JSON, name for people, unit.
+const NAMES: [(&str, &str, &str); 14] = [
+    ("alpha", "α", ""),
+    ("z", "z", ""),
+    ("window", "window", "bins"),
+    ("half_width", "depth from, ±", "bins"),
+    ("l1", "L1", "laser cycles"),
+    ("false_alarms", "false alarms", "an exposure"),
+    ("at_least", "  at least", "an exposure"),
+    ("at_most", "  at most", "an exposure"),
+    ("cycles_to_event", "time to an event", "laser cycles"),
+    ("seconds_to_event", "", "s"),
+    ("detected", "exposures with one", ""),
+    ("depth_error_mm", "depth error", "mm rms"),
+    ("snr", "SNR at L2", ""),
+    ("gaussian_alpha", "α by Eq. 11", ""),
+];
+
+impl Line {
+    /// Name for people and unit.
+    fn names(&self) -> (&'static str, &'static str) {
+        let known = NAMES.iter().find(|names| names.0 == self.0);
+        known.map_or((self.0, ""), |names| (names.1, names.2))
+    }
+}
 
 impl Tune {
     pub fn run(&self) -> Result<()> {
@@ -86,8 +112,9 @@ impl Tune {
         };
         let mut out = io::stdout().lock();
         if self.json {
-            let fields = lines.iter().map(|Line(name, _, value, unit, source)| {
-                let result = json!({ "value": value, "unit": unit, "source": source });
+            let fields = lines.iter().map(|line| {
+                let Line(name, value, source) = line;
+                let result = json!({ "value": value, "unit": line.names().1, "source": source });
                 ((*name).to_owned(), result)
             });
             let object: serde_json::Map<_, _> = fields.collect();
@@ -117,9 +144,9 @@ impl Tune {
             number(sigma),
             self.bins
         );
-        let wanted = match (self.false_per_second, self.laser_hz) {
+        let wanted = match (self.false_alarms_per_second, self.laser_hz) {
             (Some(per_second), Some(laser_hz)) => Wanted::PerCycle(per_second / laser_hz),
-            _ => Wanted::PerExposure(self.false_per_exposure.unwrap_or(0.01)),
+            _ => Wanted::PerExposure(self.false_alarm.unwrap_or(0.01)),
         };
         Ok(Request {
             background: self.background,
@@ -139,7 +166,7 @@ impl Tune {
     fn paper(&self, request: &Request) -> Result<(Vec<Line>, String)> {
         let table = Table::kept()?;
         let tuned = tune(request, &table)?;
-        let false_events = match tuned.source {
+        let false_alarms = match tuned.source {
             Source::Table => format!("simulation: table, {} exposures a point", table.exposures),
             Source::TableAtMost => format!(
                 "simulation: at most, the least the table saw, {} exposures a point",
@@ -148,41 +175,18 @@ impl Tune {
             Source::Bound => "formula: upper bound, single looks (exact) added up".to_owned(),
         };
         let exact = |what: &str| format!("formula: {what}, single look (exact)");
-        let alpha = format!("smallest for the false events wanted; {false_events}");
+        let alpha = format!("smallest for the false alarms wanted; {false_alarms}");
         let gaussian = gaussian::alpha_min(tuned.wanted, u32::from(request.bins) - 1);
         let mut lines = vec![
-            Line("alpha", "α", tuned.alpha.to_num(), "", alpha),
+            Line("alpha", tuned.alpha.to_num(), alpha),
             self.l1(tuned.l1, &tuned.detections),
-            Line(
-                "false_events",
-                "false events",
-                tuned.false_events,
-                "an exposure",
-                false_events,
-            ),
-            Line(
-                "at_least",
-                "  at least",
-                tuned.bounds.worst_look,
-                "an exposure",
-                exact("worst look"),
-            ),
-            Line(
-                "at_most",
-                "  at most",
-                tuned.bounds.sum,
-                "an exposure",
-                exact("sum over looks"),
-            ),
+            Line("false_alarms", tuned.false_alarms, false_alarms),
+            Line("at_least", tuned.bounds.worst_look, exact("worst look")),
+            Line("at_most", tuned.bounds.sum, exact("sum over looks")),
         ];
         lines.extend(self.expected(request, &tuned.detections));
-        lines.push(Line(
-            "gaussian_alpha",
-            "α by Eq. 11",
-            gaussian,
-            "",
-            "formula: Eq. 11, one look, background known; not for use".to_owned(),
-        ));
+        let source = "formula: Eq. 11, one look, background known; not for use";
+        lines.push(Line("gaussian_alpha", gaussian, source.to_owned()));
         // All digits: fewer may be another multiple of 1/256.
         let alpha = tuned.alpha.to_num::<f64>();
         Ok((lines, format!("--alpha {alpha} --l1 {}", tuned.l1)))
@@ -200,48 +204,27 @@ impl Tune {
             Some(_) => "as given".to_owned(),
             None => format!("shortest time to an event; {}", self.simulated(detections)),
         };
-        Line("l1", "L1", l1.into(), "laser cycles", source)
+        Line("l1", l1.into(), source)
     }
 
-    /// What to expect of the settings, whatever the rule.
+    /// Time, depth error and SNR to expect, with any rule.
     fn expected(&self, request: &Request, detections: &Detections) -> Vec<Line> {
         let simulated = self.simulated(detections);
         let cycles = detections.cycles_to_event();
-        let mut lines = vec![Line(
-            "cycles_to_event",
-            "time to an event",
-            cycles,
-            "laser cycles",
-            simulated.clone(),
-        )];
+        let mut lines = vec![Line("cycles_to_event", cycles, simulated.clone())];
         if let Some(laser_hz) = self.laser_hz {
-            let seconds = cycles / laser_hz;
             lines.push(Line(
                 "seconds_to_event",
-                "",
-                seconds,
-                "s",
+                cycles / laser_hz,
                 simulated.clone(),
             ));
         }
         let mm = detections.depth_error_bins() * self.bin_width_ps * MM_PER_PS;
         let at_l2 = snr(request.signal, request.background, request.l2.into());
         lines.extend([
-            Line(
-                "detected",
-                "exposures with one",
-                detections.detected(),
-                "",
-                simulated.clone(),
-            ),
-            Line("depth_error_mm", "depth error", mm, "mm rms", simulated),
-            Line(
-                "snr",
-                "SNR at L2",
-                at_l2,
-                "",
-                "formula: N·A/√(N·B)".to_owned(),
-            ),
+            Line("detected", detections.detected(), simulated.clone()),
+            Line("depth_error_mm", mm, simulated),
+            Line("snr", at_l2, "formula: N·A/√(N·B)".to_owned()),
         ]);
         lines
     }
@@ -255,7 +238,9 @@ impl Tune {
             format!(" --bins {} --bin-width-ps {}", self.bins, self.bin_width_ps)
         };
         let mut text = String::new();
-        for Line(_, name, value, unit, source) in lines {
+        for line in lines {
+            let Line(_, value, source) = line;
+            let (name, unit) = line.names();
             let value = format!("{} {unit}", number(*value));
             let _ = writeln!(text, "{name:<18}  {value:<24}  {source}");
         }

@@ -4,12 +4,10 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::{AER_VERSION, AerDecoder, AerRecord, AerWord};
-use dtof_link::SensorRecord;
 use dtof_link::endpoint::{Endpoint, LinkCounters, Message};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
-use dtof_link::message::greeting;
-use dtof_link::message::{self, LINK_VERSION};
-use dtof_link::{Configuration, Refusal, Report};
+use dtof_link::message::{self, LINK_VERSION, greeting};
+use dtof_link::{Configuration, Refusal, Report, SensorRecord};
 
 use super::port::Port;
 use crate::events::aer_file::Event;
@@ -117,7 +115,7 @@ impl Client {
         }
     }
 
-    /// What the device's sensor is, if it has one.
+    /// The device's sensor, if it has one.
     ///
     /// # Errors
     /// If the device is gone.
@@ -147,7 +145,7 @@ impl Client {
         Ok(self.take_events())
     }
 
-    /// What the device has done so far.
+    /// The report of the device so far.
     ///
     /// # Errors
     /// If the device is gone.

@@ -8,20 +8,17 @@ mod port;
 mod qemu;
 
 use anyhow::{Result, bail, ensure};
-use dtof_core::{AnyRule, DepthEstimator, DepthEvent, PixelAddress, Statistics};
+use dtof_core::{DepthEvent, PixelAddress, Statistics};
 use dtof_link::endpoint::BODY_BYTES;
-use dtof_link::message;
-use dtof_link::{Configuration, Report, Token};
+use dtof_link::{Configuration, DynamicDepth, Report, Source, Token, message};
 
 pub use client::Client;
 pub use open::open;
 pub use port::Port;
 
 use crate::engine::Engine;
-use crate::engine::detection::Rule;
 use crate::engine::settings::Settings;
 use crate::events::aer_file::Event;
-use crate::events::dynamic_depth::DynamicDepth;
 use crate::input::source::Slice;
 
 /// Photons into a device, events out.
@@ -58,7 +55,7 @@ impl DeviceEngine {
         client.configure(&configuration(
             settings,
             u16::try_from(addresses.len())?,
-            0,
+            Source::Link,
             None,
         )?)?;
         Ok(Self {
@@ -69,7 +66,7 @@ impl DeviceEngine {
         })
     }
 
-    /// What the device said of itself after the last slice.
+    /// The report of the device after the last slice.
     #[must_use]
     pub fn report(&self) -> &Report {
         &self.report
@@ -84,7 +81,7 @@ impl DeviceEngine {
 pub fn configuration(
     settings: &Settings,
     pixels: u16,
-    source: u8,
+    source: Source,
     dynamic_depth: Option<DynamicDepth>,
 ) -> Result<Configuration> {
     ensure!(
@@ -92,44 +89,19 @@ pub fn configuration(
         "a device reports events: it has no --frame"
     );
     let last_bin = u16::try_from(settings.bins)? - 1;
-    let (gate_first, gate_last) = settings.gate.unwrap_or((0, last_bin));
-    let (rule, alpha, window, z) = match settings.rule {
-        Rule::Paper { alpha } => (AnyRule::PAPER, alpha.0.to_bits(), 0, 0),
-        Rule::Window { window, z } => (AnyRule::WINDOW, 0, window, z.0.to_bits()),
-    };
-    let estimator = settings.estimator.in_core();
-    let half_width = match estimator {
-        DepthEstimator::Centroid3 => 0,
-        DepthEstimator::CentredWindow(window) => window.half_width().to_bits(),
-    };
-    let (output, reference, threshold) = match dynamic_depth {
-        None => (0, 0, 0),
-        Some(dynamic_depth) => {
-            let reference = dynamic_depth.reference.number();
-            (1, reference, dynamic_depth.threshold_mm.to_bits())
-        }
-    };
     Ok(Configuration {
-        alpha,
-        minimum_count: settings.min_count,
+        rule: settings.rule,
+        estimator: settings.estimator(),
         x: settings.x,
         l1: settings.l1,
         l2: settings.l2,
-        gate_first,
-        gate_last,
+        gate: settings.gate.unwrap_or((0, last_bin)),
+        one_hit_tdc: settings.one_hit_tdc,
         pixels,
-        bin_width: settings.bin_width_ps.0.to_bits(),
-        offset: settings.offset_mm.0.to_bits(),
+        bin_width_ps: settings.bin_width_ps,
+        offset_mm: settings.offset_mm,
         source,
-        rule,
-        window,
-        z,
-        estimator: estimator.number(),
-        half_width,
-        output,
-        reference,
-        threshold,
-        one_hit: settings.one_hit_tdc.into(),
+        dynamic_depth,
     })
 }
 

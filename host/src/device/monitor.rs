@@ -9,14 +9,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use dtof_core::{RangeScale, Statistics};
-use dtof_link::FaultRecord;
-use dtof_link::Report;
 use dtof_link::endpoint::LinkCounters;
+use dtof_link::{DynamicDepth, FaultRecord, Report, Source};
 
 use crate::device::{Client, configuration};
 use crate::engine::settings::Settings;
 use crate::events::aer_file::Event;
-use crate::events::dynamic_depth::DynamicDepth;
 use crate::events::events_csv;
 use crate::input::source::Geometry;
 use map::LiveMap;
@@ -25,7 +23,7 @@ pub use recording::Recording;
 /// How often there are statistics.
 const EVERY: Duration = Duration::from_secs(1);
 
-/// What the device is to do.
+/// The task of the device.
 #[derive(Clone, Copy, Debug)]
 pub struct Task<'a> {
     /// How its pixels operate.
@@ -153,7 +151,7 @@ fn watch(
 ) -> Result<()> {
     let configuration =
         |source| configuration(task.settings, task.pixels, source, task.dynamic_depth);
-    client.configure(&configuration(1)?)?;
+    client.configure(&configuration(Source::Sensor)?)?;
     let started = Instant::now();
     let mut figures = Figures {
         since: started,
@@ -194,7 +192,7 @@ fn watch(
         outputs.tell(figures.line(client, &report), readers)?;
     }
     // After the answer there are no more events.
-    client.configure(&configuration(0)?)
+    client.configure(&configuration(Source::Link)?)
 }
 
 fn header(out: &mut dyn Write, columns: &str) -> io::Result<()> {
@@ -221,13 +219,13 @@ fn still_open(written: io::Result<()>) -> io::Result<bool> {
     }
 }
 
-/// What the lines of statistics are worked out from.
+/// The basis of the lines of statistics.
 struct Figures {
     /// When the last line was.
     since: Instant,
-    /// What this end had counted at the beginning.
+    /// The counts of this end at the beginning.
     here: LinkCounters,
-    /// What the device had counted at the beginning.
+    /// The counts of the device at the beginning.
     first: Report,
     /// Events and photons at the last line.
     last: Statistics,
@@ -252,8 +250,8 @@ impl Figures {
     }
 }
 
-/// What went wrong since the device had counted `first`, each with a comma before
-/// it; what did not is left out. `here` is what this end of the link has counted.
+/// The losses and errors since the device had counted `first`, each with a comma before
+/// it. Counts of 0 are left out. `here` is what this end of the link has counted.
 #[must_use]
 pub fn losses(report: &Report, first: &Report, here: &LinkCounters) -> String {
     let Statistics {
@@ -306,7 +304,7 @@ pub fn losses(report: &Report, first: &Report, here: &LinkCounters) -> String {
     line
 }
 
-/// What was counted since `first`.
+/// The counts since `first`.
 fn since(now: &LinkCounters, first: &LinkCounters) -> LinkCounters {
     LinkCounters {
         frames: now.frames.wrapping_sub(first.frames),
@@ -329,19 +327,19 @@ mod tests {
             let Geometry { columns, rows } = array(pixels, columns);
             (columns, rows)
         };
-        let squarest = [1, 2, 4, 9, 64, 128, 2048, 7, 0].map(|pixels| array(pixels, None));
-        let expected = [
-            (1, 1),
-            (2, 1),
-            (2, 2),
-            (3, 3),
-            (8, 8),
-            (16, 8),
-            (64, 32),
-            (7, 1),
-            (1, 0),
-        ];
-        assert_eq!(squarest, expected);
+        for (pixels, squarest) in [1, 2, 4, 9, 64, 128, 2048, 7, 0].into_iter().zip([
+            [1, 1],
+            [2, 1],
+            [2, 2],
+            [3, 3],
+            [8, 8],
+            [16, 8],
+            [64, 32],
+            [7, 1],
+            [1, 0],
+        ]) {
+            assert_eq!(array(pixels, None), squarest.into());
+        }
         assert_eq!(array(64, Some(10)), (10, 7));
     }
 }

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail, ensure};
 use super::port::{PATIENCE, Port, STUCK, prompt};
 use super::qemu::Emulator;
 
-/// What the boards' serial ports are set to.
+/// The speed of the boards' serial ports.
 const BAUD: u32 = 1_000_000;
 
 /// Opens `tcp:HOST:PORT` or the serial port of that name. `qemu` starts an emulated

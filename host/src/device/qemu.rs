@@ -1,13 +1,12 @@
 //! An emulated device of one's own: QEMU with an image of the board `mps2-an386`.
 
-use std::env;
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::thread;
 use std::time::{Duration, Instant};
+use std::{env, thread};
 
 use anyhow::{Context, Result, bail, ensure};
 

@@ -77,7 +77,7 @@ impl<const BINS: usize> FramePixel<BINS> {
         Some(found?.event(self.address, LaserCycle(cycle), self.length))
     }
 
-    /// What it has done so far, the frame that has not ended included.
+    /// Its counts so far, the frame that has not ended included.
     fn statistics(&self) -> Statistics {
         let mut statistics = self.statistics;
         statistics.add_photons_of(&self.histogram, self.gated_out);
@@ -105,7 +105,7 @@ impl<const BINS: usize> FrameEngine<BINS> {
         let pixels = addresses.iter();
         Ok(Self {
             gate: settings.range_gate()?,
-            estimator: settings.estimator.in_core(),
+            estimator: settings.estimator(),
             pixels: pixels
                 .map(|&address| FramePixel::new(address, 0, length))
                 .collect(),

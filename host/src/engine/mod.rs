@@ -1,6 +1,5 @@
 //! The engine: photons in, depth events out.
 
-pub mod detection;
 pub mod frame;
 pub mod host;
 pub mod run;
@@ -21,6 +20,6 @@ pub trait Engine {
     /// If the engine could not be reached.
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>>;
 
-    /// What all pixels together have done so far.
+    /// The counts of all pixels so far.
     fn statistics(&self) -> Statistics;
 }

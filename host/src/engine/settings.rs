@@ -1,11 +1,11 @@
 //! How the pixels operate, in the units the command line uses.
 
-use anyhow::{Context, Result, ensure};
-use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
-use dtof_core::{AnyRule, PixelConfig, RangeGate, RangeScale};
+use anyhow::{Context, Result};
+use dtof_core::fixed::traits::Fixed;
+use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::{AnyRule, DepthEstimator, PixelConfig, RangeGate, RangeScale};
 use serde::Serialize;
-
-use crate::engine::detection::{Estimator, Rule};
+use serde::ser::{SerializeMap, Serializer};
 
 /// Everything an engine and the output need beside the photons.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -13,19 +13,20 @@ pub struct Settings {
     /// Bins of a histogram: a power of two from 8 to 1024.
     pub bins: usize,
     /// Picoseconds a bin.
-    pub bin_width_ps: U16F16Number,
+    #[serde(serialize_with = "number")]
+    pub bin_width_ps: U16F16,
     /// Millimetres added to every range.
-    pub offset_mm: I24F8Number,
+    #[serde(serialize_with = "number")]
+    pub offset_mm: I24F8,
     /// First and last bin that may hold the peak, both inclusive.
     pub gate: Option<(u16, u16)>,
-    /// What decides whether a peak stands clear.
-    #[serde(flatten)]
-    pub rule: Rule,
-    /// What finds its depth.
-    #[serde(flatten)]
-    pub estimator: Estimator,
-    /// Photons a reported peak, or the window around it, holds at least.
-    pub min_count: u16,
+    /// The rule that decides whether a peak stands clear.
+    #[serde(flatten, serialize_with = "rule")]
+    pub rule: AnyRule,
+    /// The standard deviation of the pulse in bins, if the depth is to come from a window
+    /// that suits it, and not from three bins.
+    #[serde(flatten, serialize_with = "estimator")]
+    pub sigma_bins: Option<U8F8>,
     /// The exposure a decision must exceed, in laser cycles.
     pub l1: u16,
     /// The exposure at which a pixel starts over without an event.
@@ -43,24 +44,43 @@ pub struct Settings {
     pub seed: u64,
 }
 
-/// A fixed-point number that is written into JSON as a decimal one.
-macro_rules! number {
-    ($name:ident, $fixed:ty) => {
-        #[doc = concat!("[`", stringify!($fixed), "`], shown as the number it stands for.")]
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct $name(pub $fixed);
-
-        impl Serialize for $name {
-            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                serializer.serialize_f64(self.0.to_num())
-            }
-        }
-    };
+/// A fixed-point number as a decimal one.
+fn number<S: Serializer>(number: &impl Fixed, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_f64(number.to_num())
 }
-number!(U4F12Number, U4F12);
-number!(U8F8Number, U8F8);
-number!(U16F16Number, U16F16);
-number!(I24F8Number, I24F8);
+
+/// A rule by its name, with its own numbers.
+fn rule<S: Serializer>(rule: &AnyRule, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut fields = serializer.serialize_map(None)?;
+    match rule {
+        AnyRule::Paper(rule) => {
+            let threshold = rule.threshold();
+            fields.serialize_entry("rule", "paper")?;
+            fields.serialize_entry("alpha", &threshold.alpha().to_num::<f64>())?;
+            fields.serialize_entry("min_count", &threshold.minimum_count().raw())?;
+        }
+        AnyRule::Window(rule) => {
+            fields.serialize_entry("rule", "window")?;
+            fields.serialize_entry("window", &rule.width())?;
+            fields.serialize_entry("z", &rule.z().to_num::<f64>())?;
+            fields.serialize_entry("min_count", &rule.minimum_count().raw())?;
+        }
+    }
+    fields.end()
+}
+
+/// An estimator by its name, with the pulse it suits.
+fn estimator<S: Serializer>(sigma: &Option<U8F8>, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut fields = serializer.serialize_map(None)?;
+    match sigma {
+        None => fields.serialize_entry("estimator", "centroid")?,
+        Some(sigma) => {
+            fields.serialize_entry("estimator", "centred-window")?;
+            fields.serialize_entry("sigma_bins", &sigma.to_num::<f64>())?;
+        }
+    }
+    fields.end()
+}
 
 impl Settings {
     /// As a configuration for `BINS` bins.
@@ -69,17 +89,22 @@ impl Settings {
     /// The constraint the settings break.
     pub fn config<const BINS: usize>(&self) -> Result<PixelConfig<BINS, AnyRule>> {
         let gate = self.range_gate()?;
-        ensure!(self.min_count >= 1, "--min-count must be at least 1");
-        let rule = self.rule.with_minimum_count(self.min_count)?;
-        PixelConfig::with_rule(rule)
+        PixelConfig::with_rule(self.rule)
             .x(self.x)
             .l1(self.l1)
             .l2(self.l2)
             .gate(gate)
-            .estimator(self.estimator.in_core())
+            .estimator(self.estimator())
             .one_hit_tdc(self.one_hit_tdc)
             .build()
             .with_context(|| format!("--x {} --l1 {} --l2 {}", self.x, self.l1, self.l2))
+    }
+
+    /// The estimator of the depth of a peak.
+    #[must_use]
+    pub fn estimator(&self) -> DepthEstimator {
+        self.sigma_bins
+            .map_or(DepthEstimator::Centroid3, DepthEstimator::for_pulse)
     }
 
     /// The gate among `BINS` bins.
@@ -99,10 +124,10 @@ impl Settings {
     /// # Errors
     /// The constraint the settings break.
     pub fn range_scale(&self) -> Result<RangeScale> {
-        RangeScale::new(self.bin_width_ps.0, self.offset_mm.0).with_context(|| {
+        RangeScale::new(self.bin_width_ps, self.offset_mm).with_context(|| {
             format!(
                 "--bin-width-ps {} --offset-mm {}",
-                self.bin_width_ps.0, self.offset_mm.0
+                self.bin_width_ps, self.offset_mm
             )
         })
     }

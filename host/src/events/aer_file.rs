@@ -74,7 +74,7 @@ impl Event {
         }
     }
 
-    /// What is to be said against it.
+    /// Its flags.
     #[must_use]
     pub fn flags(&self) -> Flags {
         match self {
@@ -84,7 +84,7 @@ impl Event {
     }
 }
 
-/// What a reader must know to turn words into ranges.
+/// Everything a reader needs to turn words into ranges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Header {
     /// Bins of a histogram.
@@ -129,10 +129,7 @@ impl Header {
             u16_at(10) == HEADER_BYTES && bytes[32..].iter().all(|&byte| byte == 0),
             "the header is damaged"
         );
-        let geometry = Geometry {
-            columns: u32_at(16),
-            rows: u32_at(20),
-        };
+        let geometry = Geometry::new(u32_at(16), u32_at(20));
         ensure!(
             (1..=1 << 16).contains(&addresses(geometry)),
             "the header says {}x{} pixels: must be 1 to 65,536",

@@ -1,4 +1,4 @@
-//! What the events of a run look like, pixel by pixel.
+//! The events of a run, pixel by pixel.
 
 use std::collections::VecDeque;
 
@@ -130,10 +130,7 @@ mod tests {
     #[test]
     fn the_spread_goes_from_most_to_fewest_events() {
         let with = |events: &[u64]| {
-            let mut maps = Maps::new(Geometry {
-                columns: u32::try_from(events.len()).unwrap(),
-                rows: 1,
-            });
+            let mut maps = Maps::new(Geometry::new(u32::try_from(events.len()).unwrap(), 1));
             for (pixel, events) in maps.pixels.iter_mut().zip(events) {
                 pixel.events = *events;
             }

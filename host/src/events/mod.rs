@@ -1,7 +1,6 @@
-//! What becomes of events: tables, words, maps, a folder of results.
+//! The output of events: tables, words, maps, a folder of results.
 
 pub mod aer_file;
-pub mod dynamic_depth;
 pub mod events_csv;
 pub mod maps;
 pub mod output;

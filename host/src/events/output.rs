@@ -22,14 +22,14 @@ use crate::events::sample::Sample;
 use crate::events::summary::{self, Summary};
 use crate::files::{ASIDE, aside, flushed, may_replace};
 use crate::input::source::PhotonSource;
-use crate::picture;
-use crate::report::{self, Cloud, Figure, Section};
+use crate::view::report::{self, Cloud, Figure, Section};
+use dtof_draw::svg;
 use pictures::pictures;
 
 const CSV: &str = "events.csv";
 const AER: &str = "events.aer";
 const REPORT: &str = "report.html";
-/// What makes a folder complete: moved to its place last.
+/// Makes a folder complete: moved to its place last.
 const SUMMARY: &str = "summary.json";
 /// Names of files of a run that are not complete begin so.
 const OF_A_RUN: &str = ".dtof-run-";
@@ -71,8 +71,8 @@ impl Output {
         let header = aer_file::Header {
             bins: u32::try_from(settings.bins)?,
             geometry,
-            bin_width_ps: settings.bin_width_ps.0,
-            offset_mm: settings.offset_mm.0,
+            bin_width_ps: settings.bin_width_ps,
+            offset_mm: settings.offset_mm,
         };
         let aer = aer_file::Writer::new(BufWriter::new(aside(folder, OF_A_RUN)?), &header)?;
         Ok(Self {
@@ -119,36 +119,34 @@ impl Output {
         lead: &str,
         sections: &[Section],
     ) -> Result<()> {
-        let pictures = pictures(&self.maps, self.sides, summary.cycles)?;
+        let called = summary.settings.reports();
+        let pictures = pictures(&self.maps, self.sides, called)?;
         let bytes = pictures.iter().map(|picture| picture.svg.len()).sum();
         self.sample.limit(report::room_for_events(bytes));
         let figures: Vec<Figure> = pictures
             .iter()
-            .map(|picture| Figure {
-                svg: &picture.svg,
-                caption: picture.caption,
+            .filter_map(|picture| {
+                Some(Figure {
+                    svg: &picture.svg,
+                    caption: picture.caption.as_deref()?,
+                })
             })
             .collect();
+        let bytes = figures.iter().map(|figure| figure.svg.len()).sum();
+        self.sample.limit(report::room_for_events(bytes));
         let totals = summary.rows();
         let settings = summary.settings.rows();
-        let mut all = vec![Section {
-            heading: "Totals",
-            rows: &totals,
-        }];
-        all.extend(sections.iter().map(|section| Section {
-            heading: section.heading,
-            rows: section.rows,
-        }));
-        all.push(Section {
-            heading: "Settings",
-            rows: &settings,
-        });
+        let section = |heading, rows| Section { heading, rows };
+        let mut all = vec![section("Totals", &totals[..])];
+        all.extend(sections);
+        all.push(section("Settings", &settings));
         let cloud = Cloud {
             geometry: self.maps.geometry,
             sides: self.sides,
             cycles: summary.cycles,
             sample: &self.sample,
             pixels: &self.maps.spread(),
+            called,
         };
         let report = report::html(title, lead, &all, &figures, &cloud);
 
@@ -191,7 +189,7 @@ impl Output {
 
 /// Names of results, and what stands near the start of each.
 fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
-    let pictures = pictures::NAMES.map(|name| (name, picture::MARK));
+    let pictures = pictures::NAMES.map(|name| (name, svg::MARK));
     pictures.into_iter().chain([
         (CSV, events_csv::HEADER),
         (AER, aer_file::MAGIC),
@@ -200,7 +198,7 @@ fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
     ])
 }
 
-/// What a run that was killed has left, and nothing of an export or a recording, which
+/// Removes what a killed run has left, and nothing of an export or a recording, which
 /// may be under way. None of it is worth an error.
 fn remove_leftovers(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {

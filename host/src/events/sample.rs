@@ -10,7 +10,7 @@
 
 use dtof_core::{DepthEvent, PixelAddress};
 
-/// What is kept of an event.
+/// The part of an event that is kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledEvent {
     /// The laser cycle whose end brought it.

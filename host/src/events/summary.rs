@@ -1,19 +1,20 @@
-//! What came out of a run: `summary.json`, and the same on the terminal and in
+//! The summary of a run: `summary.json`, and the same on the terminal and in
 //! the report.
 
 pub mod truth;
 
-use dtof_core::Statistics;
+use dtof_core::{AnyRule, DepthEstimator, Statistics};
 use serde::Serialize;
 
 use crate::engine::settings::Settings;
 use crate::input::source::PhotonSource;
+use crate::rows::{Row, grouped};
 use truth::AgainstTruth;
 
 /// Every `summary.json` begins with it, less the version.
 pub(crate) const MARK: &str = "\"program\": \"dtof ";
 
-/// What came out, as `summary.json` has it.
+/// The summary, as in `summary.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// This program and its version.
@@ -22,7 +23,7 @@ pub struct Summary {
     pub input: Option<String>,
     /// Laser cycles a second of a simulated scene.
     pub laser_hz: Option<u64>,
-    /// What the array sees of a simulated scene: horizontal and vertical angle.
+    /// The field of view of a simulated scene: horizontal and vertical angle.
     pub field_of_view_degrees: Option<[f64; 2]>,
     /// The options that `dtof export` needs for the scene, if any.
     pub export_with: Option<String>,
@@ -59,9 +60,6 @@ pub struct Summary {
     /// How the pixels operated.
     pub settings: Settings,
 }
-
-/// A name and a value, for people.
-pub type Row = (String, String);
 
 impl Summary {
     /// Puts together what the pixels counted and where it came from.
@@ -128,13 +126,18 @@ impl Summary {
         rows.extend([
             row("laser cycles", self.cycles),
             row("photons", self.photons),
-            row("depth events", self.events),
+            match self.settings.frame {
+                None => row("depth events", self.events),
+                Some(_) => row("readings of frames", self.events),
+            },
             (
                 "pixels reporting".to_owned(),
                 format!("{} of {}", self.pixels_reporting, self.pixels),
             ),
-            row("exposures without an event", self.expired),
         ]);
+        if self.settings.frame.is_none() {
+            rows.push(row("exposures without an event", self.expired));
+        }
         let first_decision = self.settings.first_decision();
         if self.cycles < first_decision {
             rows.push((
@@ -172,11 +175,8 @@ impl Settings {
             format!("{first}..{last}")
         });
         let mut rows = vec![
-            row(
-                "bins",
-                format!("{} of {} ps", self.bins, self.bin_width_ps.0),
-            ),
-            row("range offset", format!("{} mm", self.offset_mm.0)),
+            row("bins", format!("{} of {} ps", self.bins, self.bin_width_ps)),
+            row("range offset", format!("{} mm", self.offset_mm)),
             row("range gate", gate),
         ];
         rows.extend(self.detection_rows());
@@ -193,12 +193,21 @@ impl Settings {
         rows
     }
 
-    /// What the report is of.
+    /// The title of the report.
     #[must_use]
     pub fn title(&self) -> &'static str {
         match self.frame {
             None => "Asynchronous depth events",
             Some(_) => "Frames, as a frame-based sensor reads them",
+        }
+    }
+
+    /// The name of what a pixel reports: one of them, and several.
+    #[must_use]
+    pub const fn reports(&self) -> [&'static str; 2] {
+        match self.frame {
+            None => ["event", "events"],
+            Some(_) => ["reading", "readings"],
         }
     }
 
@@ -212,39 +221,38 @@ impl Settings {
     #[must_use]
     pub fn detection_rows(&self) -> [Row; 2] {
         let decision = match self.frame {
-            None => self.rule.row(self.min_count),
+            None => ("threshold".to_owned(), threshold(&self.rule)),
             Some(length) => (
                 "frames".to_owned(),
                 format!("the highest bin of each {length} laser cycles"),
             ),
         };
-        [decision, self.estimator.row()]
+        let depth = match self.estimator() {
+            DepthEstimator::Centroid3 => "centroid of 3 bins".to_owned(),
+            DepthEstimator::CentredWindow(window) => {
+                format!("centred window of ±{} bins", window.half_width())
+            }
+        };
+        [decision, ("depth".to_owned(), depth)]
     }
 }
 
-/// A number with its thousands apart: 12,345.
-#[must_use]
-pub fn grouped(value: u64) -> String {
-    let digits = value.to_string();
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(',');
+/// The threshold that a detection exceeds.
+fn threshold(rule: &AnyRule) -> String {
+    match rule {
+        AnyRule::Paper(rule) => {
+            let threshold = rule.threshold();
+            format!(
+                "background + {} × its square root (α), at least {} photons",
+                threshold.alpha(),
+                threshold.minimum_count()
+            )
         }
-        text.push(digit);
+        AnyRule::Window(rule) => format!(
+            "in a window of {} bins: background + {} standard deviations (z), at least {} photons",
+            rule.width(),
+            rule.z(),
+            rule.minimum_count()
+        ),
     }
-    text
-}
-
-/// Rows as lines of text, names to the left, values aligned.
-#[must_use]
-pub fn aligned(rows: &[Row]) -> String {
-    let width = rows
-        .iter()
-        .map(|(name, _)| name.chars().count())
-        .max()
-        .unwrap_or(0);
-    rows.iter()
-        .map(|(name, value)| format!("  {name:width$}  {value}\n"))
-        .collect()
 }

@@ -15,14 +15,14 @@ pub fn open(path: &Path) -> Result<Reader<BufReader<File>>> {
     Reader::new(BufReader::new(File::open(path)?))
 }
 
-/// What a file holds.
+/// The contents of a file.
 pub struct Survey {
     pub header: Header,
     depth: u64,
     dynamic_depth: u64,
     /// The laser cycle of the latest event.
     pub latest: u64,
-    /// What ends the file too early: the byte, and what is wrong there.
+    /// Damage that ends the file too early: the byte, and what is wrong there.
     pub damage: Option<String>,
 }
 

@@ -17,11 +17,11 @@ use std::io::{self, Write};
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::{DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Polarity};
+use dtof_link::DynamicDepth;
 
 use super::reorder::{Reorder, WAITING};
 use super::{Finished, LaserClock, Out, Sink};
 use crate::events::aer_file::Event;
-use crate::events::dynamic_depth::DynamicDepth;
 use crate::input::source::Geometry;
 
 /// Columns and rows are sent in 11 bits.
@@ -179,10 +179,7 @@ mod tests {
         b"% evt 2.0\n% format EVT2;height=720;width=1280\n% geometry 1280x720\n% end\n";
 
     fn words(changes: &[Change]) -> Vec<u32> {
-        let array = Geometry {
-            columns: 1280,
-            rows: 720,
-        };
+        let array = Geometry::new(1280, 720);
         let mut encoder = Encoder::new(Vec::new(), array).unwrap();
         for change in changes {
             encoder.write(change).unwrap();

@@ -24,7 +24,7 @@ const MOST_POINTS: usize = 1 << 16;
 /// The frame that points are in.
 const FRAME: &str = "dtof_optical";
 
-/// What happened in a slice of time.
+/// Counts of a slice of time.
 #[derive(Clone, Debug, Default, Serialize)]
 struct Statistics {
     /// When the slice begins.
@@ -77,22 +77,13 @@ fn schema() -> String {
         "title": "time",
         "properties": { "sec": { "type": "integer" }, "nsec": { "type": "integer" } },
     });
-    let whole = [
-        "events",
-        "pixels",
-        "flagged",
-        "saturated",
-        "clipped",
-        "deferred",
-        "pile_up",
-        "events_so_far",
-    ];
+    let whole = "events pixels flagged saturated clipped deferred pile_up events_so_far";
     let mut properties = serde_json::Map::new();
     properties.insert("timestamp".into(), time);
     for name in ["duration_s", "events_per_s"] {
         properties.insert(name.into(), serde_json::json!({ "type": "number" }));
     }
-    for name in whole {
+    for name in whole.split(' ') {
         properties.insert(name.into(), serde_json::json!({ "type": "integer" }));
     }
     serde_json::json!({
@@ -256,16 +247,10 @@ impl Mcap {
             timestamp: Timestamp::new_checked(sec, nsec),
             frame_id: FRAME.to_owned(),
             pose: Some(Pose {
-                position: Some(Vector3 {
-                    x: 0.0,
-                    y: 0.0,
-                    z: 0.0,
-                }),
+                position: Some(Vector3::default()),
                 orientation: Some(Quaternion {
-                    x: 0.0,
-                    y: 0.0,
-                    z: 0.0,
                     w: 1.0,
+                    ..Quaternion::default()
                 }),
             }),
             point_stride: offset,

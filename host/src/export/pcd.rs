@@ -1,18 +1,10 @@
 //! PCD: the point clouds of PCL, version 0.7, binary.
 
-use anyhow::Result;
-
-use super::Out;
-use super::points::{Number, Points, fields};
-use super::projection::Projection;
+use super::points::{Number, fields};
 use crate::events::aer_file::EventKind;
 
-/// Begins a file of so many points.
-pub fn begin(out: Out, projection: Projection, kind: EventKind, points: u64) -> Result<Points> {
-    Points::new(out, projection, &header(kind, points))
-}
-
-fn header(kind: EventKind, points: u64) -> String {
+/// The header of a file of so many points.
+pub fn header(kind: EventKind, points: u64) -> String {
     let fields = fields(kind);
     let names = fields.map(|field| field.name).join(" ");
     let sizes = fields

@@ -2,19 +2,11 @@
 
 use std::fmt::Write;
 
-use anyhow::Result;
-
-use super::Out;
-use super::points::{Number, Points, fields};
-use super::projection::Projection;
+use super::points::{Number, fields};
 use crate::events::aer_file::EventKind;
 
-/// Begins a file of so many points.
-pub fn begin(out: Out, projection: Projection, kind: EventKind, points: u64) -> Result<Points> {
-    Points::new(out, projection, &header(kind, points))
-}
-
-fn header(kind: EventKind, points: u64) -> String {
+/// The header of a file of so many points.
+pub fn header(kind: EventKind, points: u64) -> String {
     let mut header = format!(
         "ply\n\
          format binary_little_endian 1.0\n\

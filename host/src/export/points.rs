@@ -8,7 +8,7 @@ use super::projection::Projection;
 use super::{Finished, Out, Sink};
 use crate::events::aer_file::{Event, EventKind};
 
-/// What a field of a record holds, little-endian.
+/// The type of a field, little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Number {
     U8,
@@ -86,28 +86,42 @@ pub fn record(event: &Event, projection: &Projection) -> Result<[u8; BYTES]> {
     Ok(record)
 }
 
-/// Records, one after the other, below a header that is already there.
+/// Records below a header, all written alike.
 pub struct Points {
     out: Out,
     projection: Projection,
+    write: fn(&mut Out, &Event, &Projection) -> Result<()>,
     written: u64,
 }
 
 impl Points {
-    /// Writes `header`.
-    pub fn new(mut out: Out, projection: Projection, header: &str) -> Result<Self> {
+    /// Writes `header`, and then each event with `write`.
+    pub fn new(
+        mut out: Out,
+        projection: Projection,
+        header: &str,
+        write: fn(&mut Out, &Event, &Projection) -> Result<()>,
+    ) -> Result<Self> {
         out.write_all(header.as_bytes())?;
         Ok(Self {
             out,
             projection,
+            write,
             written: 0,
+        })
+    }
+
+    /// Packed records below `header`.
+    pub fn packed(out: Out, projection: Projection, header: &str) -> Result<Self> {
+        Self::new(out, projection, header, |out, event, projection| {
+            Ok(out.write_all(&record(event, projection)?)?)
         })
     }
 }
 
 impl Sink for Points {
     fn write(&mut self, event: &Event) -> Result<()> {
-        self.out.write_all(&record(event, &self.projection)?)?;
+        (self.write)(&mut self.out, event, &self.projection)?;
         self.written += 1;
         Ok(())
     }

@@ -7,7 +7,7 @@ use super::LaserClock;
 use crate::events::aer_file::Event;
 use crate::geometry::Rays;
 
-/// What turns an event into a point in space and time.
+/// Turns an event into a point in space and time.
 pub struct Projection {
     pub rays: Rays,
     pub scale: RangeScale,

@@ -4,34 +4,27 @@
 //! one event that may wait. So no event can be overtaken by more events than there are
 //! pixels, as long as the link takes all of them.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::BTreeMap;
 
 /// How many events wait for those that are older: one for each pixel address.
 pub const WAITING: usize = 1 << 16;
 
 /// Events on their way, the oldest first.
 pub struct Reorder<T> {
-    waiting: BinaryHeap<Reverse<Waiting<T>>>,
+    /// By time; events of one time by their number, so that they stay in the order they came in.
+    waiting: BTreeMap<(u64, u64), T>,
     most: usize,
-    /// Breaks ties: events of one time stay in the order they came in.
     number: u64,
     /// The time of the event that was given out last.
     last: u64,
     late: u64,
 }
 
-struct Waiting<T> {
-    time: u64,
-    number: u64,
-    item: T,
-}
-
 impl<T> Reorder<T> {
     /// With room for `most` events.
     pub fn new(most: usize) -> Self {
         Self {
-            waiting: BinaryHeap::new(),
+            waiting: BTreeMap::new(),
             most,
             number: 0,
             last: 0,
@@ -46,9 +39,8 @@ impl<T> Reorder<T> {
             self.late += 1;
             return None;
         }
-        let number = self.number;
+        self.waiting.insert((time, self.number), item);
         self.number += 1;
-        self.waiting.push(Reverse(Waiting { time, number, item }));
         if self.waiting.len() > self.most {
             self.pop()
         } else {
@@ -58,40 +50,14 @@ impl<T> Reorder<T> {
 
     /// The oldest.
     pub fn pop(&mut self) -> Option<T> {
-        let Reverse(oldest) = self.waiting.pop()?;
-        self.last = oldest.time;
-        Some(oldest.item)
+        let ((time, _), oldest) = self.waiting.pop_first()?;
+        self.last = time;
+        Some(oldest)
     }
 
     /// How many were left out.
     pub fn late(&self) -> u64 {
         self.late
-    }
-}
-
-impl<T> Waiting<T> {
-    fn key(&self) -> (u64, u64) {
-        (self.time, self.number)
-    }
-}
-
-impl<T> PartialEq for Waiting<T> {
-    fn eq(&self, other: &Self) -> bool {
-        self.key() == other.key()
-    }
-}
-
-impl<T> Eq for Waiting<T> {}
-
-impl<T> PartialOrd for Waiting<T> {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl<T> Ord for Waiting<T> {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.key().cmp(&other.key())
     }
 }
 

@@ -9,8 +9,8 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::{Ray, unit};
+use crate::input::range::within;
 use crate::input::source::Geometry;
-use crate::simulate::effects::limits::within;
 
 /// No file of 65,536 pixels is longer.
 const MOST_BYTES: u64 = 1 << 24;

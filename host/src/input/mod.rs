@@ -2,6 +2,7 @@
 
 pub mod npy;
 pub mod photon_csv;
+pub mod range;
 pub mod recorded;
 pub mod source;
 pub mod tmf8820;

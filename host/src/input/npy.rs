@@ -96,10 +96,7 @@ fn read_file(path: &Path) -> Result<NpyRecording> {
     let bins = usize::try_from(bins)?;
     let columns = leading.last().copied().unwrap_or(1);
     Ok(NpyRecording {
-        geometry: Geometry {
-            columns: u32::try_from(columns)?,
-            rows: u32::try_from(pixels / columns)?,
-        },
+        geometry: Geometry::new(u32::try_from(columns)?, u32::try_from(pixels / columns)?),
         bins,
         capture: Capture {
             histograms: counts.chunks(bins).map(<[u64]>::to_vec).collect(),

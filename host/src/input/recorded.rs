@@ -265,10 +265,7 @@ mod tests {
             histograms: vec![counts.to_vec()],
         };
         let mut source = RecordedHistograms::new(
-            Geometry {
-                columns: 1,
-                rows: 1,
-            },
+            Geometry::new(1, 1),
             &[capture],
             RecordingLength::Cycles(cycles),
             u64::MAX,
@@ -298,10 +295,7 @@ mod tests {
             let capture = Capture {
                 histograms: vec![vec![100; 8]; 2],
             };
-            let geometry = Geometry {
-                columns: 2,
-                rows: 1,
-            };
+            let geometry = Geometry::new(2, 1);
             let length = RecordingLength::Cycles(1000);
             let mut source =
                 RecordedHistograms::new(geometry, &[capture], length, 1000, seed).unwrap();
@@ -321,10 +315,7 @@ mod tests {
             let capture = Capture {
                 histograms: vec![vec![count; 8]],
             };
-            let geometry = Geometry {
-                columns: 1,
-                rows: 1,
-            };
+            let geometry = Geometry::new(1, 1);
             RecordedHistograms::new(geometry, &[capture], length, 1, 1).is_err()
         };
         assert!(refused(1 << 38, RecordingLength::Cycles(1 << 40)));

@@ -13,6 +13,12 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    /// An array of so many columns and rows.
+    #[must_use]
+    pub const fn new(columns: u32, rows: u32) -> Self {
+        Self { columns, rows }
+    }
+
     /// How many addresses the array has.
     #[must_use]
     pub fn addresses(&self) -> usize {
@@ -29,7 +35,7 @@ pub struct Photon {
     pub code: u16,
 }
 
-/// What one pixel received in one slice.
+/// The photons of one pixel in one slice.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PixelPhotons {
     /// Laser cycles of the slice that were recorded: all of them, or fewer
@@ -54,7 +60,7 @@ pub trait PhotonSource {
     /// The array.
     fn geometry(&self) -> Geometry;
 
-    /// What its columns and its rows are.
+    /// The names of its columns and rows.
     fn sides(&self) -> [&'static str; 2] {
         ["column", "row"]
     }

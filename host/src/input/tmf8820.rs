@@ -15,7 +15,7 @@ use crate::input::source::Geometry;
 
 /// Zones of the sensor.
 pub const ZONES: u32 = 9;
-/// What the columns and the rows of a log are.
+/// The names of the columns and rows of a log.
 pub const SIDES: [&str; 2] = ["zone", "capture"];
 /// Bins of its histograms.
 pub const BINS: usize = 128;
@@ -34,7 +34,7 @@ pub struct Tmf8820Log {
     pub captures: Vec<Capture>,
 }
 
-/// What is read of a capture. The ground truth and the sensor's own results stand
+/// The part of a capture that is read. The ground truth and the sensor's own results stand
 /// beside it in the log.
 #[derive(Deserialize)]
 struct LogEntry {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::pixel::SimulatedPixel;
 use crate::input::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
 
-/// What a pixel receives in a laser cycle, if that changes.
+/// The rates of a pixel in a laser cycle, for scenes that change.
 pub type RatesAt = Box<dyn Fn(PixelAddress, u64) -> Rates + Send + Sync>;
 
 /// An array of simulated pixels.

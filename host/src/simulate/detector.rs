@@ -31,7 +31,7 @@ pub(super) struct Detector {
     second_echo: Option<Echo>,
     cover_glass: Option<Crosstalk>,
     tail: Option<Late>,
-    /// What a hot pixel has more than others.
+    /// The additional background of a hot pixel.
     hot: Option<Background>,
     /// Only if it can change what is in the histogram.
     gap: Option<Background>,

@@ -9,11 +9,10 @@ mod file;
 mod surface;
 
 use anyhow::{Result, ensure};
-use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::{Count, PaperRule, PixelAddress};
 
-use crate::engine::detection::{Estimator, Rule};
-use crate::engine::settings::{I24F8Number, Settings, U16F16Number};
+use crate::engine::settings::Settings;
 use crate::geometry::FieldOfView;
 use crate::input::source::{Geometry, PhotonSource};
 use crate::simulate::effects::Effects;
@@ -41,7 +40,7 @@ pub struct Scene {
     pub geometry: Geometry,
     /// The array that the places in `surfaces` are given in.
     pub layout: Geometry,
-    /// What the array sees; [`FieldOfView::of`] the layout unless given. Planes need it.
+    /// The field of view; [`FieldOfView::of`] the layout unless given. Planes need it.
     pub field_of_view: Option<FieldOfView>,
     /// Laser cycles.
     pub cycles: u64,
@@ -59,11 +58,11 @@ pub struct Scene {
     pub signal_at_one_metre: f64,
     /// In the order of the file.
     pub surfaces: Vec<Surface>,
-    /// What is not plain.
+    /// Everything beyond the plain model.
     pub effects: Effects,
 }
 
-/// What a pixel sees.
+/// The surface that a pixel sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Which of [`Scene::surfaces`].
@@ -81,7 +80,7 @@ impl Scene {
         Self::parse(include_str!("../../../scenes/demo.toml"))
     }
 
-    /// What `pixel` sees in laser cycle `cycle`: the truth its events are
+    /// The view of `pixel` in laser cycle `cycle`: the truth its events are
     /// compared with. None if there is nothing at its place.
     #[must_use]
     pub fn truth(&self, pixel: PixelAddress, cycle: u64) -> Option<View> {
@@ -102,7 +101,7 @@ impl Scene {
         nearest
     }
 
-    /// What `pixel` receives in laser cycle `cycle`.
+    /// The rates of `pixel` in laser cycle `cycle`.
     #[must_use]
     pub fn rates(&self, pixel: PixelAddress, cycle: u64) -> Rates {
         let view = self.truth(pixel, cycle);
@@ -185,7 +184,7 @@ impl Scene {
         [column * across, row * down]
     }
 
-    /// What the array sees, whichever it is.
+    /// The field of view: the one given, or the default.
     #[must_use]
     pub fn view(&self) -> FieldOfView {
         let view = self.field_of_view;
@@ -266,12 +265,11 @@ impl Scene {
 pub fn settings(seed: u64) -> Settings {
     Settings {
         bins: 128,
-        bin_width_ps: U16F16Number(U16F16::lit("250")),
-        offset_mm: I24F8Number(I24F8::ZERO),
+        bin_width_ps: U16F16::lit("250"),
+        offset_mm: I24F8::ZERO,
         gate: None,
-        rule: Rule::paper(U8F8::lit("8")),
-        estimator: Estimator::default(),
-        min_count: 5,
+        rule: PaperRule::new(U8F8::lit("8"), Count::saturating(5)).into(),
+        sigma_bins: None,
         l1: 100,
         l2: 2000,
         x: 10,

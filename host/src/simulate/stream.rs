@@ -5,7 +5,7 @@ use rand_pcg::Pcg64;
 
 use dtof_theory::random::pixel_rng;
 
-/// Who draws.
+/// The effect that draws.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Stream {
     /// Where in its bin a background photon lies.

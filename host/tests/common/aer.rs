@@ -16,10 +16,7 @@ use super::Scratch;
 /// 64 columns, 32 rows, 128 bins of 250 ps.
 pub const HEADER: Header = Header {
     bins: 128,
-    geometry: Geometry {
-        columns: 64,
-        rows: 32,
-    },
+    geometry: Geometry::new(64, 32),
     bin_width_ps: U16F16::lit("250"),
     offset_mm: I24F8::lit("-12.5"),
 };

@@ -9,6 +9,15 @@ use std::process::{Command, Output};
 
 use tempfile::TempDir;
 
+/// The cells of each row of a table, `a | b | c`. A cell may hold `\n` for a line end.
+pub fn table(rows: &str) -> impl Iterator<Item = Vec<String>> {
+    let rows = rows.lines().filter(|row| !row.trim().is_empty());
+    rows.map(|row| {
+        let cells = row.split(" | ");
+        cells.map(|cell| cell.trim().replace("\\n", "\n")).collect()
+    })
+}
+
 /// A folder of its own for one test.
 pub struct Scratch(TempDir);
 
@@ -21,9 +30,10 @@ impl Scratch {
         self.0.path().join(name)
     }
 
-    /// Writes an input file.
+    /// Writes an input file, and makes its folder.
     pub fn file(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
         let path = self.path(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(&path, bytes).unwrap();
         path
     }
@@ -35,11 +45,28 @@ impl Scratch {
     /// `dtof ARGUMENTS` in this folder.
     pub fn dtof(&self, arguments: &[&str]) -> Output {
         let mut command = Command::new(env!("CARGO_BIN_EXE_dtof"));
-        command
-            .current_dir(self.0.path())
-            .args(arguments)
-            .output()
-            .unwrap()
+        command.current_dir(self.0.path()).args(arguments);
+        command.output().unwrap()
+    }
+
+    /// `dtof LINE` in this folder.
+    pub fn run(&self, line: &str) -> Output {
+        self.dtof(&line.split_whitespace().collect::<Vec<_>>())
+    }
+
+    /// What `dtof LINE` prints. It must succeed.
+    #[track_caller]
+    pub fn printed(&self, line: &str) -> String {
+        succeeded(self.run(line))
+    }
+
+    /// `dtof COMMAND OPTIONS` of each row of a table must be refused: `options | part | part`.
+    #[track_caller]
+    pub fn all_refused(&self, command: &str, rows: &str) {
+        for row in table(rows) {
+            let parts: Vec<&str> = row[1..].iter().map(String::as_str).collect();
+            self.refused(&self.run(&format!("{command} {}", row[0])), &parts);
+        }
     }
 
     /// `dtof replay` of a file into `out`.
@@ -51,12 +78,7 @@ impl Scratch {
     /// As [`Self::replay`], which must succeed.
     #[track_caller]
     pub fn replayed(&self, input: &Path, more: &[&str]) -> serde_json::Value {
-        let output = self.replay(input, more);
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        succeeded(self.replay(input, more));
         self.summary()
     }
 
@@ -76,16 +98,27 @@ impl Scratch {
     #[track_caller]
     pub fn refused(&self, output: &Output, parts: &[&str]) {
         let message = String::from_utf8(output.stderr.clone()).unwrap();
-        assert!(
-            !output.status.success(),
-            "succeeded, should have said {parts:?}"
-        );
+        assert!(!output.status.success(), "no failure with {parts:?}");
         assert_eq!(message.lines().count(), 1, "not one line: {message}");
         assert!(!message.contains("panicked"), "{message}");
         for part in parts {
-            assert!(message.contains(part), "{message:?} does not say {part:?}");
+            says(&message, part);
         }
         let left = std::fs::read_dir(self.path("out")).map_or(0, Iterator::count);
         assert_eq!(left, 0, "files were left in the output folder");
     }
+}
+
+/// `text` must have `part` in it.
+#[track_caller]
+pub fn says(text: &str, part: &str) {
+    assert!(text.contains(part), "{text:?} does not say {part:?}");
+}
+
+/// What a program printed that must have succeeded.
+#[track_caller]
+pub fn succeeded(output: Output) -> String {
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    String::from_utf8(output.stdout).unwrap()
 }

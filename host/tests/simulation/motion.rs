@@ -136,10 +136,7 @@ fn the_nearest_surface_is_seen_and_nothing_where_there_is_none() {
 #[test]
 fn another_array_looks_at_the_same_scene() {
     let demo = Scene::demo().unwrap();
-    let geometry = Geometry {
-        columns: 16,
-        rows: 8,
-    };
+    let geometry = Geometry::new(16, 8);
     let small = Scene {
         geometry,
         ..demo.clone()

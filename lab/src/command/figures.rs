@@ -1,12 +1,13 @@
 //! `cargo lab figures`: the figures and verdicts of the documentation.
 
-use std::io::{self, Write};
-use std::path::PathBuf;
-
 use anyhow::{Result, bail};
 use clap::Args;
-use dtof::arguments::path;
-use dtof_lab::pages::{self, Anew};
+use dtof::cli::arguments::path;
+use dtof_lab::pages;
+use dtof_lab::pages::Anew;
+use std::io;
+use std::io::Write;
+use std::path::PathBuf;
 
 #[derive(Args)]
 pub struct Figures {
@@ -16,6 +17,9 @@ pub struct Figures {
     /// Work out all seeds, not only those of a quick look
     #[arg(long)]
     all: bool,
+    /// Draw again from what is kept; work out no seed
+    #[arg(long, conflicts_with = "all")]
+    kept: bool,
     /// Change nothing; fail if something would change
     #[arg(long)]
     check: bool,
@@ -23,7 +27,11 @@ pub struct Figures {
 
 impl Figures {
     pub fn run(&self) -> Result<()> {
-        let anew = if self.all { Anew::All } else { Anew::Few };
+        let anew = match (self.all, self.kept) {
+            (true, _) => Anew::All,
+            (_, true) => Anew::None,
+            _ => Anew::Few,
+        };
         let documents = pages::documents(&self.docs, anew, |study| {
             // Nobody may be reading it.
             let _ = writeln!(io::stderr(), "{}", study.name);

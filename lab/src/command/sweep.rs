@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use dtof::arguments::{path, whole};
-use dtof::events::summary::grouped;
+use dtof::cli::arguments::{path, whole};
+use dtof::rows::grouped;
 use dtof_lab::studies;
 use dtof_lab::sweep::{self, Part, SeedRange};
 use indicatif::{ProgressBar, ProgressStyle};

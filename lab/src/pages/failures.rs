@@ -7,7 +7,7 @@ use anyhow::Result;
 use crate::studies::failures::cases::Case;
 use crate::studies::failures::{Method, Outcome, Verdict, Warning, outcomes};
 use crate::sweep::Part;
-use dtof::events::summary::grouped;
+use dtof::rows::grouped;
 
 /// The table of every case and method, what those that fail report, and what goes
 /// wrong without a flag.

@@ -5,18 +5,20 @@ mod events;
 mod recorded;
 mod tables;
 
-use std::path::PathBuf;
-
-use anyhow::{Context, Result};
-
-pub use self::recorded::RECORDED;
 use self::recorded::recorded;
-use crate::studies::methods::depth_error::{self, Method as Estimator};
+use crate::studies::methods::depth_error::Method as Estimator;
 use crate::studies::methods::passage::Method as Rule;
-use crate::studies::methods::time_to_detect::{self, Outcome};
+use crate::studies::methods::time_to_detect::Outcome;
+use crate::studies::methods::{depth_error, time_to_detect};
 use crate::sweep::mean::Measured;
 use crate::sweep::{Part, PointTally};
-use dtof::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
+use anyhow::{Context, Result, ensure};
+use dtof_draw::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style, chart};
+use dtof_draw::palette;
+use dtof_draw::palette::Pen;
+use std::path::PathBuf;
+
+pub use self::recorded::RECORDED;
 
 /// The instruction counts, below the documentation.
 pub const INSTRUCTIONS: &str = "bench/instructions.csv";
@@ -68,6 +70,7 @@ impl Instructions<'_> {
 /// A method: what it costs, and how it does over several scenes.
 struct Entry {
     label: String,
+    pen: Pen,
     cost: f64,
     /// Mean over the scenes of the time or error over the reference's. The interval is
     /// the mean of theirs, which may have their errors in common.
@@ -78,13 +81,14 @@ struct Entry {
 
 impl Entry {
     #[allow(clippy::cast_precision_loss, reason = "a few scenes")]
-    fn new(label: String, cost: f64, scenes: &[Measured]) -> Self {
+    fn new(label: String, pen: Pen, cost: f64, scenes: &[Measured]) -> Self {
         let values = || scenes.iter().map(|scene| scene.value);
         let mean = |of: fn(&Measured) -> f64| {
             scenes.iter().map(of).sum::<f64>() / scenes.len().max(1) as f64
         };
         Self {
             label,
+            pen,
             cost,
             mean: Measured {
                 value: mean(|scene| scene.value),
@@ -138,31 +142,40 @@ fn frontier(entries: &[Entry]) -> Vec<Dot> {
     dots
 }
 
-fn chart(title: &str, y: Axis, entries: &[Entry]) -> Result<String> {
-    let mut series = vec![Series {
-        name: Some("frontier".to_owned()),
-        colour: 6,
-        style: Style::Thin,
-        points: frontier(entries),
-    }];
-    for (colour, entry) in entries.iter().enumerate() {
-        series.push(Series {
-            name: Some(entry.label.clone()),
-            colour,
-            style: Style::Dots,
-            points: vec![Dot {
-                x: entry.cost,
-                y: entry.mean.value,
-                interval: Some(entry.range),
-            }],
-        });
-    }
-    line_chart(&Chart {
-        title,
+/// The cost of entries against how they do.
+fn against_cost(finding: Finding, y: Axis, note: &str, entries: &[Entry]) -> Result<String> {
+    ensure!(finding.holds, "the data no longer show: {}", finding.text);
+    let frontier = frontier(entries);
+    let mut series = vec![Series::unnamed(palette::REFERENCE, Style::Dashed, frontier)];
+    series.extend(entries.iter().map(|entry| {
+        let dot = Dot {
+            x: entry.cost,
+            y: entry.mean.value,
+            interval: Some(entry.range),
+        };
+        // The note says what is left out.
+        let name = entry.label.replace("window of ", "");
+        let name = name.replace("centred window for ", "");
+        Series::named(name, entry.pen, Style::Dots, vec![dot])
+    }));
+    chart(&Chart {
+        finding,
+        note: format!("{note} Dashed: nothing is both cheaper and better."),
         x: Axis::linear("instructions on a Cortex-M4F"),
         y,
-        series,
+        key: Vec::new(),
+        columns: 1,
+        panels: vec![Panel::only(series)],
     })
+}
+
+/// How `label` does.
+fn value(entries: &[Entry], label: &str) -> Result<f64> {
+    let found = entries.iter().find(|entry| entry.label == label);
+    Ok(found
+        .with_context(|| format!("no method {label}"))?
+        .mean
+        .value)
 }
 
 /// Every rule over the outcomes that `of` takes.
@@ -181,10 +194,18 @@ fn rules(
             outcome.cycles.times(one)
         });
         let ratios: Vec<Measured> = ratios.collect();
-        Ok(Entry::new(rule.label(), counts.rule(rule)?, &ratios))
+        Ok(Entry::new(
+            rule.label(),
+            rule.pen(),
+            counts.rule(rule)?,
+            &ratios,
+        ))
     };
     Rule::RULES.into_iter().map(entry).collect()
 }
+
+/// The best rule for each pulse.
+const SUITED: &str = "best for the pulse";
 
 /// For each pulse the rule that is fastest over its scenes.
 #[allow(clippy::float_cmp, reason = "parameters are as they were written")]
@@ -203,7 +224,8 @@ fn suited(counts: &Instructions, outcomes: &[Outcome]) -> Result<Entry> {
         ratios.extend(those.map(|outcome| outcome.ratio));
     }
     Ok(Entry::new(
-        "the window that suits the pulse".to_owned(),
+        SUITED.to_owned(),
+        palette::NEUTRAL,
         cost,
         &ratios,
     ))
@@ -221,7 +243,12 @@ fn estimators(
             cost = cost.max(counts.estimator(estimator, point.parameter("sigma"))?);
             ratios.push(depth_error::over_bound(point, name));
         }
-        Ok(Entry::new(estimator.label(), cost, &ratios))
+        Ok(Entry::new(
+            estimator.label(),
+            estimator.pen(),
+            cost,
+            &ratios,
+        ))
     };
     Estimator::ALL.into_iter().map(entry).collect()
 }
@@ -244,20 +271,48 @@ pub fn documents(
     let mut all_rules = rules(&counts, &outcomes, |_| true)?;
     all_rules.push(suited(&counts, &outcomes)?);
     let all_estimators = estimators(&counts, depth, |_| true)?;
-    let decision_svg = chart(
-        "A decision: its cost against the time to an event",
-        Axis::logarithmic("laser cycles over the likelihood ratio's"),
+    let recorded = recorded(&counts, recorded_rules)?;
+    let suits = value(&all_rules, SUITED)?;
+    let papers = value(&all_rules, &Rule::Paper.label())?;
+    let decision_svg = against_cost(
+        Finding::new(
+            format!(
+                "A window that suits the pulse reports {:.1} times sooner than the paper's rule",
+                papers / suits
+            ),
+            papers > 1.5 * suits,
+        ),
+        Axis::logarithmic("laser cycles to an event over the likelihood ratio's"),
+        "Dots are means over all scenes, bars go from the best scene to the worst. Windows have their width as a name.",
         &all_rules,
     )?;
-    let depth_svg = chart(
-        "A depth: its cost against its error",
-        Axis::logarithmic("root mean square error over the Cramér-Rao bound"),
+    let own = value(&all_estimators, &Estimator::OwnWindow.label())?;
+    let papers = value(&all_estimators, &Estimator::Paper.label())?;
+    let depth_svg = against_cost(
+        Finding::new(
+            format!(
+                "A centred window for the pulse takes the depth error from {papers:.1} times the bound to {own:.2}"
+            ),
+            own < papers / 1.5,
+        ),
+        Axis::logarithmic("root mean square depth error over the Cramér-Rao bound"),
+        "Dots are means over all scenes, bars go from the best scene to the worst. σ: centred windows for such a pulse.",
         &all_estimators,
     )?;
-    let recorded_svg = chart(
-        "Recorded photons: cost of a decision and a depth against its error",
-        Axis::linear("millimetres: median error, line to 95 %"),
-        &recorded(&counts, recorded_rules)?,
+    let [mass, centred] = ["centroid", "centred window"]
+        .map(|estimator| value(&recorded, &format!("{}, {estimator}", Rule::Paper.label())));
+    let gain = 1.0 - centred? / mass?;
+    let recorded_svg = against_cost(
+        Finding::new(
+            format!(
+                "On recorded photons a centred window lowers the error by {:.0} %",
+                gain * 100.0
+            ),
+            gain > 0.1,
+        ),
+        Axis::linear("depth error of recorded photons, mm"),
+        "Dots are medians, bars end where 95 % of the errors are smaller. Windows have their width as a name.",
+        &recorded,
     )?;
     let (worst, elsewhere) = depth_error::elsewhere(depth)?;
     let [sigma, signal, background] =
@@ -300,7 +355,12 @@ mod tests {
     /// As sure as 0.02 either way.
     fn entry(cost: f64, value: f64) -> Entry {
         let interval = (value - 0.02, value + 0.02);
-        Entry::new(format!("{cost}"), cost, &[Measured { value, interval }])
+        Entry::new(
+            format!("{cost}"),
+            palette::NEUTRAL,
+            cost,
+            &[Measured { value, interval }],
+        )
     }
 
     #[test]

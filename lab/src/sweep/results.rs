@@ -1,13 +1,12 @@
 //! What a study comes to: figures, and verdicts on what the paper claims.
 
-use std::fmt;
-
-use anyhow::{Context, Result};
-
 use super::{Part, PointTally};
-use dtof::chart;
+use anyhow::{Context, Result};
+use dtof_draw::chart;
+use dtof_draw::chart::Chart;
 use dtof_theory::counts::binomial;
 use dtof_theory::counts::poisson::Poisson;
+use std::fmt;
 
 /// What can be said from all trials of a study.
 #[derive(Clone, Debug, Default)]
@@ -34,10 +33,27 @@ pub struct Table {
 pub struct Figure {
     /// The file's name, without its extension.
     pub name: &'static str,
+    /// Whether the data show what its title says.
+    pub holds: bool,
     /// An SVG document.
     pub svg: String,
-    /// What it shows, how it was found, and how sure it is.
+    /// How it was found; what it shows, it says itself.
     pub caption: String,
+}
+
+impl Figure {
+    /// Draws `chart`.
+    ///
+    /// # Errors
+    /// If there is nothing to draw.
+    pub fn new(name: &'static str, chart: &Chart, caption: impl Into<String>) -> Result<Self> {
+        Ok(Self {
+            name,
+            holds: chart.finding.holds,
+            svg: chart::chart(chart)?,
+            caption: caption.into(),
+        })
+    }
 }
 
 /// Something the paper says, and whether it is so.

@@ -83,7 +83,7 @@ impl Detections {
     }
 
     /// Mean laser cycles to an event near the target, expired exposures and
-    /// those with a false event included.
+    /// those with a false alarm included.
     #[must_use]
     #[allow(clippy::cast_precision_loss)]
     pub fn cycles_to_event(&self) -> f64 {

@@ -14,8 +14,7 @@ use rand_core::Rng;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
 
-use crate::rates::Rates;
-use crate::rates::bin_share;
+use crate::rates::{Rates, bin_share};
 
 /// When a pixel looks, counted in steps of X laser cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

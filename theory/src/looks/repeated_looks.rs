@@ -1,10 +1,10 @@
-//! False events of a whole exposure: a pixel that looks every X laser cycles
+//! False alarms of a whole exposure: a pixel that looks every X laser cycles
 //! while L1 < N < L2.
 //!
 //! There is no closed form, as the looks share photons. Whatever they share, an
-//! exposure has a false event at least as often as its worst look alone and at
+//! exposure has a false alarm at least as often as its worst look alone and at
 //! most as often as the looks' probabilities add up to. What lies between comes
-//! from simulation: [`FalseEvents`] tallies it, [`table`](crate::looks::table) keeps
+//! from simulation: [`FalseAlarms`] tallies it, [`table`](crate::looks::table) keeps
 //! it.
 
 use anyhow::Result;
@@ -44,7 +44,7 @@ impl<'a> RepeatedLooks<'a> {
     pub fn bounds(&self, threshold: &Threshold) -> Bounds {
         let mut bounds = Bounds::default();
         for look in self.looks {
-            let probability = look.false_event_probability(threshold);
+            let probability = look.false_alarm_probability(threshold);
             bounds.worst_look = bounds.worst_look.max(probability);
             bounds.sum += probability;
             bounds.independent -= (-probability).ln_1p();
@@ -54,14 +54,14 @@ impl<'a> RepeatedLooks<'a> {
     }
 }
 
-/// Between what the probability of a false event in an exposure lies.
+/// Between what the probability of a false alarm in an exposure lies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bounds {
     /// At least: the probability of its worst look.
     pub worst_look: f64,
     /// At most: the probabilities of its looks added up, at most 1.
     pub sum: f64,
-    /// `H`: −ln of the probability of no false event, were the looks
+    /// `H`: −ln of the probability of no false alarm, were the looks
     /// independent. Looks share photons, so the simulated intensity is lower:
     /// [`table`](crate::looks::table) has its ratio to this.
     pub independent: f64,
@@ -91,16 +91,16 @@ pub fn alpha_bits(step: usize) -> u16 {
     u16::try_from(256 + 128 * step).unwrap_or(u16::MAX)
 }
 
-/// Exposures with a false event.
+/// Exposures with a false alarm.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FalseEvents {
+pub struct FalseAlarms {
     /// Exposures simulated.
     pub exposures: u64,
-    /// For each last look and each α, exposures with a false event.
+    /// For each last look and each α, exposures with a false alarm.
     pub events: Vec<[u64; ALPHA_STEPS]>,
 }
 
-impl FalseEvents {
+impl FalseAlarms {
     /// None yet, for as many last looks.
     #[must_use]
     pub fn new(lasts: usize) -> Self {
@@ -143,7 +143,7 @@ impl FalseEvents {
     }
 }
 
-impl std::ops::AddAssign<&Self> for FalseEvents {
+impl std::ops::AddAssign<&Self> for FalseAlarms {
     fn add_assign(&mut self, other: &Self) {
         self.exposures += other.exposures;
         for (sum, more) in self.events.iter_mut().zip(&other.events) {

@@ -1,4 +1,4 @@
-//! False events of one look, exactly: background only, the quadrant estimate,
+//! False alarms of one look, exactly: background only, the quadrant estimate,
 //! the core's tie-break, counters and threshold.
 //!
 //! Halves and quadrants are independent. Let the peak lie in one half, its
@@ -96,7 +96,7 @@ impl SingleLook {
 
     /// With the core's own threshold: integer root, α in 1/256, minimum count.
     #[must_use]
-    pub fn false_event_probability(&self, threshold: &Threshold) -> f64 {
+    pub fn false_alarm_probability(&self, threshold: &Threshold) -> f64 {
         self.probability(|background| fires_from(threshold, background))
     }
 
@@ -177,7 +177,7 @@ mod tests {
                 expected += probability;
             }
         }
-        let found = SingleLook::new(8, mean).false_event_probability(rule.threshold());
+        let found = SingleLook::new(8, mean).false_alarm_probability(rule.threshold());
         // Six photons in one of the bins have a probability of 6e-7.
         assert!(left_out < 1e-6);
         assert!((found - expected).abs() < 1e-6, "{found} {expected}");
@@ -190,7 +190,7 @@ mod tests {
             let law = Poisson::saturating(mean, 1023);
             let level = |k| law.highest_mass(k, 64) * law.highest_mass(k, 32).powi(2);
             let silent: f64 = (0..=1023).map(level).sum();
-            let fired = SingleLook::new(128, mean).false_event_probability(&threshold(0.0, 1));
+            let fired = SingleLook::new(128, mean).false_alarm_probability(&threshold(0.0, 1));
             assert!(
                 (fired + silent - 1.0).abs() < 1e-9,
                 "{mean}: {fired} {silent}"
@@ -221,7 +221,7 @@ mod tests {
             (20.0, 0.00004, 0.00001),
         ] {
             let look = SingleLook::new(128, mean);
-            let found = look.false_event_probability(&threshold(4.0, 5));
+            let found = look.false_alarm_probability(&threshold(4.0, 5));
             assert!((found - integer).abs() < 5e-6, "{mean}: {found}");
             let found = look.real_valued_probability(4.0, 5);
             assert!((found - real).abs() < 5e-6, "{mean}: {found}");
@@ -231,6 +231,6 @@ mod tests {
     #[test]
     fn full_counters_do_not_fire() {
         let look = SingleLook::new(128, 1500.0);
-        assert!(look.false_event_probability(&threshold(1.0, 5)) < 1e-12);
+        assert!(look.false_alarm_probability(&threshold(1.0, 5)) < 1e-12);
     }
 }

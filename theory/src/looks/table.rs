@@ -1,6 +1,6 @@
-//! False events of repeated looks, simulated once and interpolated.
+//! False alarms of repeated looks, simulated once and interpolated.
 //!
-//! Were the looks of an exposure independent, a false event would have the
+//! Were the looks of an exposure independent, a false alarm would have the
 //! intensity `H = Σ −ln(1 − p_k)` over the exact single-look probabilities, and
 //! the probability `1 − exp(−H)`. As they share photons, the simulated intensity is
 //! lower. Its ratio to `H`, here the share, varies slowly, where the probability itself goes
@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 use crate::counts::binomial;
 use crate::looks::repeated_looks::{
-    ALPHA_STEPS, BINS, FalseEvents, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
+    ALPHA_STEPS, BINS, FalseAlarms, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
 };
 use crate::random::trial_rng;
 
@@ -61,7 +61,7 @@ pub struct Row {
     pub last: u32,
     /// α in 1/256.
     pub alpha: u16,
-    /// Exposures with a false event.
+    /// Exposures with a false alarm.
     pub events: u64,
     /// `H`, `independent` of [`Bounds`](crate::looks::repeated_looks::Bounds).
     pub intensity: f64,
@@ -100,13 +100,13 @@ fn grid() -> String {
 ///
 /// # Errors
 /// If the point is not one, or there are too many trials.
-pub fn simulate(seed: u64, first_trial: u16, point: &Point, trials: u16) -> Result<FalseEvents> {
+pub fn simulate(seed: u64, first_trial: u16, point: &Point, trials: u16) -> Result<FalseAlarms> {
     let numbers = first_trial..first_trial.checked_add(trials).context("too many trials")?;
-    let tallies: Vec<FalseEvents> = numbers
+    let tallies: Vec<FalseAlarms> = numbers
         .into_par_iter()
-        .map(|trial| FalseEvents::trial(point, TRIAL, &mut trial_rng(seed, trial)))
+        .map(|trial| FalseAlarms::trial(point, TRIAL, &mut trial_rng(seed, trial)))
         .collect::<Result<_>>()?;
-    let mut sum = FalseEvents::new(point.lasts.len());
+    let mut sum = FalseAlarms::new(point.lasts.len());
     for tally in &tallies {
         sum += tally;
     }
@@ -115,7 +115,7 @@ pub fn simulate(seed: u64, first_trial: u16, point: &Point, trials: u16) -> Resu
 
 /// What is worth keeping of one point.
 #[must_use]
-pub fn rows(point: &Point, tally: &FalseEvents) -> Vec<Row> {
+pub fn rows(point: &Point, tally: &FalseAlarms) -> Vec<Row> {
     let Some(&last) = point.lasts.last() else {
         return Vec::new();
     };
@@ -149,7 +149,7 @@ pub fn rows(point: &Point, tally: &FalseEvents) -> Vec<Row> {
 ///
 /// # Errors
 /// If there is no point.
-pub fn csv(tallies: &[(Point, FalseEvents)]) -> Result<String> {
+pub fn csv(tallies: &[(Point, FalseAlarms)]) -> Result<String> {
     let (_, first) = tallies.first().context("no points")?;
     let mut text = format!(
         "# False events of repeated looks: {BINS} bins, minimum count {MINIMUM_COUNT}, \
@@ -307,7 +307,7 @@ impl Table {
 /// A probability from the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
-    /// That of a false event in an exposure.
+    /// That of a false alarm in an exposure.
     pub probability: f64,
     /// The same from the upper 99 % limits of what was seen at the points around it.
     pub at_most: f64,

@@ -51,7 +51,7 @@ pub fn shortest<T: Copy>(request: &Request, all: &[(Decisions, T)]) -> Result<(T
 ///
 /// # Errors
 /// If the background cannot be simulated.
-pub fn false_events(request: &Request, decisions: &Decisions) -> Result<(u64, u64)> {
+pub fn false_alarms(request: &Request, decisions: &Decisions) -> Result<(u64, u64)> {
     let without_target = Request {
         signal: 0.0,
         ..*request

@@ -1,15 +1,15 @@
-//! Settings of the window rule for a wanted rate of false events.
+//! Settings of the window rule for a wanted rate of false alarms.
 //!
 //! Window and estimator are those that suit the pulse, z is that of [`z_for`]. Of all L1
 //! the one with the shortest mean time to an event is taken, of those whose first look
-//! has a background that [`z_for`] holds for if there are any. False events are counted
+//! has a background that [`z_for`] holds for if there are any. False alarms are counted
 //! in simulated exposures without a target.
 
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{Count, DepthEstimator, HIGHEST_Z, RangeGate, WindowRule, z_for};
 
-use super::shortest::{false_events, shortest};
+use super::shortest::{false_alarms, shortest};
 use super::{Request, candidates, check};
 use crate::looks::detections::{Decisions, Detections};
 use crate::looks::exposure::Looks;
@@ -26,16 +26,24 @@ pub struct Tuned {
     pub window: u8,
     /// Standard deviations of the background.
     pub z: U4F12,
-    /// Wanted is a false event in so many exposures.
+    /// Wanted is a false alarm in so many exposures.
     pub one_in: u32,
     /// L1.
     pub l1: u16,
     /// How the depth is found.
     pub estimator: DepthEstimator,
     /// Exposures without a target that were simulated, and those with an event.
-    pub false_events: (u64, u64),
+    pub false_alarms: (u64, u64),
     /// Exposures simulated with the target.
     pub detections: Detections,
+}
+
+/// The exposures of which `share` is one, rounded up: what [`z_for`] takes. Limited to what
+/// a `u32` holds.
+#[must_use]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+pub fn one_in(share: f64) -> u32 {
+    (1.0 / share).ceil() as u32
 }
 
 /// Finds z and L1.
@@ -63,17 +71,15 @@ pub fn tune(request: &Request) -> Result<Tuned> {
     let mut all = Vec::new();
     for l1 in candidates {
         let looks = Looks::new(request.x, l1, request.l2);
-        // As a cast: limited to what a u32 holds.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let one_in = (1.0 / request.wanted.in_an_exposure(looks)).ceil() as u32;
+        let one_in = one_in(request.wanted.in_an_exposure(looks));
         ensure!(
             one_in >= 10,
-            "a false event in {one_in} exposures: there is a z for one in 10 or fewer"
+            "a false alarm in {one_in} exposures: there is a z for one in 10 or fewer"
         );
         let z = z_for(one_in, &gate, request.x, l1, request.l2);
         ensure!(
             z < HIGHEST_Z,
-            "a false event in {one_in} exposures: there is no z for so few"
+            "a false alarm in {one_in} exposures: there is no z for so few"
         );
         let decisions = Decisions {
             looks,
@@ -90,7 +96,7 @@ pub fn tune(request: &Request) -> Result<Tuned> {
         one_in,
         l1,
         estimator,
-        false_events: false_events(request, &decisions)?,
+        false_alarms: false_alarms(request, &decisions)?,
         detections,
     })
 }

@@ -1,8 +1,7 @@
 //! The window rule.
 
 use anyhow::{Result, ensure};
-use dtof::engine::detection::WIDEST_PULSE;
-use dtof_core::DepthEstimator;
+use dtof_core::{CentredWindow, DepthEstimator};
 use dtof_theory::tune::{Request, window};
 
 use super::{Line, Tune, number};
@@ -11,54 +10,35 @@ impl Tune {
     /// z, L1 and what to expect of them; the options for it.
     #[allow(clippy::cast_precision_loss)]
     pub(super) fn window(&self, request: &Request) -> Result<(Vec<Line>, String)> {
+        let widest = CentredWindow::WIDEST_PULSE;
         ensure!(
-            request.sigma <= WIDEST_PULSE.to_num::<f64>(),
-            "a pulse of σ = {} bins is too wide for a window, which suits up to {WIDEST_PULSE}; take \
+            request.sigma <= widest.to_num::<f64>(),
+            "a pulse of σ = {} bins is too wide for a window, which suits up to {widest}; take \
              wider bins, or --rule paper",
             number(request.sigma)
         );
         let tuned = window::tune(request)?;
-        let (exposures, events) = tuned.false_events;
+        let (exposures, events) = tuned.false_alarms;
+        let z = format!(
+            "for a false alarm in {} exposures; simulation: table",
+            tuned.one_in
+        );
+        let window = "formula: 2 up to σ = 0.6 bins, 3 up to 1.25, 5 above";
         let mut lines = vec![
-            Line(
-                "z",
-                "z",
-                tuned.z.to_num(),
-                "",
-                format!(
-                    "for a false event in {} exposures; simulation: table",
-                    tuned.one_in
-                ),
-            ),
-            Line(
-                "window",
-                "window",
-                tuned.window.into(),
-                "bins",
-                "formula: 2 up to σ = 0.6 bins, 3 up to 1.25, 5 above".to_owned(),
-            ),
+            Line("z", tuned.z.to_num(), z),
+            Line("window", tuned.window.into(), window.to_owned()),
         ];
         if let DepthEstimator::CentredWindow(window) = tuned.estimator {
-            lines.push(Line(
-                "half_width",
-                "depth from, ±",
-                window.half_width().to_num(),
-                "bins",
-                "formula: 2σ + 1/2, from 1 to 4; centred window".to_owned(),
-            ));
+            let source = "formula: 2σ + 1/2, from 1 to 4; centred window".to_owned();
+            lines.push(Line("half_width", window.half_width().to_num(), source));
         }
+        let source = format!(
+            "simulation: seed {}, {events} events in {exposures} exposures without a target",
+            self.seed
+        );
         lines.extend([
             self.l1(tuned.l1, &tuned.detections),
-            Line(
-                "false_events",
-                "false events",
-                events as f64 / exposures as f64,
-                "an exposure",
-                format!(
-                    "simulation: seed {}, {events} events in {exposures} exposures without a target",
-                    self.seed
-                ),
-            ),
+            Line("false_alarms", events as f64 / exposures as f64, source),
         ]);
         lines.extend(self.expected(request, &tuned.detections));
         // All digits: fewer may be another multiple of the smallest step.

@@ -9,13 +9,14 @@ use std::time::{Duration, Instant};
 use dtof_core::RangeScale;
 
 use crate::events::aer_file::Event;
-use crate::picture::{colour, levels, span};
+use dtof_draw::palette;
+use dtof_draw::picture::{levels, span};
 
 /// How often it is drawn.
 const EVERY: Duration = Duration::from_millis(200);
 
 const HIDE_CURSOR: &str = "\x1b[?25l";
-/// What undoes it, also for who ends the program in another way.
+/// Shows it again, however the program ends.
 pub const SHOW_CURSOR: &str = "\x1b[?25h";
 const PLAIN: &str = "\x1b[0m";
 const CLEAR_REST: &str = "\x1b[K";
@@ -31,7 +32,7 @@ pub struct LiveMap {
     room: Room,
     columns: usize,
     ranges: Vec<Option<f64>>,
-    /// What stands below the picture.
+    /// The text below the picture.
     line: String,
     /// Lines that are there from the last time, and the room there was.
     lines: usize,
@@ -65,7 +66,7 @@ impl LiveMap {
         }
     }
 
-    /// What is to stand below the picture from now on.
+    /// Sets the text below the picture.
     pub fn tell(&mut self, line: String) {
         self.line = line;
     }
@@ -166,7 +167,7 @@ fn cut(line: &str, columns: usize) -> String {
 /// A character with the colours of an upper and a lower pixel.
 fn block(upper: Option<u8>, lower: Option<u8>) -> String {
     let code = |ground: u8, level: u8| {
-        let (red, green, blue) = colour(level);
+        let [red, green, blue] = palette::level(level);
         format!("\x1b[{ground};2;{red};{green};{blue}m")
     };
     let (fore, back) = (38, 48);
@@ -178,7 +179,7 @@ fn block(upper: Option<u8>, lower: Option<u8>) -> String {
     }
 }
 
-/// What the colours mean.
+/// The legend of the colours.
 fn legend(ranges: &[Option<f64>]) -> String {
     let reporting = ranges.iter().flatten().count();
     let pixels = ranges.len();

@@ -92,10 +92,7 @@ mod tests {
 
     const HEADER: Header = Header {
         bins: 128,
-        geometry: Geometry {
-            columns: 2,
-            rows: 2,
-        },
+        geometry: Geometry::new(2, 2),
         bin_width_ps: U16F16::lit("250"),
         offset_mm: I24F8::ZERO,
     };

@@ -4,14 +4,13 @@ use anyhow::Result;
 
 use crate::events::maps::{Maps, PixelHistory};
 use crate::input::source::Geometry;
-use crate::picture::{Map, heat_map};
+use dtof_draw::picture::{Map, heat_map};
 
 /// The files, in the order of [`pictures`].
-pub const NAMES: [&str; 6] = [
+pub const NAMES: [&str; 5] = [
     "depth-last.svg",
     "depth-mean.svg",
     "event-counts.svg",
-    "event-rate.svg",
     "reflectivity-events.svg",
     "reflectivity-signal.svg",
 ];
@@ -20,72 +19,72 @@ pub const NAMES: [&str; 6] = [
 pub struct Picture {
     pub name: &'static str,
     pub svg: String,
-    pub caption: &'static str,
+    /// For those of the report, which has one of each quantity.
+    pub caption: Option<String>,
 }
 
-/// The maps of a run of `cycles` laser cycles, on an array with these `sides`.
+/// The maps of a run on an array with these `sides`, whose pixels report what is called
+/// `one` and `several`.
 #[allow(clippy::cast_precision_loss, reason = "a picture")]
-pub fn pictures(maps: &Maps, sides: [&str; 2], cycles: u64) -> Result<[Picture; 6]> {
-    let draw = |name, title, unit, caption, values: Vec<Option<f64>>| -> Result<Picture> {
+pub fn pictures(maps: &Maps, sides: [&str; 2], [one, several]: [&str; 2]) -> Result<[Picture; 5]> {
+    let draw = |name, title: &str, unit, caption, values: Vec<Option<f64>>| {
         let Geometry { columns, rows } = maps.geometry;
         let svg = heat_map(&Map {
             title,
             unit,
             sides,
+            missing: one,
             columns: columns as usize,
             rows: rows as usize,
             values: &values,
         })?;
-        Ok(Picture { name, svg, caption })
+        anyhow::Ok(Picture { name, svg, caption })
     };
     let all = |value: &dyn Fn(&PixelHistory) -> Option<f64>| -> Vec<Option<f64>> {
         maps.pixels.iter().map(value).collect()
     };
-    let thousands = (cycles as f64 / 1000.0).max(f64::MIN_POSITIVE);
     Ok([
         draw(
             "depth-last.svg",
-            "Range, last event",
+            &format!("Range of the last {one}"),
             "mm",
-            "The range of the last event of each pixel.",
+            Some(format!("The range of the last {one} of each pixel.")),
             all(&PixelHistory::last_mm),
         )?,
         draw(
             "depth-mean.svg",
-            "Range, mean of the last ten events",
+            &format!("Range, mean of the last ten {several}"),
             "mm",
-            "The mean range of the last ten events of each pixel, or of as many as it has.",
+            None,
             all(&PixelHistory::mean_mm),
         )?,
         draw(
             "event-counts.svg",
-            "Events",
-            "events",
-            "How many events each pixel reported. Near and bright surfaces report more often.",
+            &format!("Number of {several}"),
+            several,
+            Some(if one == "event" {
+                "How many events each pixel reported. Near and bright surfaces report more often."
+                    .to_owned()
+            } else {
+                format!("How many {several} each pixel has: one a frame with a photon.")
+            }),
             all(&|pixel| Some(pixel.events as f64)),
         )?,
         draw(
-            "event-rate.svg",
-            "Events per 1000 laser cycles",
-            "events",
-            "Events of each pixel per 1000 laser cycles of the run. A pixel that looks until L1 \
-             before it decides cannot report more often than once in L1.",
-            all(&|pixel| Some(pixel.events as f64 / thousands)),
-        )?,
-        draw(
             "reflectivity-events.svg",
-            "Reflectivity from the number of events",
+            &format!("Reflectivity from the number of {several}"),
             "of the most",
-            "Relative reflectivity as the paper has it: events × range². All bright surfaces \
-             report once in L1 and count alike.",
+            None,
             relative(all(&PixelHistory::reflectivity_of_events)),
         )?,
         draw(
             "reflectivity-signal.svg",
             "Reflectivity from the signal",
             "of the most",
-            "Relative reflectivity from what the events say: signal photons a laser cycle × \
-             range², over all events of the pixel.",
+            Some(format!(
+                "Relative reflectivity: signal photons a laser cycle × range², over all {several} \
+                 of the pixel."
+            )),
             relative(all(&PixelHistory::reflectivity_of_signal)),
         )?,
     ])
@@ -106,14 +105,11 @@ mod tests {
 
     #[test]
     fn every_picture_has_its_name_and_mark() {
-        let maps = Maps::new(Geometry {
-            columns: 1,
-            rows: 1,
-        });
-        let pictures = pictures(&maps, ["column", "row"], 1).unwrap();
+        let maps = Maps::new(Geometry::new(1, 1));
+        let pictures = pictures(&maps, ["column", "row"], ["event", "events"]).unwrap();
         assert_eq!(pictures.each_ref().map(|picture| picture.name), NAMES);
         for picture in pictures {
-            assert!(picture.svg[..1024].contains(crate::picture::MARK));
+            assert!(picture.svg[..1024].contains(dtof_draw::svg::MARK));
         }
     }
 

@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::{Row, grouped};
+use crate::rows::{Row, grouped};
 
 /// An event is a false alarm if its range lies farther from the truth than this many bins.
 pub const FALSE_BEYOND_BINS: f64 = 3.0;
@@ -22,7 +22,7 @@ pub struct AgainstTruth {
     pub all: Errors,
     /// Surface by surface, and events of pixels that see none.
     pub surfaces: Vec<OfSurface>,
-    /// What looks like the cover glass, if anything does.
+    /// False alarms that look like the cover glass, if there are any.
     pub cover_glass: Option<CoverGlass>,
 }
 
@@ -72,15 +72,15 @@ pub struct CoverGlass {
 }
 
 impl AgainstTruth {
-    /// For people.
+    /// For people. The pixels' reports are `called` so: one of them, and several.
     #[must_use]
-    pub fn rows(&self) -> Vec<Row> {
+    pub fn rows(&self, called: [&str; 2]) -> Vec<Row> {
         let mut rows = Vec::new();
         if self.surfaces.len() > 1 {
-            rows.extend(self.all.rows(""));
+            rows.extend(self.all.rows("", called));
         }
         for surface in &self.surfaces {
-            rows.extend(surface.rows(self));
+            rows.extend(surface.rows(self, called));
         }
         if let Some(glass) = &self.cover_glass {
             let (first, last) = glass.bins;
@@ -99,14 +99,15 @@ impl AgainstTruth {
 }
 
 impl OfSurface {
-    fn rows(&self, of: &AgainstTruth) -> Vec<Row> {
+    fn rows(&self, of: &AgainstTruth, called: [&str; 2]) -> Vec<Row> {
         let name = &self.name;
         let first = self.first_cycle.map_or("-".to_owned(), grouped);
         let mut rows = vec![(
             name.clone(),
             format!(
-                "{} events of {} pixels, the first in laser cycle {first}",
+                "{} {} of {} pixels, the first in laser cycle {first}",
                 grouped(self.errors.events),
+                called[1],
                 self.pixels,
             ),
         )];
@@ -119,21 +120,21 @@ impl OfSurface {
                 ),
             ));
         }
-        rows.extend(self.errors.rows(&format!("{name}, ")));
+        rows.extend(self.errors.rows(&format!("{name}, "), called));
         rows
     }
 }
 
 impl Errors {
     /// Nothing if there are no events.
-    fn rows(&self, of: &str) -> Vec<Row> {
+    fn rows(&self, of: &str, [_, several]: [&str; 2]) -> Vec<Row> {
         let Some(share) = self.false_alarm_share else {
             return Vec::new();
         };
         let mut rows = vec![(
             format!("{of}false alarms"),
             format!(
-                "{} of {} events ({}), more than {FALSE_BEYOND_BINS} bins from the truth",
+                "{} of {} {several} ({}), more than {FALSE_BEYOND_BINS} bins from the truth",
                 grouped(self.false_alarms),
                 grouped(self.events),
                 percent(share),

@@ -5,7 +5,8 @@ use rand_distr::{Bernoulli, Distribution, Exp};
 use rand_pcg::Pcg64;
 use serde::Deserialize;
 
-use super::limits::{LONGEST_PS, SHARE_OF_AFTERPULSES, Timing, within};
+use super::limits::{LONGEST_PS, SHARE_OF_AFTERPULSES, Timing};
+use crate::input::range::within;
 
 /// Every avalanche, an afterpulse too, has one afterpulse with this probability
 /// p: p / (1 - p) a photon in all. It comes once the SPAD has recharged.

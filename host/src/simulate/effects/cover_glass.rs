@@ -7,7 +7,7 @@ use rand_distr::{Distribution, Normal, Poisson};
 use rand_pcg::Pcg64;
 use serde::Deserialize;
 
-use super::limits::within;
+use crate::input::range::within;
 
 /// A second pulse of the same shape.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

@@ -7,7 +7,8 @@
 use anyhow::Result;
 use serde::Deserialize;
 
-use super::limits::{LONGEST_PS, Timing, within};
+use super::limits::{LONGEST_PS, Timing};
+use crate::input::range::within;
 
 /// How long the SPAD is blind.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

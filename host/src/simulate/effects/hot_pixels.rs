@@ -6,7 +6,8 @@ use rand_distr::{Bernoulli, Distribution};
 use rand_pcg::Pcg64;
 use serde::Deserialize;
 
-use super::limits::{SHARE, within};
+use super::limits::SHARE;
+use crate::input::range::within;
 
 /// Some pixels have a multiple of the background of the others.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

@@ -5,7 +5,8 @@ use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
 use serde::Deserialize;
 
-use super::limits::{LONGEST_PS, Timing, within};
+use super::limits::{LONGEST_PS, Timing};
+use crate::input::range::within;
 
 /// Every time is measured with a normally distributed error; its variance adds
 /// to that of the pulse.
@@ -36,7 +37,7 @@ impl TimingError {
         })
     }
 
-    /// What is measured for `time`. An error across a laser pulse counts for
+    /// The measured time of `time`. An error across a laser pulse counts for
     /// the laser cycle beside, which is as good as this one: the pulses come
     /// `period` apart.
     pub(in crate::simulate) fn measured(&mut self, time: f64, period: f64) -> f64 {

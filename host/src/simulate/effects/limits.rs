@@ -1,13 +1,11 @@
-//! What the numbers of effects may be, and their time base.
+//! The limits of the numbers of effects, and their time base.
 
 use std::ops::RangeInclusive;
-
-use anyhow::{Result, ensure};
 
 /// The most picoseconds an effect may last: 100 µs.
 pub(in crate::simulate) const LONGEST_PS: f64 = 1e8;
 
-/// What a share may be.
+/// The limits of a share.
 pub(in crate::simulate) const SHARE: RangeInclusive<f64> = 0.0..=1.0;
 
 /// Avalanches that have an afterpulse: all of them would never end.
@@ -22,17 +20,4 @@ pub struct Timing {
     pub bin_width_ps: f64,
     /// From one laser pulse to the next, in bins; at least `bins`.
     pub period: f64,
-}
-
-/// Is `value` in `range`? Infinity and what is not a number never are.
-///
-/// # Errors
-/// A line that names the key, the value and the range.
-pub fn within(key: &str, value: f64, range: RangeInclusive<f64>) -> Result<()> {
-    let (least, most) = (range.start(), range.end());
-    ensure!(
-        range.contains(&value),
-        "{key} {value}: must be from {least} to {most}"
-    );
-    Ok(())
 }

@@ -5,7 +5,8 @@ use rand_distr::{Bernoulli, Distribution};
 use rand_pcg::Pcg64;
 use serde::Deserialize;
 
-use super::limits::{SHARE, Timing, within};
+use super::limits::{SHARE, Timing};
+use crate::input::range::within;
 use crate::simulate::MM_PER_PS;
 
 /// A share of the signal photons comes from a surface behind the one a pixel

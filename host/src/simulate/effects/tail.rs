@@ -6,7 +6,8 @@ use rand_distr::{Bernoulli, Distribution, Exp};
 use rand_pcg::Pcg64;
 use serde::Deserialize;
 
-use super::limits::{SHARE, within};
+use super::limits::SHARE;
+use crate::input::range::within;
 
 /// A share of the photons of the laser comes later, by an exponentially
 /// distributed time. The mean position moves by `share * decay_bins`.

@@ -1,5 +1,5 @@
-//! How the events of a run compare with the scene, each with what its pixel saw in its
-//! laser cycle. Memory does not grow with their number.
+//! Compares the events of a run, or the readings of frames, with the scene: each with what
+//! its pixel saw in its laser cycle. Memory does not grow with their number.
 
 use dtof_core::{DepthEvent, PixelAddress, RangeScale};
 
@@ -15,16 +15,16 @@ const STEPS: usize = 3 * 1024;
 
 /// False alarms look like a cover glass if there are at least so many in one place.
 const GLASS_AT_LEAST: u64 = 10;
-/// And if that is at least one of so many events.
+/// At least one of so many events must be one of these false alarms.
 const GLASS_ONE_IN: u64 = 100;
-/// And so many times what the same bins would hold if all false alarms lay evenly.
+/// They must be more than so many times what these bins would hold if all lay evenly.
 const GLASS_TIMES_EVEN: u64 = 4;
-/// Beyond so many standard deviations of the pulse nothing of the glass is left.
+/// The pulse of the glass ends after so many standard deviations.
 const GLASS_ENDS_SIGMA: f64 = 6.0;
 /// A range gate has so many bins at least.
 const LEAST_GATE: usize = 8;
 
-/// What is known of the events so far.
+/// Counts and sums over the events so far.
 pub struct Comparison<'a> {
     scene: &'a Scene,
     scale: RangeScale,
@@ -136,7 +136,7 @@ impl Comparison<'_> {
         }
     }
 
-    /// What looks like the cover glass: more than half of all false alarms, in as many bins
+    /// False alarms that look like the cover glass: more than half of all false alarms, in as many bins
     /// as an event may lie from the truth, nearer than every surface.
     #[allow(
         clippy::cast_possible_truncation,

@@ -9,14 +9,18 @@ use serde::Deserialize;
 use super::Scene;
 use super::surface::{Ball, Fan, Light, Plane, Rectangle, Shape, Surface};
 use crate::geometry::FieldOfView;
+use crate::input::range::within;
 use crate::input::source::Geometry;
 use crate::simulate::MM_PER_PS;
 use crate::simulate::effects::Effects;
-use crate::simulate::effects::limits::within;
-use crate::simulate::effects::{
-    afterpulsing::Afterpulsing, cover_glass::CoverGlass, dead_time::DeadTime,
-    hot_pixels::HotPixels, jitter::Jitter, second_echo::SecondEcho, tail::Tail, tdc::Tdc,
-};
+use crate::simulate::effects::afterpulsing::Afterpulsing;
+use crate::simulate::effects::cover_glass::CoverGlass;
+use crate::simulate::effects::dead_time::DeadTime;
+use crate::simulate::effects::hot_pixels::HotPixels;
+use crate::simulate::effects::jitter::Jitter;
+use crate::simulate::effects::second_echo::SecondEcho;
+use crate::simulate::effects::tail::Tail;
+use crate::simulate::effects::tdc::Tdc;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -136,10 +140,7 @@ impl SceneFile {
             let name = name.unwrap_or_else(|| format!("surface {number}"));
             entry.surface(&name, mm_per_bin).context(name)
         });
-        let geometry = Geometry {
-            columns: self.columns.into(),
-            rows: self.rows.into(),
-        };
+        let geometry = Geometry::new(self.columns.into(), self.rows.into());
         let view = self.field_of_view_degrees.map(FieldOfView::new);
         let scene = Scene {
             geometry,

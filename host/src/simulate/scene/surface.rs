@@ -12,7 +12,7 @@ const FARTHEST_MM: f64 = 1e9;
 /// Something that photons come back from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
-    /// What reports call it.
+    /// Its name in reports.
     pub name: String,
     /// Millimetres away at the start, at the first column; for a ball its centre.
     pub range_mm: f64,

@@ -37,14 +37,15 @@ pub(super) fn recorded(counts: &Instructions, csv: &str) -> Result<Vec<Entry>> {
         if rule != Rule::Paper && minimum == "5" {
             continue;
         }
-        let depth = match estimator {
-            "centred window" => Estimator::CentredWindow(1.0),
-            _ => Estimator::Paper,
+        let (depth, estimator) = match estimator {
+            "centred window" => (Estimator::CentredWindow(1.0), estimator),
+            _ => (Estimator::Paper, "centroid"),
         };
         let number = |text: &str| text.parse::<f64>().with_context(|| line.to_owned());
         let median = number(median)?;
         entries.push(Entry {
             label: format!("{}, {estimator}", rule.label()),
+            pen: rule.pen(),
             cost: counts.rule(rule)? + counts.estimator(depth, 1.0)?,
             // How sure it is, is not known.
             mean: Measured {

@@ -1,21 +1,21 @@
 //! False events of the rule, which has to estimate the background, at one look and
 //! over an exposure: what `dtof tune` interpolates.
 
-use anyhow::{Context, Result};
-use dtof_core::fixed::types::U8F8;
-use dtof_core::{Count, Threshold};
-use rand_pcg::Pcg64;
-
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Share, Table, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
-use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use anyhow::{Context, Result};
+use dtof::rows::grouped;
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{Count, Threshold};
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::alpha as pen;
 use dtof_theory::gaussian::false_positive_rate;
 use dtof_theory::looks::repeated_looks::{
-    self, ALPHA_STEPS, BINS, FalseEvents, MINIMUM_COUNT, alpha_bits,
+    ALPHA_STEPS, BINS, FalseAlarms, MINIMUM_COUNT, alpha_bits,
 };
 use dtof_theory::looks::single_look::SingleLook;
-use dtof_theory::looks::table;
+use dtof_theory::looks::{repeated_looks, table};
+use rand_pcg::Pcg64;
 
 /// Exposures of a trial.
 const EXPOSURES: u32 = 50;
@@ -28,7 +28,7 @@ const LOOKS: (u32, u32) = (5, 40);
 /// Background only, 128 bins, minimum count 5.
 pub const STUDY: Study = Study {
     name: "false-events",
-    about: "false events of one look and of an exposure by background and α",
+    about: "false alarms of one look and of an exposure by background and α",
     revision: 1,
     few_seeds: 40,
     all_seeds: 400,
@@ -70,7 +70,7 @@ fn name(last: u32, step: usize) -> String {
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let point = of_table(point)?;
-    let found = FalseEvents::trial(&point, EXPOSURES, rng)?;
+    let found = FalseAlarms::trial(&point, EXPOSURES, rng)?;
     let mut tally = Tally::from([("exposures".to_owned(), found.exposures)]);
     for (&last, events) in point.lasts.iter().zip(&found.events) {
         for (step, &count) in events.iter().enumerate() {
@@ -85,9 +85,9 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 }
 
 /// The tally of a point, added up again.
-fn false_events(point: &PointTally) -> Result<(repeated_looks::Point, FalseEvents)> {
+fn false_events(point: &PointTally) -> Result<(repeated_looks::Point, FalseAlarms)> {
     let of = of_table(&point.parameters)?;
-    let mut sum = FalseEvents::new(of.lasts.len());
+    let mut sum = FalseAlarms::new(of.lasts.len());
     sum.exposures = point.count("exposures");
     for (&last, events) in of.lasts.iter().zip(&mut sum.events) {
         let mut higher = 0;
@@ -119,7 +119,7 @@ fn shares(part: &Part, last: u32, alpha: u16) -> Result<Vec<(f64, Share)>> {
 fn exact(background: f64, alpha: u16) -> f64 {
     let minimum_count = Count::saturating(MINIMUM_COUNT.into());
     let threshold = Threshold::new(U8F8::from_num(alpha), minimum_count);
-    SingleLook::new(128, background).false_event_probability(&threshold)
+    SingleLook::new(128, background).false_alarm_probability(&threshold)
 }
 
 /// Eq. 10, all bins but the pulse's.
@@ -135,31 +135,18 @@ fn fine_backgrounds() -> impl Iterator<Item = f64> {
 fn results(part: &Part) -> Result<Results> {
     let tallies = part.points().iter().map(false_events);
     let tallies: Vec<_> = tallies.collect::<Result<_>>()?;
-    let caption = |what: &str| {
-        format!(
-            "{what} {BINS} bins, background only, quadrant estimate, minimum count {MINIMUM_COUNT}; \
-             {} exposures a point, 99 % intervals. Thin lines: Eq. 10 with M_B = 127.",
-            grouped(part.points()[0].count("exposures"))
-        )
-    };
+    let exposures = grouped(part.points()[0].count("exposures"));
+    let caption = format!(
+        "Background only, {BINS} bins, quadrant background, at least {MINIMUM_COUNT} photons; {exposures} exposures a dot."
+    );
     Ok(Results {
         figures: vec![
-            Figure {
-                name: "false-events-look",
-                svg: chart(part, LOOKS.0)?,
-                caption: caption(
-                    "Probability of a false event at one look: simulated (dots) and exact (line).",
-                ),
-            },
-            Figure {
-                name: "false-events-exposure",
-                svg: chart(part, LOOKS.1)?,
-                caption: caption(&format!(
-                    "Probability of a false event in an exposure of looks {} to {} in steps of X laser \
-                     cycles, by the background at its first look.",
-                    LOOKS.0, LOOKS.1
-                )),
-            },
+            Figure::new(
+                "false-events-look",
+                &chart(part, LOOKS.0)?,
+                caption.as_str(),
+            )?,
+            Figure::new("false-events-exposure", &chart(part, LOOKS.1)?, caption)?,
         ],
         claims: claims(part)?,
         tables: vec![Table {
@@ -224,10 +211,10 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
     ])
 }
 
-fn chart(part: &Part, last: u32) -> Result<String> {
+fn chart(part: &Part, last: u32) -> Result<Chart> {
     let is_look = last == LOOKS.0;
     let mut series = Vec::new();
-    for (colour, alpha) in ALPHAS.into_iter().enumerate() {
+    for alpha in ALPHAS {
         let shares = shares(part, last, alpha)?;
         let dots = shares
             .into_iter()
@@ -235,45 +222,53 @@ fn chart(part: &Part, last: u32) -> Result<String> {
         let line = |of: fn(f64, u16) -> f64| {
             let points = fine_backgrounds();
             points
-                .map(|background| chart::Point::exact(background, of(background, alpha)))
+                .map(|background| Dot::exact(background, of(background, alpha)))
                 .collect()
         };
-        series.push(Series {
-            name: Some(format!("α = {alpha}")),
-            colour,
-            style: if is_look {
-                Style::Dots
-            } else {
-                Style::JoinedDots
-            },
-            points: dots.collect(),
-        });
+        let pen = pen(alpha.into());
+        let dots = dots.collect();
         if is_look {
-            series.push(Series {
-                name: None,
-                colour,
-                style: Style::Line,
-                points: line(exact),
-            });
-        }
-        series.push(Series {
-            name: None,
-            colour,
-            style: Style::Thin,
-            points: line(|_, alpha| printed(alpha)),
-        });
-    }
-    line_chart(&Chart {
-        title: if is_look {
-            "False events of one look: simulated, exact, Eq. 10 (thin)"
+            let name = format!("α = {alpha}");
+            series.push(Series::named(name, pen, Style::Dots, dots));
+            series.push(Series::unnamed(pen, Style::Line, line(exact)));
         } else {
-            "False events of an exposure of 36 looks: simulated, Eq. 10 (thin)"
-        },
+            let name = format!("α = {alpha}");
+            series.push(Series::named(name, pen, Style::JoinedDots, dots));
+        }
+        let printed = line(|_, alpha| printed(alpha));
+        series.push(Series::unnamed(pen, Style::Dashed, printed));
+    }
+    let shares = shares(part, last, 4)?;
+    let at_4 = shares.iter().map(|(_, share)| share.value);
+    let (low, high) = at_4.fold((f64::INFINITY, 0.0f64), |(low, high), value| {
+        (value.min(low), value.max(high))
+    });
+    let spread = low * 30.0 < printed(4) && high > printed(4);
+    let (finding, key) = if is_look {
+        let text =
+            "The false alarms of a look change with the background; by Eq. 10 they would not";
+        (text, Key::simulated("Eq. 10"))
+    } else {
+        let text = "One α cannot hold the rate of false alarms: it changes with the background";
+        let key = vec![
+            Key::new(Style::JoinedDots, "simulated"),
+            Key::new(Style::Dashed, "Eq. 10"),
+        ];
+        (text, key)
+    };
+    Ok(Chart {
+        finding: Finding::new(finding, spread),
+        note: "Bars hold 99 %; an open dot is an upper limit where there was none.".to_owned(),
         x: Axis::logarithmic("mean background counts a bin at the first look"),
-        y: Axis {
-            range: Some((1e-5, 1.0)),
-            ..Axis::logarithmic("probability")
-        },
-        series,
+        y: Axis::logarithmic(if is_look {
+            "looks with a false alarm, %"
+        } else {
+            "exposures of 36 looks with a false alarm, %"
+        })
+        .percent()
+        .within(1e-5, 1.0),
+        key,
+        columns: 1,
+        panels: vec![Panel::only(series)],
     })
 }

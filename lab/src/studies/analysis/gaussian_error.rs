@@ -1,17 +1,17 @@
 //! What the Gaussian form of the pass rate (Eq. 8) and of the false positive rate
 //! (Eq. 10) is off by, with the background known.
 
-use anyhow::Result;
-use dtof_core::isqrt;
-use rand_pcg::Pcg64;
-
 use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target};
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, Study, Tally, point};
-use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
-use dtof_theory::gaussian::{self as printed, threshold};
-use dtof_theory::known_background;
+use anyhow::Result;
+use dtof::rows::grouped;
+use dtof_core::isqrt;
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::alpha as pen;
+use dtof_theory::gaussian::threshold;
+use dtof_theory::{gaussian as printed, known_background};
+use rand_pcg::Pcg64;
 
 /// Mean background counts a bin.
 const BACKGROUNDS: [f64; 15] = [
@@ -115,35 +115,15 @@ fn fine_backgrounds() -> impl Iterator<Item = f64> + Clone {
 
 fn results(part: &Part) -> Result<Results> {
     let histograms = grouped(part.points()[0].count("histograms"));
-    let lines = format!(
-        "exact (line), as printed (thin line) and simulated with the background known (dots, \
-         {histograms} histograms a point, with 99 % intervals)."
+    let caption = format!(
+        "Background known, 7 bins of it; pulse of SNR 18, σ = 1.5 bins; {histograms} histograms a dot."
     );
+    let figure = |name, chart: &Chart| Figure::new(name, chart, caption.as_str());
     Ok(Results {
         figures: vec![
-            Figure {
-                name: "gaussian-error-false",
-                svg: rates(part, Rate::FalsePositive)?,
-                caption: format!(
-                    "Probability that one of 7 background bins exceeds the threshold (Eq. 10): {lines}"
-                ),
-            },
-            Figure {
-                name: "gaussian-error-ratio",
-                svg: ratio()?,
-                caption:
-                    "The false positive rate of Eq. 10 over the exact one, 7 background bins. \
-                          Its steps are those of whole counts. Worked out, not simulated."
-                        .to_owned(),
-            },
-            Figure {
-                name: "gaussian-error-pass",
-                svg: rates(part, Rate::Pass)?,
-                caption: format!(
-                    "Probability that the pulse's bin exceeds the threshold (Eq. 8) at an SNR of 18, \
-                     σ = 1.5 bins, pulse on a bin edge: {lines}"
-                ),
-            },
+            figure("gaussian-error-false", &rates(part, Rate::FalsePositive))?,
+            figure("gaussian-error-ratio", &ratio())?,
+            figure("gaussian-error-pass", &rates(part, Rate::Pass))?,
         ],
         claims: claims(part),
         tables: Vec::new(),
@@ -240,75 +220,104 @@ fn exact_against_simulation(part: &Part) -> Comparison {
     Comparison::of(of(Rate::FalsePositive).chain(of(Rate::Pass)))
 }
 
-fn rates(part: &Part, rate: Rate) -> Result<String> {
+fn rates(part: &Part, rate: Rate) -> Chart {
     let mut series = Vec::new();
-    for (colour, alpha) in ALPHAS.into_iter().enumerate() {
+    for alpha in ALPHAS {
         let line = |of: fn(Rate, f64, u32) -> f64| {
             let points = fine_backgrounds();
-            points
-                .map(|background| chart::Point::exact(background, of(rate, background, alpha)))
-                .collect()
+            let points =
+                points.map(|background| Dot::exact(background, of(rate, background, alpha)));
+            points.collect()
         };
         let dots = part.points().iter().map(|point| {
             let share = point.share(&rate.name(alpha), "histograms");
             share.at(point.parameter("background"))
         });
+        let pen = pen(alpha);
         series.extend([
-            Series {
-                name: Some(format!("α = {alpha}")),
-                colour,
-                style: Style::Dots,
-                points: dots.collect(),
-            },
-            Series {
-                name: None,
-                colour,
-                style: Style::Line,
-                points: line(Rate::exact),
-            },
-            Series {
-                name: None,
-                colour,
-                style: Style::Thin,
-                points: line(Rate::gaussian),
-            },
+            Series::unnamed(pen, Style::Dots, dots.collect()),
+            Series::named(format!("α = {alpha}"), pen, Style::Line, line(Rate::exact)),
+            Series::unnamed(pen, Style::Dashed, line(Rate::gaussian)),
         ]);
     }
-    let is_false = rate == Rate::FalsePositive;
-    let y = Axis::linear("probability");
-    line_chart(&Chart {
-        title: if is_false {
-            "False positives of known background: simulated, exact, Eq. 10 (thin)"
-        } else {
-            "The pulse's bin passes: simulated, exact, Eq. 8 (thin)"
-        },
-        x: Axis::logarithmic("mean background counts a bin"),
-        y: Axis {
-            logarithmic: is_false,
-            range: is_false.then_some((1e-7, 1.0)),
-            ..y
-        },
-        series,
-    })
+    let exact = exact_against_simulation(part);
+    let off = |background, alpha| {
+        let of = |of: fn(Rate, f64, u32) -> f64| of(rate, background, alpha);
+        (of(Rate::exact), of(Rate::gaussian))
+    };
+    let x = Axis::logarithmic("mean background counts a bin");
+    let note = "Bars hold 99 %; most are smaller than their dots.".to_owned();
+    match rate {
+        Rate::FalsePositive => {
+            let more = |alpha| {
+                let mut pairs = fine_backgrounds().map(|background| off(background, alpha));
+                pairs.all(|(exact, printed)| exact > printed)
+            };
+            Chart {
+                finding: Finding::new(
+                    "At a high α there are more false alarms than Eq. 10 says",
+                    exact.is_chance() && [4, 5].into_iter().all(more),
+                ),
+                note,
+                x,
+                y: Axis::logarithmic("histograms with a false alarm, %")
+                    .percent()
+                    .within(1e-7, 1.0),
+                key: Key::simulated("Eq. 10"),
+                columns: 1,
+                panels: vec![Panel::only(series)],
+            }
+        }
+        Rate::Pass => {
+            let near = |alpha| {
+                let enough = fine_backgrounds().filter(|&background| background >= ENOUGH);
+                let mut pairs = enough.map(|background| off(background, alpha));
+                pairs.all(|(exact, printed)| (exact - printed).abs() < 0.05)
+            };
+            Chart {
+                finding: Finding::new(
+                    "From 30 background counts a bin on Eq. 8 is right to 5 points",
+                    exact.is_chance() && ALPHAS.into_iter().all(near),
+                ),
+                note,
+                x,
+                y: Axis::linear("pulses above the threshold, %")
+                    .percent()
+                    .within(0.0, 1.0),
+                key: Key::simulated("Eq. 8"),
+                columns: 1,
+                panels: vec![Panel::only(series)],
+            }
+        }
+    }
 }
 
-fn ratio() -> Result<String> {
-    let series = ALPHAS.into_iter().enumerate().map(|(colour, alpha)| {
-        let points = fine_backgrounds().map(|background| {
-            let of = |rate: fn(Rate, f64, u32) -> f64| rate(Rate::FalsePositive, background, alpha);
-            chart::Point::exact(background, of(Rate::gaussian) / of(Rate::exact))
-        });
-        Series {
-            name: Some(format!("α = {alpha}")),
-            colour,
-            style: Style::Line,
-            points: points.collect(),
-        }
+fn ratio() -> Chart {
+    let of = |background, alpha| {
+        let of = |rate: fn(Rate, f64, u32) -> f64| rate(Rate::FalsePositive, background, alpha);
+        of(Rate::gaussian) / of(Rate::exact)
+    };
+    let series = ALPHAS.into_iter().map(|alpha| {
+        let points =
+            fine_backgrounds().map(|background| Dot::exact(background, of(background, alpha)));
+        Series::named(
+            format!("α = {alpha}"),
+            pen(alpha),
+            Style::Line,
+            points.collect(),
+        )
     });
-    line_chart(&Chart {
-        title: "False positive rate: Eq. 10 over exact",
+    let series = series.collect();
+    let ordered = ALPHAS
+        .windows(2)
+        .all(|pair| of(ENOUGH, pair[1]) < of(ENOUGH, pair[0]) && of(ENOUGH, pair[0]) < 1.0);
+    Chart {
+        finding: Finding::new("The larger α, the more false alarms Eq. 10 misses", ordered),
+        note: "Worked out, for 7 background bins; at 1 Eq. 10 would be right.".to_owned(),
         x: Axis::logarithmic("mean background counts a bin"),
-        y: Axis::logarithmic("Gaussian / exact"),
-        series: series.collect(),
-    })
+        y: Axis::logarithmic("Eq. 10 over the exact share of false alarms"),
+        key: Vec::new(),
+        columns: 1,
+        panels: vec![Panel::only(series)],
+    }
 }

@@ -1,15 +1,15 @@
 //! How often the highest bin is the pulse's (Eq. 7 and its figures).
 
-use anyhow::{Context, Result};
-use dtof_core::ComparatorTree;
-use rand_pcg::Pcg64;
-
 use super::paper_setting::{Histograms, gaussian, means, target};
-use crate::sweep::results::{Claim, Comparison, Figure, Results, Share, Verdict};
-use crate::sweep::{Part, Point, Study, Tally, point, tally};
-use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, point, tally};
+use anyhow::{Context, Result};
+use dtof::rows::grouped;
+use dtof_core::ComparatorTree;
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::NEUTRAL;
 use dtof_theory::known_background;
+use rand_pcg::Pcg64;
 
 /// Mean background counts a bin (N·B): the paper's B = 0.05 at N = 2 to 2000.
 const BACKGROUNDS: [f64; 5] = [0.1, 1.0, 10.0, 30.0, 100.0];
@@ -114,32 +114,14 @@ fn comparison(part: &Part, backgrounds: &[f64], predicted: impl Fn(f64, f64) -> 
 
 fn results(part: &Part) -> Result<Results> {
     let histograms = part.one([("snr", 1.0)])?.count("histograms");
-    let caption = |what: &str| {
-        format!(
-            "{what} Pulse on a bin edge, σ = 1.5 bins, 8 bins. Dots: simulated, {} histograms a \
-             point, with 99 % intervals.",
-            grouped(histograms)
-        )
-    };
+    let caption = format!(
+        "8 bins, pulse of σ = 1.5 bins on the edge of two; {} histograms a dot.",
+        grouped(histograms)
+    );
     Ok(Results {
         figures: vec![
-            Figure {
-                name: "hit-rate",
-                svg: chart(part, 0.0)?,
-                caption: caption(
-                    "How often the highest bin is the pulse's, without signal in the bins beside it: \
-                     exact (line) and Eq. 7 as printed (thin line).",
-                ),
-            },
-            Figure {
-                name: "hit-rate-neighbours",
-                svg: chart(part, 1.0)?,
-                caption: caption(
-                    "The same with the whole pulse: how often the highest bin is the lower one at \
-                     the edge (filled by half of the pulse), exact (thin line), and how often it is \
-                     one of the two (line).",
-                ),
-            },
+            Figure::new("hit-rate", &chart(part, 0.0)?, caption.as_str())?,
+            Figure::new("hit-rate-neighbours", &chart(part, 1.0)?, caption)?,
         ],
         claims: claims(part)?,
         tables: Vec::new(),
@@ -223,57 +205,97 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
     ])
 }
 
-/// Simulated dots, exact line, and what is thin.
-fn chart(part: &Part, neighbours: f64) -> Result<String> {
+/// Backgrounds of the figures.
+const SHOWN: [f64; 3] = [1.0, 10.0, 100.0];
+
+/// A panel a background.
+fn chart(part: &Part, neighbours: f64) -> Result<Chart> {
     let with_neighbours = neighbours > 0.0;
-    let mut series = Vec::new();
-    for (colour, background) in [1.0, 10.0, 100.0].into_iter().enumerate() {
+    let snrs = (1..=30).map(f64::from);
+    let panel = |background: f64| {
         let points = part.at([("neighbours", neighbours), ("background", background)]);
-        let mut add =
-            |name: Option<String>, style, y: &dyn Fn(f64, Share, Share) -> chart::Point| {
-                let points = points.clone().map(|point| {
-                    let share = |name| point.share(name, "histograms");
-                    y(point.parameter("snr"), share("hits"), share("either"))
-                });
-                series.push(Series {
-                    name,
-                    colour,
-                    style,
-                    points: points.collect(),
-                });
-            };
-        let of = |snr: f64| exact(&means(background, snr, with_neighbours));
-        let name = format!("background {background} a bin");
-        add(Some(name), Style::Dots, &|snr, hits, either| {
-            if with_neighbours { either } else { hits }.at(snr)
-        });
-        add(None, Style::Line, &|snr, _, _| {
-            let (hit, either) = of(snr);
-            chart::Point::exact(snr, if with_neighbours { either } else { hit })
-        });
-        add(None, Style::Thin, &|snr, _, _| {
-            let printed = || gaussian(background, snr).hit_probability();
-            chart::Point::exact(
-                snr,
-                if with_neighbours {
-                    of(snr).0
-                } else {
-                    printed()
-                },
-            )
-        });
-        if with_neighbours {
-            add(None, Style::Dots, &|snr, hits, _| hits.at(snr));
-        }
-    }
-    line_chart(&Chart {
-        title: if with_neighbours {
-            "The highest bin is one of the two at the edge, or the lower of them (thin)"
+        let dots = |of: &str| {
+            let dot = |point: &PointTally| point.share(of, "histograms").at(point.parameter("snr"));
+            points.clone().map(dot).collect()
+        };
+        let line = |of: &dyn Fn(f64) -> f64| {
+            let points = snrs.clone().map(|snr| Dot::exact(snr, of(snr)));
+            points.collect()
+        };
+        let exact = |snr| exact(&means(background, snr, with_neighbours));
+        let series = |style, points| Series::unnamed(NEUTRAL, style, points);
+        let series = if with_neighbours {
+            vec![
+                series(Style::Dots, dots("either")),
+                series(Style::Line, line(&|snr| exact(snr).1)),
+                series(Style::Dots, dots("hits")),
+                series(Style::Dashed, line(&|snr| exact(snr).0)),
+            ]
         } else {
-            "The highest bin is the pulse's: simulated, exact, Eq. 7 (thin)"
-        },
-        x: Axis::linear("SNR, N·A / √(N·B)"),
-        y: Axis::share("probability"),
-        series,
+            let printed = |snr| gaussian(background, snr).hit_probability();
+            vec![
+                series(Style::Dots, dots("hits")),
+                series(Style::Line, line(&|snr| exact(snr).0)),
+                series(Style::Dashed, line(&printed)),
+            ]
+        };
+        Panel {
+            title: format!("{background} background counts a bin"),
+            series,
+        }
+    };
+    let finding = if with_neighbours {
+        let alone = part.at([("neighbours", 1.0), ("snr", 30.0)]);
+        let near_half = alone
+            .filter(|point| SHOWN.contains(&point.parameter("background")))
+            .all(|point| (point.share("hits", "histograms").value - 0.5).abs() < 0.1);
+        Finding::new(
+            "On the edge of two bins either is the highest, each about half of the time",
+            near_half,
+        )
+    } else {
+        let printed = |background, snr| gaussian(background, snr).hit_probability();
+        let points = part.at([("neighbours", 0.0), ("background", SHOWN[0])]);
+        let is_below = |point: &&PointTally| {
+            let share = point.share("hits", "histograms");
+            share.interval.1 < printed(SHOWN[0], point.parameter("snr"))
+        };
+        let below = points.clone().filter(is_below).count();
+        let mostly = 2 * below > points.count();
+        let many = comparison(part, &SHOWN[2..], printed).largest;
+        let exact = comparison(part, &BACKGROUNDS, |background, snr| {
+            exact(&means(background, snr, false)).0
+        });
+        Finding::new(
+            "With few photons the pulse's bin is the highest less often than Eq. 7 says",
+            exact.is_chance() && mostly && many < 0.02,
+        )
+    };
+    let key = if with_neighbours {
+        vec![
+            Key::new(Style::Dots, "simulated"),
+            Key::new(Style::Line, "exact, either of the two"),
+            Key::new(Style::Dashed, "exact, the lower of them"),
+        ]
+    } else {
+        Key::simulated("Eq. 7")
+    };
+    Ok(Chart {
+        finding,
+        note: format!(
+            "{} Bars hold 99 %; most are smaller than their dots.",
+            if with_neighbours {
+                "Every bin has its signal."
+            } else {
+                "No signal in the bins beside the pulse's."
+            }
+        ),
+        x: Axis::linear("signal to noise, N·A / √(N·B)"),
+        y: Axis::linear("histograms with the pulse's bin the highest, %")
+            .percent()
+            .within(0.0, 1.0),
+        key,
+        columns: 3,
+        panels: SHOWN.map(panel).into(),
     })
 }

@@ -1,18 +1,18 @@
 //! The receiver operating characteristic of the threshold (Eq. 8 and 10): α swept
 //! at several SNR.
 
-use anyhow::Result;
-use dtof_core::ComparatorTree;
-use rand_pcg::Pcg64;
-
 use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target};
 use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point, tally};
-use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use anyhow::Result;
+use dtof::rows::grouped;
+use dtof_core::ComparatorTree;
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::STEPS;
 use dtof_theory::counts::binomial;
 use dtof_theory::gaussian::{false_positive_rate, threshold};
 use dtof_theory::known_background;
+use rand_pcg::Pcg64;
 
 /// Mean background counts a bin: the paper's B = 0.05 at N = 600, its rule of thumb
 /// for Gaussian counts.
@@ -104,18 +104,13 @@ fn area(part: &Part, snr: f64) -> f64 {
 fn results(part: &Part) -> Result<Results> {
     let histograms = grouped(part.points()[0].count("histograms"));
     Ok(Results {
-        figures: vec![Figure {
-            name: "roc",
-            svg: chart(part)?,
-            caption: format!(
-                "True and false positive rate of the threshold with the background known, α from 0 (right) \
-                 to 5 (left) in quarters, at {BACKGROUND} background counts a bin: simulated (dots, \
-                 {histograms} histograms a dot; the 99 % interval of the true positive rate), exact \
-                 (line), Eq. 7, 8 and 10 (thin line). 8 bins, signal in the pulse's bin only, σ = 1.5 \
-                 bins, pulse on a bin edge. The exact true positive rate counts hit and pass at once; the \
-                 paper multiplies them."
+        figures: vec![Figure::new(
+            "roc",
+            &chart(part),
+            format!(
+                "α from 0 to 5; {BACKGROUND} background counts a bin, known; {histograms} histograms a dot."
             ),
-        }],
+        )?],
         claims: claims(part),
         tables: Vec::new(),
     })
@@ -205,9 +200,15 @@ fn is_chance(rises: u32, steps: u32) -> bool {
     binomial::at_least(rises.into(), steps.into(), 0.01) > 1e-3
 }
 
-fn chart(part: &Part) -> Result<String> {
+/// Points from the largest α to the least.
+fn from_the_left(mut points: Vec<Dot>) -> Vec<Dot> {
+    points.reverse();
+    points
+}
+
+fn chart(part: &Part) -> Chart {
     let mut series = Vec::new();
-    for (colour, snr) in SNRS.into_iter().enumerate() {
+    for (snr, pen) in SNRS.into_iter().zip(STEPS) {
         let dots = part
             .at([("snr", snr)])
             .map(|point| true_positives(point).at(false_positives(point).value));
@@ -217,33 +218,35 @@ fn chart(part: &Part) -> Result<String> {
         };
         let line = |of: &dyn Fn(f64) -> (f64, f64)| {
             let points = alphas().map(of);
-            points.map(|(x, y)| chart::Point::exact(x, y)).collect()
+            let points = points.map(|(x, y)| Dot::exact(x, y));
+            from_the_left(points.collect())
         };
         series.extend([
-            Series {
-                name: Some(format!("SNR {snr}")),
-                colour,
-                style: Style::Dots,
-                points: dots.collect(),
-            },
-            Series {
-                name: None,
-                colour,
-                style: Style::Line,
-                points: line(&|alpha| exact(snr, alpha)),
-            },
-            Series {
-                name: None,
-                colour,
-                style: Style::Thin,
-                points: line(&printed),
-            },
+            Series::unnamed(pen, Style::Dots, dots.collect()),
+            Series::named(
+                format!("SNR {snr}"),
+                pen,
+                Style::Line,
+                line(&|alpha| exact(snr, alpha)),
+            ),
+            Series::unnamed(pen, Style::Dashed, line(&printed)),
         ]);
     }
-    line_chart(&Chart {
-        title: "ROC by SNR: simulated, exact, Gaussian (thin)",
-        x: Axis::share("false positive rate"),
-        y: Axis::share("true positive rate"),
-        series,
-    })
+    let areas = SNRS.map(|snr| area(part, snr));
+    Chart {
+        finding: Finding::new(
+            "The more signal, the more hits at the same rate of false alarms",
+            areas.windows(2).all(|pair| pair[0] < pair[1]),
+        ),
+        note: "Along a curve α falls from 5 (left) to 0 (right). Bars hold 99 %.".to_owned(),
+        x: Axis::linear("histograms with a false alarm, %")
+            .percent()
+            .within(0.0, 1.0),
+        y: Axis::linear("histograms with a hit, %")
+            .percent()
+            .within(0.0, 1.0),
+        key: Key::simulated("Eq. 7, 8 and 10"),
+        columns: 1,
+        panels: vec![Panel::only(series)],
+    }
 }

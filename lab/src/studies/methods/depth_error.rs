@@ -1,24 +1,24 @@
 //! How well a pulse is placed, against the Cramér-Rao bound.
 
-use std::fmt::Write as _;
-
+use crate::sweep::mean::Measured;
+use crate::sweep::results::{Figure, Results, Table};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
 use anyhow::{Context, Result};
+use dtof::rows::grouped;
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
 use dtof_core::{
     BinPosition, Count, Count10, DepthEstimator, DetectionRule, Histogram, Peak, RangeGate,
     SubBinOffset, WindowRule, quadrant_background, whole_background,
 };
-use rand_core::Rng;
-use rand_pcg::Pcg64;
-
-use crate::sweep::mean::Measured;
-use crate::sweep::results::{Figure, Results, Table};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
-use dtof::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette;
+use dtof_draw::palette::Pen;
 use dtof_theory::bounds::cramer_rao::Pulse;
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::rates::Rates;
+use rand_core::Rng;
+use rand_pcg::Pcg64;
+use std::fmt::Write as _;
 
 const BINS: usize = 128;
 /// Standard deviations of the pulse in bins.
@@ -47,7 +47,7 @@ pub const STUDY: Study = Study {
 pub enum Method {
     /// The middle of the highest bin.
     HighestBin,
-    /// The paper's: centre of mass of three bins less the quadrant background.
+    /// The paper's: centroid of three bins less the quadrant background.
     Paper,
     /// The same less the mean of the bins outside a window.
     CentreOfMass3,
@@ -69,13 +69,27 @@ impl Method {
         (Self::OwnWindow, "centred"),
     ];
 
-    /// Its name in a legend.
+    /// What it looks like in a chart.
+    #[must_use]
+    pub fn pen(self) -> Pen {
+        match self {
+            Self::HighestBin => palette::REFERENCE,
+            Self::Paper => palette::PAPER,
+            Self::CentreOfMass3 => palette::STEPS[4],
+            Self::CentredWindow(sigma) if sigma < 0.75 => palette::STEPS[0],
+            Self::CentredWindow(sigma) if sigma < 1.25 => palette::STEPS[1],
+            Self::CentredWindow(_) => palette::STEPS[3],
+            Self::OwnWindow => palette::CENTRED,
+        }
+    }
+
+    /// Its name in a chart.
     #[must_use]
     pub fn label(self) -> String {
         match self {
             Self::HighestBin => "highest bin".to_owned(),
-            Self::Paper => "centre of mass of 3, quadrant background".to_owned(),
-            Self::CentreOfMass3 => "centre of mass of 3, mean background".to_owned(),
+            Self::Paper => "centroid of 3, quadrant background".to_owned(),
+            Self::CentreOfMass3 => "centroid of 3, mean background".to_owned(),
             Self::CentredWindow(sigma) => format!("centred window for σ {sigma}"),
             Self::OwnWindow => "centred window for the pulse's σ".to_owned(),
         }
@@ -221,55 +235,62 @@ fn summary(part: &Part, sigma: f64, name: &str) -> (f64, (f64, f64)) {
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let mut series = Vec::new();
-    for (colour, (method, name)) in Method::ALL.into_iter().enumerate() {
-        let dot = |sigma| {
+    let bound = [SIGMAS[0], SIGMAS[SIGMAS.len() - 1]].map(|sigma| Dot::exact(sigma, 1.0));
+    let panels = Method::ALL.map(|(method, name)| {
+        let dots = SIGMAS.map(|sigma| {
             let (mean, range) = summary(part, sigma, name);
             Dot {
                 x: sigma,
                 y: mean,
                 interval: Some(range),
             }
-        };
-        series.push(Series {
-            name: Some(method.label()),
-            colour,
-            style: Style::JoinedDots,
-            points: SIGMAS.map(dot).to_vec(),
         });
-    }
-    let svg = line_chart(&Chart {
-        title: "Depth error over the Cramér-Rao bound",
-        x: Axis::linear("pulse σ (bins)"),
-        y: Axis {
-            range: Some((0.9, 9.0)),
-            ..Axis::logarithmic("root mean square error over the bound")
-        },
-        series,
-    })?;
-    let own = SIGMAS.map(|sigma| {
-        let (mean, (_, largest)) = summary(part, sigma, "centred");
-        format!("{mean:.2} at {sigma} (at most {largest:.2})")
+        Panel {
+            title: method.label(),
+            series: vec![
+                Series::unnamed(palette::REFERENCE, Style::Dashed, bound.into()),
+                Series::unnamed(method.pen(), Style::JoinedDots, dots.into()),
+            ],
+        }
     });
+    let own = SIGMAS.map(|sigma| summary(part, sigma, "centred"));
+    let (mean, most) = own
+        .into_iter()
+        .fold((0.0f64, 0.0f64), |(mean, most), (of, range)| {
+            (mean.max(of), most.max(range.1))
+        });
+    let chart = Chart {
+        finding: Finding::new(
+            format!(
+                "A centred window for the pulse errs {:.0} % more than the bound at most",
+                (most - 1.0) * 100.0
+            ),
+            most < 1.2,
+        ),
+        note: "Dots are means over 16 pairs of signal and background, bars go from the best pair to the worst."
+            .to_owned(),
+        x: Axis::linear("pulse σ, bins"),
+        y: Axis::logarithmic("root mean square depth error over the Cramér-Rao bound")
+            .within(0.9, 9.0),
+        key: vec![Key {
+            pen: palette::REFERENCE,
+            style: Style::Dashed,
+            text: "the bound: pulse shape known, signal and background not".to_owned(),
+        }],
+        columns: 3,
+        panels: panels.into(),
+    };
     let histograms = part
         .points()
         .first()
         .map_or(0, |point| point.count("histograms"));
+    let caption = format!(
+        "30 to 200 signal photons, 0.5 to 5 background counts a bin, anywhere in a bin; {} histograms a pair. Mean of the window for the pulse at most {mean:.2}. Peaks beyond 2 σ + 1 bins are left out, up to {:.1} %.",
+        grouped(histograms),
+        100.0 * elsewhere(part)?.1,
+    );
     Ok(Results {
-        figures: vec![Figure {
-            name: "depth-error",
-            svg,
-            caption: format!(
-                "Root mean square depth error over the Cramér-Rao bound (shape known, amplitude and background not), \
-                 averaged over positions in a bin: 30 to 200 signal photons on 0.5 to 5 background counts a bin; \
-                 bars from the least to the largest of the 16 combinations. Peaks outside the pulse, farther than 2 σ + 1 \
-                 bins from it, are left out: they are false events, up to {:.1} %. The centred window for the pulse's σ has {} ({} histograms \
-                 a combination)",
-                100.0 * elsewhere(part)?.1,
-                own.join(", "),
-                grouped(histograms)
-            ),
-        }],
+        figures: vec![Figure::new("depth-error", &chart, caption)?],
         claims: Vec::new(),
         tables: vec![Table {
             path: "results/data/depth_error.csv",

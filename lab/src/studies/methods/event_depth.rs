@@ -6,24 +6,24 @@
 mod outcome;
 mod pixel;
 
-use std::fmt::Write as _;
-
-use anyhow::Result;
-use dtof_core::fixed::types::U8F8;
-use dtof_core::{DepthEstimator, WindowRule};
-use rand_core::Rng;
-use rand_pcg::Pcg64;
-
-pub use self::outcome::{Outcome, Placed, outcomes};
 use self::pixel::{Pixel, exposure};
 use crate::studies::methods::passage::Method;
 use crate::studies::methods::time_to_detect::signal;
 use crate::sweep::mean::{add, add_error, add_value};
 use crate::sweep::results::{Figure, Results, Table};
 use crate::sweep::{Part, Point, Study, Tally, point};
-use dtof::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use anyhow::Result;
+use dtof::rows::grouped;
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{DepthEstimator, WindowRule};
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::{CENTRED, PAPER, REFERENCE};
 use dtof_theory::rates::Rates;
+use rand_core::Rng;
+use rand_pcg::Pcg64;
+use std::fmt::Write as _;
+
+pub use self::outcome::{Outcome, Placed, outcomes};
 
 pub use crate::studies::methods::time_to_detect::{BACKGROUNDS, SIGMAS};
 
@@ -33,7 +33,7 @@ pub const FIRST_LOOKS: [u32; 2] = [40, 400];
 /// The estimators, as tallies, tables and figures call them. The first two are a pixel's; the
 /// third, which none has, tells what the window has a background of its own for.
 pub const ESTIMATORS: [(&str, &str); 3] = [
-    ("mass3", "centre of mass of 3"),
+    ("mass3", "centroid of 3"),
     ("centred", "centred window"),
     ("centred-rules", "centred window, the rule's background"),
 ];
@@ -139,15 +139,6 @@ fn results(part: &Part) -> Result<Results> {
     let outcomes = outcomes(part)?;
     let exposures = part.at([("target", 1.0)]).next();
     let exposures = exposures.map_or(0, |point| point.count("exposures"));
-    let svg = line_chart(&Chart {
-        title: "Depth error of events as they come (pulse σ 0.5, 1 and 1.5 bins from below)",
-        x: Axis {
-            range: Some((200.0, 660.0)),
-            ..Axis::linear("mean laser cycles of the event")
-        },
-        y: Axis::linear("root mean square error (bins)"),
-        series: series(&outcomes),
-    })?;
     let better = |number: usize, is_paper: bool| {
         let those = outcomes
             .iter()
@@ -156,27 +147,18 @@ fn results(part: &Part) -> Result<Results> {
         those.count()
     };
     let half = outcomes.len() / 2;
+    let caption = format!(
+        "About 1 % false alarms, first look after {} laser cycles; {} exposures a scene. With this look or one after {}, the centred window is surely better in {} of {half} cases with the paper's rule (worse in {}), in {} with the window rule (worse in {}).",
+        FIRST_LOOKS[0],
+        grouped(exposures),
+        FIRST_LOOKS[1],
+        better(1, true),
+        better(0, true),
+        better(1, false),
+        better(0, false),
+    );
     Ok(Results {
-        figures: vec![Figure {
-            name: "event-depth",
-            svg,
-            caption: format!(
-                "Root mean square depth error of the events whose peak is in the pulse, within 2 σ + 1 bins, over their mean laser \
-                 cycles, with about 1 % false events an exposure and the first look after {} laser cycles; signal as in \
-                 `time-to-detect`, the pulse anywhere in its bin. Joined are the backgrounds of a pulse, 0.01 to 0.2 a bin and laser \
-                 cycle. No pixel's window has the background of the paper's rule: it tells what its own is for. \
-                 With this first look or one after {} laser cycles, {half} cases a rule, the centred window for the pulse's σ is \
-                 surely better than the centre of mass of 3 in {} of them with the paper's rule and surely worse in {}; with the \
-                 window rule that suits the pulse better in {}, worse in {} ({} exposures a scene)",
-                FIRST_LOOKS[0],
-                FIRST_LOOKS[1],
-                better(1, true),
-                better(0, true),
-                better(1, false),
-                better(0, false),
-                grouped(exposures)
-            ),
-        }],
+        figures: vec![Figure::new("event-depth", &chart(&outcomes), caption)?],
         claims: Vec::new(),
         tables: vec![Table {
             path: "results/data/event_depth.csv",
@@ -185,42 +167,69 @@ fn results(part: &Part) -> Result<Results> {
     })
 }
 
-/// The backgrounds of a pulse, rule and estimator, from the earlier first look.
+/// A panel for each rule and pulse, from the earlier first look.
 #[allow(clippy::float_cmp, reason = "parameters are as they were written")]
-fn series(outcomes: &[Outcome]) -> Vec<Series> {
-    let mut all = Vec::new();
-    let rules = [(true, "paper's rule"), (false, "window rule")];
-    let mut colour = 0;
-    for (is_paper, rule) in rules {
-        // A window rule's background is a mean as well.
-        let count = if is_paper { 3 } else { 2 };
-        for (index, (_, estimator)) in ESTIMATORS.into_iter().take(count).enumerate() {
-            let mut name = Some(format!("{rule}, {estimator}"));
-            for sigma in SIGMAS {
-                let those = outcomes.iter().filter(|outcome| {
-                    outcome.first_look == FIRST_LOOKS[0]
-                        && outcome.sigma == sigma
-                        && (outcome.method == Method::Paper) == is_paper
+fn chart(outcomes: &[Outcome]) -> Chart {
+    let pens = [PAPER, CENTRED, REFERENCE];
+    let early = || {
+        let outcomes = outcomes.iter();
+        outcomes.filter(|outcome| outcome.first_look == FIRST_LOOKS[0])
+    };
+    let mut panels = Vec::new();
+    for (is_paper, rule) in [(true, "paper's rule"), (false, "window rule")] {
+        for sigma in SIGMAS {
+            let of_rule = move |outcome: &&Outcome| (outcome.method == Method::Paper) == is_paper;
+            let those = || {
+                early()
+                    .filter(of_rule)
+                    .filter(|outcome| outcome.sigma == sigma)
+            };
+            // A window rule's background is a mean as well.
+            let count = if is_paper { 3 } else { 2 };
+            let series = pens
+                .into_iter()
+                .enumerate()
+                .take(count)
+                .map(|(number, pen)| {
+                    let dots = those().map(|outcome| {
+                        let error = outcome.placed[number].error;
+                        Dot {
+                            x: outcome.background,
+                            y: error.value,
+                            interval: Some(error.interval),
+                        }
+                    });
+                    Series::unnamed(pen, Style::JoinedDots, dots.collect())
                 });
-                let dot = |outcome: &Outcome| {
-                    let error = outcome.placed[index].error;
-                    Dot {
-                        x: outcome.cycles,
-                        y: error.value,
-                        interval: Some(error.interval),
-                    }
-                };
-                all.push(Series {
-                    name: name.take(),
-                    colour,
-                    style: Style::JoinedDots,
-                    points: those.map(dot).collect(),
-                });
-            }
-            colour += 1;
+            panels.push(Panel {
+                title: format!("{rule}, σ {sigma}"),
+                series: series.collect(),
+            });
         }
     }
-    all
+    let names = ESTIMATORS.map(|(_, name)| name);
+    let key = names.into_iter().zip(pens).map(|(text, pen)| Key {
+        pen,
+        style: Style::JoinedDots,
+        text: text.to_owned(),
+    });
+    // The paper's rule chooses events with a centroid that the window betters.
+    let of_paper = || early().filter(|outcome| outcome.method == Method::Paper);
+    let better = of_paper().filter(|outcome| outcome.better() == Some(1));
+    let worse = of_paper().any(|outcome| outcome.better() == Some(0));
+    Chart {
+        finding: Finding::new(
+            "With the paper's rule, a centred window places events better than the centroid",
+            2 * better.count() > of_paper().count() && !worse,
+        ),
+        note: "Bars hold 99 %. No pixel's window has the rule's background: it tells what its own is for."
+            .to_owned(),
+        x: Axis::logarithmic("background photons a bin and laser cycle"),
+        y: Axis::linear("root mean square depth error of events, bins"),
+        key: key.collect(),
+        columns: 3,
+        panels,
+    }
 }
 
 fn csv(outcomes: &[Outcome]) -> Result<String> {

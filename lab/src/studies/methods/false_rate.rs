@@ -1,18 +1,17 @@
 //! How far one threshold holds: false events of an exposure when the background
 //! goes over orders of magnitude and the threshold stays.
 
-use std::fmt::Write as _;
-
-use anyhow::Result;
-use rand_pcg::Pcg64;
-
 use crate::studies::methods::passage::{BINS, LOOKS, Ladder, Method, Passage, count_false};
 use crate::sweep::results::{Figure, Results, Share, Table};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
-use dtof::chart::{Axis, Chart, Point as Dot, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use anyhow::Result;
+use dtof::rows::grouped;
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::REFERENCE;
 use dtof_theory::looks::exposure::Exposures;
 use dtof_theory::rates::Rates;
+use rand_pcg::Pcg64;
+use std::fmt::Write as _;
 
 /// Mean background counts a bin at the first look, after 40 laser cycles; 25 times
 /// as many after 1000.
@@ -27,7 +26,7 @@ const TESTED: u64 = 50;
 /// Every rule with one threshold for all backgrounds.
 pub const STUDY: Study = Study {
     name: "false-rate",
-    about: "false events with one threshold from 0.4 to 200 background counts a bin",
+    about: "false alarms with one threshold from 0.4 to 200 background counts a bin",
     revision: 3,
     few_seeds: 40,
     all_seeds: 4000,
@@ -99,34 +98,50 @@ impl Outcome {
         }
     }
 
-    /// The largest factor between a share and `wanted`, up or down, with the interval of
-    /// that share. Where there is no false event, at least as many as the intervals leave.
-    fn worst_factor(&self, wanted: f64) -> String {
+    /// The largest factor between a share and `wanted`, up or down. Where there is no
+    /// false alarm at all, the one that is sure.
+    fn worst_factor(&self, wanted: f64) -> f64 {
         let factor = |value: f64| (value / wanted).max(wanted / value);
-        // Of an interval with `wanted` in it the least is 1.
-        let least = |(low, high): (f64, f64)| {
+        let sure = |(low, high): (f64, f64)| {
             if low <= wanted && wanted <= high {
                 1.0
             } else {
                 factor(low).min(factor(high))
             }
         };
-        let worst = self.shares.iter().filter(|(_, share)| share.value > 0.0);
-        let worst = worst.max_by(|a, b| factor(a.1.value).total_cmp(&factor(b.1.value)));
-        if self.shares.iter().any(|(_, share)| share.value == 0.0) {
-            let least = self.shares.iter().map(|(_, share)| least(share.interval));
-            return format!("at least {:.1}", least.fold(1.0, f64::max));
-        }
-        let Some((_, worst)) = worst else {
-            return "unknown".to_owned();
+        let factors = self.shares.iter().map(|(_, share)| {
+            if self.has_none() {
+                sure(share.interval)
+            } else {
+                factor(share.value)
+            }
+        });
+        factors.fold(1.0, f64::max)
+    }
+
+    /// Whether a background brought no false alarm.
+    fn has_none(&self) -> bool {
+        self.shares.iter().any(|(_, share)| share.value == 0.0)
+    }
+
+    /// A panel with what is `wanted`.
+    fn panel(&self, wanted: f64) -> Panel {
+        let symbol = if self.method == Method::Paper {
+            "α"
+        } else {
+            "z"
         };
-        let (low, high) = worst.interval;
-        let most = factor(low).max(factor(high));
-        format!(
-            "{:.2} ({:.2} to {most:.2})",
-            factor(worst.value),
-            least(worst.interval)
-        )
+        let dots = self.shares.iter();
+        let dots = dots.map(|(background, share)| share.at(*background));
+        let ends = [BACKGROUNDS[0], BACKGROUNDS[BACKGROUNDS.len() - 1]];
+        let line = ends.map(|background| Dot::exact(background, wanted));
+        Panel {
+            title: format!("{}, {symbol} {:.2}", self.method.short(), self.threshold),
+            series: vec![
+                Series::unnamed(REFERENCE, Style::Dashed, line.into()),
+                Series::unnamed(self.method.pen(), Style::JoinedDots, dots.collect()),
+            ],
+        }
     }
 }
 
@@ -142,78 +157,65 @@ fn results(part: &Part) -> Result<Results> {
             .iter()
             .map(|ladder| Outcome::new(ladder, part, wanted))
             .collect();
-        let mut series = Vec::new();
-        let mut factors = Vec::new();
-        for (colour, outcome) in outcomes.iter().enumerate() {
-            let threshold = outcome.threshold;
-            let symbol = if outcome.method == Method::Paper {
-                "α"
-            } else {
-                "z"
-            };
-            series.push(Series {
-                name: Some(format!(
-                    "{}, {symbol} {threshold:.2}",
-                    outcome.method.label()
-                )),
-                colour,
-                style: Style::JoinedDots,
-                points: outcome
-                    .shares
-                    .iter()
-                    .map(|(background, share)| share.at(*background))
-                    .collect(),
-            });
-            factors.push(format!(
-                "{} {}",
-                outcome.method.label(),
-                outcome.worst_factor(wanted)
-            ));
+        for outcome in &outcomes {
             for (background, share) in &outcome.shares {
                 let (low, high) = share.interval;
                 writeln!(
                     csv,
-                    "{wanted},{},{threshold:.3},{background},{:.6},{low:.6},{high:.6}",
+                    "{wanted},{},{:.3},{background},{:.6},{low:.6},{high:.6}",
                     outcome.method.name(),
+                    outcome.threshold,
                     share.value
                 )?;
             }
         }
-        for (name, factor) in [
-            ("wanted, and a factor of 1.5", 1.0),
-            ("", 1.5),
-            ("", 1.0 / 1.5),
-        ] {
-            let at = |x| Dot::exact(x, wanted * factor);
-            series.push(Series {
-                name: (!name.is_empty()).then(|| name.to_owned()),
-                colour: 6,
-                style: Style::Thin,
-                points: vec![at(BACKGROUNDS[0]), at(BACKGROUNDS[BACKGROUNDS.len() - 1])],
-            });
-        }
         let percent = wanted * 100.0;
-        let svg = line_chart(&Chart {
-            title: &format!("One threshold for all backgrounds, {percent} % wanted"),
+        let is_paper = |outcome: &&Outcome| outcome.method == Method::Paper;
+        let worst = |is_paper: bool| {
+            let those = outcomes.iter();
+            let those = those.filter(|outcome| (outcome.method == Method::Paper) == is_paper);
+            those
+                .map(|outcome| outcome.worst_factor(wanted))
+                .fold(1.0, f64::max)
+        };
+        let (paper, windows) = (worst(true), worst(false));
+        let least = outcomes
+            .iter()
+            .find(is_paper)
+            .is_some_and(Outcome::has_none);
+        let least = if least { "at least " } else { "" };
+        let chart = Chart {
+            finding: Finding::new(
+                format!(
+                    "One z holds {percent} % false alarms at any background; one α is off by a factor of {least}{paper:.0}"
+                ),
+                windows < 1.5 && paper > 10.0,
+            ),
+            note: "Bars hold 99 %; an open dot is an upper limit where there was none.".to_owned(),
             x: Axis::logarithmic("background counts a bin at the first look"),
-            y: Axis {
-                range: Some((wanted / 100.0, wanted * 40.0)),
-                ..Axis::logarithmic("false events an exposure")
-            },
-            series,
-        })?;
-        figures.push(Figure {
+            y: Axis::logarithmic("exposures with a false alarm, %")
+                .percent()
+                .within(wanted / 100.0, wanted * 10.0),
+            key: vec![Key {
+                pen: REFERENCE,
+                style: Style::Dashed,
+                text: format!("{percent} %, as wanted"),
+            }],
+            columns: 3,
+            panels: outcomes
+                .iter()
+                .map(|outcome| outcome.panel(wanted))
+                .collect(),
+        };
+        figures.push(Figure::new(
             name,
-            svg,
-            caption: format!(
-                "False events of a 1000-cycle exposure with one threshold for all backgrounds, set to {percent} % on \
-                 average over the backgrounds in {} exposures of each (in steps of 1/16, α 1/8), counted in {} others a dot; an open dot is an \
-                 upper limit where there was none. Largest factor off, up or down, with the interval of that dot: {}",
+            &chart,
+            format!(
+                "Exposures of 1000 laser cycles: {} a background set the threshold, {} others are counted. Every window stays within a factor of 1.5.",
                 exposures(0.0),
                 exposures(1.0),
-                factors.join(", ")
             ),
-        });
+        )?);
     }
     Ok(Results {
         figures,

@@ -9,6 +9,7 @@ use dtof_core::{Count, Count16, DetectionRule, Histogram, PaperRule, Peak, Range
 use rand_pcg::Pcg64;
 
 use crate::sweep::{PointTally, Tally};
+use dtof_draw::palette::{self, Pen};
 use dtof_theory::bounds::likelihood_ratio::{Evidence, LikelihoodRatio};
 use dtof_theory::looks::exposure::{Exposures, Looks};
 
@@ -56,7 +57,28 @@ impl Method {
         }
     }
 
-    /// Its name in a legend.
+    /// What it looks like in a chart.
+    #[must_use]
+    pub const fn pen(self) -> Pen {
+        match self {
+            Self::Paper => palette::PAPER,
+            Self::Window(width) => palette::window(width),
+            Self::Oracle => palette::REFERENCE,
+        }
+    }
+
+    /// Its name where there is little room: a window's is its width.
+    #[must_use]
+    pub fn short(self) -> String {
+        match self {
+            Self::Paper => "paper's".to_owned(),
+            Self::Window(1) => "1 bin".to_owned(),
+            Self::Window(width) => format!("{width} bins"),
+            Self::Oracle => self.label(),
+        }
+    }
+
+    /// Its name in a text.
     #[must_use]
     pub fn label(self) -> String {
         match self {

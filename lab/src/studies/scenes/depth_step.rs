@@ -1,22 +1,22 @@
 //! How soon a pixel reports a surface that is suddenly there, and what it reports
 //! of an exposure that saw two (section III-D).
 
-use anyhow::Result;
-use dtof_core::PixelAddress;
-use rand_core::Rng;
-use rand_distr::{Distribution, Uniform};
-use rand_pcg::Pcg64;
-
-use super::mixed::{self, add_pair, excess, is_sharp, neither};
-use super::one_pixel::{CODES, FRAMES, PER_BIN, Reading, SENSORS, in_parts, prototype, watch};
+use super::mixed;
+use super::mixed::{MARGIN, add_pair, excess, is_sharp, neither};
+use super::one_pixel::{CODES, FRAMES, PER_BIN, Reading, SENSORS, in_parts, pen, prototype, watch};
 use crate::sweep::mean::{Measured, add, add_value};
 use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
-use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use anyhow::Result;
+use dtof::rows::grouped;
 use dtof::simulate::SimulatedPixel;
+use dtof_core::PixelAddress;
+use dtof_draw::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
+use rand_core::Rng;
+use rand_distr::{Distribution, Uniform};
+use rand_pcg::Pcg64;
 
 /// Steps of a trial.
 const STEPS: u64 = 10;
@@ -119,69 +119,78 @@ fn add_step(tally: &mut Tally, sensor: &str, readings: &[Reading], at: u64, [old
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let axis = |label, logarithmic| Axis {
-        label,
-        logarithmic,
-        range: None,
-    };
     let series = |step: f64, y: &dyn Fn(&PointTally, &str) -> Measured| {
         let sensors = SENSORS.into_iter().enumerate();
-        let lines = sensors.map(|(colour, sensor)| Series {
-            name: Some(sensor.to_owned()),
-            colour,
-            style: Style::JoinedDots,
-            points: part
-                .at([("step", step)])
-                .map(|point| {
-                    let measured = y(point, sensor);
-                    chart::Point {
-                        x: point.parameter("signal"),
-                        y: measured.value,
-                        interval: Some(measured.interval),
-                    }
-                })
-                .collect(),
+        let lines = sensors.map(|(number, sensor)| {
+            let points = part.at([("step", step)]).map(|point| {
+                let measured = y(point, sensor);
+                Dot {
+                    x: point.parameter("signal"),
+                    y: measured.value,
+                    interval: Some(measured.interval),
+                }
+            });
+            Series::named(sensor, pen(number), Style::JoinedDots, points.collect())
         });
-        lines.collect::<Vec<_>>()
+        Panel::only(lines.collect())
     };
-    let x = axis("signal photons a laser cycle", true);
-    let reaction = line_chart(&Chart {
-        title: "From a step of 20 bins to the first reading of the new surface",
-        x,
-        y: axis("laser cycles, mean to 6,000", true),
-        series: series(EDGE, &Measured::mean),
-    })?;
-    let blur = line_chart(&Chart {
-        title: "Exposures over a step of 2 bins that are read as neither surface",
-        x,
-        y: axis("share", false),
-        series: series(2.0, &|point, sensor| {
+    let signal = || Axis::logarithmic("signal photons a laser cycle");
+    let at = |signal: f64| part.one([("step", EDGE), ("signal", signal)]);
+    let [events, frames] = [0, 4].map(|sensor| -> Result<[Measured; 2]> {
+        let of = |signal| anyhow::Ok(Measured::mean(at(signal)?, SENSORS[sensor]));
+        Ok([of(BRIGHT)?, of(DIM)?])
+    });
+    let (events, frames) = (events?, frames?);
+    let reaction = Chart {
+        finding: Finding::new(
+            format!(
+                "A bright pixel reports a step after {:.0} laser cycles, a dim one no sooner than a long frame",
+                events[0].value
+            ),
+            events[0].interval.1 < frames[0].interval.0 / 10.0
+                && events[1].interval.1 > frames[1].interval.0,
+        ),
+        note: format!(
+            "Bars hold 99 %. A step not noticed in {} laser cycles counts as that many. Short frames of dim pixels are mostly false alarms.",
+            grouped(AFTER)
+        ),
+        x: signal(),
+        y: Axis::logarithmic("laser cycles from a step of 0.75 m to its first reading, mean"),
+        key: Vec::new(),
+        columns: 1,
+        panels: vec![series(EDGE, &Measured::mean)],
+    };
+    // Where a reading has enough photons to be right without the step.
+    let blurs = |point: &PointTally| {
+        let mut sensors = SENSORS.into_iter();
+        sensors.all(|sensor| excess(point, sensor).interval.0 > MARGIN)
+    };
+    let bright = |point: &&PointTally| point.parameter("signal") >= SIGNAL;
+    let blur = Chart {
+        finding: Finding::new(
+            "A step of two bins within an exposure blurs events and frames alike",
+            part.at([("step", STEPS_BINS[0])]).filter(bright).all(blurs),
+        ),
+        note:
+            "Bars hold 99 %. Farther apart two surfaces do not mix: the centroid sees three bins."
+                .to_owned(),
+        x: signal(),
+        y: Axis::linear("exposures over a step of 75 mm that read as neither surface, %").percent(),
+        key: Vec::new(),
+        columns: 1,
+        panels: vec![series(STEPS_BINS[0], &|point, sensor| {
             let Share { value, interval } = neither(point, sensor, "mixed");
             Measured { value, interval }
-        }),
-    })?;
-    let steps = grouped(STEPS * part.seed_count());
+        })],
+    };
+    let caption = format!(
+        "α = 8, L1 = 40, X = 4, L2 = 2000; 0.02 background photons a bin and laser cycle; {} steps a dot.",
+        grouped(STEPS * part.seed_count())
+    );
     Ok(Results {
         figures: vec![
-            Figure {
-                name: "step-reaction",
-                svg: reaction,
-                caption: format!(
-                    "Mean laser cycles from a step of 20 bins (0.75 m) to the end of the first reading nearer to the \
-                     new surface (within 3 bins of it): events at α = 8, L1 = 40, X = 4, L2 = 2000, and frames of \
-                     the same photons at a random phase; 0.02 background photons a bin and laser cycle. {steps} steps a \
-                     dot; those not noticed in {AFTER} laser cycles count as {AFTER}, so that the mean is a lower bound where there are any. Short frames of a dim pixel are mostly false: see the next figure"
-                ),
-            },
-            Figure {
-                name: "step-blur",
-                svg: blur,
-                caption: format!(
-                    "Of the exposures in which the surface steps by 2 bins (75 mm), those read farther than half a bin \
-                     from both ranges: blur, and the noise of the reading. The centre of mass sees three bins, so that \
-                     surfaces farther apart do not mix. At most {steps} exposures a dot"
-                ),
-            },
+            Figure::new("step-reaction", &reaction, caption.as_str())?,
+            Figure::new("step-blur", &blur, caption)?,
         ],
         claims: claims(part)?,
         tables: Vec::new(),

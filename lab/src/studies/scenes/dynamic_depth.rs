@@ -15,7 +15,6 @@ use self::watched::{Watched, true_steps};
 use crate::sweep::mean::add;
 use crate::sweep::{Point, Study, Tally, point};
 use dtof::engine::host::host_engine;
-use dtof::engine::settings::U16F16Number;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::scene::{self, Light, Scene, Shape};
 
@@ -130,8 +129,8 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let mut settings = scene::settings(rng.next_u64());
     (settings.l1, settings.x) = (40, 4);
     settings.bins = scene.bins.into();
-    settings.bin_width_ps = U16F16Number(U16F16::from_num(scene.bin_width_ps));
-    let scale = RangeScale::new(settings.bin_width_ps.0, I24F8::ZERO)?;
+    settings.bin_width_ps = U16F16::from_num(scene.bin_width_ps);
+    let scale = RangeScale::new(settings.bin_width_ps, I24F8::ZERO)?;
 
     let mut photons = scene.photons(settings.seed, cycles)?;
     let addresses = photons.addresses();

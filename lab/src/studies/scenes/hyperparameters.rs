@@ -10,21 +10,22 @@
 
 mod setting;
 
+use self::setting::{NOTHING, Setting, error, false_share};
+use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, point, tally};
 use anyhow::Result;
+use dtof::rows::grouped;
+use dtof::simulate::MM_PER_PS;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AsyncPixel, Count, LaserCycle, Look, PaperRule, PixelAddress, PixelConfig, Statistics,
 };
+use dtof_draw::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette;
+use dtof_draw::palette::STEPS;
+use dtof_theory::rates::bin_share;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
-
-use self::setting::{NOTHING, Setting, error, false_share};
-use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point, tally};
-use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
-use dtof::simulate::MM_PER_PS;
-use dtof_theory::rates::bin_share;
 
 const BINS: usize = 8;
 /// The board, in bins from the start of the window.
@@ -47,7 +48,7 @@ const FRAMES: u16 = 2000;
 /// With the pixel and the rule of the core.
 pub const STUDY: Study = Study {
     name: "hyperparameters",
-    about: "false events and depth error of a board by SNR, α and L1",
+    about: "false alarms and depth error of a board by SNR, α and L1",
     revision: 1,
     few_seeds: 20,
     all_seeds: 400,
@@ -248,92 +249,94 @@ fn below_a_thousandth(share: Share) -> Option<bool> {
 
 fn figures(setting: Setting) -> Result<Vec<Figure>> {
     let pixels = setting.part.seed_count();
-    let caption = |what: &str| {
-        format!(
-            "{what} Board on a bin edge, 8 bins of 8.75 ns ({METRES_A_BIN:.3} m), B = {}, σ = {} bins, X = 5, \
-             L2 = 2000, no minimum count; {} pixels of 10,000 laser cycles a point, 99 % intervals. Points \
-             with fewer than 50 events are left out.",
-            setting.background,
-            setting.sigma,
-            grouped(pixels)
-        )
+    let caption = format!(
+        "8 bins of 8.75 ns ({METRES_A_BIN:.3} m), B = {}, σ = {} bins, X = 5, L2 = 2000; {} pixels of 10,000 laser cycles a dot.",
+        setting.background,
+        setting.sigma,
+        grouped(pixels)
+    );
+    let dots = |points: Vec<&PointTally>, of: fn(&PointTally) -> Share| -> Vec<Dot> {
+        let points = points.into_iter();
+        points
+            .map(|point| of(point).at(point.parameter("snr")))
+            .collect()
     };
-    let by_snr =
-        |name: String, colour, points: Vec<&PointTally>, of: fn(&PointTally) -> Share| Series {
-            name: Some(name),
-            colour,
-            style: Style::JoinedDots,
-            points: points
-                .into_iter()
-                .map(|point| of(point).at(point.parameter("snr")))
-                .collect(),
-        };
-    let x = Axis::logarithmic("normalised SNR, A/B");
-    let false_events = ALPHAS.into_iter().enumerate().map(|(colour, alpha)| {
-        by_snr(
-            format!("α = {alpha}"),
-            colour,
-            setting.by_snr(alpha, 20),
-            false_share,
-        )
+    let joined = |name, pen, points| Series::named(name, pen, Style::JoinedDots, points);
+    let false_alarms = ALPHAS.map(|alpha| {
+        let points = dots(setting.by_snr(alpha, 20), false_share);
+        joined(format!("α = {alpha}"), palette::alpha(alpha.into()), points)
     });
-    let errors = L1S.into_iter().enumerate().map(|(colour, l1)| {
-        by_snr(
-            format!("L1 = {l1}"),
-            colour,
-            setting.by_snr(4, l1),
-            |point| metres(error(point)),
-        )
+    let in_metres = |point: &PointTally| metres(error(point));
+    let mut pens = STEPS.into_iter();
+    let errors = L1S.map(|l1| {
+        let points = dots(setting.by_snr(4, l1), in_metres);
+        let pen = pens.next().unwrap_or(palette::NEUTRAL);
+        joined(format!("L1 = {l1}"), pen, points)
     });
-    let by_l1 = ALPHAS
-        .into_iter()
-        .enumerate()
-        .map(|(colour, alpha)| Series {
-            name: Some(format!("α = {alpha}")),
-            colour,
-            style: Style::JoinedDots,
-            points: L1S
-                .into_iter()
-                .flat_map(|l1| setting.by_snr(alpha, l1))
-                .filter(|point| point.is_at([("snr", 5.0)]))
-                .map(|point| metres(error(point)).at(point.parameter("l1")))
-                .collect::<Vec<chart::Point>>(),
-        });
+    let by_l1 = ALPHAS.map(|alpha| {
+        let points = L1S.into_iter().flat_map(|l1| setting.by_snr(alpha, l1));
+        let points = points.filter(|point| point.is_at([("snr", 5.0)]));
+        let points = points.map(|point| in_metres(point).at(point.parameter("l1")));
+        let pen = palette::alpha(alpha.into());
+        joined(format!("α = {alpha}"), pen, points.collect())
+    });
+    let falls = |series: &[Series]| {
+        series.iter().all(|series| {
+            let [first, .., last] = series.points[..] else {
+                return false;
+            };
+            let ends = (first.interval, last.interval);
+            matches!(ends, (Some(first), Some(last)) if last.1 < first.0)
+        })
+    };
+    let chart = |text: &str, x: &str, y, series: Vec<Series>| Chart {
+        finding: Finding::new(text, falls(&series)),
+        note: "Bars hold 99 %. Dots with fewer than 50 events are left out.".to_owned(),
+        x: Axis::logarithmic(x),
+        y,
+        key: Vec::new(),
+        columns: 1,
+        panels: vec![Panel::only(series)],
+    };
+    let metres = |at: &str| {
+        Axis::linear(format!(
+            "root mean square error, false alarms included, metres ({at})"
+        ))
+    };
+    let snr = "signal over background, A/B";
     Ok(vec![
-        Figure {
-            name: "hyperparameters-false",
-            svg: line_chart(&Chart {
-                title: "Events outside ±0.5 bin, L1 = 20",
-                x,
-                y: Axis::logarithmic("share of events"),
-                series: false_events.collect(),
-            })?,
-            caption: caption("Share of events that are false, by SNR and α, at L1 = 20."),
-        },
-        Figure {
-            name: "hyperparameters-error",
-            svg: line_chart(&Chart {
-                title: "Root mean square error of all events, α = 4",
-                x,
-                y: Axis::linear("metres"),
-                series: errors.collect(),
-            })?,
-            caption: caption(
-                "Depth error of all events, false ones included, by SNR and L1, at α = 4.",
+        Figure::new(
+            "hyperparameters-false",
+            &chart(
+                "The stronger the signal, the fewer events are false alarms",
+                snr,
+                Axis::linear("events that are false alarms, % (L1 = 20)")
+                    .percent()
+                    .within(0.0, 1.0),
+                false_alarms.into(),
             ),
-        },
-        Figure {
-            name: "hyperparameters-alpha",
-            svg: line_chart(&Chart {
-                title: "Root mean square error of all events, A/B = 5",
-                x: Axis::logarithmic("L1, laser cycles"),
-                y: Axis::linear("metres"),
-                series: by_l1.collect(),
-            })?,
-            caption: caption(
-                "Depth error of all events, false ones included, by L1 and α, at A/B = 5.",
+            caption.as_str(),
+        )?,
+        Figure::new(
+            "hyperparameters-error",
+            &chart(
+                "A stronger signal lowers the depth error at every L1",
+                snr,
+                metres("α = 4"),
+                errors.into(),
             ),
-        },
+            caption.as_str(),
+        )?,
+        Figure::new(
+            "hyperparameters-alpha",
+            &chart(
+                "A larger L1 lowers the depth error at every α",
+                "L1, laser cycles",
+                metres("A/B = 5"),
+                by_l1.into(),
+            ),
+            caption.as_str(),
+        )?,
     ])
 }
 

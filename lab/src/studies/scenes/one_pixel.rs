@@ -2,14 +2,15 @@
 //! photons.
 
 use anyhow::Result;
+use dtof::engine::frame::FramePixel;
+use dtof::engine::settings::Settings;
+use dtof::simulate::scene;
 use dtof_core::{
     AnyRule, AsyncPixel, BinPosition, DepthEstimator, DepthEvent, LaserCycle, PixelAddress,
     PixelConfig, RangeGate, Statistics,
 };
-
-use dtof::engine::frame::FramePixel;
-use dtof::engine::settings::Settings;
-use dtof::simulate::scene;
+use dtof_draw::palette;
+use dtof_draw::palette::Pen;
 
 /// Bins of a histogram.
 pub const BINS: usize = CODES as usize;
@@ -29,6 +30,14 @@ pub const SENSORS: [&str; 5] = [
     "frames of 1000",
     "frames of 2000",
 ];
+
+/// The pen of a sensor, counted as [`SENSORS`].
+pub const fn pen(sensor: usize) -> Pen {
+    match sensor {
+        0 => palette::EVENTS,
+        number => palette::frames(FRAMES[number - 1]),
+    }
+}
 
 /// Laser cycles of the prototype from one look at the histogram to the next (X).
 pub const PROTOTYPE_X: u16 = 4;

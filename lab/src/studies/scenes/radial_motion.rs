@@ -1,21 +1,22 @@
 //! A surface that goes away and comes back: how far the depth reported lags behind
 //! (section III-D, radial motion).
 
-use anyhow::Result;
-use dtof_core::PixelAddress;
-use rand_core::Rng;
-use rand_distr::{Distribution, Uniform};
-use rand_pcg::Pcg64;
-
-use super::one_pixel::{BIN_WIDTH_PS, CODES, FRAMES, PER_BIN, SENSORS, in_parts, prototype, watch};
+use super::one_pixel::{
+    BIN_WIDTH_PS, CODES, FRAMES, PER_BIN, SENSORS, in_parts, pen, prototype, watch,
+};
 use crate::sweep::mean::{Measured, add, add_value};
 use crate::sweep::results::{Claim, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
-use dtof::chart::{self, Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use anyhow::Result;
+use dtof::rows::grouped;
 use dtof::simulate::{MM_PER_PS, SimulatedPixel};
+use dtof_core::PixelAddress;
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
+use rand_core::Rng;
+use rand_distr::{Distribution, Uniform};
+use rand_pcg::Pcg64;
 
 /// Runs of a trial, half of them away and half towards the sensor. Either begin
 /// evenly spread over a bin: what the centre of mass errs by within a bin cancels,
@@ -134,55 +135,52 @@ fn lag(point: &PointTally, sensor: &str) -> Lag {
 
 fn figure(part: &Part, name: &'static str, laser_rate_mhz: f64) -> Result<Figure> {
     let mut series = Vec::new();
-    for (colour, sensor) in SENSORS.into_iter().enumerate() {
+    for (number, sensor) in SENSORS.into_iter().enumerate() {
         let lags = part.at([("laser_rate_mhz", laser_rate_mhz)]);
         let lags = lags.map(|point| (point.parameter("metres_per_second"), lag(point, sensor)));
-        let measured = lags.clone().map(|(x, lag)| chart::Point {
-            x,
-            y: lag.mm.value,
-            interval: Some(lag.mm.interval),
+        let steps = f64::from(u32::try_from(number)?) - 2.0;
+        let measured = lags.clone().map(|(x, lag)| {
+            let dot = Dot {
+                x,
+                y: lag.mm.value,
+                interval: Some(lag.mm.interval),
+            };
+            dot.aside(steps)
         });
-        series.push(Series {
-            name: Some(sensor.to_owned()),
-            colour,
-            style: Style::Dots,
-            points: measured.collect(),
-        });
-        series.push(Series {
-            name: None,
-            colour,
-            style: Style::Thin,
-            points: lags
-                .map(|(x, lag)| chart::Point::exact(x, lag.path_mm / 2.0))
-                .collect(),
-        });
+        let half = lags.map(|(x, lag)| Dot::exact(x, lag.path_mm / 2.0));
+        let pen = pen(number);
+        series.push(Series::named(sensor, pen, Style::Dashed, half.collect()));
+        series.push(Series::unnamed(pen, Style::Dots, measured.collect()));
     }
-    let title =
-        format!("Lag behind a surface that goes away or comes nearer, {laser_rate_mhz} MHz");
-    let svg = line_chart(&Chart {
-        title: &title,
-        x: Axis::logarithmic("speed, m/s"),
-        y: Axis {
-            label: "how far the reading is behind at the end of the exposure, mm",
-            logarithmic: true,
-            range: Some((1e-4, 200.0)),
-        },
-        series,
-    })?;
-    let readings = part.one([("laser_rate_mhz", laser_rate_mhz)])?;
-    let count = |sensor: &str| grouped(readings.count(&format!("{sensor} values")));
-    Ok(Figure {
-        name,
-        svg,
-        caption: format!(
-            "How far the depth reported lags behind a surface that goes away or comes nearer, at α = 8, L1 = 40, X = 4, L2 = 2000, \
-             {laser_rate_mhz} MHz, 0.5 signal photons a laser cycle and 0.02 background photons a bin; lines: half of \
-             what the surface goes in a mean exposure. Means of {} events to {} frames of 2000 a dot; where the \
-             interval reaches the lower edge the lag is too small to be seen, and a mean below the axis is not drawn",
-            count(SENSORS[0]),
-            count(SENSORS[4]),
+    let fastest = part.one([
+        ("laser_rate_mhz", laser_rate_mhz),
+        ("metres_per_second", 100.0),
+    ])?;
+    let [events, frames] = [0, 4].map(|sensor| lag(fastest, SENSORS[sensor]).mm);
+    let times = frames.value / events.value;
+    let chart = Chart {
+        finding: Finding::new(
+            format!(
+                "At {laser_rate_mhz} MHz events lag {times:.0} times less behind a moving surface than frames of 2000"
+            ),
+            events.interval.1 * 10.0 < frames.interval.0,
         ),
-    })
+        note: "Dots of one speed stand side by side. Bars hold 99 %; one that reaches the lower edge includes no lag at all.".to_owned(),
+        x: Axis::logarithmic("speed, m/s").within(0.06, 150.0),
+        y: Axis::logarithmic("lag of a reading at the end of its exposure, mm").within(1e-4, 200.0),
+        key: vec![
+            Key::new(Style::Dots, "simulated"),
+            Key::new(Style::Dashed, "half of the path in a mean exposure"),
+        ],
+        columns: 1,
+        panels: vec![Panel::only(series)],
+    };
+    let caption = format!(
+        "α = 8, L1 = 40, X = 4, L2 = 2000; 0.5 signal photons a laser cycle; {} runs of {} laser cycles a dot.",
+        grouped(u64::from(RUNS) * part.seed_count()),
+        grouped(CYCLES),
+    );
+    Figure::new(name, &chart, caption)
 }
 
 fn results(part: &Part) -> Result<Results> {

@@ -24,7 +24,7 @@ fn two_rows_share_a_line_and_no_range_is_empty() {
     assert_eq!(characters(&lines[0]), "▀▄");
     assert_eq!(characters(&lines[1]), "  ");
     // The upper pixel in front, the lower one behind.
-    let ((r, g, b), (red, green, blue)) = (colour(0), colour(255));
+    let ([r, g, b], [red, green, blue]) = (palette::level(0), palette::level(255));
     let expected = format!("\x1b[38;2;{r};{g};{b}m\x1b[48;2;{red};{green};{blue}m▀");
     assert!(lines[0].starts_with(&expected), "{:?}", lines[0]);
     assert!(r < red && g < green, "purple to yellow");

@@ -1,15 +1,14 @@
 //! The figure, the table and the claims.
 
-use std::fmt::Write as _;
-
-use anyhow::Result;
-
 use super::{CAR_M_PER_S, CYCLES, LASER_RATE_MHZ, REFERENCES, SCENES, THRESHOLDS, name};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Figure, Results, Share, Table, Verdict};
 use crate::sweep::{Part, PointTally};
-use dtof::chart::{Axis, Chart, Series, Style, line_chart};
-use dtof::events::summary::grouped;
+use anyhow::Result;
+use dtof::rows::grouped;
+use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Series, Style};
+use dtof_draw::palette::{EVENTS, PAPER};
+use std::fmt::Write as _;
 
 /// The paper's threshold in millimetres.
 const PAPER_MM: u32 = 100;
@@ -73,52 +72,64 @@ pub fn results(part: &Part) -> Result<Results> {
 }
 
 fn figure(scenes: &[(&str, &PointTally)]) -> Result<Figure> {
-    let mut series = Vec::new();
-    for (colour, &(scene, point)) in scenes.iter().enumerate() {
-        for (style, (_, reference)) in [Style::Dots, Style::JoinedDots].into_iter().zip(REFERENCES)
-        {
-            let points = THRESHOLDS.map(|threshold_mm| {
-                let outcome = outcome(point, threshold_mm, reference);
-                outcome.left.at(threshold_mm.into())
+    let pens = [PAPER, EVENTS];
+    let panels = scenes.iter().map(|&(scene, point)| {
+        let series = REFERENCES
+            .into_iter()
+            .zip(pens)
+            .map(|((_, reference), pen)| {
+                let points = THRESHOLDS.map(|threshold_mm| {
+                    let outcome = outcome(point, threshold_mm, reference);
+                    outcome.left.at(threshold_mm.into())
+                });
+                Series::unnamed(pen, Style::JoinedDots, points.to_vec())
             });
-            series.push(Series {
-                name: Some(format!("{scene}, against the {reference}")),
-                colour,
-                style,
-                points: points.to_vec(),
-            });
+        Panel {
+            title: scene.to_owned(),
+            series: series.collect(),
         }
-    }
-    let svg = line_chart(&Chart {
-        title: "What dynamic depth leaves of the events",
-        x: Axis {
-            range: Some((40.0, 1250.0)),
-            ..Axis::logarithmic("threshold, mm")
-        },
-        y: Axis {
-            range: Some((1e-7, 1.0)),
-            ..Axis::logarithmic("changes an event")
-        },
-        series,
-    })?;
+    });
+    let key = |(reference, pen)| Key {
+        pen,
+        style: Style::JoinedDots,
+        text: format!("against {reference}"),
+    };
+    let references = ["the mean before (paper)", "the mean reported last"];
+    // Of the two cars.
+    let found = |reference: usize| {
+        let found = scenes
+            .iter()
+            .take(2)
+            .map(|(_, point)| outcome(point, PAPER_MM, REFERENCES[reference].1).found);
+        found.collect::<Vec<_>>()
+    };
+    let chart = Chart {
+        finding: Finding::new(
+            "Against the mean before, dynamic depth misses a moving car",
+            found(0).iter().all(|share| share.interval.1 < 0.01)
+                && found(1).iter().all(|share| share.interval.0 > 0.9),
+        ),
+        note: "Bars hold 99 %; an open dot is an upper limit where there was no change.".to_owned(),
+        x: Axis::logarithmic("threshold, mm").within(40.0, 1250.0),
+        y: Axis::logarithmic("changes reported, % of the events")
+            .percent()
+            .within(1e-7, 1.0),
+        key: references.into_iter().zip(pens).map(key).collect(),
+        columns: 2,
+        panels: panels.collect(),
+    };
     let steps: u64 = scenes
         .iter()
         .map(|(_, point)| outcome(point, PAPER_MM, REFERENCES[0].1).steps)
         .sum();
-    Ok(Figure {
-        name: "dynamic-depth",
-        svg,
-        caption: format!(
-            "Changes an event that the mean of three events reports (an interval without a dot is none): \
-             against the mean at the event before, as the paper has it, and against the mean reported last. Which of them there \
-             were is in [data/dynamic-depth.csv](data/dynamic-depth.csv). A car at {CAR_M_PER_S} m/s \
-             and a fan at 120 rpm before a wall, {LASER_RATE_MHZ} MHz, α = 8, L1 = 40, X = 4, L2 = 2000, 8×8 macropixels, {} to {} \
-             laser cycles a run; {} steps at {PAPER_MM} mm. The car makes a step whenever it has gone the threshold, the fan with each edge",
-            grouped(CYCLES[0]),
-            grouped(CYCLES[2]),
-            grouped(steps),
-        ),
-    })
+    let caption = format!(
+        "A car at {CAR_M_PER_S} m/s and a fan at 120 rpm before a wall, {LASER_RATE_MHZ} MHz, {} to {} laser cycles a run; \
+         mean of three events, α = 8, L1 = 40, X = 4, L2 = 2000; {} steps at {PAPER_MM} mm ([numbers](data/dynamic-depth.csv)).",
+        grouped(CYCLES[0]),
+        grouped(CYCLES[2]),
+        grouped(steps),
+    );
+    Figure::new("dynamic-depth", &chart, caption)
 }
 
 fn table(scenes: &[(&str, &PointTally)]) -> Result<Table> {

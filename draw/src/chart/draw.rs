@@ -1,0 +1,242 @@
+//! A chart as a document: where its parts are, and the frame around the panels.
+
+use anyhow::{Result, ensure};
+
+use super::names::Area;
+use super::panel::{self, LINE, Names, TEXT};
+use super::parts::{Chart, Panel};
+use super::scale::{GAP, Scale, Tick};
+use crate::svg::{Anchor, Svg, text_width, wrapped};
+
+/// Width of every chart. At 400 pixels its smallest letters are 10 high.
+const WIDTH: f64 = 560.0;
+const EDGE: f64 = 14.0;
+const TITLE: f64 = 20.0;
+const TITLE_LINE: f64 = 25.0;
+/// Of a plot: the only one, those of one row, those of several.
+const HEIGHTS: [f64; 3] = [300.0, 210.0, 165.0];
+/// Between two rows of panels, beside titles and labels.
+const BETWEEN: f64 = 14.0;
+
+/// Draws `chart` as a complete SVG document. The same chart always gives the same
+/// bytes. What lies outside a given range is not drawn, nor is what a logarithmic
+/// axis has no place for.
+///
+/// # Errors
+/// If there is no point to draw.
+pub fn chart(chart: &Chart) -> Result<String> {
+    let layout = Layout::new(chart)?;
+    let mut svg = Svg::default();
+    let title = chart.finding.title();
+    let mut y = EDGE;
+    for line in wrapped(&title, TITLE, WIDTH - 2.0 * EDGE) {
+        svg.text(
+            "ink title",
+            (EDGE, y + TITLE_LINE / 2.0),
+            TITLE,
+            Anchor::Start,
+            &line,
+        );
+        y += TITLE_LINE;
+    }
+    y += 6.0;
+    y = key(&mut svg, chart, y);
+    for line in wrapped(&chart.y.label, TEXT, WIDTH - 2.0 * EDGE) {
+        svg.text("soft", (EDGE, y + LINE / 2.0), TEXT, Anchor::Start, &line);
+        y += LINE;
+    }
+    y += 8.0;
+    let rows: Vec<&[Panel]> = chart.panels.chunks(layout.columns).collect();
+    for (row, panels) in rows.iter().enumerate() {
+        let title_lines = panels.iter().map(|panel| layout.title(panel).len());
+        let top = y + LINE * lines(title_lines.max().unwrap_or(0));
+        let below = rows.get(row + 1).map_or(0, |below| below.len());
+        for (column, of) in panels.iter().enumerate() {
+            let area = layout.area(column, top);
+            for (number, line) in layout.title(of).iter().enumerate() {
+                let at = (area.left, y + LINE * (lines(number) + 0.4));
+                svg.text("ink panel", at, TEXT, Anchor::Start, line);
+            }
+            layout.frame(&mut svg, &area, column, column >= below);
+            panel::draw(
+                &mut svg,
+                of,
+                (&layout.x, &layout.y),
+                &area,
+                &layout.names[column],
+            );
+        }
+        y = top + layout.height + BETWEEN;
+    }
+    y += LINE - BETWEEN + 6.0;
+    let right = layout.area(layout.columns - 1, 0.0).right;
+    let middle = f64::midpoint(layout.left, right);
+    svg.text(
+        "soft",
+        (middle, y + LINE / 2.0),
+        TEXT,
+        Anchor::Middle,
+        &chart.x.label,
+    );
+    y += LINE + 8.0;
+    for line in wrapped(&chart.note, TEXT, WIDTH - 2.0 * EDGE) {
+        svg.text("soft", (EDGE, y + LINE / 2.0), TEXT, Anchor::Start, &line);
+        y += LINE;
+    }
+    Ok(svg.document((WIDTH, y + EDGE - 4.0), &title))
+}
+
+#[allow(clippy::cast_precision_loss, reason = "a few lines")]
+fn lines(count: usize) -> f64 {
+    count as f64
+}
+
+/// What kinds of dots and lines mean. Gives where it ends.
+fn key(svg: &mut Svg, chart: &Chart, mut y: f64) -> f64 {
+    let mut x = EDGE;
+    for key in &chart.key {
+        let width = 36.0 + text_width(&key.text, TEXT);
+        if x > EDGE && x + width > WIDTH - EDGE {
+            (x, y) = (EDGE, y + LINE);
+        }
+        let (line, middle) = ([(x, y + LINE / 2.0), (x + 28.0, y + LINE / 2.0)], x + 14.0);
+        svg.raw(&format!("<g class=\"{}\">", key.pen.colour.class()));
+        panel::line(svg, key.style, &line);
+        if key.style.has_dots() {
+            panel::interval(svg, (middle, y + 2.0), (middle, y + LINE - 2.0));
+            panel::dot(svg, key.pen.mark, (middle, y + LINE / 2.0), 4.2, true);
+        }
+        svg.raw("</g>");
+        svg.text(
+            "ink",
+            (x + 34.0, y + LINE / 2.0),
+            TEXT,
+            Anchor::Start,
+            &key.text,
+        );
+        x += width + 14.0;
+    }
+    if chart.key.is_empty() {
+        y
+    } else {
+        y + LINE + 4.0
+    }
+}
+
+/// Where the panels are, and what is common to them.
+struct Layout {
+    columns: usize,
+    x: Scale,
+    y: Scale,
+    x_ticks: Vec<Tick>,
+    y_ticks: Vec<Tick>,
+    /// Where the first plot begins, and between two plots of a row beside names.
+    left: f64,
+    gap: f64,
+    /// Of a plot.
+    width: f64,
+    height: f64,
+    /// Beside the plots of each column.
+    names: Vec<Names>,
+}
+
+impl Layout {
+    fn new(chart: &Chart) -> Result<Self> {
+        let columns = chart.columns.clamp(1, chart.panels.len().max(1));
+        ensure!(
+            !chart.panels.is_empty(),
+            "{}: no panels",
+            chart.finding.text
+        );
+        let all = || chart.panels.iter().flat_map(|panel| &panel.series);
+        let points = || all().flat_map(|series| &series.points);
+        let x = Scale::new(&chart.x, points().map(|point| point.x))?;
+        let heights = all().flat_map(|series| {
+            let has_interval = series.style.has_dots();
+            series.points.iter().flat_map(move |point| {
+                let interval = point.interval.filter(|_| has_interval);
+                let (low, high) = interval.unwrap_or((point.y, point.y));
+                // A lower end near 0 would stretch a logarithmic axis without end.
+                let low = if chart.y.logarithmic {
+                    low.max(point.y / 3.0)
+                } else {
+                    low
+                };
+                [point.y, low, high]
+            })
+        });
+        let y = Scale::new(&chart.y, heights)?;
+        let height = match (chart.panels.len(), chart.panels.len() > columns) {
+            (1, _) => HEIGHTS[0],
+            (_, false) => HEIGHTS[1],
+            (_, true) => HEIGHTS[2],
+        };
+        let y_ticks = y.ticks(height, |_| TEXT);
+        let widest = |ticks: &[Tick]| {
+            let widths = ticks.iter().map(|tick| text_width(&tick.label, TEXT));
+            widths.fold(0.0, f64::max)
+        };
+        let left = EDGE + widest(&y_ticks) + 8.0;
+        let most = if columns == 1 { 165.0 } else { 105.0 };
+        let names: Vec<Names> = (0..columns)
+            .map(|column| {
+                let panels = chart.panels.iter().skip(column).step_by(columns);
+                Names::new(panels.flat_map(|panel| &panel.series), &x, most)
+            })
+            .collect();
+        let beside: f64 = names.iter().map(|names| names.width).sum();
+        let whole = WIDTH - left - EDGE - beside;
+        let plot = |gap: f64| (whole - gap * (lines(columns) - 1.0)) / lines(columns);
+        let ticks = |gap| x.ticks(plot(gap), |label| text_width(label, TEXT));
+        // The last label of a plot and the first of the next stand half beyond their ends.
+        let gap = widest(&ticks(20.0)) + GAP;
+        Ok(Self {
+            columns,
+            x_ticks: ticks(gap),
+            x,
+            y,
+            y_ticks,
+            left,
+            gap,
+            width: plot(gap),
+            height,
+            names,
+        })
+    }
+
+    /// The plot in a `column`, from `top` on.
+    fn area(&self, column: usize, top: f64) -> Area {
+        let before: f64 = self.names[..column].iter().map(|names| names.width).sum();
+        let left = self.left + lines(column) * (self.width + self.gap) + before;
+        Area {
+            left,
+            top,
+            right: left + self.width,
+            bottom: top + self.height,
+        }
+    }
+
+    fn title(&self, panel: &Panel) -> Vec<String> {
+        wrapped(&panel.title, TEXT, self.width + self.gap / 2.0)
+    }
+
+    /// The lines of a plot, with labels on the left of the first and `below` the last.
+    fn frame(&self, svg: &mut Svg, area: &Area, column: usize, below: bool) {
+        for tick in &self.y_ticks {
+            let y = area.bottom - self.height * self.y.place(tick.value);
+            svg.line("grid", (area.left, y), (area.right, y));
+            if column == 0 {
+                svg.text("soft", (area.left - 7.0, y), TEXT, Anchor::End, &tick.label);
+            }
+        }
+        for tick in &self.x_ticks {
+            let x = area.left + self.width * self.x.place(tick.value);
+            svg.line("edge", (x, area.bottom), (x, area.bottom + 5.0));
+            if below {
+                let at = (x, area.bottom + 6.0 + LINE / 2.0);
+                svg.text("soft", at, TEXT, Anchor::Middle, &tick.label);
+            }
+        }
+        svg.line("edge", (area.left, area.bottom), (area.right, area.bottom));
+    }
+}

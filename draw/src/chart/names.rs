@@ -1,0 +1,115 @@
+//! Where names go, so that none hides another.
+
+/// A name beside the plot.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wanted {
+    /// The height at which its curve ends.
+    pub y: f64,
+    /// How high its text is.
+    pub height: f64,
+}
+
+/// The middles of names in a column from `top` to `bottom`, as near as may be to where
+/// they are wanted, in the same order. Where the column is too short they overlap evenly.
+pub(super) fn apart(wanted: &[Wanted], top: f64, bottom: f64) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..wanted.len()).collect();
+    order.sort_by(|&a, &b| wanted[a].y.total_cmp(&wanted[b].y));
+    let all: f64 = wanted.iter().map(|name| name.height).sum();
+    let squeeze = ((bottom - top) / all.max(1.0)).min(1.0);
+    // Names that touch are a block around the mean of what its names want.
+    let mut blocks: Vec<Vec<usize>> = Vec::new();
+    let height = |block: &[usize]| {
+        let heights = block.iter().map(|&index| wanted[index].height * squeeze);
+        heights.sum::<f64>()
+    };
+    let start = |block: &[usize]| {
+        let mut above = 0.0;
+        let mut sum = 0.0;
+        for &index in block {
+            let height = wanted[index].height * squeeze;
+            sum += wanted[index].y - above - height / 2.0;
+            above += height;
+        }
+        #[allow(clippy::cast_precision_loss, reason = "a few names")]
+        let mean = sum / block.len() as f64;
+        mean.min(bottom - above).max(top)
+    };
+    for index in order {
+        blocks.push(vec![index]);
+        while let [.., above, below] = &blocks[..] {
+            if start(above) + height(above) <= start(below) {
+                break;
+            }
+            let below = blocks.pop().unwrap_or_default();
+            if let Some(above) = blocks.last_mut() {
+                above.extend(below);
+            }
+        }
+    }
+    let mut places = vec![0.0; wanted.len()];
+    for block in blocks {
+        let mut y = start(&block);
+        for index in block {
+            let height = wanted[index].height * squeeze;
+            places[index] = y + height / 2.0;
+            y += height;
+        }
+    }
+    places
+}
+
+/// A rectangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Area {
+    pub left: f64,
+    pub top: f64,
+    pub right: f64,
+    pub bottom: f64,
+}
+
+impl Area {
+    fn common(&self, other: &Self) -> f64 {
+        let width = self.right.min(other.right) - self.left.max(other.left);
+        let height = self.bottom.min(other.bottom) - self.top.max(other.top);
+        width.max(0.0) * height.max(0.0)
+    }
+}
+
+/// The left upper corner of a name of this `size` beside a dot, within `bounds`: that
+/// place around the dot which hides least of what is `taken`.
+pub(super) fn beside(
+    dot: (f64, f64),
+    size: (f64, f64),
+    bounds: &Area,
+    taken: &[Area],
+) -> (f64, f64) {
+    let (x, y) = dot;
+    let (width, height) = size;
+    let mut best = ((x, y), f64::INFINITY);
+    for away in [9.0, 20.0, 34.0, 50.0] {
+        let (level, above, below) = (y - height / 2.0, y - away - height, y + away);
+        let corners = [
+            (x + away, level),
+            (x - away - width, level),
+            (x + away.min(12.0), above),
+            (x + away.min(12.0), below),
+            (x - away.min(12.0) - width, above),
+            (x - away.min(12.0) - width, below),
+        ];
+        for (left, top) in corners {
+            let area = Area {
+                left,
+                top,
+                right: left + width,
+                bottom: top + height,
+            };
+            let inside = area.common(bounds) / (width * height);
+            let hidden: f64 = taken.iter().map(|other| area.common(other)).sum();
+            let cost = hidden + 1e4 * (1.0 - inside) + away;
+            if cost < best.1 - 1e-6 {
+                best = ((left, top), cost);
+            }
+        }
+    }
+    best.0
+}

@@ -1,0 +1,262 @@
+//! What is drawn in a plot: lines, intervals, dots and names.
+
+use super::names::{Area, Wanted, apart, beside};
+use super::parts::{Panel, Point, Series, Style};
+use super::scale::Scale;
+use crate::palette::Mark;
+use crate::svg::{Anchor, At, Svg, text_width, wrapped};
+
+/// Size of all texts but the title, and the height of a line.
+pub(super) const TEXT: f64 = 14.5;
+pub(super) const LINE: f64 = 18.0;
+/// Between a plot and its names, and between two names.
+const TO_NAME: f64 = 16.0;
+const NAME_GAP: f64 = 3.0;
+/// A curve that ends beyond this part of the axis has its name beside the plot.
+const RIGHT: f64 = 0.9;
+/// A name within the plot is broken at this width.
+const BESIDE: f64 = 150.0;
+/// Boxes of this size keep names off a line.
+const GRAIN: f64 = 6.0;
+
+/// The room for the names beside a column of plots.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Names {
+    /// What they take of the picture.
+    pub width: f64,
+    /// Where a name is broken.
+    most: f64,
+}
+
+impl Names {
+    /// For the names at the right end of `x`, of at most `most`.
+    pub fn new<'a>(series: impl Iterator<Item = &'a Series>, x: &Scale, most: f64) -> Self {
+        let is_right = |series: &&Series| {
+            let mut ends = series.points.iter().rev();
+            let end = ends.find(|point| x.holds(point.x));
+            end.is_some_and(|end| x.place(end.x) > RIGHT)
+        };
+        let names = series.filter(is_right);
+        let names = names.filter_map(|series| series.name.as_deref());
+        let lines = names.flat_map(|name| wrapped(name, TEXT, most));
+        let widest = lines
+            .map(|line| text_width(&line, TEXT))
+            .fold(0.0, f64::max);
+        Self {
+            width: if widest > 0.0 { widest + TO_NAME } else { 0.0 },
+            most,
+        }
+    }
+}
+
+/// A line as its style has it, through `points`.
+pub(super) fn line(svg: &mut Svg, style: Style, points: &[(f64, f64)]) {
+    let pen = match style {
+        Style::Line => "stroke-width=\"2.4\"",
+        Style::Dashed => "stroke-width=\"1.7\" stroke-dasharray=\"6 4\"",
+        Style::JoinedDots => "stroke-width=\"1.5\"",
+        Style::Dots => return,
+    };
+    let points = points.iter().map(|&(x, y)| format!("{},{}", At(x), At(y)));
+    let points = points.collect::<Vec<_>>().join(" ");
+    svg.raw(&format!(
+        "<polyline class=\"stroke\" {pen} points=\"{points}\"/>"
+    ));
+}
+
+/// An interval from `low` to `high`.
+pub(super) fn interval(svg: &mut Svg, low: (f64, f64), high: (f64, f64)) {
+    let [x, left, right] = [low.0, low.0 - 3.0, low.0 + 3.0].map(At);
+    let (low, high) = (At(low.1), At(high.1));
+    svg.raw(&format!(
+        "<path class=\"stroke\" stroke-width=\"1.3\" d=\"M{x} {low}V{high}M{left} {low}H{right}M{left} {high}H{right}\"/>"
+    ));
+}
+
+/// A dot, filled or open.
+pub(super) fn dot(svg: &mut Svg, mark: Mark, (x, y): (f64, f64), radius: f64, is_filled: bool) {
+    let class = if is_filled { "fill" } else { "open" };
+    let path = |places: &[(f64, f64)]| {
+        let place = |&(across, down): &(f64, f64)| {
+            format!("{} {}", At(x + across * radius), At(y + down * radius))
+        };
+        let places: Vec<String> = places.iter().map(place).collect();
+        format!("<path class=\"{class}\" d=\"M{}z\"/>", places.join("L"))
+    };
+    let element = match mark {
+        Mark::Circle => format!(
+            "<circle class=\"{class}\" cx=\"{}\" cy=\"{}\" r=\"{}\"/>",
+            At(x),
+            At(y),
+            At(radius)
+        ),
+        Mark::Square => path(&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]),
+        Mark::Diamond => path(&[(0.0, -1.3), (1.3, 0.0), (0.0, 1.3), (-1.3, 0.0)]),
+        Mark::Up => path(&[(0.0, -1.2), (1.2, 0.9), (-1.2, 0.9)]),
+        Mark::Down => path(&[(0.0, 1.2), (1.2, -0.9), (-1.2, -0.9)]),
+        Mark::Cross => {
+            let [left, right, top, bottom] =
+                [x - radius, x + radius, y - radius, y + radius].map(At);
+            format!(
+                "<path class=\"stroke\" stroke-width=\"2.2\" d=\"M{left} {top}L{right} {bottom}M{left} {bottom}L{right} {top}\"/>"
+            )
+        }
+    };
+    svg.raw(&element);
+}
+
+/// Draws a panel into its plot.
+pub(super) fn draw(
+    svg: &mut Svg,
+    panel: &Panel,
+    (x, y): (&Scale, &Scale),
+    area: &Area,
+    names: &Names,
+) {
+    let place = |at: f64, height: f64| {
+        (
+            area.left + (area.right - area.left) * x.place(at),
+            area.bottom - (area.bottom - area.top) * y.place(height),
+        )
+    };
+    let shown = |point: &Point| x.holds(point.x) && y.holds(point.y);
+    let most = panel.series.iter().map(|series| series.points.len()).max();
+    let radius = if most.unwrap_or(0) > 12 { 2.8 } else { 4.2 };
+    let mut taken = Vec::new();
+    for series in &panel.series {
+        svg.raw(&format!("<g class=\"{}\">", series.pen.colour.class()));
+        if series.style.has_line() {
+            for part in series.points.chunk_by(|a, b| shown(a) == shown(b)) {
+                let places = part.iter().filter(|point| shown(point));
+                let places: Vec<_> = places.map(|point| place(point.x, point.y)).collect();
+                if places.len() > 1 {
+                    line(svg, series.style, &places);
+                    taken.extend(places.windows(2).flat_map(|ends| along(ends[0], ends[1])));
+                }
+            }
+        }
+        let dots = series.points.iter().filter(|_| series.style.has_dots());
+        for point in dots {
+            let ends = point.interval.filter(|_| x.holds(point.x));
+            let ends = ends.map(|(low, high)| (y.clamp(low), y.clamp(high)));
+            if shown(point) {
+                if let Some((low, high)) = ends {
+                    let ends = (place(point.x, low), place(point.x, high));
+                    interval(svg, ends.0, ends.1);
+                    taken.push(around(ends.0, ends.1, 3.0));
+                }
+                let at = place(point.x, point.y);
+                dot(svg, series.pen.mark, at, radius, true);
+                taken.push(around(at, at, radius + 2.0));
+            } else if let Some((_, high)) = ends.filter(|_| y.logarithmic && point.y <= 0.0) {
+                let (foot, at) = (place(point.x, y.low), place(point.x, high));
+                interval(svg, foot, at);
+                dot(svg, series.pen.mark, at, radius, false);
+            }
+        }
+        svg.raw("</g>");
+    }
+    let ends = panel.series.iter().filter_map(|series| {
+        let limit = |point: &Point| Some(Point::exact(point.x, point.interval?.1));
+        let mut ends = series.points.iter().rev().filter_map(|point| {
+            let limit = limit(point).filter(|_| y.logarithmic && point.y <= 0.0);
+            limit.or(Some(*point)).filter(|end| shown(end))
+        });
+        let end = ends.next()?;
+        let is_right = x.place(end.x) > RIGHT;
+        let name = Name {
+            class: format!("{} halo", series.pen.colour.class()),
+            text: series.name.as_deref()?,
+            end: place(end.x, end.y),
+        };
+        Some((name, is_right))
+    });
+    let (right, within): (Vec<_>, Vec<_>) = ends.partition(|(_, is_right)| *is_right);
+    let right: Vec<Name> = right.into_iter().map(|(name, _)| name).collect();
+    names_beside_the_plot(svg, &right, area, names);
+    let bounds = Area {
+        top: area.top - LINE,
+        right: area.right + 8.0,
+        ..*area
+    };
+    for (name, _) in within {
+        let lines = wrapped(name.text, TEXT, BESIDE);
+        let widths = lines.iter().map(|line| text_width(line, TEXT));
+        let size = (widths.fold(0.0, f64::max), LINE * count(lines.len()));
+        let (left, top) = beside(name.end, size, &bounds, &taken);
+        taken.push(around((left, top), (left + size.0, top + size.1), 2.0));
+        let (x, anchor) = if left + size.0 < name.end.0 {
+            (left + size.0, Anchor::End)
+        } else {
+            (left, Anchor::Start)
+        };
+        for (number, line) in lines.iter().enumerate() {
+            let y = top + LINE * (count(number) + 0.5);
+            svg.text(&name.class, (x, y), TEXT, anchor, line);
+        }
+    }
+}
+
+/// A name, and where its curve ends.
+struct Name<'a> {
+    class: String,
+    text: &'a str,
+    end: (f64, f64),
+}
+
+/// Boxes all along a line.
+fn along(from: (f64, f64), to: (f64, f64)) -> impl Iterator<Item = Area> {
+    let steps = ((to.0 - from.0).hypot(to.1 - from.1) / GRAIN)
+        .ceil()
+        .max(1.0);
+    let places = (0..1000)
+        .map(f64::from)
+        .take_while(move |step| *step <= steps);
+    places.map(move |step| {
+        let part = step / steps;
+        let at = (
+            from.0 + (to.0 - from.0) * part,
+            from.1 + (to.1 - from.1) * part,
+        );
+        around(at, at, GRAIN / 2.0)
+    })
+}
+
+fn around(from: (f64, f64), to: (f64, f64), margin: f64) -> Area {
+    Area {
+        left: from.0.min(to.0) - margin,
+        top: from.1.min(to.1) - margin,
+        right: from.0.max(to.0) + margin,
+        bottom: from.1.max(to.1) + margin,
+    }
+}
+
+/// Each with a line to the end of its curve unless that is near.
+fn names_beside_the_plot(svg: &mut Svg, ends: &[Name], area: &Area, names: &Names) {
+    let texts = ends.iter().map(|name| wrapped(name.text, TEXT, names.most));
+    let texts: Vec<Vec<String>> = texts.collect();
+    let wanted = ends.iter().zip(&texts).map(|(name, lines)| Wanted {
+        y: name.end.1,
+        height: LINE * count(lines.len()) - 2.0 + NAME_GAP,
+    });
+    let wanted: Vec<Wanted> = wanted.collect();
+    let places = apart(&wanted, area.top - LINE / 2.0, area.bottom + LINE / 2.0);
+    for ((name, lines), middle) in ends.iter().zip(&texts).zip(places) {
+        let (x, class) = (area.right + TO_NAME, &name.class);
+        if (middle - name.end.1).abs() > 3.0 {
+            let [x1, y1, x2, y2] = [name.end.0 + 7.0, name.end.1, x - 3.0, middle].map(At);
+            svg.raw(&format!(
+                "<g class=\"{class}\"><path class=\"stroke\" stroke-width=\"1\" d=\"M{x1} {y1}L{x2} {y2}\"/></g>"
+            ));
+        }
+        for (number, line) in lines.iter().enumerate() {
+            let y = middle + LINE * (count(number) - (count(lines.len()) - 1.0) / 2.0);
+            svg.text(class, (x, y), TEXT, Anchor::Start, line);
+        }
+    }
+}
+
+#[allow(clippy::cast_precision_loss, reason = "a few lines")]
+fn count(number: usize) -> f64 {
+    number as f64
+}

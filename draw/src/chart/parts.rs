@@ -1,0 +1,261 @@
+//! What a chart is made of.
+
+use crate::palette::{self, Pen};
+
+/// What a chart shows, and whether its points say so.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// A sentence without its full stop.
+    pub text: String,
+    /// Whether the data show it.
+    pub holds: bool,
+}
+
+impl Finding {
+    /// `text`, which the data show if it `holds`.
+    #[must_use]
+    pub fn new(text: impl Into<String>, holds: bool) -> Self {
+        Self {
+            text: text.into(),
+            holds,
+        }
+    }
+
+    /// What stands above the chart: never what its points do not show.
+    #[must_use]
+    pub fn title(&self) -> String {
+        if self.holds {
+            self.text.clone()
+        } else {
+            format!("These data do not show: {}", self.text)
+        }
+    }
+}
+
+/// A chart.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// Its title.
+    pub finding: Finding,
+    /// What dots, lines and intervals are; drawn below it.
+    pub note: String,
+    /// What runs to the right.
+    pub x: Axis,
+    /// What runs upwards.
+    pub y: Axis,
+    /// What kinds of dots and lines mean, the same for every curve; drawn above it.
+    pub key: Vec<Key>,
+    /// Panels beside each other.
+    pub columns: usize,
+    /// At least one, row by row.
+    pub panels: Vec<Panel>,
+}
+
+/// A kind of dots or lines.
+#[derive(Clone, Debug)]
+pub struct Key {
+    /// Its colour and mark.
+    pub pen: Pen,
+    /// How it is drawn.
+    pub style: Style,
+    /// What it is.
+    pub text: String,
+}
+
+impl Key {
+    /// Dots or lines in the colour of texts.
+    #[must_use]
+    pub fn new(style: Style, text: impl Into<String>) -> Self {
+        Self {
+            pen: palette::NEUTRAL,
+            style,
+            text: text.into(),
+        }
+    }
+
+    /// Simulated, exact and as printed.
+    #[must_use]
+    pub fn simulated(printed: &str) -> Vec<Self> {
+        vec![
+            Self::new(Style::Dots, "simulated"),
+            Self::new(Style::Line, "exact"),
+            Self::new(Style::Dashed, printed),
+        ]
+    }
+}
+
+/// A part of a chart with axes of its own, the same as those of the others.
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// Drawn above it; empty for the only one.
+    pub title: String,
+    /// What is drawn, in this order.
+    pub series: Vec<Series>,
+}
+
+impl Panel {
+    /// The only one.
+    #[must_use]
+    pub const fn only(series: Vec<Series>) -> Self {
+        Self {
+            title: String::new(),
+            series,
+        }
+    }
+}
+
+/// How the numbers of an axis are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// As they are.
+    Plain,
+    /// Shares as hundredths.
+    Percent,
+}
+
+/// An axis.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// What it is, with its unit.
+    pub label: String,
+    /// How its numbers are written.
+    pub unit: Unit,
+    /// Whether equal steps are equal factors.
+    pub logarithmic: bool,
+    /// From where to where; by the points where not given. A linear one has 0 then.
+    pub range: Option<(f64, f64)>,
+}
+
+impl Axis {
+    /// Equal steps are equal distances, from 0 to the last point.
+    #[must_use]
+    pub fn linear(label: impl Into<String>) -> Self {
+        Self {
+            label: label.into(),
+            unit: Unit::Plain,
+            logarithmic: false,
+            range: None,
+        }
+    }
+
+    /// Equal factors are equal distances, all points fit.
+    #[must_use]
+    pub fn logarithmic(label: impl Into<String>) -> Self {
+        Self {
+            logarithmic: true,
+            ..Self::linear(label)
+        }
+    }
+
+    /// Its numbers are shares.
+    #[must_use]
+    pub fn percent(self) -> Self {
+        Self {
+            unit: Unit::Percent,
+            ..self
+        }
+    }
+
+    /// From `low` to `high`.
+    #[must_use]
+    pub fn within(self, low: f64, high: f64) -> Self {
+        Self {
+            range: Some((low, high)),
+            ..self
+        }
+    }
+}
+
+/// Points that belong together.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Its name, at the end of its curve or beside its only dot.
+    pub name: Option<String>,
+    /// Its colour and mark.
+    pub pen: Pen,
+    /// How it is drawn.
+    pub style: Style,
+    /// In order of x.
+    pub points: Vec<Point>,
+}
+
+impl Series {
+    /// One with a name.
+    #[must_use]
+    pub fn named(name: impl Into<String>, pen: Pen, style: Style, points: Vec<Point>) -> Self {
+        Self {
+            name: Some(name.into()),
+            pen,
+            style,
+            points,
+        }
+    }
+
+    /// One that goes with another, which has the name.
+    #[must_use]
+    pub const fn unnamed(pen: Pen, style: Style, points: Vec<Point>) -> Self {
+        Self {
+            name: None,
+            pen,
+            style,
+            points,
+        }
+    }
+}
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// Worked out: a line.
+    Line,
+    /// Worked out, of less weight: a dashed line.
+    Dashed,
+    /// Measured: dots with their intervals.
+    Dots,
+    /// Measured: dots with their intervals, joined.
+    JoinedDots,
+}
+
+impl Style {
+    pub(super) const fn has_line(self) -> bool {
+        !matches!(self, Self::Dots)
+    }
+
+    pub(super) const fn has_dots(self) -> bool {
+        matches!(self, Self::Dots | Self::JoinedDots)
+    }
+}
+
+/// A point, with an interval if it was measured. One of 0 on a logarithmic axis is drawn
+/// as an upper limit: an open dot at the end of its interval, with a line down.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    /// To the right.
+    pub x: f64,
+    /// Upwards.
+    pub y: f64,
+    /// The interval it lies in.
+    pub interval: Option<(f64, f64)>,
+}
+
+impl Point {
+    /// Worked out.
+    #[must_use]
+    pub const fn exact(x: f64, y: f64) -> Self {
+        Self {
+            x,
+            y,
+            interval: None,
+        }
+    }
+
+    /// So many steps of a tenth to the right on a logarithmic axis, beside others that
+    /// would hide it.
+    #[must_use]
+    pub fn aside(self, steps: f64) -> Self {
+        Self {
+            x: self.x * 1.1f64.powf(steps),
+            ..self
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! From the values of an axis to places in the picture, and the labels that fit there.
+
+use anyhow::{Result, ensure};
+
+use super::parts::{Axis, Unit};
+
+/// Least distance of two labels, in the unit of the picture.
+pub(super) const GAP: f64 = 10.0;
+/// Most labels of a linear axis.
+const MOST: usize = 8;
+
+/// A label of an axis, and the value it stands at.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Tick {
+    pub value: f64,
+    pub label: String,
+}
+
+/// The values of an axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scale {
+    pub low: f64,
+    pub high: f64,
+    pub logarithmic: bool,
+    unit: Unit,
+}
+
+impl Scale {
+    /// That of `axis`, whose points lie at `values`.
+    pub fn new(axis: &Axis, values: impl Iterator<Item = f64>) -> Result<Self> {
+        let logarithmic = axis.logarithmic;
+        let of = |(low, high)| Self {
+            low,
+            high,
+            logarithmic,
+            unit: axis.unit,
+        };
+        let drawn = values.filter(|&value| value.is_finite() && (value > 0.0 || !logarithmic));
+        let (low, high) = drawn.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (value.min(low), value.max(high))
+        });
+        ensure!(low <= high, "{}: nothing to draw", axis.label);
+        if let Some(range) = axis.range {
+            return Ok(of(range));
+        }
+        Ok(of(match (logarithmic, low.min(0.0) < high.max(0.0)) {
+            (true, _) => (low / 1.25, high * 1.25),
+            (false, true) => {
+                let (low, high) = (low.min(0.0), high.max(0.0));
+                (low, high + (high - low) * 0.06)
+            }
+            (false, false) => (0.0, 1.0),
+        }))
+    }
+
+    /// Whether it has a place for `value`.
+    pub fn holds(&self, value: f64) -> bool {
+        (self.low..=self.high).contains(&value) && (value > 0.0 || !self.logarithmic)
+    }
+
+    /// The nearest value it has a place for.
+    pub fn clamp(&self, value: f64) -> f64 {
+        value.clamp(self.low, self.high)
+    }
+
+    /// Where `value` lies: 0 at the low end, 1 at the high end.
+    pub fn place(&self, value: f64) -> f64 {
+        let of = |value: f64| {
+            if self.logarithmic {
+                value.log10()
+            } else {
+                value
+            }
+        };
+        (of(value) - of(self.low)) / (of(self.high) - of(self.low))
+    }
+
+    /// As many labels as fit on an axis of `length`, where one takes `room` along it.
+    pub fn ticks(&self, length: f64, room: impl Fn(&str) -> f64) -> Vec<Tick> {
+        let mut candidates = if self.logarithmic {
+            self.factors()
+        } else {
+            self.steps()
+        };
+        candidates.retain(|ticks| !ticks.is_empty());
+        let fits = |ticks: &Vec<Tick>| {
+            let spans = ticks.iter().map(|tick| {
+                let (middle, half) = (length * self.place(tick.value), room(&tick.label) / 2.0);
+                (middle - half, middle + half)
+            });
+            let spans: Vec<(f64, f64)> = spans.collect();
+            spans.windows(2).all(|pair| pair[0].1 + GAP <= pair[1].0)
+        };
+        let found = candidates.iter().find(|ticks| fits(ticks));
+        // One alone always fits.
+        let alone = || candidates.last().map(|ticks| ticks[..1].to_vec());
+        found.cloned().or_else(alone).unwrap_or_default()
+    }
+
+    /// Labels of a linear axis, ever fewer.
+    fn steps(&self) -> Vec<Vec<Tick>> {
+        let span = self.high - self.low;
+        let least = decade(span) - 1;
+        let mut candidates = Vec::new();
+        for power in least..=least + 2 {
+            for factor in [1.0, 2.0, 5.0] {
+                let ticks = self.multiples(factor * 10f64.powi(power));
+                if ticks.len() <= MOST {
+                    candidates.push(ticks);
+                }
+            }
+        }
+        candidates
+    }
+
+    /// The multiples of `step` on the axis, if they are not very many.
+    fn multiples(&self, step: f64) -> Vec<Tick> {
+        let first = (self.low / step - 1e-9).ceil();
+        let numbers = (0..200).map(|index| first + f64::from(index));
+        let values = numbers.map(|number| number * step);
+        let values = values.take_while(|value| *value <= self.high + step * 1e-9);
+        values.map(|value| self.tick(value)).collect()
+    }
+
+    /// Labels of a logarithmic axis, ever fewer: 1, 2 and 5 of each decade, decades, every
+    /// second one, and so on. Less than two decades have finer ones first.
+    fn factors(&self) -> Vec<Vec<Tick>> {
+        let (first, last) = (decade(self.low), decade(self.high));
+        let of = |factors: &[f64], every: i32| {
+            let powers = (first..=last).filter(|power| power.rem_euclid(every) == 0);
+            let values = powers.flat_map(|power| {
+                let factors = factors.iter();
+                factors.map(move |factor| factor * 10f64.powi(power))
+            });
+            let values = values.filter(|&value| self.holds(value));
+            values.map(|value| self.tick(value)).collect::<Vec<_>>()
+        };
+        let mut candidates = Vec::new();
+        if self.high < 10.0 * self.low {
+            candidates.push(of(&[1.0, 1.2, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0], 1));
+            candidates.push(of(&[1.0, 1.5, 2.0, 3.0, 5.0, 7.0], 1));
+            candidates.push(of(&[1.0, 2.0, 3.0, 5.0], 1));
+            // A range so small that none of these may lie in it.
+            candidates.retain(|ticks| ticks.len() > 1);
+            candidates.extend(self.steps());
+        }
+        candidates.push(of(&[1.0, 2.0, 5.0], 1));
+        candidates.extend((1..=20).map(|every| of(&[1.0], every)));
+        candidates
+    }
+
+    fn tick(&self, value: f64) -> Tick {
+        let shown = match self.unit {
+            Unit::Plain => value,
+            Unit::Percent => value * 100.0,
+        };
+        Tick {
+            value,
+            label: number(shown),
+        }
+    }
+}
+
+/// The power of ten at or below `value`.
+#[allow(clippy::cast_possible_truncation, reason = "-324 to 308")]
+fn decade(value: f64) -> i32 {
+    (value.log10() + 1e-9).floor() as i32
+}
+
+/// A number at an axis: no more digits than it takes, thousands apart.
+pub(super) fn number(value: f64) -> String {
+    if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
+        let power = decade(value.abs());
+        let factor = value / 10f64.powi(power);
+        let raised: String = power.to_string().chars().map(raised).collect();
+        let factor = (factor * 1e6).round() / 1e6;
+        return match factor {
+            1.0 => format!("10{raised}"),
+            _ => format!("{factor}·10{raised}"),
+        };
+    }
+    // A grid of tenths is not exact.
+    let rounded = (value * 1e9).round() / 1e9 + 0.0;
+    let text = rounded.to_string();
+    let (whole, rest) = text.split_at(text.find('.').unwrap_or(text.len()));
+    let digits = whole.trim_start_matches('-').len();
+    if digits < 5 {
+        return text.replace('-', "−");
+    }
+    let (head, tail) = whole.split_at(whole.len() - 3);
+    format!("{head},{tail}{rest}").replace('-', "−")
+}
+
+fn raised(c: char) -> char {
+    match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        _ => c
+            .to_digit(10)
+            .and_then(|digit| char::from_u32(0x2070 + digit))
+            .unwrap_or(c),
+    }
+}

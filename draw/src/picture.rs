@@ -1,0 +1,14 @@
+//! Pictures of per-pixel values: heat maps as SVG documents.
+
+mod axis;
+mod cells;
+mod draw;
+mod layout;
+mod map;
+mod scale;
+#[cfg(test)]
+mod tests;
+
+pub use draw::heat_map;
+pub use map::Map;
+pub use scale::{levels, span};

@@ -1,0 +1,117 @@
+//! The picture as a document.
+
+use anyhow::{Result, ensure};
+
+use super::axis::TEXT;
+use super::cells;
+use super::layout::{Bar, EDGE, Frame, LINE, Layout, TITLE};
+use super::map::Map;
+use super::scale::{Scale, levels};
+use crate::palette::{NO_EVENT, hex};
+use crate::svg::{Anchor, At, Svg};
+
+/// Draws `map` as a complete SVG document.
+///
+/// Row 0 is at the top. Pixels are square, unless the map is so long and thin
+/// that it has to be stretched to be seen. A single row or column too long to
+/// be drawn in one piece is wrapped into lines, as text is.
+///
+/// The colours span the 2nd to the 98th percentile of the values. Where values
+/// lie beyond, the end of the colour bar is marked `≤` or `≥`. Should the two
+/// percentiles coincide although the values differ, the colours span all values.
+///
+/// The same map always gives the same bytes.
+///
+/// # Errors
+///
+/// Fails if the map has no pixels or if `values` is not `columns * rows` long.
+pub fn heat_map(map: &Map) -> Result<String> {
+    ensure!(
+        map.columns.checked_mul(map.rows) == Some(map.values.len()),
+        "{} values for a map of {} columns and {} rows",
+        map.values.len(),
+        map.columns,
+        map.rows
+    );
+    ensure!(!map.values.is_empty(), "a map without pixels");
+
+    let scale = Scale::new(map.values);
+    let levels = levels(map.values);
+    let silent = levels.iter().filter(|level| level.is_none()).count();
+    let layout = Layout::new(map, scale.as_ref(), silent);
+    let mut svg = Svg::default();
+    texts(&mut svg, &layout);
+    axes(&mut svg, &layout);
+    cells::draw(
+        &mut svg,
+        &levels,
+        layout.columns,
+        layout.plot.corner,
+        layout.cell,
+    );
+    if let Some(of) = &layout.bar {
+        bar(&mut svg, of);
+    }
+    Ok(svg.document(layout.size, map.title))
+}
+
+/// Title and notes.
+fn texts(svg: &mut Svg, layout: &Layout) {
+    let mut y = EDGE + 12.5;
+    for line in &layout.title {
+        svg.text("ink title", (EDGE, y), TITLE, Anchor::Start, line);
+        y += 25.0;
+    }
+    let mut y = layout.notes_y + LINE / 2.0;
+    for note in &layout.notes {
+        let mut x = EDGE;
+        if note.no_event {
+            let (top, fill) = (At(y - 7.0), hex(NO_EVENT));
+            svg.raw(&format!(
+                "<rect fill=\"{fill}\" x=\"{}\" y=\"{top}\" width=\"14\" height=\"14\"/>",
+                At(x)
+            ));
+            x += 22.0;
+        }
+        svg.text("soft", (x, y), TEXT, Anchor::Start, &note.text);
+        y += LINE;
+    }
+}
+
+/// Numbers and names of the axes: that of the rows stands above them.
+fn axes(svg: &mut Svg, layout: &Layout) {
+    let ((x, y), (width, height)) = (layout.plot.corner, layout.plot.size);
+    let [below, beside] = &layout.axes;
+    let bottom = y + height + 1.0;
+    for (at, number) in &below.numbers {
+        svg.line("edge", (x + at, bottom), (x + at, bottom + 5.0));
+        let place = (x + at, bottom + 15.0);
+        svg.text("soft", place, TEXT, Anchor::Middle, number);
+    }
+    let middle = (x + width / 2.0, bottom + 36.0);
+    svg.text("soft", middle, TEXT, Anchor::Middle, &below.name);
+    for (at, number) in &beside.numbers {
+        svg.line("edge", (x - 6.0, y + at), (x - 1.0, y + at));
+        svg.text("soft", (x - 9.0, y + at), TEXT, Anchor::End, number);
+    }
+    let above = (EDGE, y - 8.0 - LINE / 2.0);
+    svg.text("soft", above, TEXT, Anchor::Start, &beside.name);
+}
+
+/// Steps, marks and unit of the colour bar.
+fn bar(svg: &mut Svg, bar: &Bar) {
+    let Frame {
+        corner: (x, y),
+        size: (width, height),
+    } = bar.frame;
+    let cell = (width, height / bar.levels.len() as f64);
+    cells::draw(svg, &bar.levels, 1, (x, y), cell);
+    let right = x + width + 1.0;
+    for mark in &bar.marks {
+        let at = y + height * (1.0 - mark.position);
+        svg.line("edge", (right, at), (right + 5.0, at));
+        svg.text("soft", (right + 9.0, at), TEXT, Anchor::Start, &mark.label);
+    }
+    let above = (x, y - 8.0 - LINE / 2.0);
+    svg.text("soft", above, TEXT, Anchor::Start, &bar.unit);
+}

@@ -1,0 +1,82 @@
+//! Every link of a page leads to a file, and to a heading where it names one.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The pages below `folder`, itself included.
+fn pages(folder: &Path, pages: &mut Vec<PathBuf>) {
+    for path in fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+    {
+        if path.is_dir() {
+            pages_below(&path, pages);
+        } else if path.extension().is_some_and(|extension| extension == "md") {
+            pages.push(path);
+        }
+    }
+}
+
+/// Of the folders, `docs` alone has pages of the project.
+fn pages_below(folder: &Path, found: &mut Vec<PathBuf>) {
+    if folder.components().any(|part| part.as_os_str() == "docs") {
+        pages(folder, found);
+    }
+}
+
+/// A heading as a link names it.
+fn anchor(heading: &str) -> String {
+    let heading = heading.trim_start_matches('#').trim().to_lowercase();
+    let kept = heading
+        .chars()
+        .filter(|c| c.is_alphanumeric() || "-_ ".contains(*c));
+    kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+/// Whether `target`, as seen from `page`, is there.
+fn leads_somewhere(page: &Path, target: &str) -> bool {
+    let (file, heading) = target.split_once('#').unwrap_or((target, ""));
+    let path = if file.is_empty() {
+        page.to_owned()
+    } else {
+        page.parent().unwrap().join(file)
+    };
+    if heading.is_empty() {
+        return path.exists();
+    }
+    let Ok(text) = fs::read_to_string(path) else {
+        return false;
+    };
+    let mut headings = text.lines().filter(|line| line.starts_with('#'));
+    headings.any(|line| anchor(line) == heading)
+}
+
+#[test]
+fn every_link_of_a_page_leads_somewhere() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("..")
+        .canonicalize()
+        .unwrap();
+    let mut found = Vec::new();
+    pages(&root, &mut found);
+    let (mut links, mut broken) = (0, Vec::new());
+    for page in &found {
+        let text = fs::read_to_string(page).unwrap();
+        let targets = text
+            .split("](")
+            .skip(1)
+            .filter_map(|rest| rest.split_once(')'));
+        let targets = targets.map(|(target, _)| target);
+        for target in targets.filter(|target| !target.contains("://") && !target.contains(' ')) {
+            links += 1;
+            if !leads_somewhere(page, target) {
+                broken.push(format!(
+                    "{}: {target}",
+                    page.strip_prefix(&root).unwrap().display()
+                ));
+            }
+        }
+    }
+    assert!(links > 80, "{links} links in {} pages", found.len());
+    assert_eq!(broken, [""; 0]);
+}

@@ -1,0 +1,182 @@
+//! How numbers and paths are read from the command line, the same for every option.
+//!
+//! A number is decimal, with or without an exponent: `0.5`, `10e6`. A whole number may have an
+//! exponent, too: `1e5`.
+
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use dtof_core::fixed::traits::Fixed;
+
+/// Exponents go so far either way, somewhat farther than those of any `f64`.
+const MOST_EXPONENT: u32 = 400;
+
+/// Reads a whole number in `range`.
+pub fn whole<T>(
+    range: RangeInclusive<T>,
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static
+where
+    T: Clone + Display + FromStr + PartialOrd + Send + Sync + 'static,
+{
+    move |text| {
+        let number = plain(text).and_then(|plain| plain.parse().ok());
+        number
+            .filter(|number| range.contains(number))
+            .ok_or_else(|| {
+                let (first, last) = (range.start(), range.end());
+                format!("must be a whole number from {first} to {last}")
+            })
+    }
+}
+
+/// Reads how many bins a histogram has.
+///
+/// # Errors
+/// If there is no such histogram.
+pub fn bins(text: &str) -> Result<u16, String> {
+    let bins = whole(8..=1024)(text).ok();
+    bins.filter(|bins: &u16| bins.is_power_of_two())
+        .ok_or("must be a power of two from 8 to 1024".to_owned())
+}
+
+/// Reads a fixed-point number, rounded to the nearest.
+///
+/// # Errors
+/// If it is none, does not fit, or becomes 0 and was not written so.
+pub fn fixed<T: Fixed + FromStr>(text: &str) -> Result<T, String> {
+    let range = || format!("must be a number from {} to {}", T::MIN, T::MAX);
+    let plain = plain(text).ok_or_else(range)?;
+    let number: T = plain.parse().map_err(|_| range())?;
+    if number == T::ZERO && plain.contains(|digit| matches!(digit, '1'..='9')) {
+        return Err(format!(
+            "is less than half of {}, the smallest step",
+            T::DELTA
+        ));
+    }
+    Ok(number)
+}
+
+/// Reads a number above 0.
+///
+/// # Errors
+/// If it is none, or not a finite one.
+pub fn positive(text: &str) -> Result<f64, String> {
+    real(text)
+        .filter(|number| *number > 0.0)
+        .ok_or("must be a number above 0".to_owned())
+}
+
+/// Reads a finite number.
+#[must_use]
+pub fn real(text: &str) -> Option<f64> {
+    let number: f64 = plain(text)?.parse().ok()?;
+    number.is_finite().then_some(number)
+}
+
+/// Reads the name of a file or a folder. `-`, elsewhere standard input or output, is none.
+#[must_use]
+pub fn path() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| {
+        if path.as_os_str() == "-" {
+            return Err("standard input and output are not supported here; give a name");
+        }
+        Ok(path)
+    })
+}
+
+/// A number without an exponent, and without zeros that say nothing: `2.50e3` as `2500`.
+fn plain(text: &str) -> Option<String> {
+    let (number, exponent) = match text.split_once(['e', 'E']) {
+        Some((number, exponent)) => (number, exponent.parse::<i32>().ok()?),
+        None => (text, 0),
+    };
+    let (sign, number) = match number.strip_prefix('-') {
+        Some(number) => ("-", number),
+        None => ("", number.strip_prefix('+').unwrap_or(number)),
+    };
+    let (before, after) = number.split_once('.').unwrap_or((number, ""));
+    let mut digits = format!("{before}{after}");
+    let is_number = !digits.is_empty() && digits.bytes().all(|digit| digit.is_ascii_digit());
+    let zeros = exponent.unsigned_abs();
+    if !is_number || zeros > MOST_EXPONENT {
+        return None;
+    }
+    // Room for the point wherever it goes.
+    let zeros = "0".repeat(zeros as usize);
+    let mut point = before.len();
+    if exponent < 0 {
+        digits.insert_str(0, &zeros);
+    } else {
+        digits.push_str(&zeros);
+        point += zeros.len();
+    }
+    let (whole, fraction) = digits.split_at(point);
+    let whole = whole.trim_start_matches('0');
+    let whole = if whole.is_empty() { "0" } else { whole };
+    let fraction = fraction.trim_end_matches('0');
+    let point = if fraction.is_empty() { "" } else { "." };
+    Some(format!("{sign}{whole}{point}{fraction}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dtof_core::fixed::types::{I24F8, U8F8};
+
+    #[test]
+    fn numbers_are_what_they_say_however_written() {
+        for (text, expected) in [
+            ("250", "250"),
+            ("0250.0", "250"),
+            ("1e5", "100000"),
+            ("10E6", "10000000"),
+            ("+2.5e+3", "2500"),
+            ("2.5e0", "2.5"),
+            (".5", "0.5"),
+            ("5.", "5"),
+            ("125e-3", "0.125"),
+            ("-1.5e-2", "-0.015"),
+            ("1200e-2", "12"),
+            ("0e400", "0"),
+        ] {
+            assert_eq!(plain(text).as_deref(), Some(expected), "{text}");
+        }
+        let none = "|-|.|e5|1e|1e5.5|0x10|1_000|1,000| 1|--1|1-|NaN|inf|1e401|1e-401|1e99999999999|1.2.3|１";
+        for text in none.split('|') {
+            assert_eq!(plain(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_whole_number_is_exact_and_in_its_range() {
+        let cycles = whole(1..=u64::MAX);
+        assert_eq!(cycles("1e5"), Ok(100_000));
+        assert_eq!(cycles("18446744073709551615"), Ok(u64::MAX));
+        let refused = format!("must be a whole number from 1 to {}", u64::MAX);
+        for text in "0 -1 1.5 1e-1 18446744073709551616 1e20 x".split(' ') {
+            assert_eq!(cycles(text).unwrap_err(), refused);
+        }
+        assert_eq!(bins("1.28e2"), Ok(128));
+        for text in ["4", "100", "2048", "many"] {
+            let error = bins(text).unwrap_err();
+            assert_eq!(error, "must be a power of two from 8 to 1024");
+        }
+    }
+
+    #[test]
+    fn other_numbers_take_exponents_too() {
+        assert_eq!(fixed::<U8F8>("4e0"), Ok(U8F8::lit("4")));
+        assert_eq!(fixed::<I24F8>("-1795e-1"), Ok(I24F8::lit("-179.5")));
+        let refused = |text| fixed::<U8F8>(text).unwrap_err();
+        assert!(refused("256").starts_with("must be a number from 0"));
+        assert!(refused("1e-3").contains("less than half"));
+        assert_eq!(positive("1e-300"), Ok(1e-300));
+        assert_eq!(real("-2.5e-3"), Some(-2.5e-3));
+        for text in ["0", "-1", "inf", "1e-350", "1e309"] {
+            assert_eq!(positive(text).unwrap_err(), "must be a number above 0");
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Command lines, alike in every program of this project: help is printed whole, an
+//! error is one line and a failure.
+
+pub mod arguments;
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::Parser;
+
+/// Parses the command line and runs it.
+#[must_use]
+pub fn run<C: Parser>(run: impl FnOnce(C) -> Result<()>) -> ExitCode {
+    let done = match C::try_parse() {
+        Ok(cli) => run(cli),
+        Err(error) => return refuse(&error),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        // The reader of the output has seen enough.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            complain(&format!("error: {error:#}"));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Help is printed whole; an error with its hints as one line.
+fn refuse(error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        return error
+            .print()
+            .map_or(ExitCode::FAILURE, |()| ExitCode::SUCCESS);
+    }
+    let text = error.to_string();
+    let lines = text.lines().map(str::trim);
+    let reason: Vec<&str> = lines
+        .filter(|line| !line.is_empty() && !line.starts_with("Usage:"))
+        .collect();
+    complain(&reason.join(" "));
+    ExitCode::from(2)
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    let io = error.downcast_ref::<io::Error>();
+    io.is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+}
+
+/// One line on standard error; if that cannot be written, nobody reads it.
+fn complain(message: &str) {
+    let line: Vec<&str> = message.lines().collect();
+    let _ = writeln!(io::stderr(), "{}", line.join(" "));
+}

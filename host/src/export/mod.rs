@@ -1,0 +1,217 @@
+//! Events of an AER file in formats that other programs read. `docs/export.md` says
+//! what is in them.
+//!
+//! The file is read twice: once to count the events up to its end, or to where it is
+//! damaged; once to write them, without ever holding more than a few of them. What is
+//! written is moved to its place when it is whole.
+
+mod clock;
+mod csv;
+mod events;
+mod evt2;
+mod mcap;
+mod pcd;
+mod ply;
+mod points;
+mod projection;
+mod reorder;
+
+use std::fmt::Write;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::ValueEnum;
+use dtof_core::RangeScale;
+use dtof_link::DynamicDepth;
+use tempfile::NamedTempFile;
+
+use crate::events::aer_file::{Event, EventKind};
+use crate::files::{aside, flushed, place_of};
+use crate::geometry::{FieldOfView, Rays};
+use crate::input::source::Geometry;
+use crate::progress::Progress;
+
+pub use clock::LaserClock;
+use events::Survey;
+use points::Points;
+use projection::Projection;
+
+/// The format of an exported file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// Comma-separated values
+    Csv,
+    /// Points, in the format of PCL
+    Pcd,
+    /// Points, as vertices of a mesh
+    Ply,
+    /// Points slice by slice and statistics, for Foxglove
+    Mcap,
+    /// Changes of depth as an event camera's RAW file (EVT2)
+    Evt2,
+}
+
+/// Where the rays of the pixels come from.
+#[derive(Clone, Debug)]
+pub enum Optics {
+    /// A pinhole camera; [`FieldOfView::of`] the array unless given.
+    Pinhole(Option<FieldOfView>),
+    /// A calibration file.
+    Calibration(PathBuf),
+}
+
+impl Optics {
+    /// The rays, and what they are for people.
+    fn rays(&self, array: Geometry) -> Result<(Rays, String)> {
+        Ok(match self {
+            Self::Pinhole(view) => {
+                let view = view.unwrap_or_else(|| FieldOfView::of(array));
+                (Rays::pinhole(array, view), format!("{view} degrees, "))
+            }
+            Self::Calibration(path) => (Rays::read(path, array)?, format!("{}, ", path.display())),
+        })
+    }
+}
+
+/// How events become points in space and time, or changes of depth.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Where pixels look.
+    pub optics: Optics,
+    /// How long a laser cycle is.
+    pub clock: LaserClock,
+    /// Which events of a file that holds both kinds.
+    pub kind: Option<EventKind>,
+    /// MCAP: nanoseconds of a slice, not 0; 1/100 of the run unless given, see docs/export.md.
+    pub slice_ns: Option<u64>,
+    /// EVT2: what is made of depth events.
+    pub dynamic_depth: DynamicDepth,
+}
+
+impl Default for Options {
+    /// A pinhole camera at the paper's 10 MHz, and the paper's dynamic depth: 0.1 m
+    /// between the means of adjacent events (section III-E).
+    fn default() -> Self {
+        Self {
+            optics: Optics::Pinhole(None),
+            clock: LaserClock::default(),
+            kind: None,
+            slice_ns: None,
+            dynamic_depth: DynamicDepth::default(),
+        }
+    }
+}
+
+/// The result of an export.
+#[derive(Debug)]
+pub struct Exported {
+    /// Events or points in the file.
+    pub written: u64,
+    /// Events that came too late to be put in order, and are left out.
+    pub late: u64,
+    /// Where the AER file is damaged and how, if it is. What came before is written.
+    pub damage: Option<String>,
+    /// The assumptions behind points and times: "60x32.2 degrees, 10 MHz".
+    pub assumed: String,
+}
+
+/// A file on its way.
+type Out = BufWriter<NamedTempFile>;
+
+/// A file that is whole.
+struct Finished {
+    out: Out,
+    written: u64,
+    late: u64,
+}
+
+/// Takes events, writes a file.
+trait Sink {
+    fn write(&mut self, event: &Event) -> Result<()>;
+    fn finish(self: Box<Self>) -> Result<Finished>;
+}
+
+/// Writes the events of the AER file `input` to `out`.
+///
+/// # Errors
+/// If `input` is not an AER file, holds what the format cannot, or `out` cannot be
+/// written; `out` is what it was then. Damage of `input` is no error: see
+/// [`Exported::damage`].
+pub fn export(
+    input: &Path,
+    out: &Path,
+    format: Format,
+    options: &Options,
+    quiet: bool,
+) -> Result<Exported> {
+    let name = || input.display().to_string();
+    let inputs = match &options.optics {
+        Optics::Pinhole(_) => vec![input],
+        Optics::Calibration(calibration) => vec![input, calibration],
+    };
+    let place = place_of(out, &inputs)?;
+    let survey = Survey::of(input, format, options.clock, quiet).with_context(name)?;
+    let kind = survey.kind(options.kind).with_context(name)?;
+    let header = survey.header;
+    let array = header.geometry;
+    let (rays, mut assumed) = options.optics.rays(array)?;
+    let projection = Projection {
+        rays,
+        scale: RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?,
+        clock: options.clock,
+    };
+    if format == Format::Evt2 {
+        assumed.clear();
+    }
+    assumed += &options.clock.to_string();
+    let end_ns = options.clock.end_ns(survey.latest);
+    let slice_ns = options.slice_ns.unwrap_or_else(|| mcap::slice_of(end_ns));
+    let file = BufWriter::new(aside(&place.folder, ".dtof-export-")?);
+    let points = survey.events(kind);
+    let to = || out.display().to_string();
+    let sink: Result<Box<dyn Sink>> = match format {
+        Format::Csv => csv::begin(file, projection, kind).map(boxed),
+        Format::Pcd => Points::packed(file, projection, &pcd::header(kind, points)).map(boxed),
+        Format::Ply => Points::packed(file, projection, &ply::header(kind, points)).map(boxed),
+        Format::Mcap => {
+            let _ = write!(assumed, ", clouds every {} µs", slice_ns as f64 / 1000.0);
+            mcap::Mcap::new(file, projection, array, kind, [slice_ns, end_ns]).map(boxed)
+        }
+        Format::Evt2 => {
+            let changes = &options.dynamic_depth;
+            let config = changes
+                .config(&projection.scale)
+                .with_context(|| format!("--threshold-mm {}", changes.threshold_mm))?;
+            evt2::Evt2::new(file, array, options.clock, config).map(boxed)
+        }
+    };
+    let mut sink = sink.with_context(to)?;
+
+    let progress = Progress::new(survey.all(), "events", quiet);
+    let mut events = events::open(input).with_context(name)?;
+    for done in 1..=survey.all() {
+        let event = events.next_event().with_context(name)?;
+        let event = event.with_context(|| format!("{} changed while it was read", name()))?;
+        if event.kind() == kind {
+            sink.write(&event).with_context(to)?;
+        }
+        if done.is_multiple_of(4096) {
+            progress.at(done);
+        }
+    }
+    progress.finish();
+    let finished = sink.finish().with_context(to)?;
+    let moved = flushed(finished.out).with_context(to)?.persist(&place.file);
+    moved.map_err(|error| error.error).with_context(to)?;
+    Ok(Exported {
+        written: finished.written,
+        late: finished.late,
+        damage: survey.damage,
+        assumed,
+    })
+}
+
+fn boxed<S: Sink + 'static>(sink: S) -> Box<dyn Sink> {
+    Box::new(sink)
+}

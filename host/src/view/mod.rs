@@ -1,0 +1,3 @@
+//! Pages to look at.
+
+pub mod report;

@@ -1,0 +1,114 @@
+//! The report on a run: one HTML page with everything in it.
+
+mod cloud;
+#[cfg(test)]
+mod tests;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use sha2::{Digest, Sha256};
+
+pub use cloud::Cloud;
+
+use crate::events::sample::Sample;
+use dtof_draw::svg::{escape, one_line};
+
+/// A picture of the report.
+#[derive(Clone, Copy, Debug)]
+pub struct Figure<'a> {
+    /// An SVG document. It is placed in the page as it is, so it has to come
+    /// from a trusted source.
+    pub svg: &'a str,
+    /// The text below it.
+    pub caption: &'a str,
+}
+
+/// A table of names and values, such as settings or totals.
+#[derive(Clone, Copy, Debug)]
+pub struct Section<'a> {
+    /// The heading of the table.
+    pub heading: &'a str,
+    /// Names and values.
+    pub rows: &'a [(String, String)],
+}
+
+/// Every page has it near its start.
+pub(crate) const MARK: &str = "<meta name=\"generator\" content=\"dtof\">";
+
+/// Bytes of a page. Larger ones are slow to open, and to send.
+const PAGE: usize = 5_000_000;
+/// Bytes of a page for all but events and figures, at most.
+const ALL_ELSE: usize = 200_000;
+/// There are events even where figures leave no room for any.
+const LEAST_EVENTS: usize = 4096;
+
+/// How many events there is room for beside figures of so many bytes.
+#[must_use]
+pub fn room_for_events(figures: usize) -> usize {
+    let bytes = PAGE.saturating_sub(ALL_ELSE + figures);
+    // Four characters for three bytes.
+    let events = bytes / 4 * 3 / cloud::RECORD;
+    events.clamp(LEAST_EVENTS, Sample::LIMIT)
+}
+
+/// Colours follow the reader's scheme, the columns the width of the window.
+const STYLE: &str = include_str!("report/page.css");
+
+/// A page with `title` and the paragraph `lead`, the events to turn and look at, then
+/// all `figures`, then all `sections`.
+///
+/// The page is whole: it loads nothing, and runs no script but its own, which the
+/// policy at its head names by its hash. All texts are escaped. Figures are taken as
+/// they are, and define no identifiers.
+#[must_use]
+pub fn html(
+    title: &str,
+    lead: &str,
+    sections: &[Section],
+    figures: &[Figure],
+    events: &Cloud,
+) -> String {
+    let title = text(title);
+    let lead = text(lead);
+    let hash = BASE64.encode(Sha256::digest(cloud::SCRIPT));
+    let mut page = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{MARK}\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" \
+         content=\"default-src 'none'; script-src 'sha256-{hash}'; \
+         style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'\">\n\
+         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n\
+         <body>\n<main>\n<header>\n<h1>{title}</h1>\n<p>{lead}</p>\n</header>\n"
+    );
+    page += &events.html();
+    page += "<div class=\"cards\">\n";
+    for figure in figures {
+        let svg = element(figure.svg);
+        let caption = text(figure.caption);
+        page += &format!("<figure>\n{svg}\n<figcaption>{caption}</figcaption>\n</figure>\n");
+    }
+    for (index, section) in sections.iter().enumerate() {
+        let id = format!("section-{}", index + 1);
+        let heading = text(section.heading);
+        page += &format!(
+            "<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{heading}</h2>\n\
+             <table aria-labelledby=\"{id}\">\n<tbody>\n"
+        );
+        for (name, value) in section.rows {
+            let (name, value) = (text(name), text(value));
+            page += &format!("<tr><th scope=\"row\">{name}</th><td>{value}</td></tr>\n");
+        }
+        page += "</tbody>\n</table>\n</section>\n";
+    }
+    page + "</div>\n</main>\n</body>\n</html>\n"
+}
+
+fn text(text: &str) -> String {
+    escape(&one_line(text))
+}
+
+/// The `<svg>` element of a document: a page has no room for its declaration.
+fn element(svg: &str) -> &str {
+    svg.find("<svg").map_or("", |start| svg[start..].trim_end())
+}

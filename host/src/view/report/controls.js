@@ -1,0 +1,201 @@
+// What the reader does: turn, choose the window of time, play it, choose pixels.
+
+const start = element("start");
+const width = element("width");
+const play = element("play");
+const status = element("status");
+const STEPS = 200;
+/** Seconds to play the whole run in. */
+const PLAY_SECONDS = 10;
+
+/** Everything, before the next picture of the screen. */
+const redraw = (() => {
+  let asked = false;
+  return () => {
+    if (asked) return;
+    asked = true;
+    requestAnimationFrame(() => {
+      asked = false;
+      drawCloud();
+      drawLanes();
+    });
+  };
+})();
+
+function chooseWindow() {
+  const cycles = Number(width.value);
+  const from = Math.round((Number(start.value) / STEPS) * (data.cycles - cycles));
+  start.disabled = cycles === data.cycles;
+  start.setAttribute("aria-valuetext", `laser cycle ${number(from)}`);
+  showWindow(from, from + cycles);
+  tell();
+  redraw();
+}
+
+/** What is shown, what was clicked, and what else there is to say. */
+function tell(news = "") {
+  const [first, last] = [number(shown.start), number(shown.end)];
+  let count = 0;
+  for (let event = shown.first; event < shown.last; event++) {
+    if (events.range[event] <= shown.far) count++;
+  }
+  status.value = `${number(count)} ${data.events} from laser cycle ${first} to ${last}. ${pickedText()} ${news}`.trim();
+}
+
+/** Adds a pixel's spikes, and says so. */
+function showSpikes(pixel) {
+  return `Spikes of ${addLane(pixel, true)} are shown first.`;
+}
+
+function pickedText() {
+  if (picked < 0) return "";
+  const [range, cycle] = [number(events.range[picked], 1), number(events.cycle[picked])];
+  return `Chosen: ${pixelName(events.pixel[picked])}, ${range} mm at laser cycle ${cycle}.`;
+}
+
+// The window of time.
+const parts = [1, 2, 5, 10, 20, 50, 100].map((part) => Math.max(1, Math.round(data.cycles / part)));
+for (const cycles of new Set(parts)) {
+  const text = cycles === data.cycles ? "whole run" : `${number(cycles)} laser cycles`;
+  width.add(new Option(text, cycles));
+}
+start.max = STEPS;
+start.addEventListener("input", chooseWindow);
+width.addEventListener("input", chooseWindow);
+
+// Playing it, in single steps for those who want no motion.
+const still = matchMedia("(prefers-reduced-motion: reduce)");
+let playing = 0;
+function stop() {
+  clearInterval(playing);
+  playing = 0;
+  play.textContent = "Play";
+  status.setAttribute("aria-live", "polite");
+}
+play.addEventListener("click", () => {
+  if (playing) return stop();
+  if (Number(width.value) === data.cycles) width.selectedIndex = Math.min(3, width.length - 1);
+  play.textContent = "Pause";
+  // Twenty a second are not to be read out.
+  status.setAttribute("aria-live", "off");
+  const perSecond = still.matches ? 1 : 20;
+  playing = setInterval(() => {
+    const next = Number(start.value) + STEPS / PLAY_SECONDS / perSecond;
+    start.value = next > STEPS ? 0 : next;
+    chooseWindow();
+  }, 1000 / perSecond);
+  chooseWindow();
+});
+start.addEventListener("pointerdown", stop);
+
+// Turning: one finger or button turns, two fingers change the size.
+const fingers = new Map();
+let moved = 0;
+cloud.addEventListener("pointerdown", (event) => {
+  cloud.setPointerCapture(event.pointerId);
+  fingers.set(event.pointerId, event);
+  moved = 0;
+});
+cloud.addEventListener("pointermove", (event) => {
+  const before = fingers.get(event.pointerId);
+  if (!before) return;
+  const [x, y] = [event.clientX - before.clientX, event.clientY - before.clientY];
+  moved += Math.hypot(x, y);
+  if (fingers.size === 1) {
+    turn(-x / 150, y / 150);
+  } else {
+    const other = [...fingers.values()].find((finger) => finger.pointerId !== event.pointerId);
+    const away = (finger) =>
+      Math.hypot(finger.clientX - other.clientX, finger.clientY - other.clientY) + 1;
+    enlarge(away(event) / away(before));
+  }
+  fingers.set(event.pointerId, event);
+  redraw();
+});
+for (const type of ["pointerup", "pointercancel"]) {
+  cloud.addEventListener(type, (event) => {
+    const click = type === "pointerup" && moved < 5 && fingers.size === 1;
+    fingers.delete(event.pointerId);
+    if (!click) return;
+    picked = eventAt(event.offsetX, event.offsetY);
+    tell(picked >= 0 ? showSpikes(events.pixel[picked]) : "");
+    redraw();
+  });
+}
+cloud.addEventListener("wheel", (event) => {
+  if (!event.ctrlKey) return; // The page scrolls.
+  event.preventDefault();
+  enlarge(Math.exp(-event.deltaY / 200));
+  redraw();
+}, { passive: false });
+
+const KEYS = {
+  ArrowLeft: () => turn(0.1, 0),
+  ArrowRight: () => turn(-0.1, 0),
+  ArrowUp: () => turn(0, -0.1),
+  ArrowDown: () => turn(0, 0.1),
+  "+": () => enlarge(1.2),
+  "=": () => enlarge(1.2),
+  "-": () => enlarge(1 / 1.2),
+  0: () => Object.assign(view, VIEWS.reset),
+};
+cloud.addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.key]) return;
+  event.preventDefault();
+  KEYS[event.key]();
+  redraw();
+});
+
+for (const button of document.querySelectorAll("[data-view]")) {
+  button.addEventListener("click", () => {
+    Object.assign(view, VIEWS[button.dataset.view]);
+    redraw();
+  });
+}
+const far = element("far");
+function chooseFar() {
+  const open = far.value === far.max;
+  const range = data.low + (data.high - data.low) * (far.value / far.max);
+  shown.far = open ? Infinity : range;
+  element("far-mm").value = open ? "any range" : `${number(range)} mm`;
+  far.setAttribute("aria-valuetext", element("far-mm").value);
+  tell();
+  redraw();
+}
+far.addEventListener("input", chooseFar);
+function chooseThird() {
+  view.third = element("third").value;
+  const third = view.third === "range" ? "range" : "laser cycle";
+  const by = [...data.sides, third].join(", ");
+  cloud.setAttribute("aria-label", `${capital(data.events)} by ${by}, coloured by range`);
+  redraw();
+}
+element("third").addEventListener("input", chooseThird);
+
+// Pixels by their place.
+for (const [at, id] of ["across", "down"].entries()) {
+  const name = data.sides[at];
+  element(id).textContent = name[0].toUpperCase() + name.slice(1);
+}
+element("column").max = data.columns - 1;
+element("line").max = data.rows - 1;
+element("add").addEventListener("submit", (event) => {
+  event.preventDefault();
+  tell(showSpikes(Number(element("line").value) * data.columns + Number(element("column").value)));
+});
+
+// The first look.
+const colourAt = (level) => colours[Math.round(level)];
+const stops = Array.from({ length: 18 }, (_, stop) => colourAt(stop * 15));
+element("bar").style.background = `linear-gradient(to right, ${stops.join(", ")})`;
+element("low").textContent = `≤ ${number(data.low)}`;
+element("high").textContent = `≥ ${number(data.high)}`;
+element("unscripted").hidden = true;
+element("interactive").hidden = false;
+addScale();
+data.spikes.forEach((pixel) => addLane(pixel));
+chooseWindow();
+chooseFar();
+chooseThird();
+new ResizeObserver(redraw).observe(cloud);
+dark.addEventListener("change", redraw);

@@ -1,0 +1,102 @@
+// The events of the page, in order of laser cycle, and what is common to all that shows them.
+
+const data = JSON.parse(element("data").textContent);
+const events = decode(data.records, data.unit);
+// Their places in the colours: 0 at data.low and below, 255 at data.high and above.
+const levels = Uint8Array.from(events.range, (range) =>
+  data.high > data.low ? (255 * Math.min(1, Math.max(0, share(range, data.low, data.high)))) + 0.5 : 127,
+);
+// All ranges, beyond the colours too.
+const [nearest, farthest] = events.range.reduce(
+  ([low, high], range) => [Math.min(low, range), Math.max(high, range)], [Infinity, -Infinity]);
+const colours = data.colours.match(/.{6}/g).map((hex) => `#${hex}`);
+
+/**
+ * What is shown: laser cycles from start to before end, which are the events from first to
+ * before last, and of these the ones no farther than far, in millimetres.
+ */
+const shown = { start: 0, end: data.cycles, first: 0, last: events.count, far: Infinity };
+
+function element(id) {
+  return document.getElementById(id);
+}
+
+/** Columns of equal length, from records of ten little-endian bytes in base64. */
+function decode(base64, unit) {
+  const text = atob(base64);
+  const bytes = new DataView(new ArrayBuffer(text.length));
+  for (let at = 0; at < text.length; at++) bytes.setUint8(at, text.charCodeAt(at));
+  const count = text.length / 10;
+  const columns = {
+    count,
+    cycle: new Float64Array(count),
+    range: new Float32Array(count),
+    pixel: new Uint16Array(count),
+  };
+  for (let index = 0; index < count; index++) {
+    columns.cycle[index] = bytes.getUint32(10 * index, true) * unit;
+    columns.range[index] = bytes.getFloat32(10 * index + 4, true);
+    columns.pixel[index] = bytes.getUint16(10 * index + 8, true);
+  }
+  return columns;
+}
+
+/** Shows laser cycles from start to before end. */
+function showWindow(start, end) {
+  const first = firstFrom(start);
+  Object.assign(shown, { start, end, first, last: firstFrom(end) });
+}
+
+/** The first event at laser cycle `cycle` or after it. */
+function firstFrom(cycle) {
+  let [low, high] = [0, events.count];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (events.cycle[middle] < cycle) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
+
+/** Where a value lies between low and high: 0 to 1. */
+function share(value, low, high) {
+  return (value - low) / (high - low);
+}
+
+/** Round values from low to high, at most `most` of them. */
+function ticks(low, high, most, whole) {
+  const least = (high - low) / Math.max(1, most);
+  const power = 10 ** Math.floor(Math.log10(least));
+  let step = power * [1, 2, 5, 10].find((factor) => factor * power >= least * 0.999);
+  if (whole) step = Math.max(1, Math.round(step));
+  const values = [];
+  for (let at = Math.ceil(low / step) + 0; at * step <= high; at++) values.push(at * step + 0); // never −0
+  return values;
+}
+
+function number(value, digits = 0) {
+  return value.toLocaleString("en", { maximumFractionDigits: digits });
+}
+
+function capital(word) {
+  return word[0].toUpperCase() + word.slice(1);
+}
+
+function pixelName(pixel) {
+  const [column, row] = data.sides;
+  return `${column} ${pixel % data.columns}, ${row} ${Math.floor(pixel / data.columns)}`;
+}
+
+/** The context of a canvas that has as many pixels as the screen shows of it. */
+function context(canvas) {
+  const ratio = Math.min(2, window.devicePixelRatio || 1);
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  canvas.width = Math.max(1, Math.round(width * ratio));
+  canvas.height = Math.max(1, Math.round(height * ratio));
+  const context = canvas.getContext("2d");
+  context.scale(ratio, ratio);
+  const style = getComputedStyle(canvas);
+  context.font = `13px ${style.fontFamily}`;
+  return { context, width, height, ratio, ink: style.getPropertyValue("--ink"),
+    soft: style.getPropertyValue("--soft"), line: style.getPropertyValue("--line") };
+}

@@ -1,0 +1,85 @@
+// The spikes: for some pixels a line for each event, at its laser cycle.
+
+const lanes = element("lanes");
+const MOST_LANES = 12;
+
+/** Adds a pixel, and gives its label; the oldest one goes if there are too many. */
+function addLane(pixel, prepend = false) {
+  removeLane(pixel);
+  const lane = document.createElement("li");
+  const spikes = [];
+  for (let event = 0; event < events.count; event++) {
+    if (events.pixel[event] === pixel) spikes.push(event);
+  }
+  const name = pixelName(pixel);
+  const label = document.createElement("span");
+  const thinned = data.oneOf > 1 ? ` (1 of ${number(data.oneOf)})` : "";
+  label.textContent = `${name}: ${number(spikes.length)} ${data.events}${thinned}`;
+  const canvas = document.createElement("canvas");
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", label.textContent);
+  const remove = document.createElement("button");
+  remove.type = "button";
+  remove.textContent = "×";
+  remove.setAttribute("aria-label", `Remove ${name}`);
+  remove.addEventListener("click", () => {
+    lane.remove();
+    element("column").focus();
+  });
+  lane.append(label, canvas, remove);
+  Object.assign(lane, { pixel, draw: () => drawLane(canvas, spikes) });
+  if (prepend) lanes.prepend(lane);
+  else lanes.insertBefore(lane, lanes.querySelector(".scale"));
+  const all = [...lanes.querySelectorAll("li:not(.scale)")];
+  if (all.length > MOST_LANES) all.at(-1).remove();
+  lane.draw();
+  return label.textContent;
+}
+
+function removeLane(pixel) {
+  [...lanes.children].find((lane) => lane.pixel === pixel)?.remove();
+}
+
+/** The last line: laser cycles. */
+function addScale() {
+  const scale = document.createElement("li");
+  scale.className = "scale";
+  const canvas = document.createElement("canvas");
+  const label = document.createElement("span");
+  label.textContent = "laser cycle";
+  canvas.setAttribute("aria-hidden", "true");
+  // As wide as a line's button.
+  const room = document.createElement("button");
+  room.textContent = "×";
+  room.disabled = true;
+  room.style.visibility = "hidden";
+  scale.append(label, canvas, room);
+  scale.draw = () => drawScale(canvas);
+  lanes.append(scale);
+}
+
+function drawLanes() {
+  for (const lane of lanes.children) lane.draw();
+}
+
+/** A line for each event of the part of the run that is shown. */
+function drawLane(canvas, spikes) {
+  const { context: lines, width, height, ink } = context(canvas);
+  lines.fillStyle = ink;
+  for (const event of spikes) {
+    if (event < shown.first || event >= shown.last) continue;
+    const at = width * share(events.cycle[event], shown.start, shown.end);
+    lines.fillRect(at - 0.6, 3, 1.2, height - 6);
+  }
+}
+
+function drawScale(canvas) {
+  const { context: lines, width, soft } = context(canvas);
+  lines.fillStyle = soft;
+  for (const cycle of ticks(shown.start, shown.end, width / 90, true)) {
+    const at = width * share(cycle, shown.start, shown.end);
+    lines.fillRect(Math.min(width - 1, at), 0, 1, 5);
+    lines.textAlign = at < 20 ? "left" : at > width - 30 ? "right" : "center";
+    lines.fillText(number(cycle), at, 19);
+  }
+}

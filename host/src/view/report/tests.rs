@@ -1,0 +1,229 @@
+use super::*;
+use dtof_core::{
+    BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, RangeScale, SubBinOffset,
+};
+
+use crate::events::events_csv::range_mm;
+use crate::events::sample::Sample;
+use crate::input::source::Geometry;
+
+/// `count` events, one a laser cycle, of four pixels in turn.
+fn sample(limit: usize, count: u32) -> Sample {
+    let scale = RangeScale::new(
+        dtof_core::fixed::types::U16F16::lit("250"),
+        dtof_core::fixed::types::I24F8::ZERO,
+    )
+    .unwrap();
+    let mut sample = Sample::new(limit);
+    for cycle in 0..count {
+        let pixel = u16::try_from(cycle % 4).unwrap();
+        let event = DepthEvent {
+            pixel: PixelAddress(pixel),
+            cycle: LaserCycle(cycle.into()),
+            exposure: 40,
+            peak_bin: BinIndex::saturating(10 + pixel),
+            offset: SubBinOffset::CENTRE,
+            peak_count: Count::saturating(9),
+            background: Count::saturating(1),
+            flags: Flags::NONE,
+        };
+        sample.add(&event, range_mm(&event, &scale));
+    }
+    sample
+}
+
+/// The events of `sample`, on an array of four pixels.
+fn cloud<'a>(sample: &'a Sample, cycles: u64, called: [&'static str; 2]) -> Cloud<'a> {
+    Cloud {
+        sides: ["zone", "capture"],
+        geometry: Geometry::new(2, 2),
+        cycles,
+        sample,
+        pixels: &[PixelAddress(2), PixelAddress(0)],
+        called,
+    }
+}
+
+/// A page with the events of `sample`, nothing else that varies.
+fn page(sample: &Sample, cycles: u64, sections: &[Section], figures: &[Figure]) -> String {
+    let events = cloud(sample, cycles, ["event", "events"]);
+    html("t", "l", sections, figures, &events)
+}
+
+/// What the script is given.
+fn data(page: &str) -> serde_json::Value {
+    let (_, data) = page.split_once("id=\"data\">").unwrap();
+    let (data, _) = data.split_once("</script>").unwrap();
+    serde_json::from_str(data).unwrap()
+}
+
+#[test]
+fn all_texts_are_escaped() {
+    let rows = [("<b>&\"'".to_owned(), "1 < 2\0".to_owned())];
+    let sections = [Section {
+        heading: "<h>",
+        rows: &rows,
+    }];
+    let figures = [Figure {
+        svg: "<svg/>",
+        caption: "a </figure> & b",
+    }];
+    let none = Sample::new(1);
+    let events = cloud(&none, 1, ["event", "events"]);
+    let page = html("</title><script>", "<lead>", &sections, &figures, &events);
+
+    assert!(page.contains("<title>&lt;/title&gt;&lt;script&gt;</title>"));
+    assert!(page.contains("<p>&lt;lead&gt;</p>"));
+    assert!(page.contains(">&lt;h&gt;</h2>"));
+    assert!(page.contains("<th scope=\"row\">&lt;b&gt;&amp;&quot;&#39;</th>"));
+    assert!(page.contains("<td>1 &lt; 2</td>"));
+    assert!(page.contains("<figcaption>a &lt;/figure&gt; &amp; b</figcaption>"));
+    assert!(!page.contains("<script"), "a script without events");
+}
+
+#[test]
+fn page_loads_nothing() {
+    let values = [Some(1.0), None];
+    let map = dtof_draw::picture::Map {
+        title: "t",
+        unit: "m",
+        sides: ["column", "row"],
+        missing: "event",
+        columns: 2,
+        rows: 1,
+        values: &values,
+    };
+    let svg = dtof_draw::picture::heat_map(&map).unwrap();
+    let figures = [Figure {
+        svg: &svg,
+        caption: "c",
+    }; 3];
+    let page = page(&sample(10, 10), 10, &[], &figures);
+
+    assert_eq!(page.matches("<svg").count(), 3);
+    let reaching_out = "src=|href|@import|url(|<link|fetch|import |XMLHttp|eval|innerHTML";
+    for word in reaching_out.split('|') {
+        assert!(!page.contains(word), "{word}");
+    }
+    let addresses = page.matches("http://").count() + page.matches("https://").count();
+    assert_eq!(
+        addresses,
+        page.matches("xmlns=\"http://www.w3.org/2000/svg\"").count()
+    );
+}
+
+#[test]
+fn the_policy_names_the_only_script() {
+    let page = page(&sample(10, 10), 10, &[], &[]);
+    assert_eq!(page.matches("<script").count(), 2);
+    let (_, script) = page.split_once("<script type=\"module\">").unwrap();
+    let (script, _) = script.split_once("</script>").unwrap();
+    let hash = BASE64.encode(Sha256::digest(script));
+    let policy = format!("default-src 'none'; script-src 'sha256-{hash}'; ");
+    assert!(page.contains(&policy));
+    assert!(!page.contains("script-src 'unsafe-inline'"));
+    // No handlers in attributes: the policy would not run them.
+    assert!(!page.contains(" onclick") && !page.contains(" onload"));
+}
+
+#[test]
+fn the_script_is_given_every_event() {
+    let data = data(&page(&sample(10, 10), 12, &[], &[]));
+    assert_eq!((&data["columns"], &data["rows"]), (&2.into(), &2.into()));
+    assert_eq!((&data["cycles"], &data["unit"]), (&12.into(), &1.into()));
+    assert_eq!(data["spikes"], serde_json::json!([2, 0]));
+    assert_eq!(data["colours"].as_str().unwrap().len(), 256 * 6);
+    let records = BASE64.decode(data["records"].as_str().unwrap()).unwrap();
+    assert_eq!(records.len(), 10 * 10);
+    for (index, record) in (0u16..).zip(records.chunks(10)) {
+        let cycle = u32::from_le_bytes(record[..4].try_into().unwrap());
+        let range = f32::from_le_bytes(record[4..8].try_into().unwrap());
+        let pixel = u16::from_le_bytes(record[8..].try_into().unwrap());
+        assert_eq!((cycle, pixel), (index.into(), index % 4));
+        // The middle of a bin of 37.47 mm.
+        let expected = (f32::from(10 + index % 4) + 0.5) * 37.474;
+        assert!((range - expected).abs() < 0.1, "{range} {expected}");
+    }
+}
+
+#[test]
+fn a_run_of_any_length_fits_32_bits() {
+    let data = data(&page(&sample(10, 10), u64::MAX, &[], &[]));
+    let unit = data["unit"].as_u64().unwrap();
+    assert_eq!(unit, 1 << 32);
+    assert!((u64::MAX - 1) / unit <= u64::from(u32::MAX));
+}
+
+#[test]
+fn a_page_says_how_many_of_the_events_it_shows() {
+    let whole = page(&sample(10, 10), 10, &[], &[]);
+    assert!(whole.contains("All 10 events are shown."));
+    let sample = sample(10, 50);
+    let kept = sample.events().len();
+    let part = page(&sample, 50, &[], &[]);
+    let note = format!("<strong>1 of 8 events shown</strong>: {kept} of 50, evenly spread.");
+    assert!(part.contains(&note));
+    assert_eq!(data(&part)["oneOf"], 8);
+}
+
+#[test]
+fn a_report_on_frames_speaks_of_readings() {
+    let sample = sample(10, 10);
+    let events = cloud(&sample, 10, ["reading", "readings"]);
+    let page = html("t", "l", &[], &[], &events);
+    assert!(page.contains("All 10 readings are shown."));
+    assert!(page.contains(">Readings in space and time<"));
+    assert_eq!(data(&page)["events"], "readings");
+    assert!(!page.contains("{{"));
+}
+
+#[test]
+fn events_and_figures_stay_below_the_documented_size() {
+    assert_eq!(Sample::LIMIT, 262_144);
+    let base64 = base64::encoded_len(10 * Sample::LIMIT, true).unwrap();
+    assert!((3_450_000..3_550_000).contains(&base64)); // 3.5 MB
+    for figures in [0, 1_000_000, 2_000_000, 3_000_000, 4_500_000] {
+        let mut sample = sample(Sample::LIMIT, 1 << 18);
+        sample.limit(room_for_events(figures));
+        let svg = format!("<svg>{}</svg>", "M1 1h1v1h-1z".repeat(figures / 12));
+        let figures = [Figure {
+            svg: &svg,
+            caption: "c",
+        }];
+        let page = page(&sample, 1 << 20, &[], &figures);
+        assert!(page.len() < PAGE, "{}", page.len());
+    }
+    // Beside maps that leave nothing there are some.
+    assert_eq!(room_for_events(PAGE), 4096);
+    let empty = page(&sample(1, 1), 1, &[], &[]).len();
+    assert!(empty < ALL_ELSE / 2, "{empty}");
+}
+
+#[test]
+fn without_scripting_the_maps_are_left() {
+    let page = page(&sample(10, 10), 10, &[], &[]);
+    let (_, note) = page.split_once("id=\"unscripted\">").unwrap();
+    assert!(note.starts_with("Without scripting the events cannot be turned;"));
+    assert!(page.contains("<div id=\"interactive\" hidden>"));
+}
+
+#[test]
+fn figures_stand_in_the_page_as_elements() {
+    let svg = "<?xml version=\"1.0\"?>\n<svg width=\"1\"/>\n";
+    let figures = [Figure { svg, caption: "c" }, Figure { svg, caption: "d" }];
+    let page = page(&sample(1, 1), 1, &[], &figures);
+    assert_eq!(page.matches("<svg width=\"1\"/>").count(), 2);
+    assert!(!page.contains("<?xml"));
+}
+
+#[test]
+fn page_is_deterministic() {
+    let rows = [("a".to_owned(), "b".to_owned())];
+    let sections = [Section {
+        heading: "h",
+        rows: &rows,
+    }; 2];
+    let page = || page(&sample(10, 100), 100, &sections, &[]);
+    assert_eq!(page(), page());
+    assert!(page().contains("id=\"section-2\""));
+}

@@ -1,0 +1,193 @@
+//! No command replaces a file that it reads, nor one in its folder that it did not write.
+
+use std::fs;
+use std::path::Path;
+
+use crate::common::Scratch;
+use crate::common::aer::{HEADER, events, file};
+use dtof::events::output::Output;
+use dtof::events::summary::Summary;
+use dtof::input::photon_csv::PhotonCsv;
+use dtof::simulate::scene;
+use dtof_core::Statistics;
+
+const PHOTONS: &str = "pixel,cycle,bin\n0,0,0\n";
+const SCENE: &str = "cycles = 100\n[[surface]]\nrange_mm = 1000\nsignal = 1\n";
+const RESULTS: [&str; 9] = [
+    "depth-last.svg",
+    "depth-mean.svg",
+    "event-counts.svg",
+    "events.aer",
+    "events.csv",
+    "reflectivity-events.svg",
+    "reflectivity-signal.svg",
+    "report.html",
+    "summary.json",
+];
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// `dtof ARGUMENTS` must end with one line that says `reason`, and leave `name` as it is.
+#[track_caller]
+fn kept(scratch: &Scratch, arguments: &[&str], name: &str, reason: &str) {
+    let before = scratch.read(name);
+    let output = scratch.dtof(arguments);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+    assert!(message.contains(&format!("{name}: {reason}")), "{message}");
+    assert_eq!(message.lines().count(), 1, "{message}");
+    assert_eq!(scratch.read(name), before);
+}
+
+const READ: &str = "is the file that is read";
+
+#[test]
+fn a_recording_in_the_output_folder_is_kept() {
+    for name in RESULTS {
+        let scratch = Scratch::new();
+        // Photon lists end in .csv; other names are reached through a link.
+        let arguments = |input| ["replay", "--input", input, "--out", "out"];
+        scratch.file("out/photons.csv", PHOTONS);
+        fs::hard_link(
+            scratch.path("out/photons.csv"),
+            scratch.path("out").join(name),
+        )
+        .unwrap();
+        let result = format!("out/{name}");
+        kept(&scratch, &arguments("out/photons.csv"), &result, READ);
+        assert_eq!(names(&scratch.path("out")).len(), 2);
+    }
+    let scratch = Scratch::new();
+    scratch.file("out/events.csv", PHOTONS);
+    let arguments = ["replay", "--input", "out/events.csv", "--out", "out/../out"];
+    let output = scratch.dtof(&arguments);
+    assert!(String::from_utf8(output.stderr).unwrap().contains(READ));
+    assert_eq!(scratch.read("out/events.csv"), PHOTONS);
+}
+
+#[cfg(unix)]
+#[test]
+fn links_hide_no_input() {
+    let scratch = Scratch::new();
+    fs::create_dir(scratch.path("out")).unwrap();
+    scratch.file("photons.csv", PHOTONS);
+    scratch.file("scene.toml", SCENE);
+    std::os::unix::fs::symlink("../photons.csv", scratch.path("out/summary.json")).unwrap();
+    let arguments = ["replay", "--input", "photons.csv", "--out", "out"];
+    kept(&scratch, &arguments, "out/summary.json", READ);
+    fs::remove_file(scratch.path("out/summary.json")).unwrap();
+    std::os::unix::fs::symlink("../scene.toml", scratch.path("out/report.html")).unwrap();
+    let arguments = ["simulate", "--scene", "scene.toml", "--out", "out"];
+    kept(&scratch, &arguments, "out/report.html", READ);
+    assert_eq!(
+        scratch.read("photons.csv") + &scratch.read("scene.toml"),
+        PHOTONS.to_owned() + SCENE
+    );
+}
+
+#[test]
+fn a_scene_in_the_output_folder_is_kept() {
+    let scratch = Scratch::new();
+    scratch.file("out/summary.json", SCENE);
+    let arguments = ["simulate", "--scene", "out/summary.json", "--out", "out"];
+    kept(&scratch, &arguments, "out/summary.json", READ);
+}
+
+#[test]
+fn a_file_of_somebody_else_is_kept() {
+    for name in RESULTS {
+        // Of the same kind, and empty.
+        for text in ["{}\n", "<svg></svg>\n", "<!DOCTYPE html>\n", PHOTONS, ""] {
+            let scratch = Scratch::new();
+            let result = format!("out/{name}");
+            scratch.file(&result, text);
+            scratch.file("photons.csv", PHOTONS);
+            let arguments = ["replay", "--input", "photons.csv", "--out", "out"];
+            kept(
+                &scratch,
+                &arguments,
+                &result,
+                "was not written by this program",
+            );
+            assert_eq!(names(&scratch.path("out")), [name]);
+        }
+    }
+    let scratch = Scratch::new();
+    scratch.file("out/demo/report.html", "mine\n");
+    let arguments = ["demo", "--cycles", "200"];
+    kept(
+        &scratch,
+        &arguments,
+        "out/demo/report.html",
+        "was not written",
+    );
+}
+
+/// Also after one that was ended between any two of its files.
+#[test]
+fn results_of_an_earlier_run_are_replaced() {
+    let scratch = Scratch::new();
+    let photons = scratch.file("photons.csv", PHOTONS);
+    scratch.replayed(&photons, &[]);
+    assert_eq!(names(&scratch.path("out")), RESULTS);
+    scratch.file("out/notes.txt", "mine\n");
+    scratch.replayed(&photons, &["--alpha", "8"]);
+    for name in [
+        "summary.json",
+        "report.html",
+        "events.aer",
+        "depth-last.svg",
+    ] {
+        fs::remove_file(scratch.path("out").join(name)).unwrap();
+        scratch.replayed(&photons, &[]);
+    }
+    assert_eq!(scratch.read("out/notes.txt"), "mine\n");
+    // Another command's, too: they are of this program.
+    let scene = scratch.file("scene.toml", SCENE);
+    assert!(scratch.simulate(&scene, &["--quiet"]).status.success());
+}
+
+/// What cannot be moved to its place leaves a folder that does not look complete.
+#[test]
+fn a_folder_that_cannot_be_completed_has_no_summary() {
+    let scratch = Scratch::new();
+    let photons = scratch.file("photons.csv", PHOTONS);
+    scratch.replayed(&photons, &[]);
+    let source = PhotonCsv::open(&photons, 128, None, 1).unwrap();
+    let settings = scene::settings(1);
+    let out = scratch.path("out");
+    let output = Output::create(&out, &settings, &source, None).unwrap();
+    fs::remove_file(out.join("report.html")).unwrap();
+    fs::create_dir(out.join("report.html")).unwrap();
+    let summary = Summary::new(&Statistics::default(), &source, 0, &settings);
+    let error = output.finish(&summary, "", "", &[]).unwrap_err();
+    assert!(format!("{error:#}").contains("report.html: "), "{error:#}");
+    assert!(!out.join("summary.json").exists());
+    assert!(names(&out).iter().all(|name| !name.starts_with('.')));
+}
+
+#[test]
+fn what_an_export_reads_is_kept() {
+    let scratch = Scratch::new();
+    scratch.file("events.aer", file(&HEADER, &events()));
+    scratch.file("calibration.toml", "columns = 64\n");
+    fs::hard_link(scratch.path("events.aer"), scratch.path("same.aer")).unwrap();
+    let export = |out| {
+        let arguments = ["export", "events.aer", "--format", "ply", "--out", out];
+        let output =
+            scratch.dtof(&[&arguments[..], &["--calibration", "calibration.toml"]].concat());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    for out in ["events.aer", "./events.aer", "same.aer", "calibration.toml"] {
+        assert_eq!(export(out), format!("error: {out}: {READ}\n"));
+    }
+    assert_eq!(scratch.read("calibration.toml"), "columns = 64\n");
+    assert!(fs::read(scratch.path("same.aer")).unwrap() == file(&HEADER, &events()));
+}

@@ -1,0 +1,119 @@
+//! Numbers, names and devices of the command line: read alike by every command, and refused in
+//! one line.
+
+use std::fs;
+use std::process::{Command, Stdio};
+
+use crate::common::aer::{HEADER, events, file};
+use crate::common::{Scratch, table};
+
+const PHOTONS: &str = "pixel,cycle,bin\n0,0,0\n";
+
+#[test]
+fn numbers_may_have_exponents() {
+    let scratch = Scratch::new();
+    let scene = scratch.file(
+        "scene.toml",
+        "columns = 4\ncycles = 10\n[[surface]]\nrange_mm = 1000\nsignal = 1\n",
+    );
+    let run = |arguments: &str| {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        let output = scratch.simulate(&scene, &arguments);
+        assert!(output.status.success(), "{output:?}");
+        (scratch.read("out/events.csv"), scratch.summary())
+    };
+    let plain = run(
+        "--cycles 2000 --alpha 4.5 --l1 40 --l2 1000 --x 8 --min-count 6 --gate 8..100 \
+                     --array 2x1 --seed 12 --sigma-bins 1",
+    );
+    let other = run(
+        "--cycles 2e3 --alpha 45e-1 --l1 4E1 --l2 1e+3 --x 8.0 --min-count 0.6e1 \
+                     --gate 8..1e2 --array 2x1e0 --seed 1.2e1 --sigma-bins 1e0",
+    );
+    assert!(plain.0.lines().count() > 10);
+    assert_eq!(plain, other);
+}
+
+#[test]
+fn numbers_that_cannot_be_are_refused_in_one_line() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", PHOTONS);
+    scratch.all_refused(
+        &format!("replay --out out --input {}", input.display()),
+        "
+            --cycles 1.5 | --cycles | must be a whole number from
+            --cycles 1e-1 | --cycles | must be a whole number from
+            --cycles 1e20 | --cycles | must be a whole number from
+            --cycles 1_000 | --cycles | must be a whole number from
+            --seed many | --seed | must be a whole number from
+            --l2 1e5 | --l2 | from 0 to 65535
+            --bins 1e2 | --bins | must be a power of two from 8 to 1024
+            --gate 1..x | --gate | FIRST..LAST
+            --sigma-bins 0 | --sigma-bins | must be above 0 and at most 1.75
+            --sigma-bins 1.76 | --sigma-bins | must be above 0 and at most 1.75
+            --sigma-bins 255 | --sigma-bins | must be above 0 and at most 1.75
+        ",
+    );
+    let tune = "tune --rule window --background 0.1 --signal 1 --sigma-bins 2";
+    scratch.refused(&scratch.run(tune), &["σ = 2 bins", "up to 1.75"]);
+}
+
+#[test]
+fn standard_input_and_output_are_no_files_of_that_name() {
+    let scratch = Scratch::new();
+    for row in table(
+        "
+            --input | replay --input - --out out
+            --out | replay --input photons.csv --out -
+            --scene | simulate --scene - --out out
+            --out | simulate --scene scene.toml --out -
+            --out | demo --out -
+            '< | export - --format csv --out x
+            --out | export events.aer --format csv --out -
+            --calibration | export events.aer --format csv --out x --calibration -
+            --record | monitor --device tcp:localhost:1 --record -
+        ",
+    ) {
+        let said = "standard input and output are not supported here";
+        scratch.refused(&scratch.run(&row[1]), &[&row[0], said]);
+    }
+    assert!(!scratch.path("-").exists());
+}
+
+#[test]
+fn decode_reads_standard_input() {
+    let scratch = Scratch::new();
+    let aer = scratch.file("events.aer", file(&HEADER, &events()));
+    let decode = |input: fs::File| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_dtof"));
+        command.args(["decode", "-"]).stdin(Stdio::from(input));
+        command.output().unwrap()
+    };
+    let output = decode(fs::File::open(&aer).unwrap());
+    assert!(output.status.success());
+    let of_file = scratch.run("decode events.aer");
+    assert_eq!(output.stdout, of_file.stdout);
+    let other = scratch.file("photons.csv", PHOTONS);
+    let output = decode(fs::File::open(other).unwrap());
+    scratch.refused(&output, &["error: standard input: not an AER file"]);
+}
+
+#[test]
+fn the_help_of_monitor_has_no_option_that_it_refuses() {
+    let scratch = Scratch::new();
+    let help = |command| String::from_utf8(scratch.dtof(&[command, "--help"]).stdout).unwrap();
+    assert!(help("replay").contains("--frame") && help("simulate").contains("--frame"));
+    assert!(!help("monitor").contains("--frame"));
+}
+
+#[test]
+fn a_serial_port_that_is_not_there_is_answered_with_those_that_are() {
+    let scratch = Scratch::new();
+    for command in [
+        &["monitor"][..],
+        &["demo", "--cycles", "10", "--out", "out"],
+    ] {
+        let output = scratch.dtof(&[command, &["--device", "/dev/ttyNOWHERE"]].concat());
+        scratch.refused(&output, &["/dev/ttyNOWHERE: ", "serial port"]);
+    }
+}

@@ -1,0 +1,163 @@
+//! The options that choose the rule and the estimator, end to end.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+use std::process::Output;
+
+use crate::common::Scratch;
+use serde_json::Value;
+
+/// A pulse over bins 60 and 61, and a background photon every third laser cycle.
+fn photons(scratch: &Scratch) -> PathBuf {
+    let mut text = "pixel,cycle,bin\n".to_owned();
+    for cycle in 0..1000 {
+        let signal = 60 + cycle % 2;
+        writeln!(text, "0,{cycle},{signal}").unwrap();
+        if cycle % 3 == 0 {
+            writeln!(text, "0,{cycle},{}", cycle * 7 % 128).unwrap();
+        }
+    }
+    scratch.file("photons.csv", text)
+}
+
+/// The settings in the summary, and the events.
+#[track_caller]
+fn replayed(options: &str) -> (Value, String) {
+    let scratch = Scratch::new();
+    let options: Vec<&str> = options.split_whitespace().collect();
+    let summary = scratch.replayed(&photons(&scratch), &options);
+    (summary["settings"].clone(), scratch.read("out/events.csv"))
+}
+
+fn replay(scratch: &Scratch, options: &str) -> Output {
+    let options: Vec<&str> = options.split_whitespace().collect();
+    scratch.replay(&photons(scratch), &options)
+}
+
+#[test]
+fn without_an_option_it_is_the_papers_rule_and_centroid() {
+    let (settings, events) = replayed("");
+    assert_eq!(
+        (&settings["rule"], &settings["estimator"]),
+        (&"paper".into(), &"centroid".into())
+    );
+    assert_eq!(settings["alpha"], 4.0);
+    for name in ["window", "z", "sigma_bins"] {
+        assert!(settings.get(name).is_none(), "{name}");
+    }
+    assert_eq!(replayed("--rule paper --alpha 4").1, events);
+}
+
+#[test]
+fn the_pulse_chooses_estimator_and_window() {
+    let (settings, events) = replayed("--rule window --sigma-bins 1 --l1 4");
+    assert_eq!(settings["rule"], "window");
+    assert_eq!(settings["window"], 3);
+    assert_eq!(settings["estimator"], "centred-window");
+    assert_eq!(settings["sigma_bins"], 1.0);
+    assert!(settings.get("alpha").is_none());
+    // The pulse lies evenly about 61.
+    assert!(
+        events.lines().count() > 50 && events.contains(",61.0000,"),
+        "{events}"
+    );
+
+    // With the paper's rule, too; and a window that is given stays.
+    let (settings, _) = replayed("--sigma-bins 1");
+    assert_eq!(
+        (&settings["rule"], &settings["sigma_bins"]),
+        (&"paper".into(), &1.0.into())
+    );
+    let (settings, _) = replayed("--rule window --sigma-bins 1 --window 5");
+    assert_eq!(settings["window"], 5);
+    let (settings, _) = replayed("--rule window --window 5");
+    assert_eq!(settings["estimator"], "centroid");
+}
+
+/// What `z_for` gives for one in 100 exposures: `core/tests/detect/window_z.rs` holds it.
+#[test]
+fn the_false_alarms_choose_z() {
+    let z = |options: &str| {
+        let (settings, _) = replayed(&format!("--rule window --window 2 {options}"));
+        settings["z"].as_f64().unwrap()
+    };
+    let z_for = |one_in, first, last, l1| {
+        let gate = dtof_core::RangeGate::<128>::new(first, last).unwrap();
+        dtof_core::z_for(one_in, &gate, 4, l1, 2000).to_num::<f64>()
+    };
+    assert_eq!(z(""), z_for(100, 0, 127, 40));
+    assert_eq!(z("--false-alarm 0.01"), z(""));
+    assert_eq!(z("--false-alarm 1e-3"), z_for(1000, 0, 127, 40));
+    // Of a share that is not one in a whole number, the next rarer one.
+    assert_eq!(z("--false-alarm 0.03"), z_for(34, 0, 127, 40));
+    assert_eq!(z("--gate 20..119 --l1 8"), z_for(100, 20, 119, 8));
+    assert!(z("--false-alarm 0.001") > z("") && z("") > z("--gate 20..119"));
+}
+
+#[test]
+fn the_summary_says_how_to_do_it_again() {
+    for options in [
+        "--rule window --sigma-bins 0.7 --false-alarm 0.003 --l1 8",
+        "--rule window --window 4 --z 3.1 --l1 8",
+        "--sigma-bins 1.3 --alpha 3.3 --l1 8",
+    ] {
+        let (settings, events) = replayed(options);
+        let mut again = format!("--l1 8 --rule {}", settings["rule"].as_str().unwrap());
+        for (option, name) in [
+            ("alpha", "alpha"),
+            ("window", "window"),
+            ("z", "z"),
+            ("sigma-bins", "sigma_bins"),
+        ] {
+            if let Some(value) = settings.get(name) {
+                write!(again, " --{option} {value}").unwrap();
+            }
+        }
+        assert_eq!(replayed(&again), (settings, events), "{again}");
+    }
+}
+
+#[test]
+fn what_was_used_is_printed_and_in_the_report() {
+    let scratch = Scratch::new();
+    let output = replay(&scratch, "--rule window --sigma-bins 1 --z 4.5");
+    let printed = String::from_utf8(output.stdout).unwrap();
+    for text in [printed, scratch.read("out/report.html")] {
+        for part in ["window of 3 bins", "4.5 standard deviations", "±2.5 bins"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+    }
+}
+
+#[test]
+fn options_that_contradict_each_other_are_refused_in_one_line() {
+    let scratch = Scratch::new();
+    photons(&scratch);
+    scratch.all_refused(
+        "replay --input photons.csv --out out",
+        r#"
+            --rule window --window 3 --alpha 4 | --alpha | --rule paper
+            --z 4 | --z is for --rule window
+            --window 3 | --window is for --rule window
+            --false-alarm 0.02 | --false-alarm is for --rule window
+            --rule window --window 3 --z 4 --false-alarm 0.02 | --z | --false-alarm
+            --rule window | --window | --sigma-bins
+            --rule window --window 0 | --window | from 1 to 7
+            --rule window --window 8 | --window | from 1 to 7
+            --rule window --window -1 | --window | from 1 to 7
+            --rule window --window 3 --z 16 | --z | a number from 0
+            --rule window --window 3 --z -1 | --z | a number from 0
+            --rule window --window 3 --false-alarm 0.11 | --false-alarm | at most 0.1
+            --rule window --window 3 --false-alarm 0 | --false-alarm | above 0
+            --rule window --window 3 --false-alarm 1e-9 | --false-alarm 0.000000001 | no z for so few
+            --sigma-bins 0 | --sigma-bins | above 0
+            --sigma-bins -1 | --sigma-bins
+            --sigma-bins 0.0001 | --sigma-bins | smallest step
+            --rule other | --rule | paper | window
+            --rule window --window 3 --gate 0..3 | --gate 0..3
+            --rule window --window 3 --gate 100..200 | --gate 100..200 | 128 bins
+            --rule window --window 3 --bins 100 | --bins | power of two
+            --rule window --window 3 --bins 5 | --bins | power of two
+        "#,
+    );
+}

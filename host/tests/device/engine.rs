@@ -1,0 +1,199 @@
+//! The engine on a device against the engine on this computer: the same
+//! photons, word for word the same events. The device is the sidecar of the
+//! firmware behind a TCP port of this computer.
+
+use std::net::TcpListener;
+use std::path::Path;
+use std::time::Duration;
+
+use crate::common::says;
+use crate::{listen, serve};
+use dtof::device::{self, Client, DeviceEngine};
+use dtof::engine::Engine;
+use dtof::engine::host::host_engine;
+use dtof::engine::settings::Settings;
+use dtof::input::source::{Geometry, PhotonSource};
+use dtof::simulate::scene;
+use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::{Count, DepthEvent, WindowRule};
+use dtof_firmware::sidecar::Sidecar;
+
+const PIXELS: usize = 64;
+
+fn settings() -> Settings {
+    scene::settings(1)
+}
+
+/// The same with the other rule and the other estimator.
+fn with_windows() -> Settings {
+    Settings {
+        rule: WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
+            .unwrap()
+            .into(),
+        sigma_bins: Some(U8F8::lit("0.55")),
+        ..settings()
+    }
+}
+
+/// Serves one connection after the other, each with a sidecar fresh from
+/// power-on; a connection ends when the host is gone or after `lives`.
+fn device(lives: Option<Duration>) -> String {
+    let mut lives = lives.unwrap_or(Duration::MAX);
+    listen(move |stream| {
+        let mut pixels = heapless::Vec::<_, PIXELS>::new();
+        while let Ok(true) = serve(
+            stream,
+            &mut Sidecar::new(&mut pixels, None),
+            lives,
+            |_, _| {},
+        ) {
+            lives = Duration::MAX; // switched off and on
+        }
+        true
+    })
+}
+
+/// All events of `cycles` laser cycles of the demo's scene, which is the same with all
+/// settings.
+fn events(engine: &mut dyn Engine, cycles: u64) -> anyhow::Result<Vec<DepthEvent>> {
+    let geometry = Geometry::new(8, 8);
+    let mut photons = scene::photons(geometry, &settings(), cycles)?;
+    let mut events = Vec::new();
+    for _ in 0..cycles / 250 {
+        events.extend(engine.run(&photons.next_slice(250)?)?);
+    }
+    Ok(events)
+}
+
+fn addresses() -> Vec<dtof_core::PixelAddress> {
+    (0..64).map(dtof_core::PixelAddress).collect()
+}
+
+/// The same events on the device and on the host, and gives them.
+#[track_caller]
+fn same_events(
+    settings: &Settings,
+    cycles: u64,
+    reads_every: Duration,
+    at_least: u64,
+) -> Vec<DepthEvent> {
+    let mut client = Client::new(device::open(&device(None), None).unwrap()).unwrap();
+    assert_eq!((client.bins(), client.pixels()), (128, 64));
+    client.reads_every = reads_every;
+    let mut on_device = DeviceEngine::new(client, settings, &addresses()).unwrap();
+    let mut on_host = host_engine(settings, &addresses()).unwrap();
+    let expected = events(on_host.as_mut(), cycles).unwrap();
+    let actual = events(&mut on_device, cycles).unwrap();
+    assert!(!expected.is_empty() && actual == expected);
+    assert_eq!(on_device.statistics(), on_host.statistics());
+    assert_eq!(on_device.report().cycles, cycles);
+    assert!(on_device.statistics().counted >= at_least);
+    actual
+}
+
+#[test]
+fn a_million_photons_give_the_same_events_on_a_device() {
+    same_events(&settings(), 6_000, Duration::ZERO, 1_000_000);
+}
+
+#[test]
+fn a_host_that_seldom_reads_gets_the_same_events() {
+    same_events(&settings(), 1_500, Duration::from_millis(20), 100_000);
+}
+
+#[test]
+fn every_rule_and_estimator_gives_the_same_events_on_a_device() {
+    let with_windows = with_windows();
+    let variants = [
+        Settings {
+            sigma_bins: None,
+            ..with_windows.clone()
+        },
+        Settings {
+            rule: settings().rule,
+            ..with_windows.clone()
+        },
+        with_windows,
+        settings(),
+    ];
+    let events: Vec<_> = variants
+        .iter()
+        .map(|settings| same_events(settings, 1_000, Duration::ZERO, 100_000))
+        .collect();
+    // And not because the device decides as it always does.
+    for (index, one) in events.iter().enumerate() {
+        assert!(!events[index + 1..].contains(one));
+    }
+}
+
+#[test]
+fn a_configuration_the_device_cannot_take_is_refused_with_its_reason() {
+    let name = device(None);
+    let refused = |settings: &Settings, pixels: u16| {
+        let client = Client::new(device::open(&name, None).unwrap()).unwrap();
+        let addresses: Vec<_> = (0..pixels).map(dtof_core::PixelAddress).collect();
+        let engine = DeviceEngine::new(client, settings, &addresses);
+        format!("{:#}", engine.err().expect("refused"))
+    };
+    let reason = refused(
+        &Settings {
+            l2: 100,
+            ..settings()
+        },
+        64,
+    );
+    assert!(
+        reason.contains("refuses") && reason.contains("L2 must be greater than L1"),
+        "{reason}"
+    );
+    let reason = refused(&settings(), 65);
+    says(&reason, "does not have that many pixels");
+}
+
+#[test]
+fn a_device_that_restarts_is_noticed() {
+    let name = device(Some(Duration::from_millis(200)));
+    let client = Client::new(device::open(&name, None).unwrap()).unwrap();
+    let mut engine = DeviceEngine::new(client, &settings(), &addresses()).unwrap();
+    let error = loop {
+        if let Err(error) = events(&mut engine, 250) {
+            break error;
+        }
+    };
+    assert!(format!("{error:#}").contains("restarted"), "{error:#}");
+}
+
+#[test]
+fn an_emulated_device_runs_an_image_and_no_other_takes_one() {
+    let refused = |name: &str, image: &str| {
+        let opened = device::open(name, Some(Path::new(image)));
+        format!("{:#}", opened.err().expect("refused"))
+    };
+    let missing = refused("qemu", "no/such/image");
+    assert!(missing.starts_with("no image at no/such/image: "));
+    assert!(missing.contains("`cargo xtask image mps2-an386`"));
+    assert_eq!(
+        refused("qemu", "Cargo.toml"),
+        "Cargo.toml: no ELF file, as an image is"
+    );
+    assert_eq!(
+        refused("tcp:127.0.0.1:1", "Cargo.toml"),
+        "--image is for --device qemu"
+    );
+}
+
+#[test]
+fn nobody_at_the_other_end_is_an_error_not_a_hang() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let name = format!("tcp:{}", listener.local_addr().unwrap());
+    let error = Client::new(device::open(&name, None).unwrap())
+        .err()
+        .expect("nobody answers");
+    assert!(
+        format!("{error:#}").contains("no device answered"),
+        "{error:#}"
+    );
+    drop(listener);
+    assert!(device::open(&name, None).is_err());
+    assert!(device::open("/dev/not-a-port", None).is_err());
+}

@@ -1,0 +1,259 @@
+//! `dtof monitor --record` on a device that plays a part: events at awkward moments, and
+//! readers that have seen enough.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::io::{self, ErrorKind, Write};
+use std::path::Path;
+use std::rc::Rc;
+use std::time::Duration;
+
+use crate::{Closing, settings};
+use dtof::device::monitor::map::LiveMap;
+use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
+use dtof::device::{Client, Port};
+use dtof::events::aer_file::{Event, Header, Reader};
+use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_core::{
+    AerEncoder, BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, SubBinOffset,
+};
+use dtof_link::endpoint::Endpoint;
+use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_link::message::greeting;
+use dtof_link::{Configuration, Report, Source, message};
+
+const PIXELS: u16 = 4;
+
+fn event(pixel: u16, cycle: u64) -> DepthEvent {
+    DepthEvent {
+        pixel: PixelAddress(pixel),
+        cycle: LaserCycle(cycle),
+        exposure: 44,
+        peak_bin: BinIndex::saturating(20),
+        offset: SubBinOffset::CENTRE,
+        peak_count: Count::saturating(37),
+        background: Count::saturating(4),
+        flags: Flags::NONE,
+    }
+}
+
+/// When the device sends an event.
+#[derive(Clone, Copy, PartialEq)]
+enum Moment {
+    /// It answers the first request for statistics.
+    Begins,
+    /// It answers any later one.
+    Runs,
+    /// It is to stop.
+    Stops,
+}
+
+/// A device whose events come from pixel `pixel`, the last one from pixel 0. After `lives`
+/// events it is gone.
+struct Device {
+    endpoint: Endpoint,
+    deframer: Deframer,
+    encoder: AerEncoder,
+    pixel: u16,
+    lives: u64,
+    answers: VecDeque<(u8, Vec<u8>)>,
+    reports: u32,
+    now_ms: u32,
+    sent: Rc<RefCell<Vec<DepthEvent>>>,
+}
+
+impl Device {
+    fn event(&mut self, moment: Moment) {
+        let cycle = self.sent.borrow().len() as u64;
+        let pixel = match moment {
+            Moment::Stops => 0,
+            Moment::Begins | Moment::Runs => self.pixel,
+        };
+        let event = event(pixel, 100 * cycle + moment as u64);
+        let (time, word) = self.encoder.encode(&event);
+        let words = time.into_iter().chain([word]);
+        let body: Vec<u8> = words.flat_map(|word| word.to_le_bytes()).collect();
+        self.answers.push_back((message::EVENTS, body));
+        self.sent.borrow_mut().push(event);
+    }
+
+    fn answer(&mut self, kind: u8, body: &[u8]) {
+        let answer = match kind {
+            message::CONFIGURE => {
+                if Configuration::from_le_bytes(body).unwrap().source == Source::Link {
+                    self.event(Moment::Stops);
+                }
+                (message::CONFIGURED, Vec::new())
+            }
+            message::STATISTICS_REQUEST => {
+                let moments = [Moment::Begins, Moment::Runs];
+                self.event(moments[usize::from(self.reports > 0)]);
+                self.reports += 1;
+                (
+                    message::STATISTICS,
+                    Report::default().to_le_bytes().to_vec(),
+                )
+            }
+            kind => panic!("message {kind:#04x}"),
+        };
+        self.answers.push_back(answer);
+    }
+}
+
+impl Port for Device {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        for &byte in bytes {
+            if let Some(frame) = self.deframer.push(byte) {
+                self.endpoint.receive(frame, self.now_ms);
+            }
+        }
+        while let Some(message) = self.endpoint.take() {
+            self.answer(message.kind, &message.body);
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.now_ms += 1;
+        std::thread::sleep(Duration::from_millis(1));
+        let gone = self.sent.borrow().len() as u64 >= self.lives;
+        while let Some((kind, body)) = self.answers.front() {
+            // The last thing it sends is an event.
+            if gone && *kind != message::EVENTS || self.endpoint.offer(*kind, body).is_err() {
+                break;
+            }
+            self.answers.pop_front();
+        }
+        let mut length = 0;
+        let mut wire = [0; WIRE_BYTES];
+        loop {
+            let more = self.endpoint.transmit(self.now_ms, &mut wire);
+            if more == 0 {
+                break;
+            }
+            bytes[length..length + more].copy_from_slice(&wire[..more]);
+            length += more;
+        }
+        match (gone, length) {
+            (true, 0) => Err(ErrorKind::UnexpectedEof.into()),
+            _ => Ok(length),
+        }
+    }
+}
+
+/// A terminal, for all to see.
+#[derive(Clone, Default)]
+struct Screen(Rc<RefCell<Vec<u8>>>);
+
+impl Write for Screen {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.borrow_mut().write(bytes)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// What the device sent, what was recorded of it, and why it ended.
+struct Monitored {
+    sent: Vec<DepthEvent>,
+    recorded: Vec<Event>,
+    drawn: String,
+    error: Option<String>,
+}
+
+fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("events.aer");
+    let header = Header {
+        bins: 128,
+        geometry: array(PIXELS, None),
+        bin_width_ps: U16F16::lit("250"),
+        offset_mm: I24F8::ZERO,
+    };
+    let sent = Rc::default();
+    let mut client = Client::new(Box::new(Device {
+        endpoint: Endpoint::device(greeting(128, PIXELS)),
+        deframer: Deframer::new(),
+        encoder: AerEncoder::new(),
+        pixel,
+        lives,
+        answers: VecDeque::new(),
+        reports: 0,
+        now_ms: 0,
+        sent: Rc::clone(&sent),
+    }))
+    .unwrap();
+    let mut recording = Recording::new(&path, &header).unwrap();
+    let screen = Screen::default();
+    let room = Box::new(|| (24, 80));
+    let mut map = LiveMap::new(Box::new(screen.clone()), room, PIXELS, 2);
+    let task = Task {
+        settings: &settings(),
+        pixels: PIXELS,
+        dynamic_depth: None,
+    };
+    let ended = monitor(
+        &mut client,
+        &task,
+        |elapsed| elapsed >= Duration::from_secs(seconds),
+        &mut Outputs {
+            events: &mut Closing(events),
+            statistics: &mut io::sink(),
+            map: Some(&mut map),
+            recording: Some(&mut recording),
+        },
+    );
+    recording.finish().unwrap();
+    Monitored {
+        sent: sent.take(),
+        recorded: recorded(&path),
+        drawn: String::from_utf8(screen.0.take()).unwrap(),
+        error: ended.err().map(|error| format!("{error:#}")),
+    }
+}
+
+fn recorded(path: &Path) -> Vec<Event> {
+    let file = std::fs::File::open(path).unwrap();
+    let mut reader = Reader::new(io::BufReader::new(file)).unwrap();
+    std::iter::from_fn(|| reader.next_event().transpose())
+        .collect::<Result<_, _>>()
+        .unwrap()
+}
+
+#[test]
+fn what_is_sent_is_recorded_also_when_nobody_reads_and_while_the_device_stops() {
+    // No room for the columns' names, for them alone, for everything.
+    for room in [0, 100, 100_000] {
+        let run = monitored(3, u64::MAX, 2, room);
+        assert_eq!(run.error, None);
+        assert!(run.sent.len() >= 3, "at first, after a second, at the end");
+        let sent: Vec<_> = run.sent.into_iter().map(Event::Depth).collect();
+        assert_eq!(run.recorded, sent);
+        // The last event, too.
+        let (_, last) = run.drawn.rsplit_once("\r").unwrap();
+        assert!(last.contains("2 of 4 pixels") && last.contains("events/s "));
+    }
+}
+
+#[test]
+fn what_was_sent_before_the_device_is_gone_is_recorded() {
+    for lives in [1, 2] {
+        let run = monitored(3, lives, 30, 100_000);
+        let error = run.error.unwrap();
+        assert!(error.contains("the device cannot be read from"), "{error}");
+        let sent: Vec<_> = run.sent.into_iter().map(Event::Depth).collect();
+        assert_eq!(sent.len() as u64, lives);
+        assert_eq!(run.recorded, sent);
+    }
+}
+
+#[test]
+fn a_pixel_the_device_was_not_configured_for_ends_it() {
+    let run = monitored(PIXELS, u64::MAX, 30, 100_000);
+    assert_eq!(
+        run.error.unwrap(),
+        "the device sends an event of pixel 4, and has 4 pixels"
+    );
+    assert_eq!(run.recorded, []);
+}

@@ -1,0 +1,12 @@
+//! `dtof export`: each format, and files and options that it refuses.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod damage;
+mod event_camera;
+#[cfg(target_os = "linux")]
+mod memory;
+mod plane;
+mod points;
+mod refused;

@@ -1,0 +1,54 @@
+//! `dtof export`: options that cannot be.
+
+use crate::common::Scratch;
+use crate::common::aer::{HEADER, depth, events, file};
+
+#[cfg(unix)]
+#[test]
+fn a_calibration_without_end_is_refused() {
+    let scratch = Scratch::new();
+    scratch.file("events.aer", file(&HEADER, &events()));
+    let arguments = ["export", "events.aer", "--format", "csv", "--out", "x"];
+    let output = scratch.dtof(&[&arguments[..], &["--calibration", "/dev/zero"]].concat());
+    scratch.refused(&output, &["/dev/zero: more than 16777216 bytes"]);
+}
+
+#[test]
+fn options_that_cannot_be_are_refused_in_one_line() {
+    let scratch = Scratch::new();
+    scratch.file("events.aer", file(&HEADER, &events()));
+    scratch.file(
+        "calibration.toml",
+        "columns = 64\nrows = 32\npixels = [\n]\n",
+    );
+    scratch.file("late.aer", file(&HEADER, &[depth(0, 1 << 60, 5)]));
+    std::fs::create_dir(scratch.path("folder")).unwrap();
+    scratch.all_refused(
+        "export",
+        r#"
+            events.aer --format csv | --out
+            events.aer --out x | --format
+            events.aer --format las --out x | las
+            none.aer --format csv --out x | none.aer: No such file
+            folder --format csv --out x | folder: not a file
+            events.aer --format csv --out folder | folder: is there, and is no file
+            events.aer --format csv --out /dev/null | is no file
+            events.aer --format csv --out ./events.aer | is the file that is read
+            events.aer --format csv --out x --fov 60 | HORIZONTALxVERTICAL
+            events.aer --format csv --out x --fov 0x10 | HORIZONTALxVERTICAL
+            events.aer --format csv --out x --laser-hz 0 | --laser-hz
+            late.aer --format ply --out x | PLY holds 9007199 s of time
+            events.aer --format csv --out x --slice-us 5 | --slice-us: only for mcap
+            events.aer --format mcap --out x --slice-us 0 | --slice-us
+            events.aer --format ply --out x --threshold-mm 3 | --threshold-mm and --reference: only for evt2
+            events.aer --format mcap --out x --reference reported | --threshold-mm and --reference: only for evt2
+            events.aer --format evt2 --out x --fov 60x40 | --fov: only for points
+            events.aer --format evt2 --out x --calibration none.toml | --calibration: only for points
+            events.aer --format csv --out x --events dynamic-depth | 12 events, none of them a dynamic depth event
+            events.aer --format csv --out x --calibration none.toml | none.toml: No such file
+            events.aer --format csv --out x --calibration calibration.toml | calibration.toml: line 1: 0 pixels, should be 2048
+            events.aer --format csv --out x --calibration calibration.toml --fov 60x40 | cannot be used with
+        "#,
+    );
+    assert!(!scratch.path("x").exists());
+}

@@ -1,0 +1,348 @@
+//! Bad input gives one clear line and a failure, never a panic and never a
+//! half-written result.
+
+use crate::common::{Scratch, table};
+
+const CSV_HEADER: &str = "pixel,cycle,bin\n";
+
+#[track_caller]
+fn csv_refused(rows: &str, parts: &[&str]) {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", format!("{CSV_HEADER}{rows}"));
+    scratch.refused(&scratch.replay(&input, &[]), parts);
+}
+
+#[test]
+fn csv_rows_that_are_not_photons_are_named_by_line() {
+    for row in table(
+        r#"
+        0,1,2\n0,2\n | photons.csv:3: | 2 fields, not 3
+        0,1,2\n0,2,3,4\n | photons.csv:3: | 4 fields
+        0,1,2\n0,2, | photons.csv:3: | bin "" | whole number
+        0,1,2\n\n\n0,2\n\n | photons.csv:5: | 2 fields, not 3
+        +1,0,2\n | photons.csv:2: | pixel "+1"
+        0,x,2\n | photons.csv:2: | cycle "x" | whole number
+        -1,0,2\n | photons.csv:2: | pixel "-1"
+        0,0,2.5\n | photons.csv:2: | bin "2.5"
+        0,99999999999999999999,2\n | photons.csv:2: | cycle
+        65536,0,2\n | photons.csv:2: | pixel 65536 | 65535
+        0,5,2\n0,4,2\n | photons.csv:3: | cycle 4 comes after cycle 5
+        0,5,128\n | photons.csv:2: | bin 128 | 128 bins
+        0,5,65664\n | photons.csv:2: | bin 65664
+    "#,
+    ) {
+        let parts: Vec<&str> = row[1..].iter().map(String::as_str).collect();
+        csv_refused(&row[0], &parts);
+    }
+    csv_refused(&"0,".repeat(1000), &["photons.csv:2:", "fields, not 3"]);
+    csv_refused("", &["photons.csv:2:", "no photons"]);
+}
+
+#[test]
+fn a_bad_row_after_the_last_cycle_to_replay_is_still_found() {
+    let scratch = Scratch::new();
+    let input = scratch.file(
+        "photons.csv",
+        format!("{CSV_HEADER}0,1,2\n0,5000,3\n0,5001,x\n"),
+    );
+    let output = scratch.replay(&input, &["--cycles", "100"]);
+    scratch.refused(&output, &["photons.csv:4:", "bin \"x\""]);
+}
+
+#[test]
+fn csv_files_that_are_not_photon_lists_are_refused() {
+    for (bytes, part) in [
+        (&b""[..], "photons.csv:1: the file is empty"),
+        (
+            b"cycle,pixel,bin\n0,1,2\n",
+            "photons.csv:1: the header must be pixel,cycle,bin, not \"cycle,pixel,bin\"",
+        ),
+        (b"pixel,cycle,bin\n0,\xff,2\n", "photons.csv:2: not text"),
+    ] {
+        let scratch = Scratch::new();
+        let input = scratch.file("photons.csv", bytes);
+        scratch.refused(&scratch.replay(&input, &[]), &[part]);
+    }
+}
+
+/// An `.npy` file as it should be, or not.
+fn npy(header: &str, data: &[u8]) -> Vec<u8> {
+    let padding = 64 - (10 + header.len() + 1) % 64;
+    let length = u16::try_from(header.len() + padding + 1).unwrap();
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend(length.to_le_bytes());
+    bytes.extend(header.bytes());
+    bytes.extend(std::iter::repeat_n(b' ', padding));
+    bytes.push(b'\n');
+    bytes.extend(data);
+    bytes
+}
+
+fn described(descr: &str, fortran: &str, shape: &str) -> String {
+    format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': {shape}, }}")
+}
+
+#[track_caller]
+fn npy_refused(header: &str, data: &[u8], parts: &[&str]) {
+    let scratch = Scratch::new();
+    let input = scratch.file("recorded.npy", npy(header, data));
+    scratch.refused(
+        &scratch.replay(&input, &[]),
+        &[parts, &["recorded.npy"]].concat(),
+    );
+}
+
+#[test]
+fn npy_files_that_are_not_integer_histograms_are_refused() {
+    let zeros = [0; 128];
+    for row in table(
+        "
+            <f4 | False | (2, 16) | <f4 | not integers
+            |b1 | False | (2, 64) | not integers
+            <c8 | False | (2, 8) | not integers
+            <u4 | True | (4, 8) | Fortran order
+            <u1 | False | (32, 4) | 4 bins | power of two
+        ",
+    ) {
+        let cells: Vec<&str> = row.iter().map(String::as_str).collect();
+        npy_refused(
+            &described(cells[0], cells[1], cells[2]),
+            &zeros,
+            &cells[3..],
+        );
+    }
+    for (descr, shape, data, part) in [
+        ("<i4", "(4, 8)", &[255; 128][..], "element 0 is negative"),
+        ("<u4", "()", &zeros[..4], "no axis"),
+        ("<u1", "(0, 8)", &[], "empty"),
+        ("<u1", "(8, 12)", &zeros[..96], "12 bins"),
+    ] {
+        npy_refused(&described(descr, "False", shape), data, &[part]);
+    }
+    npy_refused(
+        "{'descr': [('a', '<u4')], 'fortran_order': False, 'shape': (32,), }",
+        &zeros,
+        &["records"],
+    );
+    npy_refused("nonsense", &zeros, &["not an .npy file"]);
+}
+
+#[test]
+fn an_npy_header_that_lies_about_its_shape_is_refused() {
+    let zeros = [0; 128];
+    for shape in [
+        "(3, 16)",                      // more than there is
+        "(1, 16)",                      // less than there is
+        "(4294967296, 8)",              // far more
+        "(9223372036854775808, 16)",    // more bytes than can be counted
+        "(2305843009213693953, 8, 16)", // a product that wraps to 128
+    ] {
+        npy_refused(
+            &described("<u4", "False", shape),
+            &zeros,
+            &["the header claims"],
+        );
+    }
+}
+
+#[test]
+fn npy_files_cut_short_are_refused() {
+    let whole = npy(&described("<u2", "False", "(2, 32)"), &[1; 128]);
+    for length in [0, 5, 9, 30, whole.len() - 1] {
+        let scratch = Scratch::new();
+        let input = scratch.file("recorded.npy", &whole[..length]);
+        scratch.refused(&scratch.replay(&input, &[]), &["recorded.npy"]);
+    }
+}
+
+#[test]
+fn json_files_that_are_not_capture_logs_are_refused() {
+    let zone = format!("[{}]", ["0"; 128].join(","));
+    let eight = [zone.as_str(); 8].join(",");
+    for (text, part) in [
+        (String::new(), "log.json:1:"),
+        ("[]".into(), "no captures"),
+        ("[{}]".into(), "log.json:1:"),
+        ("[\n{\"hists\": [[1,\n".into(), "log.json:3:"),
+        (
+            format!("[{{\"hists\": [{eight}]}}]"),
+            "capture 0 has 8 zones, not 9",
+        ),
+        (
+            format!("[{{\"hists\": [{eight},[1,2]]}}]"),
+            "capture 0, zone 8 has 2 bins, not 128",
+        ),
+        (format!("[{{\"hists\": [{eight},[-1]]}}]"), "log.json:1:"),
+        (format!("[{{\"hists\": [{eight},[1.5]]}}]"), "log.json:1:"),
+    ] {
+        let scratch = Scratch::new();
+        let input = scratch.file("log.json", text);
+        scratch.refused(&scratch.replay(&input, &[]), &["log.json", part]);
+    }
+}
+
+#[test]
+fn settings_that_cannot_be_are_refused() {
+    let scratch = Scratch::new();
+    scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
+    scratch.all_refused(
+        "replay --out out --input photons.csv",
+        r#"
+            --l1 100 --l2 100 | L2 must be greater than L1
+            --x 0 | X must be at least 1
+            --x 50 | X must not be greater than L1
+            --x 30 --l2 50 | no multiple of X
+            --l2 65536 | 65536
+            --alpha 256 | --alpha
+            --alpha -1 | must be a number from 0 to
+            --alpha NaN | --alpha
+            --alpha 0.001 | less than half
+            --bins 100 | power of two
+            --bins 4 | power of two
+            --bins 2048 | power of two
+            --columns 0 | --columns
+            --gate 0..128 | past the last bin
+            --gate 20..26 | fewer than 8 bins
+            --gate 30..20 | fewer than 8 bins
+            --gate 20 | FIRST..LAST
+            --min-count 0 | --min-count
+            --min-count 1024 | --min-count
+            --bin-width-ps 0 | bin width is zero
+            --bin-width-ps 0.00003 | bin width is zero
+            --bin-width-ps 65535 | 8388 m
+            --bin-width-ps wide | --bin-width-ps
+            --offset-mm 9e9 | --offset-mm
+            --cycles 0 | --cycles
+            --photons-per-cycle 1 | are for histograms
+            --recorded-cycles 0 | --recorded-cycles
+            --nonsense | --nonsense
+            --apha 4 | a similar argument exists: '--alpha'
+        "#,
+    );
+    scratch.file("h.npy", npy(&described("<u1", "False", "(8,)"), &[1; 8]));
+    scratch.all_refused(
+        "replay --out out --input h.npy",
+        r#"
+            --photons-per-cycle 0 | --photons-per-cycle
+            --photons-per-cycle inf | --photons-per-cycle
+            --photons-per-cycle 1e-300 | longer than 2^40
+            --bins 16 | --bins 16, but the file has 8
+            --photons-per-cycle 1 --recorded-cycles 5 | cannot be used with
+        "#,
+    );
+}
+
+#[test]
+fn files_that_are_not_there_or_not_known_are_refused() {
+    let scratch = Scratch::new();
+    std::fs::create_dir(scratch.path("folder.csv")).unwrap();
+    scratch.all_refused(
+        "replay --out out --input",
+        "
+            none.csv | none.csv | No such file
+            none.npy | none.npy | No such file
+            none.json | none.json | No such file
+            a.txt | a.txt | .npy, .json or .csv
+            folder.csv | folder.csv
+        ",
+    );
+    scratch.refused(&scratch.run("replay"), &["--input"]);
+}
+
+#[test]
+fn an_output_folder_that_cannot_be_written_is_refused() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
+    let input = input.to_str().unwrap();
+    scratch.file("taken", "a file, not a folder");
+    for folder in ["taken", "taken/below", "/proc/none"] {
+        let output = scratch.dtof(&["replay", "--input", input, "--out", folder]);
+        scratch.refused(&output, &[folder]);
+    }
+    assert_eq!(scratch.read("taken"), "a file, not a folder");
+}
+
+#[test]
+fn a_folder_in_the_place_of_a_result_is_refused() {
+    let scratch = Scratch::new();
+    std::fs::create_dir_all(scratch.path("out/report.html")).unwrap();
+    let input = scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
+    let output = scratch.replay(&input, &[]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        !output.status.success() && message.contains("report.html: is there, and is no file"),
+        "{message}"
+    );
+}
+
+#[test]
+fn what_a_run_that_was_killed_has_left_is_removed() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
+    scratch.replayed(&input, &[]);
+    scratch.file("out/.dtof-run-left.partial", "from a run that was killed");
+    let of_others = [
+        "out/.dtof-export-a.partial",
+        "out/.dtof-recording-b.partial",
+    ];
+    for name in of_others {
+        scratch.file(name, "of an export or a recording under way");
+    }
+    scratch.replayed(&input, &[]);
+    assert!(!scratch.path("out/.dtof-run-left.partial").exists());
+    assert!(of_others.iter().all(|name| scratch.path(name).exists()));
+}
+
+#[test]
+fn output_that_cannot_be_written_is_an_error_not_a_panic() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
+    let full = || {
+        std::fs::File::options()
+            .write(true)
+            .open("/dev/full")
+            .unwrap()
+    };
+    let run = |arguments: &[&str], out: std::process::Stdio, err: std::process::Stdio| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_dtof"));
+        command.current_dir(scratch.path(".")).args(arguments);
+        command.stdout(out).stderr(err).output().unwrap()
+    };
+    let input = input.to_str().unwrap();
+    let arguments = ["replay", "--input", input, "--out", "out"];
+    let output = run(&arguments, full().into(), std::process::Stdio::piped());
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        String::from_utf8(output.stderr)
+            .unwrap()
+            .contains("No space left")
+    );
+    let output = run(&["decode", "none"], full().into(), full().into());
+    assert_eq!(output.status.code(), Some(1));
+}
+
+#[test]
+fn an_npy_header_made_to_take_long_is_refused_at_once() {
+    let nested = format!("{{'descr': {}'<u4'{}, }}", "[".repeat(60), "]".repeat(60));
+    npy_refused(&nested, &[0; 32], &["not plain integers"]);
+    let scratch = Scratch::new();
+    let long = [&b"\x93NUMPY\x02\x00\xff\xff\xff\xff"[..], &[b' '; 200]].concat();
+    let input = scratch.file("recorded.npy", long);
+    scratch.refused(&scratch.replay(&input, &[]), &["header is longer"]);
+}
+
+#[test]
+fn a_failed_run_leaves_the_results_of_the_one_before() {
+    let scratch = Scratch::new();
+    let good = scratch.file("good.csv", format!("{CSV_HEADER}0,0,0\n"));
+    scratch.replayed(&good, &[]);
+    let before = scratch.read("out/summary.json");
+    let bad = scratch.file("bad.csv", format!("{CSV_HEADER}0,0,0\n0,1,x\n"));
+    assert!(!scratch.replay(&bad, &[]).status.success());
+    assert_eq!(scratch.read("out/summary.json"), before);
+    let names: Vec<_> = std::fs::read_dir(scratch.path("out"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    assert!(names.iter().all(|name| !name.starts_with('.')), "{names:?}");
+}

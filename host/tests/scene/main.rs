@@ -1,0 +1,8 @@
+//! `dtof simulate`: scene files, and events against what the pixels saw.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod files;
+mod refused;
+mod truth;
