@@ -168,13 +168,8 @@ fn a_bin_past_the_histogram_is_passed_on_and_one_before_it_is_rejected() {
     let results = over(0x19, &[4000, 0, 8_000, 0, 0x7f_ffff], CALIBRATIONS);
     let accesses = [results, write(0x00, ARM_1)].concat();
     assert_eq!(bench.poll(&accesses), Ok(Polled::Data));
-    let expected = [
-        Given::Photon(7, u16::MAX),
-        Given::Photon(7, 933),
-        Given::Photon(7, u16::MAX),
-        Given::End(1),
-    ];
-    assert_eq!(bench.sink.take(), expected);
+    let [a, b, c] = [u16::MAX, 933, u16::MAX].map(|code| Given::Photon(7, code));
+    assert_eq!(bench.sink.take(), [a, b, c, Given::End(1)]);
 }
 
 #[test]
