@@ -22,10 +22,8 @@ fn every_gate<const BINS: usize>() {
         let gate = RangeGate::<BINS>::new(first, last);
         assert_eq!(gate, Err(GateError::PastLastBin));
     }
-    assert_eq!(
-        RangeGate::<BINS>::new(u16::MAX, bins - 1),
-        Err(GateError::TooNarrow)
-    );
+    let gate = RangeGate::<BINS>::new(u16::MAX, bins - 1);
+    assert_eq!(gate, Err(GateError::TooNarrow));
     assert_eq!(RangeGate::<BINS>::new(0, bins - 1), Ok(RangeGate::full()));
     check_gate(RangeGate::<BINS>::full(), 0, bins - 1, BINS);
 }
@@ -45,17 +43,9 @@ fn check_gate<const BINS: usize>(gate: RangeGate<BINS>, first: u16, last: u16, i
 }
 
 #[test]
-fn every_gate_of_8_bins() {
+fn every_gate_is_what_it_says_or_refused() {
     every_gate::<8>();
-}
-
-#[test]
-fn every_gate_of_128_bins() {
     every_gate::<128>();
-}
-
-#[test]
-fn every_gate_of_1024_bins() {
     every_gate::<1024>();
 }
 

@@ -100,17 +100,9 @@ fn fill_one_bin<W: CounterWidth>(full: u32, past: u32) {
 }
 
 #[test]
-fn a_10_bit_counter_stops_at_1023() {
+fn counters_of_10_16_and_24_bits_stop_when_they_are_full() {
     fill_one_bin::<Count10>(1023, 100);
-}
-
-#[test]
-fn a_16_bit_counter_stops_at_65535() {
     fill_one_bin::<Count16>(65_535, 100);
-}
-
-#[test]
-fn a_24_bit_counter_stops_at_16777215() {
     fill_one_bin::<Count24>(16_777_215, 100);
 }
 
@@ -176,18 +168,10 @@ fn a_frame_is_its_photons_one_at_a_time() {
 #[test]
 fn a_frame_may_be_of_bytes_or_words() {
     let frame = [0u8, 1, 2, 255, 4, 5, 6, 7];
-    for histogram in [
-        {
-            let mut histogram = Histogram::<8>::new();
-            histogram.add_frame(&frame, &RangeGate::full());
-            histogram
-        },
-        {
-            let mut histogram = Histogram::<8>::new();
-            histogram.add_frame(&frame.map(u32::from), &RangeGate::full());
-            histogram
-        },
-    ] {
+    let (mut bytes, mut words) = (Histogram::<8>::new(), Histogram::<8>::new());
+    bytes.add_frame(&frame, &RangeGate::full());
+    words.add_frame(&frame.map(u32::from), &RangeGate::full());
+    for histogram in [bytes, words] {
         assert_eq!(histogram.counts(), &frame.map(u16::from));
         assert_eq!(histogram.peak().bin.raw(), 3);
     }

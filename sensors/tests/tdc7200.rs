@@ -3,9 +3,12 @@
 
 mod common;
 
-use std::cell::{Cell, RefCell};
-use std::rc::Rc;
+use std::cell::RefCell;
 
+use common::tdc7200::{
+    ARM_1, Access, Bench, CALIBRATIONS, MODE_1, configure, example, mode_1, over, read,
+    read_results, write, writes,
+};
 use common::{Broken, Given, Line, Notes};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
@@ -13,176 +16,8 @@ use dtof_sensors::tdc7200::{
     CalibrationPeriods, Config, ConfigError, Counts, Edge, Error, Mode, Settings, Stops, Tdc7200,
 };
 use dtof_sensors::{Polled, Sensor};
-use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
-use embedded_hal_mock::eh1::spi::{Mock, Transaction};
-
-type Access = Transaction<u8>;
-
-/// An SPI device that can be unplugged.
-#[derive(Clone)]
-struct Plug {
-    mock: Mock<u8>,
-    out: Rc<Cell<bool>>,
-}
-
-impl ErrorType for Plug {
-    type Error = ErrorKind;
-}
-
-impl SpiDevice for Plug {
-    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), ErrorKind> {
-        if self.out.get() {
-            return Err(ErrorKind::Other);
-        }
-        self.mock.transaction(operations)
-    }
-}
-
-fn transaction<const N: usize>(accesses: [Access; N]) -> Vec<Access> {
-    let start = [Access::transaction_start()].into_iter();
-    let ended = start.chain(accesses).chain([Access::transaction_end()]);
-    ended.collect()
-}
-
-fn write(register: u8, value: u8) -> Vec<Access> {
-    transaction([Access::write_vec(vec![0x40 | register, value])])
-}
-
-fn read(command: u8, bytes: &[u8]) -> Vec<Access> {
-    transaction([Access::write(command), Access::read_vec(bytes.to_vec())])
-}
-
-/// 24-bit registers, most significant byte first, with auto-increment.
-fn read_results(first: u8, values: &[u32]) -> Vec<Access> {
-    let bytes = values
-        .iter()
-        .flat_map(|value| value.to_be_bytes()[1..].to_vec());
-    read(0x80 | first, &bytes.collect::<Vec<u8>>())
-}
-
-/// A measurement that is over: `INT_STATUS`, the results and the calibrations.
-fn over(status: u8, results: &[u32], calibrations: [u32; 2]) -> Vec<Access> {
-    [
-        read(0x02, &[status]),
-        read_results(0x10, results),
-        read_results(0x1b, &calibrations),
-    ]
-    .concat()
-}
-
-/// The data sheet's example, 247.061 ns, and the next `START_MEAS`.
-fn example() -> Vec<Access> {
-    [over(0x19, &[4175], CALIBRATIONS), write(0x00, ARM_1)].concat()
-}
-
-/// The registers 0x01 and 0x03 to 0x09 as they should be configured, then
-/// CONFIG1 with `START_MEAS`.
-fn configure(registers: [(u8, u8); 8], config1: u8) -> Vec<Access> {
-    let reset = [read(0x01, &[0x40]), read(0x03, &[0x07])].concat();
-    let writes = registers.map(|(register, value)| write(register, value));
-    let reads = registers.map(|(register, value)| read(register, &[value]));
-    [reset, writes.concat(), reads.concat(), write(0x00, config1)].concat()
-}
-
-const MODE_1: [(u8, u8); 8] = [
-    (0x01, 0x40),
-    (0x03, 0x07),
-    (0x04, 0xff),
-    (0x05, 0xff),
-    (0x06, 0xff),
-    (0x07, 0xff),
-    (0x08, 0),
-    (0x09, 0),
-];
-const ARM_1: u8 = 0b1000_0001;
-/// The registers of the data sheet's example.
-const CALIBRATIONS: [u32; 2] = [2110, 21121];
-
-fn mode_1() -> Settings {
-    Settings {
-        first_bin_ps: 240_000,
-        ..Settings::new(PixelAddress(7), 8_000, U16F16::lit("250"))
-    }
-}
-
-struct Bench<const CHUNK: usize> {
-    sensor: Tdc7200<Plug, Line, Line, CHUNK>,
-    spi: Plug,
-    interrupt: Line,
-    enable: Line,
-    sink: Notes,
-    now_ms: u32,
-}
-
-impl<const CHUNK: usize> Bench<CHUNK> {
-    fn new(settings: Settings) -> Self {
-        let spi = Plug {
-            mock: Mock::new(&[]),
-            out: Rc::default(),
-        };
-        let interrupt = Line::new(true);
-        let enable = Line::new(false);
-        let config = Config::new(settings).unwrap();
-        Self {
-            sensor: Tdc7200::new(spi.clone(), interrupt.clone(), enable.clone(), config),
-            spi,
-            interrupt,
-            enable,
-            sink: Notes::default(),
-            // So that the milliseconds wrap in the middle of it.
-            now_ms: u32::MAX - 3,
-        }
-    }
-
-    /// Polls with exactly these accesses.
-    fn poll(&mut self, accesses: &[Access]) -> Result<Polled, Error<ErrorKind, Broken>> {
-        self.spi.mock.update_expectations(accesses);
-        let polled = self.sensor.poll(self.now_ms, &mut self.sink);
-        self.spi.mock.done();
-        polled
-    }
-
-    /// Polls after so many milliseconds, without an access.
-    fn wait(&mut self, ms: u32) -> Result<Polled, Error<ErrorKind, Broken>> {
-        self.now_ms = self.now_ms.wrapping_add(ms);
-        self.poll(&[])
-    }
-
-    /// From off to armed.
-    fn bring_up(&mut self, registers: [(u8, u8); 8], config1: u8) {
-        self.enable.driven.take();
-        assert_eq!(self.wait(0), Ok(Polled::Working));
-        assert_eq!(*self.enable.driven.borrow(), [false]);
-        assert_eq!(self.wait(1), Ok(Polled::Idle));
-        assert_eq!(self.wait(1), Ok(Polled::Working));
-        assert_eq!(*self.enable.driven.borrow(), [false, true]);
-        assert_eq!(self.wait(2), Ok(Polled::Idle));
-        self.now_ms = self.now_ms.wrapping_add(1);
-        let polled = self.poll(&configure(registers, config1));
-        assert_eq!(polled, Ok(Polled::Working));
-        assert!(self.sensor.is_armed());
-        assert_eq!(self.wait(0), Ok(Polled::Idle));
-    }
-
-    /// One measurement of mode 1 with one stop, as the data sheet's example.
-    fn measure(&mut self) {
-        self.interrupt.set(false);
-        assert_eq!(self.poll(&example()), Ok(Polled::Data));
-        // 247.061 ns are 7.061 ns into the histogram: bin 28.
-        assert_eq!(self.sink.take(), [Given::Photon(7, 28), Given::End(1)]);
-        self.interrupt.set(true);
-        assert_eq!(self.poll(&[]), Ok(Polled::Idle));
-    }
-
-    /// After an error nothing was given away, and all works again.
-    fn recover(&mut self) {
-        assert!(!self.sensor.is_armed());
-        assert_eq!(self.sink.take(), []);
-        self.interrupt.set(true);
-        self.bring_up(MODE_1, ARM_1);
-        self.measure();
-    }
-}
+use embedded_hal::spi::ErrorKind;
+use embedded_hal_mock::eh1::spi::Mock;
 
 fn armed() -> Bench<13> {
     let mut bench = Bench::new(mode_1());
@@ -262,17 +97,8 @@ fn every_setting_reaches_its_register() {
         parity: true,
         ..mode_1()
     });
-    let registers = [
-        (0x01, 0b1100_0100),
-        (0x03, 0x07),
-        (0x04, 0xff),
-        (0x05, 0xff),
-        (0x06, 0x12),
-        (0x07, 0x34),
-        (0x08, 0x01),
-        (0x09, 0x23),
-    ];
-    bench.bring_up(registers, 0b1101_1011);
+    let values = [0b1100_0100, 0x07, 0xff, 0xff, 0x12, 0x34, 0x01, 0x23];
+    bench.bring_up(values, 0b1101_1011);
 }
 
 #[test]
@@ -281,10 +107,9 @@ fn the_overflow_of_mode_1_is_the_coarse_counters() {
         overflow: 0x0100,
         ..mode_1()
     });
-    let mut registers = MODE_1;
-    registers[2] = (0x04, 0x01);
-    registers[3] = (0x05, 0x00);
-    bench.bring_up(registers, ARM_1);
+    let mut values = MODE_1;
+    (values[2], values[3]) = (0x01, 0x00);
+    bench.bring_up(values, ARM_1);
 }
 
 /// Mode 2, five stops of which three come before the clock counter overflows,
@@ -298,10 +123,10 @@ fn reads_in_chunks_and_gives_the_stops_that_came() {
             first_bin_ps: 0,
             ..mode_1()
         });
-        let mut registers = MODE_1;
-        registers[0] = (0x01, 0x44);
+        let mut values = MODE_1;
+        values[0] = 0x44;
         assert!(!bench.sensor.is_one_hit());
-        bench.bring_up(registers, ARM_1 | 0b10);
+        bench.bring_up(values, ARM_1 | 0b10);
         bench.interrupt.set(false);
 
         // 59.18 ps a count: 1000 counts are 59.176 ns. The second stop meets an
@@ -335,21 +160,16 @@ fn a_bin_past_the_histogram_is_passed_on_and_one_before_it_is_rejected() {
         stops: Stops::Three,
         ..mode_1()
     });
-    let mut registers = MODE_1;
-    registers[0] = (0x01, 0x42);
-    bench.bring_up(registers, ARM_1);
+    let mut values = MODE_1;
+    values[0] = 0x42;
+    bench.bring_up(values, ARM_1);
     bench.interrupt.set(false);
     // 236.7 ns, 473.4 ns and 0.496 ms.
     let results = over(0x19, &[4000, 0, 8_000, 0, 0x7f_ffff], CALIBRATIONS);
     let accesses = [results, write(0x00, ARM_1)].concat();
     assert_eq!(bench.poll(&accesses), Ok(Polled::Data));
-    let expected = [
-        Given::Photon(7, u16::MAX),
-        Given::Photon(7, 933),
-        Given::Photon(7, u16::MAX),
-        Given::End(1),
-    ];
-    assert_eq!(bench.sink.take(), expected);
+    let [a, b, c] = [u16::MAX, 933, u16::MAX].map(|code| Given::Photon(7, code));
+    assert_eq!(bench.sink.take(), [a, b, c, Given::End(1)]);
 }
 
 #[test]
@@ -422,9 +242,7 @@ fn a_register_that_does_not_take_its_value_is_an_error() {
     let accesses = [
         read(0x01, &[0x40]),
         read(0x03, &[0x07]),
-        MODE_1
-            .map(|(register, value)| write(register, value))
-            .concat(),
+        writes(MODE_1),
         read(0x01, &[0x40]),
         read(0x03, &[0x07]),
         read(0x04, &[0xfe]),

@@ -22,7 +22,7 @@ const PROFILES: [&str; 2] = ["firmware", "firmware-small"];
 /// What the panic handler of the image calls and nobody defines.
 const UNDEFINED: &str = "dtof_core_has_a_reachable_panic";
 
-/// The functions of `core_image.rs` that between them use all of dtof-core.
+/// The functions of `core_image/main.rs` that between them use all of dtof-core.
 const PARTS: &str =
     "units roots ranges words products texts gates trees thresholds histograms pixels";
 
@@ -161,7 +161,7 @@ impl Image {
             // Either mangling writes a name's length before it.
             let mangled = format!("10core_image{}{part}", part.len());
             if !self.symbols.iter().any(|name| name.contains(&mangled)) {
-                problems.push(format!("the part `{part}` of core_image.rs is missing"));
+                problems.push(format!("the part `{part}` of core-image is missing"));
             }
         }
         if self.text < MIN_TEXT {

@@ -1,11 +1,7 @@
 //! The background is the smaller of the two quadrant maxima of the half
 //! without the peak, and sees nothing outside the gate.
 
-use dtof_core::fixed::types::U8F8;
-use dtof_core::{
-    AsyncPixel, BinIndex, ComparatorTree, Count, LaserCycle, PaperRule, PhotonCount, PixelAddress,
-    PixelConfig, RangeGate, Statistics, quadrant_background,
-};
+use dtof_core::{BinIndex, ComparatorTree, Count, PhotonCount, RangeGate, quadrant_background};
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -161,60 +157,5 @@ proptest! {
             prop_assert_eq!(u16::first_reaching(&counts, level), first);
             prop_assert_eq!(u32::first_reaching(&wide, level), first);
         }
-    }
-
-    #[test]
-    fn bins_outside_the_gate_do_not_matter(
-        counts in prop::array::uniform32(0u32..1000),
-        other in prop::array::uniform32(0u32..1000),
-        first in 0u16..24,
-        width in 8u16..=32,
-        peak in 0usize..32,
-    ) {
-        let last = (first + width - 1).min(31);
-        let gate = RangeGate::<32>::new(first, last).unwrap();
-        let peak = peak.clamp(first.into(), last.into());
-        let mut changed = other;
-        let inside = &counts[first.into()..=last.into()];
-        changed[first.into()..=last.into()].copy_from_slice(inside);
-        let expected = naive(inside, peak - usize::from(first));
-        prop_assert_eq!(quadrant(&counts, &gate, peak), expected);
-        prop_assert_eq!(quadrant(&changed, &gate, peak), expected);
-    }
-
-    /// A pixel that is given the photons outside its gate, too, does the same
-    /// as one that is not, and says how many there were.
-    #[test]
-    fn photons_outside_the_gate_change_nothing(
-        photons in prop::collection::vec(prop::collection::vec(0u16..32, 0..8), 0..200),
-    ) {
-        let rule = PaperRule::new(U8F8::lit("1.5"), Count::saturating(3));
-        let gate = RangeGate::<32>::new(5, 20).unwrap();
-        let config = PixelConfig::with_rule(rule).x(4).l1(8).l2(40).gate(gate).build().unwrap();
-        let mut all = AsyncPixel::<32>::new(PixelAddress(1));
-        let mut some = AsyncPixel::<32>::new(PixelAddress(1));
-        let (mut of_all, mut of_some) = (Statistics::default(), Statistics::default());
-        let mut outside = 0;
-        for (cycle, codes) in (0..).map(LaserCycle).zip(&photons) {
-            for &code in codes {
-                all.count(&config, code);
-                if (5..=20).contains(&code) {
-                    some.count(&config, code);
-                } else {
-                    outside += 1;
-                }
-            }
-            let (look, expected) = (
-                all.end_laser_cycle(&config, &mut of_all, cycle),
-                some.end_laser_cycle(&config, &mut of_some, cycle),
-            );
-            prop_assert_eq!(look, expected);
-            prop_assert_eq!(all.acknowledge(), some.acknowledge());
-            prop_assert_eq!(all.histogram().counts(), some.histogram().counts());
-        }
-        all.add_photons_to(&mut of_all);
-        some.add_photons_to(&mut of_some);
-        prop_assert_eq!((of_all.gated_out, of_some.gated_out), (outside, 0));
-        prop_assert_eq!(of_all.counted, of_some.counted);
     }
 }

@@ -98,12 +98,9 @@ fn pattern<const BINS: usize>(number: u32, full: u32, rng: &mut Pcg32) -> [u32; 
             photons[a * group..(a + 1) * group].fill(5);
         }
         // Some bins one below full, full, one past it.
-        6 => photons.fill_with(|| {
-            if below(4) == 0 {
-                full - 1 + below(3)
-            } else {
-                below(9)
-            }
+        6 => photons.fill_with(|| match below(4) {
+            0 => full - 1 + below(3),
+            _ => below(9),
         }),
         // One bin far past full, so that a later one may tie with it.
         7 => {

@@ -27,20 +27,13 @@ fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) -> u32 {
     for round in 0..rounds {
         let (gate, histogram, most) = crate::common::histogram::<BINS, W>(&mut rng, round);
         let alpha = rng.next_u32() as u16 >> (rng.next_u32() % 16);
-        let minimum = Count::saturating(rng.next_u32() % (2 * most));
-        let minimum = if round % 2 == 0 {
-            Count::default()
-        } else {
-            minimum
-        };
-        let rule = PaperRule::new(U8F8::from_bits(alpha), minimum);
+        let minimum = rng.next_u32() % (2 * most) * (round % 2);
+        let rule = PaperRule::new(U8F8::from_bits(alpha), Count::saturating(minimum));
 
         let expected = as_written(&rule, &histogram, &gate);
         let background = rule.detect(&histogram, &gate, histogram.peak());
-        assert_eq!(
-            background,
-            expected.map(|(_, background)| whole_background(background))
-        );
+        let whole = expected.map(|(_, background)| whole_background(background));
+        assert_eq!(background, whole);
         let detection = detect(&histogram, &gate, &rule, &DepthEstimator::default());
         let detected = detection.map(|detection| (detection.peak, detection.background));
         assert_eq!(detected, expected);
@@ -61,19 +54,14 @@ fn it_decides_as_the_rule_is_written() {
         (check::<1024, Count10>(500, 5), 500),
     ] {
         // Both answers, often.
-        assert!(
-            fired > rounds / 20 && fired < rounds - rounds / 20,
-            "{fired}"
-        );
+        let often = rounds / 20..rounds - rounds / 20;
+        assert!(often.contains(&fired), "{fired}");
     }
 }
 
 #[test]
 fn an_empty_histogram_is_no_detection() {
     let rule = PaperRule::new(U8F8::ZERO, Count::default());
-    let (gate, estimator) = (RangeGate::full(), DepthEstimator::default());
-    assert_eq!(
-        detect(&Histogram::<8>::new(), &gate, &rule, &estimator),
-        None
-    );
+    let (empty, estimator) = (Histogram::<8>::new(), DepthEstimator::default());
+    assert!(detect(&empty, &RangeGate::full(), &rule, &estimator).is_none());
 }

@@ -84,18 +84,6 @@ fn every_10_bit_peak_fires_strictly_above_the_level_only() {
 }
 
 #[test]
-fn a_peak_equal_to_the_level_does_not_fire_and_the_next_does() {
-    let alpha = 640; // 2.5
-    for (background, level) in [(0, 0), (4, 9), (16, 26), (400, 450), (900, 975)] {
-        assert!(!fires::<Count10>(threshold(alpha, 0), level, background));
-        assert!(fires::<Count10>(threshold(alpha, 0), level + 1, background));
-    }
-    // A level of 9 and 1/256 is exceeded by 10, not by 9.
-    assert!(!fires::<Count10>(threshold(1, 0), 9, 9));
-    assert!(fires::<Count10>(threshold(1, 0), 10, 9));
-}
-
-#[test]
 fn fewer_photons_than_the_minimum_never_fire() {
     for minimum in [0, 1, 2, 5, 1000, 1023, 1024, 0x00ff_ffff] {
         for background in (0..1024).step_by(31) {
@@ -109,14 +97,6 @@ fn fewer_photons_than_the_minimum_never_fire() {
     }
 }
 
-#[test]
-fn an_empty_histogram_never_fires() {
-    for alpha in ALPHAS {
-        assert!(!fires::<Count10>(threshold(alpha, 0), 0, 0));
-        assert!(!fires::<Count24>(threshold(alpha, 0), 0, 0));
-    }
-}
-
 /// The level at 24 bits, and all peaks around it.
 fn check_24_bits(alpha: u16, background: u32) {
     const TOP: u64 = u32::MAX as u64; // the largest U24F8
@@ -126,11 +106,8 @@ fn check_24_bits(alpha: u16, background: u32) {
     for peak in [exact / 256, exact / 256 + 1, 0x00ff_fffe, 0x00ff_ffff] {
         let peak = u32::try_from(peak.min(0x00ff_ffff)).unwrap();
         let fires = fires::<Count24>(threshold(alpha, 0), peak, background);
-        assert_eq!(
-            fires,
-            u64::from(peak) * 256 > exact,
-            "{alpha}, {background}"
-        );
+        let expected = u64::from(peak) * 256 > exact;
+        assert_eq!(fires, expected, "{alpha}, {background}");
     }
 }
 

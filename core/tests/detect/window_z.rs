@@ -34,13 +34,8 @@ fn false_events<const BINS: usize>(
     let Looks { x, l1, l2 } = looks;
     let z = z_for(one_in, &gate, x, l1, l2);
     let rule = WindowRule::new(width, z, Count::default()).unwrap();
-    let config = PixelConfig::with_rule(rule)
-        .x(x)
-        .l1(l1)
-        .l2(l2)
-        .gate(gate)
-        .build()
-        .unwrap();
+    let config = PixelConfig::with_rule(rule).x(x).l1(l1).l2(l2);
+    let config = config.gate(gate).build().unwrap();
     let mut rng = Pcg64Mcg::seed_from_u64(u64::from(width));
     #[allow(clippy::cast_precision_loss, reason = "at most 1024")]
     let photons_a_cycle = background * BINS as f64;
@@ -55,9 +50,8 @@ fn false_events<const BINS: usize>(
                 pixel.count(&config, code);
                 next += gap(&mut rng, photons_a_cycle);
             }
-            if pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle.into()))
-                == Look::Event
-            {
+            let last = LaserCycle(cycle.into());
+            if pixel.end_laser_cycle(&config, &mut statistics, last) == Look::Event {
                 events += 1.0;
                 break;
             }

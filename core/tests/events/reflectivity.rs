@@ -25,13 +25,8 @@ fn event(peak: u32, background: u32, exposure: u16) -> DepthEvent {
 #[test]
 fn no_event_and_events_without_exposure_are_dark() {
     let mut pixel = Reflectivity::new();
-    assert_eq!(
-        (
-            pixel.of_events(I24F8::MAX),
-            pixel.of_signal(I24F8::MAX).to_bits()
-        ),
-        (0, 0)
-    );
+    assert_eq!(pixel.of_events(I24F8::MAX), 0);
+    assert_eq!(pixel.of_signal(I24F8::MAX).to_bits(), 0);
     pixel.add(&event(9, 1, 0));
     assert_eq!((pixel.events(), pixel.signal().to_bits()), (1, 0));
 }
@@ -79,12 +74,7 @@ fn photons(rng: &mut Pcg32, mean: f64) -> u32 {
 
 /// The signal read over the signal sent, all of it in one bin.
 fn read<R: DetectionRule>(rule: R, signal: f64) -> f64 {
-    let config = PixelConfig::with_rule(rule)
-        .x(4)
-        .l1(40)
-        .l2(2000)
-        .build()
-        .unwrap();
+    let config = PixelConfig::with_rule(rule).build().unwrap();
     let mut rng = Pcg32::seed_from_u64(1);
     let mut pixel = AsyncPixel::<128>::new(PixelAddress(0));
     let mut statistics = Statistics::default();

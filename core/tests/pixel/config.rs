@@ -96,20 +96,12 @@ impl DetectionRule for EverySecond {
 
 #[test]
 fn another_rule_takes_the_place_of_the_paper_s() {
-    let config = PixelConfig::with_rule(EverySecond)
-        .x(1)
-        .l1(1)
-        .l2(9)
-        .build()
-        .unwrap();
+    let config = PixelConfig::with_rule(EverySecond).x(1).l1(1).l2(9);
+    let config = config.build().unwrap();
     let mut pixel = Lone::<8>::new(0);
     for cycle in 0..100 {
         pixel.pixel.count(&config, 5);
-        let expected = if cycle % 2 == 0 {
-            Look::TooEarly
-        } else {
-            Look::Event
-        };
+        let expected = [Look::TooEarly, Look::Event][cycle as usize % 2];
         assert_eq!(pixel.end(&config, cycle, 1), expected);
         if let Some(event) = pixel.pixel.acknowledge() {
             assert_eq!((event.peak_count.raw(), event.background.raw()), (2, 1));

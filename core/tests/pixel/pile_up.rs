@@ -1,7 +1,6 @@
 //! Pile-up is flagged where the TDC takes one photon a laser cycle.
 
-use dtof_core::fixed::types::U8F8;
-use dtof_core::{Count, Flags, Look, PaperRule, PixelConfig, RangeGate};
+use dtof_core::{Flags, Look, PixelConfig, RangeGate};
 
 use crate::model::Lone;
 
@@ -9,15 +8,8 @@ use crate::model::Lone;
 /// the exposure alone.
 #[test]
 fn pile_up_is_more_than_a_photon_in_every_other_laser_cycle() {
-    let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
     let gate = RangeGate::new(1, 15).unwrap();
-    let multi = PixelConfig::<16>::with_rule(rule)
-        .x(4)
-        .l1(40)
-        .l2(2000)
-        .gate(gate)
-        .build()
-        .unwrap();
+    let multi = PixelConfig::<16>::paper().gate(gate).build().unwrap();
     let one_hit = multi.with_one_hit_tdc();
     assert!(one_hit.is_one_hit() && !multi.is_one_hit());
     // In the peak, gated out, past the last bin.
@@ -46,12 +38,7 @@ fn pile_up_is_more_than_a_photon_in_every_other_laser_cycle() {
 /// A full counter counts no more, but its photons came.
 #[test]
 fn photons_that_met_a_full_counter_pile_up_too() {
-    let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
-    let config = PixelConfig::<8>::with_rule(rule)
-        .x(4)
-        .l1(40)
-        .l2(4000)
-        .build();
+    let config = PixelConfig::<8>::paper().l2(4000).build();
     let config = config.unwrap().with_one_hit_tdc();
     for (photons, is_flagged) in [(1500, false), (1501, true)] {
         let mut pixel = Lone::<8>::new(0);

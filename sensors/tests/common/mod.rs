@@ -10,6 +10,7 @@ pub mod chips {
     pub mod tmf882x;
 }
 pub mod plug;
+pub mod tdc7200;
 pub mod tmf882x;
 
 use std::cell::{Cell, RefCell};

@@ -6,7 +6,7 @@ use std::iter;
 use dtof_core::PixelAddress;
 use dtof_sensors::tmf882x::{Config, Error, Settings, Tmf882x};
 use dtof_sensors::{Polled, Sensor};
-use embedded_hal::i2c::ErrorKind;
+use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock, Transaction as Access};
 
 use super::{Broken, Line, Notes};
@@ -70,6 +70,26 @@ pub fn settings() -> Settings {
         reference: Some(PixelAddress(99)),
         ..Settings::new(PixelAddress(10))
     }
+}
+
+pub const IMAGE: &[u8] = &[1, 2, 3];
+pub const NACK: ErrorKind = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
+
+/// Counts that differ in every bin and use all three bytes.
+pub fn some_counts() -> Counts {
+    let mut count = 0u32;
+    [(); 10].map(|()| {
+        [(); 128].map(|()| {
+            count = (count.wrapping_mul(1_664_525).wrapping_add(12345)) & 0xff_ffff;
+            count
+        })
+    })
+}
+
+pub fn measuring() -> Bench<128> {
+    let mut bench = Bench::new(settings(), IMAGE);
+    bench.bring_up_running();
+    bench
 }
 
 pub struct Bench<const CHUNK: usize> {
@@ -170,14 +190,19 @@ impl<const CHUNK: usize> Bench<CHUNK> {
         self.configure();
     }
 
-    /// A sensor that has to be loaded with the image 1, 2, 3.
-    pub fn bring_up_loading(&mut self) {
+    /// The bootloader takes the image 1, 2, 3.
+    pub fn load(&mut self) {
         let done = || read(0x41, 0x08, &[0x00, 0x00, 0xFF]);
-        self.switch_on(true);
         self.identify(0x80, &[0x08, 0x14, 0x01, 0x29, 0xC1]);
         self.work(&[done(), write(0x41, &[0x08, 0x43, 0x02, 0x00, 0x00, 0xBA])]);
         self.work(&[done(), write(0x41, &[0x08, 0x41, 0x03, 1, 2, 3, !0x4A])]);
         self.work(&[done(), write(0x41, &[0x08, 0x11, 0x00, 0xEE])]);
+    }
+
+    /// A sensor that has to be loaded.
+    pub fn bring_up_loading(&mut self) {
+        self.switch_on(true);
+        self.load();
         self.wait(11);
         self.work(&[read(0x41, 0x00, &[0x03]), write(0x41, &[0x08, 0x16])]);
         self.configure();

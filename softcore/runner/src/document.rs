@@ -168,52 +168,6 @@ mod tests {
         assert_eq!(text(&files.rows, &files.photons, &files.memory), written);
     }
 
-    /// What the README says of the figures.
-    fn readme(files: &Files) -> String {
-        let whole = |row: Option<&Row>| row.map_or(0, |row| (row.cycles + 50) / 100);
-        let warm = |core, operation| whole(find(&files.rows, core, operation).0);
-        let cold = |core, operation| whole(find(&files.rows, core, operation).1);
-        let [decision, .., event] = AGAINST;
-        let [vexriscv, ibex, picorv32, serv] = [
-            "vexriscv,rv32im",
-            "ibex,rv32imc",
-            "picorv32,rv32im",
-            "serv,rv32i",
-        ];
-        let rate = |core: &str| {
-            let highest = files.photons.iter().find(|photons| photons.core == core);
-            highest.map_or(0.0, Sustained::rate) * 1e4
-        };
-        format!(
-            "A decision on a kept peak, without an event, takes {} cycles on VexRiscv with its code in the cache ({} \
-             without), {} on Ibex, {} on PicoRV32 and {} on SERV; an event takes {}, {}, {} and {} from the look to the packed \
-             word. Four macropixels that share a processor of 100 MHz and a laser of 10 MHz take in {:.0}, {:.0}, {:.0} and \
-             {:.0} thousand photons a second from a FIFO.",
-            warm(vexriscv, decision),
-            cold(vexriscv, decision),
-            warm(ibex, decision),
-            warm(picorv32, decision),
-            warm(serv, decision),
-            warm(vexriscv, event),
-            warm(ibex, event),
-            warm(picorv32, event),
-            warm(serv, event),
-            rate(vexriscv),
-            rate(ibex),
-            rate(picorv32),
-            rate(serv),
-        )
-    }
-
-    #[test]
-    fn the_readme_says_what_the_files_say() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let text = fs::read_to_string(root.join("README.md")).unwrap();
-        let words: Vec<&str> = text.split_whitespace().collect();
-        let expected = readme(&Files::read(&root).unwrap());
-        assert!(words.join(" ").contains(&expected), "not there: {expected}");
-    }
-
     #[test]
     fn what_the_page_says_of_240_cycles_holds() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

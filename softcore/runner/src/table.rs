@@ -34,14 +34,9 @@ pub struct Row {
 
 pub const HEADER: &str = "core,isa,operation,cycles,instructions,code lines,data lines";
 
-/// A count of the testbench at a mark.
-#[derive(Clone, Copy, Debug, Default)]
-struct Count {
-    cycle: u64,
-    instructions: u64,
-    code: u64,
-    data: u64,
-}
+/// What the testbench counts: cycles, instructions, lines of code and of data.
+const COUNTS: [&str; 4] = ["cycle", "instructions", "code", "data"];
+type Counts = [u64; COUNTS.len()];
 
 /// The operations of a run of the bench: cold ones of a processor that has `caches`
 /// only; where there is none, both must be the same.
@@ -60,7 +55,7 @@ pub fn rows(core: &str, caches: bool, ran: &Ran) -> Result<Vec<Row>> {
         }
     }
     let mut pairs = operations.chunks_exact(2);
-    let mut calls = [(Count::default(), 0); 2];
+    let mut calls = [(Counts::default(), 0); 2];
     let mut rows = Vec::new();
     for (number, pair) in pairs.by_ref().enumerate() {
         let mut both = Vec::new();
@@ -75,10 +70,10 @@ pub fn rows(core: &str, caches: bool, ran: &Ran) -> Result<Vec<Row>> {
                 *call = (total, measured);
                 continue;
             }
-            let less = |of: fn(Count) -> u64| {
+            let less = |of: usize| {
                 // In parts of a call of nothing, of which there may be more or fewer.
                 let parts = call.1.max(1);
-                let rest = (of(total) * parts).checked_sub(of(call.0) * measured);
+                let rest = (total[of] * parts).checked_sub(call.0[of] * measured);
                 let rest = rest.with_context(|| format!("{name}: less than a call of nothing"))?;
                 let times = times.max(1) * parts;
                 anyhow::Ok((rest * 100 + times / 2) / times)
@@ -86,11 +81,11 @@ pub fn rows(core: &str, caches: bool, ran: &Ran) -> Result<Vec<Row>> {
             both.push(Row {
                 core: core.to_owned(),
                 operation: name.to_owned(),
-                cycles: less(|count| count.cycle)?,
-                instructions: less(|count| count.instructions)?,
+                cycles: less(0)?,
+                instructions: less(1)?,
                 // A call of nothing may meet a line that the operation does not.
-                code_lines: less(|count| count.code).unwrap_or_default(),
-                data_lines: less(|count| count.data).unwrap_or_default(),
+                code_lines: less(2).unwrap_or_default(),
+                data_lines: less(3).unwrap_or_default(),
             });
         }
         let [cold, warm] = &mut both[..] else {
@@ -113,26 +108,25 @@ pub fn rows(core: &str, caches: bool, ran: &Ran) -> Result<Vec<Row>> {
 }
 
 /// What was counted between marks 2 k + 1 and 2 k + 2, and how often, by k.
-fn totals(lines: &str) -> Result<BTreeMap<u64, (Count, u64)>> {
-    let mut totals = BTreeMap::<u64, (Count, u64)>::new();
-    let mut begun: Option<(u64, Count)> = None;
+fn totals(lines: &str) -> Result<BTreeMap<u64, (Counts, u64)>> {
+    let mut totals = BTreeMap::<u64, (Counts, u64)>::new();
+    let mut begun: Option<(u64, Counts)> = None;
     for line in lines.lines() {
         let Some(rest) = line.strip_prefix("mark ") else {
             continue;
         };
-        let (number, count) = mark(rest).with_context(|| format!("what is `{line}`?"))?;
+        let (number, counts) = mark(rest).with_context(|| format!("what is `{line}`?"))?;
         match begun.take() {
             None => {
                 ensure!(number % 2 == 1, "`{line}` ends what did not begin");
-                begun = Some((number, count));
+                begun = Some((number, counts));
             }
             Some((before, start)) => {
                 ensure!(number == before + 1, "`{line}` does not end {before}");
                 let (total, times) = totals.entry(before / 2).or_default();
-                total.cycle += count.cycle - start.cycle;
-                total.instructions += count.instructions - start.instructions;
-                total.code += count.code - start.code;
-                total.data += count.data - start.data;
+                for ((total, count), start) in total.iter_mut().zip(counts).zip(start) {
+                    *total += count - start;
+                }
                 *times += 1;
             }
         }
@@ -142,66 +136,40 @@ fn totals(lines: &str) -> Result<BTreeMap<u64, (Count, u64)>> {
 }
 
 /// The rest of `mark N cycle C instructions I code C data D`.
-fn mark(rest: &str) -> Option<(u64, Count)> {
-    let words: Vec<&str> = rest.split(' ').collect();
-    let [
-        number,
-        "cycle",
-        cycle,
-        "instructions",
-        instructions,
-        "code",
-        code,
-        "data",
-        data,
-    ] = words[..]
-    else {
-        return None;
-    };
-    let count = Count {
-        cycle: cycle.parse().ok()?,
-        instructions: instructions.parse().ok()?,
-        code: code.parse().ok()?,
-        data: data.parse().ok()?,
-    };
-    Some((number.parse().ok()?, count))
+fn mark(rest: &str) -> Option<(u64, Counts)> {
+    let mut words = rest.split(' ');
+    let number = words.next()?.parse().ok()?;
+    let mut counts = Counts::default();
+    for (name, count) in COUNTS.iter().zip(&mut counts) {
+        words.next().filter(|word| word == name)?;
+        *count = words.next()?.parse().ok()?;
+    }
+    words.next().is_none().then_some((number, counts))
 }
 
 impl Row {
     /// Its line of the file.
     pub fn csv(&self) -> String {
-        let figures = [
-            self.cycles,
-            self.instructions,
-            self.code_lines,
-            self.data_lines,
-        ];
-        let figures = figures.map(decimal).join(",");
-        format!("{},{},{figures}", self.core, self.operation)
+        let counted = [self.cycles, self.instructions].map(decimal).join(",");
+        let lines = [self.code_lines, self.data_lines].map(decimal).join(",");
+        format!("{},{},{counted},{lines}", self.core, self.operation)
     }
 
     /// What a line of the file says.
     pub fn parse(line: &str) -> Option<Self> {
         let words: Vec<&str> = line.split(',').collect();
-        let [
-            core,
-            isa,
-            operation,
-            cycles,
-            instructions,
-            code_lines,
-            data_lines,
-        ] = words[..]
-        else {
+        let (&[core, isa, operation], figures) = words.split_first_chunk()?;
+        let figures: Option<Vec<u64>> = figures.iter().map(|text| of_decimal(text)).collect();
+        let [cycles, instructions, code_lines, data_lines] = figures?[..] else {
             return None;
         };
         Some(Self {
             core: format!("{core},{isa}"),
             operation: operation.to_owned(),
-            cycles: of_decimal(cycles)?,
-            instructions: of_decimal(instructions)?,
-            code_lines: of_decimal(code_lines)?,
-            data_lines: of_decimal(data_lines)?,
+            cycles,
+            instructions,
+            code_lines,
+            data_lines,
         })
     }
 
@@ -217,11 +185,8 @@ impl Row {
 
     /// Lines of code and of data filled, to be looked at.
     pub fn lines(&self) -> String {
-        format!(
-            "{:.0} + {:.0}",
-            hundredths(self.code_lines),
-            hundredths(self.data_lines)
-        )
+        let lines = [self.code_lines, self.data_lines].map(hundredths);
+        format!("{:.0} + {:.0}", lines[0], lines[1])
     }
 }
 
@@ -269,13 +234,8 @@ exit 0x0 cycle 250 instructions 60
     fn takes_a_call_of_the_same_kind_off_and_divides_by_the_times() {
         let rows = rows("vexriscv,rv32im", true, &Ran::success(OUTPUT, MARKS)).unwrap();
         let lines: Vec<String> = rows.iter().map(Row::csv).collect();
-        assert_eq!(
-            lines,
-            [
-                "vexriscv,rv32im,a: b; cold,12.50,5.00,0.50,1.00",
-                "vexriscv,rv32im,a: b,9.00,5.00,0.00,0.00"
-            ]
-        );
+        let cold = "vexriscv,rv32im,a: b; cold,12.50,5.00,0.50,1.00";
+        assert_eq!(lines, [cold, "vexriscv,rv32im,a: b,9.00,5.00,0.00,0.00"]);
         for (row, line) in rows.iter().zip(&lines) {
             assert_eq!(Row::parse(line).as_ref(), Some(row));
         }

@@ -6,8 +6,8 @@
 //! for floating point and allocation: `cargo xtask check-image` does both, for
 //! every target and profile.
 //!
-//! Every value comes from [`word`], about which the optimiser knows nothing, and
-//! ends in [`keep`], so that nothing is worked out while compiling and nothing
+//! Every value comes from [`values::word`], about which the optimiser knows nothing, and
+//! ends in [`values::keep`], so that nothing is worked out while compiling and nothing
 //! is dropped. Each part below is a function of its own, whose name
 //! `check-image` looks for in the image.
 //!
@@ -19,21 +19,25 @@
 #[cfg(not(target_os = "none"))]
 compile_error!("core-image is for targets without an operating system: cargo xtask check-image");
 
-use core::array;
-use core::fmt::{self, Write};
-use core::hint::black_box;
+mod values;
+
+use core::fmt::Write;
 use core::panic::PanicInfo;
 use core::ptr;
-use core::sync::atomic::AtomicU32;
 
-use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
+use dtof_core::fixed::types::U16F16;
 use dtof_core::{
-    AerDecoder, AerEncoder, AerWord, AnyRule, AsyncPixel, BinIndex, BinPosition, CentredWindow,
-    ComparatorTree, Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DepthEvent,
-    DetectionRule, DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Flags, Histogram,
-    LaserCycle, PaperRule, Peak, PixelAddress, PixelConfig, PixelConfigBuilder, RangeGate,
-    RangeScale, Reference, Reflectivity, RunningMean, Statistics, SubBinOffset, Threshold,
-    WindowRule, centroid, detect, isqrt, quadrant_background, whole_background, z_for,
+    AerDecoder, AerEncoder, AerWord, AnyRule, AsyncPixel, BinIndex, BinPosition, ComparatorTree,
+    Count, Count10, Count16, Count24, CounterWidth, DetectionRule, DynamicDepthConfig,
+    DynamicDepthPixel, Flags, Histogram, Peak, RangeGate, RangeScale, Reference, Reflectivity,
+    RunningMean, Statistics, SubBinOffset, Threshold, centroid, detect, isqrt, quadrant_background,
+    z_for,
+};
+
+use values::{
+    Link, address, alpha, background_level, bin, byte, change, count, cycle, distance, double,
+    estimator, event, flags, gate, half, keep, millimetres, more, position, rule, settings, some,
+    values, window_rule, word,
 };
 
 #[allow(unsafe_code, reason = "the linker knows the entry by this name")]
@@ -177,16 +181,6 @@ fn texts() {
     }
 }
 
-/// Takes text, or not.
-struct Link;
-
-impl Write for Link {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        keep(text);
-        if more() { Ok(()) } else { Err(fmt::Error) }
-    }
-}
-
 #[inline(never)]
 fn gates<const BINS: usize>() {
     match RangeGate::<BINS>::new(half(), half()) {
@@ -292,164 +286,6 @@ fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(rule: R) {
     sum += statistics;
     keep((sum, sum.photons()));
     keep(pixel.histogram().peak());
-}
-
-/// Valid or not.
-fn settings<const BINS: usize, R: DetectionRule>(rule: R) -> PixelConfigBuilder<BINS, R> {
-    PixelConfig::with_rule(rule)
-        .x(half())
-        .l1(half())
-        .l2(half())
-        .gate(gate())
-        .estimator(estimator())
-        .one_hit_tdc(more())
-}
-
-fn gate<const BINS: usize>() -> RangeGate<BINS> {
-    RangeGate::new(half(), half()).unwrap_or(RangeGate::full())
-}
-
-fn rule() -> PaperRule {
-    PaperRule::new(alpha(), count())
-}
-
-fn window_rule() -> Option<WindowRule> {
-    match WindowRule::new(byte(), U4F12::from_bits(half()), count()) {
-        Ok(rule) => {
-            keep((rule.width(), rule.z(), rule.minimum_count()));
-            Some(rule)
-        }
-        Err(error) => {
-            keep(write!(Link, "{error}"));
-            None
-        }
-    }
-}
-
-fn estimator() -> DepthEstimator {
-    let estimator = DepthEstimator::for_pulse(alpha());
-    match CentredWindow::new(alpha()) {
-        Some(window) => {
-            keep(window.half_width());
-            DepthEstimator::CentredWindow(window)
-        }
-        None if more() => estimator,
-        None => DepthEstimator::Centroid3,
-    }
-}
-
-/// Of any fraction, and whole.
-fn background_level() -> U24F8 {
-    if more() {
-        U24F8::from_bits(word())
-    } else {
-        whole_background(count())
-    }
-}
-
-fn event() -> DepthEvent {
-    DepthEvent {
-        pixel: address(),
-        cycle: cycle(),
-        exposure: half(),
-        peak_bin: bin(),
-        offset: offset(),
-        peak_count: count(),
-        background: count(),
-        flags: flags(),
-    }
-}
-
-/// Out of range as often as not.
-fn change() -> Option<DynamicDepthEvent> {
-    let position = BinPosition::new(word().cast_signed())?;
-    DynamicDepthEvent::new(address(), cycle(), position, word().cast_signed(), flags())
-}
-
-fn distance() -> U24F8 {
-    U24F8::from_bits(word())
-}
-
-fn alpha() -> U8F8 {
-    U8F8::from_bits(half())
-}
-
-fn millimetres() -> I24F8 {
-    I24F8::from_bits(word().cast_signed())
-}
-
-fn position() -> BinPosition {
-    BinPosition::of(bin(), offset())
-}
-
-fn offset() -> SubBinOffset {
-    SubBinOffset::new(half().cast_signed()).unwrap_or(SubBinOffset::CENTRE)
-}
-
-fn flags() -> Flags {
-    Flags::from_bits(byte()).unwrap_or(Flags::NONE) | Flags::CLIPPED
-}
-
-fn count() -> Count {
-    Count::saturating(word())
-}
-
-fn bin() -> BinIndex {
-    BinIndex::saturating(half())
-}
-
-fn address() -> PixelAddress {
-    PixelAddress(half())
-}
-
-fn cycle() -> LaserCycle {
-    LaserCycle(double())
-}
-
-/// Whether to go round again.
-fn more() -> bool {
-    word() != 0
-}
-
-/// The first of `all`: how many, the optimiser does not know either.
-fn some<T>(all: &[T]) -> &[T] {
-    all.get(..usize::from(half())).unwrap_or(all)
-}
-
-fn values<T, const N: usize>(one: fn() -> T) -> [T; N] {
-    array::from_fn(|_| one())
-}
-
-fn byte() -> u8 {
-    let [byte, ..] = word().to_le_bytes();
-    byte
-}
-
-fn half() -> u16 {
-    let [low, high, ..] = word().to_le_bytes();
-    u16::from_le_bytes([low, high])
-}
-
-fn double() -> u64 {
-    u64::from(word()) << 32 | u64::from(word())
-}
-
-/// Where values come from.
-static INPUT: AtomicU32 = AtomicU32::new(0);
-
-/// Any value: a volatile read, as from a register that the hardware changes.
-#[inline(never)]
-fn word() -> u32 {
-    #[allow(unsafe_code, reason = "only a volatile read is never optimised away")]
-    // SAFETY: the pointer is to a static of this type, which nothing writes.
-    unsafe {
-        INPUT.as_ptr().read_volatile()
-    }
-}
-
-/// Where values go: all of `value` has to be there, as something may look.
-fn keep<T>(value: T) {
-    black_box(value);
 }
 
 #[allow(unsafe_code, reason = "what is declared here is never linked")]

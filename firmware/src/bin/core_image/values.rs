@@ -1,0 +1,181 @@
+//! Where values come from, and where they go.
+
+use core::array;
+use core::fmt::{self, Write};
+use core::hint::black_box;
+use core::sync::atomic::AtomicU32;
+
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U24F8};
+use dtof_core::{
+    BinIndex, BinPosition, CentredWindow, Count, DepthEstimator, DepthEvent, DetectionRule,
+    DynamicDepthEvent, Flags, LaserCycle, PaperRule, PixelAddress, PixelConfig, PixelConfigBuilder,
+    RangeGate, SubBinOffset, WindowRule, whole_background,
+};
+
+/// Valid or not.
+pub fn settings<const BINS: usize, R: DetectionRule>(rule: R) -> PixelConfigBuilder<BINS, R> {
+    PixelConfig::with_rule(rule)
+        .x(half())
+        .l1(half())
+        .l2(half())
+        .gate(gate())
+        .estimator(estimator())
+        .one_hit_tdc(more())
+}
+
+pub fn gate<const BINS: usize>() -> RangeGate<BINS> {
+    RangeGate::new(half(), half()).unwrap_or(RangeGate::full())
+}
+
+pub fn rule() -> PaperRule {
+    PaperRule::new(alpha(), count())
+}
+
+pub fn window_rule() -> Option<WindowRule> {
+    match WindowRule::new(byte(), U4F12::from_bits(half()), count()) {
+        Ok(rule) => {
+            keep((rule.width(), rule.z(), rule.minimum_count()));
+            Some(rule)
+        }
+        Err(error) => {
+            keep(write!(Link, "{error}"));
+            None
+        }
+    }
+}
+
+pub fn estimator() -> DepthEstimator {
+    let estimator = DepthEstimator::for_pulse(alpha());
+    match CentredWindow::new(alpha()) {
+        Some(window) => {
+            keep(window.half_width());
+            DepthEstimator::CentredWindow(window)
+        }
+        None if more() => estimator,
+        None => DepthEstimator::Centroid3,
+    }
+}
+
+/// Of any fraction, and whole.
+pub fn background_level() -> U24F8 {
+    if more() {
+        U24F8::from_bits(word())
+    } else {
+        whole_background(count())
+    }
+}
+
+pub fn event() -> DepthEvent {
+    DepthEvent {
+        pixel: address(),
+        cycle: cycle(),
+        exposure: half(),
+        peak_bin: bin(),
+        offset: offset(),
+        peak_count: count(),
+        background: count(),
+        flags: flags(),
+    }
+}
+
+/// Out of range as often as not.
+pub fn change() -> Option<DynamicDepthEvent> {
+    let position = BinPosition::new(word().cast_signed())?;
+    DynamicDepthEvent::new(address(), cycle(), position, word().cast_signed(), flags())
+}
+
+pub fn distance() -> U24F8 {
+    U24F8::from_bits(word())
+}
+
+pub fn alpha() -> U8F8 {
+    U8F8::from_bits(half())
+}
+
+pub fn millimetres() -> I24F8 {
+    I24F8::from_bits(word().cast_signed())
+}
+
+pub fn position() -> BinPosition {
+    BinPosition::of(bin(), offset())
+}
+
+pub fn offset() -> SubBinOffset {
+    SubBinOffset::new(half().cast_signed()).unwrap_or(SubBinOffset::CENTRE)
+}
+
+pub fn flags() -> Flags {
+    Flags::from_bits(byte()).unwrap_or(Flags::NONE) | Flags::CLIPPED
+}
+
+pub fn count() -> Count {
+    Count::saturating(word())
+}
+
+pub fn bin() -> BinIndex {
+    BinIndex::saturating(half())
+}
+
+pub fn address() -> PixelAddress {
+    PixelAddress(half())
+}
+
+pub fn cycle() -> LaserCycle {
+    LaserCycle(double())
+}
+
+/// Whether to go round again.
+pub fn more() -> bool {
+    word() != 0
+}
+
+/// The first of `all`: how many, the optimiser does not know either.
+pub fn some<T>(all: &[T]) -> &[T] {
+    all.get(..usize::from(half())).unwrap_or(all)
+}
+
+pub fn values<T, const N: usize>(one: fn() -> T) -> [T; N] {
+    array::from_fn(|_| one())
+}
+
+pub fn byte() -> u8 {
+    let [byte, ..] = word().to_le_bytes();
+    byte
+}
+
+pub fn half() -> u16 {
+    let [low, high, ..] = word().to_le_bytes();
+    u16::from_le_bytes([low, high])
+}
+
+pub fn double() -> u64 {
+    u64::from(word()) << 32 | u64::from(word())
+}
+
+/// Where values come from.
+static INPUT: AtomicU32 = AtomicU32::new(0);
+
+/// Any value: a volatile read, as from a register that the hardware changes.
+#[inline(never)]
+pub fn word() -> u32 {
+    #[allow(unsafe_code, reason = "only a volatile read is never optimised away")]
+    // SAFETY: the pointer is to a static of this type, which nothing writes.
+    unsafe {
+        INPUT.as_ptr().read_volatile()
+    }
+}
+
+/// Where values go: all of `value` has to be there, as something may look.
+pub fn keep<T>(value: T) {
+    black_box(value);
+}
+
+/// Takes text, or not.
+pub struct Link;
+
+impl Write for Link {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        keep(text);
+        if more() { Ok(()) } else { Err(fmt::Error) }
+    }
+}
