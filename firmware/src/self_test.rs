@@ -1,4 +1,4 @@
-//! What `dtof-core` works out, as text: the same lines on every board as on the
+//! Results of `dtof-core` as text: the same lines on every board as on the
 //! host, byte for byte.
 //!
 //! `firmware/self-test.out` holds them as the host writes them. A test compares;
@@ -19,7 +19,7 @@ pub const LAST_LINE: &str = "end";
 /// Writes every line.
 ///
 /// # Errors
-/// Those of `out`.
+/// The errors of `out`.
 pub fn run(out: &mut impl Write) -> fmt::Result {
     roots(out)?;
     let mut encoder = AerEncoder::new();

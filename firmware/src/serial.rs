@@ -130,7 +130,7 @@ impl SerialInterrupt<'_> {
         self.sending.ready()
     }
 
-    /// What the port is to send next, if anything. Once there is nothing, the
+    /// The byte that the port sends next, if any. Once there is nothing, the
     /// handler lets the port rest; `start_sending` makes it ask again.
     #[inline]
     pub fn next_to_send(&mut self) -> Option<u8> {

@@ -27,7 +27,7 @@ impl DynamicDepth {
     /// Events of a mean: the paper's.
     pub const MEAN_OF: usize = 3;
 
-    /// As the core takes it.
+    /// The same for the core.
     ///
     /// # Errors
     /// If the threshold is less than half of 1/256 bin.

@@ -11,7 +11,7 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 pub const FRAME_BYTES: usize = 254;
 /// Bytes of a frame on the wire, the zero byte included.
 pub const WIRE_BYTES: usize = FRAME_BYTES + 2;
-/// What a frame carries at most.
+/// The most bytes a frame carries.
 pub const PAYLOAD_BYTES: usize = FRAME_BYTES - CHECKSUM_BYTES;
 
 const CHECKSUM_BYTES: usize = 4;
@@ -91,7 +91,7 @@ impl Deframer {
     }
 }
 
-/// What a frame carries.
+/// The payload of a frame.
 fn open(bytes: &mut [u8]) -> Result<&[u8], FrameError> {
     let length = cobs::decode_in_place(bytes).map_err(|_| FrameError::Corrupt)?;
     let frame = bytes.get(..length).ok_or(FrameError::Corrupt)?;

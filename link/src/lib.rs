@@ -12,6 +12,8 @@
 //! [`message`] has the kinds of messages; [`Configuration`], [`Token`], [`Refusal`],
 //! [`Report`] and [`SensorRecord`] are their bodies. Neither a board nor a host is
 //! known here.
+//!
+//! The example `two_ends` is a host and a device in one process.
 
 #![no_std]
 #![forbid(unsafe_code)]

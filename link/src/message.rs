@@ -44,8 +44,8 @@ pub const STATISTICS: u8 = 0x85;
 /// Device to host: a [`SensorRecord`](crate::SensorRecord).
 pub const SENSOR: u8 = 0x86;
 
-/// What an end says of itself: versions of link and AER words, and of a device
-/// its bins and pixels.
+/// The greeting of an end: versions of link and AER words, and of a device its bins
+/// and pixels.
 #[must_use]
 pub const fn greeting(bins: u16, pixels: u16) -> [u8; GREETING_BYTES] {
     let [a, b] = LINK_VERSION.to_le_bytes();

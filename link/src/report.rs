@@ -5,8 +5,8 @@ use heapless::Vec;
 
 use crate::endpoint::LinkCounters;
 
-/// What the device has done since it was configured, and what happened to the
-/// link since it was switched on.
+/// The statistics of the device since it was configured, and of the link since the
+/// device was switched on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Report {
@@ -65,7 +65,7 @@ impl Report {
         )
     }
 
-    /// As it is sent.
+    /// The bytes to send.
     #[must_use]
     pub fn to_le_bytes(mut self) -> Vec<u8, { Self::BYTES }> {
         let last = [self.last_sensor_error];
@@ -75,7 +75,7 @@ impl Report {
         wide.chain(narrow).chain(last).collect()
     }
 
-    /// As it was received, or `None` if it is not as long as the record.
+    /// Reads the record. `None` if the length is wrong.
     #[must_use]
     pub fn from_le_bytes(bytes: &[u8]) -> Option<Self> {
         let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;

@@ -1,4 +1,4 @@
-//! What a device says of its sensor and of what is wrong with it.
+//! The records of a device's sensor and of its errors.
 
 use dtof_core::fixed::types::{I24F8, U16F16};
 
@@ -31,7 +31,7 @@ impl SensorRecord {
         }
     }
 
-    /// As it is sent. A device without a sensor sends one without pixels.
+    /// The record as bytes. A device without a sensor sends one without pixels.
     #[must_use]
     pub fn to_le_bytes(sensor: Option<&Self>) -> [u8; Self::BYTES] {
         let Some(sensor) = sensor else {
@@ -43,8 +43,8 @@ impl SensorRecord {
         [a, b, c, d, e, f, g, h, i, j]
     }
 
-    /// As it was received: the sensor, or that there is none. `None` if it is not as
-    /// long as the record.
+    /// Reads the record: the sensor, or that there is none. `None` if the length is
+    /// wrong.
     #[must_use]
     pub fn from_le_bytes(bytes: &[u8]) -> Option<Option<Self>> {
         let [a, b, c, d, e, f, g, h, i, j]: [u8; Self::BYTES] = bytes.try_into().ok()?;

@@ -1,10 +1,9 @@
-//! What a photons message is made of.
+//! The parts of a photons message.
 
 use heapless::Vec;
 
-/// What a photons message is made of. Tokens begin at pixel 0 in each message
-/// and after each end of a laser cycle, and do not reach over the end of a
-/// message.
+/// One part of a photons message. Each message begins at pixel 0, and so does each
+/// laser cycle. No token reaches over the end of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Token {
     /// A photon of the present pixel in the present laser cycle: one byte for
@@ -33,7 +32,7 @@ impl Token {
     const PHOTON: u8 = 0xc0;
     const END: u8 = 0xc1;
 
-    /// As it is sent.
+    /// The bytes to send.
     #[must_use]
     pub fn to_bytes(self) -> Vec<u8, { Self::MAX_BYTES }> {
         let (first, number) = match self {

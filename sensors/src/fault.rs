@@ -1,4 +1,4 @@
-//! What is wrong with a sensor, whichever it is.
+//! The kinds of errors that all sensors share.
 
 use core::convert::Infallible;
 

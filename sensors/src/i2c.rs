@@ -29,9 +29,9 @@ const RISE_LOOK_NS: u32 = 100;
 /// After so many looks, a microsecond, a device holds it: one that is not ready.
 /// Then it is looked at after each `LOW_NS`.
 const RISE_LOOKS: u32 = 10;
-/// What the devices may hold SCL low in a transaction, all bits together: what
-/// `SMBus` allows one in a message (`T_LOW:SEXT`). The pauses are counted, not the
-/// looks between them.
+/// The time that devices may hold SCL low in a transaction, all bits together. `SMBus`
+/// allows as much in a message (`T_LOW:SEXT`). The pauses are counted, not the looks
+/// between them.
 const HELD_NS: u32 = 25_000_000;
 /// Clocks after which a device that was interrupted while it sent has let go of
 /// SDA (UM10204, section 3.1.16 "Bus clear").
@@ -44,11 +44,11 @@ pub struct SoftwareI2c<SCL, SDA, D> {
     scl: SCL,
     sda: SDA,
     delay: D,
-    /// What is left of `HELD_NS` in this transaction.
+    /// The rest of `HELD_NS` in this transaction.
     held_left_ns: u32,
 }
 
-/// What can go wrong on the bus.
+/// An error of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Error {
@@ -305,7 +305,7 @@ where
             _ => done,
         };
         if ended.is_err() {
-            // What is wrong is known already; the next START clears the rest.
+            // The error is known already; the next START clears the rest.
             let _ = self.sda.set_high();
             let _ = self.scl.set_high();
         }

@@ -12,6 +12,8 @@
 //! its own error every few milliseconds and nobody else's time. Every error
 //! leaves the driver usable: the next polls bring the sensor up again.
 //!
+//! The examples `tdc7200` and `tmf882x` go from bus and pins to millimetres.
+//!
 //! A driver owns an `SpiDevice` or an `I2c` of embedded-hal 1.0, so that several
 //! sensors share a bus by way of embedded-hal-bus.
 
@@ -55,10 +57,10 @@ pub trait PhotonSink {
 /// at once while the answer is not [`Polled::Idle`], but not without a bound: a
 /// fast sensor may always have more.
 pub trait Sensor {
-    /// What can go wrong; the error of the bus is inside. A host is told the kind.
+    /// The driver's error, with that of the bus inside. A host is told the kind.
     type Error: Into<SensorFault>;
 
-    /// What a host has to know of it.
+    /// The description for a host.
     fn about(&self) -> About;
 
     /// Whether it gives the first photon of a laser cycle only, so that at high rates
@@ -81,12 +83,11 @@ pub trait Sensor {
     /// Takes the next step. `now_ms` counts milliseconds and may wrap.
     ///
     /// # Errors
-    /// What went wrong. The sensor is brought up again by the polls that
-    /// follow.
+    /// The error of this step. The next polls bring the sensor up again.
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Self::Error>;
 }
 
-/// What a host has to know of a sensor.
+/// The description of a sensor for a host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct About {
@@ -119,7 +120,7 @@ impl About {
     }
 }
 
-/// What a poll came to.
+/// The result of a poll.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Polled {

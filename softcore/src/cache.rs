@@ -1,4 +1,4 @@
-//! What a processor's caches hold, if it has any.
+//! Filling and emptying a processor's caches, if it has any.
 
 use core::arch::{asm, global_asm};
 

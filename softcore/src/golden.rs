@@ -11,7 +11,7 @@ pub const EXPECTED: &[u8] = include_bytes!("../../firmware/self-test.out");
 /// Prints all lines and a verdict: whether they are the expected ones.
 ///
 /// # Errors
-/// Those of `out`.
+/// The errors of `out`.
 pub fn run(expected: &[u8], out: &mut impl Write) -> Result<bool, fmt::Error> {
     let mut lines = Lines {
         out,
@@ -30,11 +30,11 @@ pub fn run(expected: &[u8], out: &mut impl Write) -> Result<bool, fmt::Error> {
 /// Passes on what is written and compares it.
 struct Lines<'a, W> {
     out: &'a mut W,
-    /// What is expected next.
+    /// The bytes expected next.
     rest: &'a [u8],
-    /// Of the line that is being written.
+    /// The number of the line being written.
     number: u32,
-    /// Whether that line is right so far.
+    /// Whether this line is right so far.
     is_right: bool,
     /// Lines that are not as expected.
     wrong: u32,

@@ -76,7 +76,7 @@ pub fn is_acknowledged() -> bool {
     acknowledged
 }
 
-/// What is written to it is printed.
+/// Prints the text written to it.
 pub struct Printer;
 
 impl fmt::Write for Printer {

@@ -52,7 +52,7 @@ pub fn is_acknowledged() -> bool {
     true
 }
 
-/// What is written to it is printed.
+/// Prints the text written to it.
 pub struct Printer;
 
 impl fmt::Write for Printer {

@@ -1,4 +1,4 @@
-//! What bare programs on an RV32 soft-core need: the start, the trap handler, the
+//! The parts that bare programs on an RV32 soft-core need: the start, the trap handler, the
 //! registers of the testbench or of QEMU's `virt`, and the programs' parts.
 //!
 //! The programs are in `src/bin`; `cargo softcore` builds and runs them, and

@@ -5,7 +5,7 @@ use core::panic::PanicInfo;
 
 use crate::{io, println};
 
-/// What the start writes over the stack.
+/// The paint that the start lays over the stack.
 const PAINT: u32 = 0xcccc_cccc;
 
 /// The run failed: the program said so, or panicked.

@@ -43,7 +43,7 @@ pub const fn config() -> Result<PixelConfig<BINS>, ConfigError> {
     PixelConfig::paper().x(X).l1(L1).l2(L2).build()
 }
 
-/// What is marked.
+/// The events of a run that are marked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
     /// The next macropixel in turn is looked at, when so many laser cycles have ended, of
@@ -70,7 +70,7 @@ impl Mark {
         }
     }
 
-    /// What is marked with a number, if less than 2³¹ laser cycles have ended.
+    /// The mark of a number, if less than 2³¹ laser cycles have ended.
     #[allow(clippy::cast_possible_truncation, reason = "16 bits were marked")]
     #[must_use]
     pub const fn from_raw(raw: u32) -> Self {
@@ -192,7 +192,7 @@ impl<const N: usize> Pixels<N> {
         if self.is_requesting {
             return;
         }
-        // What follows a time word comes before all others.
+        // The word after a time word comes before all others.
         let word = self.next.take().or_else(|| {
             let event = self.pixels.get_mut(index)?.acknowledge()?;
             io::mark(Mark::Taken(event.pixel).to_raw());
@@ -223,7 +223,7 @@ impl<const N: usize> Pixels<N> {
     /// photons, events, exposures without one and decisions put off.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// The errors of `out`.
     pub fn report(&self, out: &mut impl Write) -> fmt::Result {
         let mut all = self.statistics;
         for pixel in &self.pixels {

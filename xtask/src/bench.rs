@@ -81,7 +81,7 @@ fn measured(line: &str, level: &str) -> Option<Row> {
     })
 }
 
-/// What is missing in `rows` or in `committed`, or more than a little apart.
+/// Figures that are missing on one side, or more than a little apart.
 fn differences(committed: &[Row], rows: &[Row]) -> Vec<String> {
     let mut lines = Vec::new();
     for Row { name, hundredths } in committed {

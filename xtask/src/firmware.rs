@@ -85,7 +85,7 @@ impl Board {
     }
 }
 
-/// What is built for a board.
+/// The images of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Build {
     /// The sidecar with simulated photons.
@@ -106,7 +106,7 @@ impl Build {
     }
 }
 
-/// What is connected to the real board.
+/// The sensor on the real board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sensor {
     Tdc7200,
@@ -128,7 +128,7 @@ impl Sensor {
     }
 }
 
-/// What `firmware/build.rs` takes the program of the TMF8820/21/28 from.
+/// The variable that names the program of the TMF8820/21/28 to `firmware/build.rs`.
 const IMAGE: &str = "TMF882X_IMAGE";
 
 /// Where the program of the TMF8820/21/28 is.

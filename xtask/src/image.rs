@@ -19,7 +19,7 @@ use crate::{cargo, panics, symbols, target_folder};
 
 const PROFILES: [&str; 2] = ["firmware", "firmware-small"];
 
-/// What the panic handler of the image calls and nobody defines.
+/// The function that the panic handler of the image calls and nobody defines.
 const UNDEFINED: &str = "dtof_core_has_a_reachable_panic";
 
 /// The functions of `core_image/main.rs` that between them use all of dtof-core.
@@ -106,7 +106,7 @@ fn build(root: &Path, target: &str, profile: &str, compiler: &[&str]) -> Result<
     bail!("{target}, {profile}: core-image does not build, see above");
 }
 
-/// What is looked at in an image.
+/// The parts of an image that are checked.
 #[derive(Clone, Default)]
 struct Image {
     /// Names as the linker has them.
@@ -146,7 +146,7 @@ impl Image {
         Ok(image)
     }
 
-    /// What is wrong, one line each.
+    /// The problems, one line each.
     fn problems(&self) -> Vec<String> {
         let mut problems = Vec::new();
         for name in &self.symbols {

@@ -27,28 +27,27 @@ use firmware::Build;
 const HELP: &str = "\
 cargo xtask <command>
 
-  setup         install what rust-toolchain.toml names and is not there yet;
-                the emulators, Verilator and the other tools as well if that
-                needs no question
+  setup         install the missing parts of rust-toolchain.toml, and the emulators,
+                Verilator and the other tools if that needs no question
   image BOARD [SENSOR | self-test] [--emulator]
-                build the sidecar for mps2-an386 or stm32f405, or the self-test,
-                and print its path; stm32f405 takes a sensor, tdc7200 or
-                tmf882x; --emulator builds for QEMU, with its slower clock
+                build an image and print its path: the sidecar or the self-test.
+                BOARD is mps2-an386 or stm32f405. SENSOR is tdc7200 or tmf882x, on
+                stm32f405 only. --emulator builds for QEMU, with its slower clock
                 and without the sensor's own program
   flash [--chip CHIP] [SENSOR | self-test]
-                write the sidecar onto an STM32F405 or STM32F407 and show its log,
-                or write the self-test and show its lines; CHIP is its name in
-                probe-rs, by default that of the Discovery
+                write an image onto an STM32F405 or STM32F407 and show its log.
+                CHIP is the name in probe-rs, by default that of the Discovery
   emulate [--port PORT] [exit | panic | fault]
-                run the sidecar in QEMU, its serial port on a TCP port (5386)
-  sizes         flash, RAM and stack of each image
+                run the sidecar in QEMU, its serial port on a TCP port (5386).
+                The last word ends it in that way
+  sizes         print flash, RAM and stack of each image
   check-image   link dtof-core for every target: no panic, float or allocation
   self-test [--bless]
-                the self-test in QEMU prints the lines of firmware/self-test.out;
-                --bless writes them
+                run the self-test in QEMU and compare its lines with
+                firmware/self-test.out; --bless writes the file
   bench [--check]
                 count the instructions of the core's operations in QEMU and write
-                docs/bench/instructions.csv; --check compares with it instead
+                docs/bench/instructions.csv; --check compares with the file instead
   python FILE   install the packages of a requirements file below the build folder
                 and print the path of a Python that has them";
 

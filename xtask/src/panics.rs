@@ -1,5 +1,5 @@
-//! Where an image can panic: a help for whom `check-image` turns away, as the
-//! linker names only the panic handler.
+//! The places where an image can panic. The linker names only the panic handler, so
+//! `check-image` looks for them when it refuses an image.
 //!
 //! Every call of the panicking machinery hands over the address of a
 //! [`Location`](std::panic::Location) among the constants: the address and

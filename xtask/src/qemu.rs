@@ -64,7 +64,7 @@ pub fn run(board: Board, image: &Path, arguments: &[&str]) -> Result<(ExitStatus
     let mut stdout = emulator.stdout.take().context("no output of QEMU")?;
     let output = thread::spawn(move || {
         let mut bytes = Vec::new();
-        // What came before an error is all there is.
+        // The text before an error is kept.
         let _ = stdout.read_to_end(&mut bytes);
         bytes
     });

@@ -45,7 +45,7 @@ pub fn bless(root: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What a board's image prints.
+/// The lines that a board's image prints.
 fn lines(board: Board, root: &Path) -> Result<String> {
     let image = board.build_bare(root, Build::SelfTest)?;
     let (status, output) = qemu::run(board, &image, &[])?;

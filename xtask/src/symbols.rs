@@ -57,9 +57,9 @@ fn is_soft_float(name: &str) -> bool {
 
 /// The names of Arm's run-time ABI, less `__aeabi_`.
 ///
-/// Those of the integers stay: `uidiv`, `uldivmod`, `lmul`, `llsl`, `memcpy`.
+/// The names of the integers stay: `uidiv`, `uldivmod`, `lmul`, `llsl`, `memcpy`.
 fn is_aeabi_float(name: &str) -> bool {
-    // Of one of the types: fadd, dmul, fcmplt, cdcmpeq, cfrcmple, d2iz.
+    // Operations on one of the types: fadd, dmul, fcmplt, cdcmpeq, cfrcmple, d2iz.
     const TYPES: &str = "f d h cf cd";
     const OPERATIONS: &str = "add sub rsub mul div neg cmpeq cmplt cmple cmpge cmpgt cmpun \
         rcmple 2iz 2uiz 2lz 2ulz 2f 2d 2h 2f_alt 2h_alt";

@@ -12,7 +12,7 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use toml::{Table, Value};
 
-/// What `rust-toolchain.toml` names.
+/// The toolchain of `rust-toolchain.toml`.
 pub struct Toolchain {
     pub channel: String,
     pub components: Vec<String>,
@@ -44,8 +44,8 @@ impl Toolchain {
         })
     }
 
-    /// What `installed`, a list of rustup's, lacks of `wanted`. Most components
-    /// are listed with the name of the host after theirs.
+    /// The `wanted` names that are not in `installed`, a list of rustup's. Most
+    /// components are listed with the name of the host after theirs.
     fn missing<'a>(wanted: &'a [String], installed: &str) -> Vec<&'a str> {
         let is_there = |name: &str| {
             installed.lines().any(|line| {
@@ -90,7 +90,7 @@ pub fn set_up(root: &Path) -> Result<()> {
     }
 }
 
-/// What rustup prints, or `None` if it fails. Never asks.
+/// The output of rustup, or `None` if it fails. Never asks.
 fn rustup(arguments: &[&str]) -> Result<Option<String>> {
     let output = Command::new("rustup")
         .args(arguments)

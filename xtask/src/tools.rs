@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 /// A program, and the one line that installs it.
 pub struct Tool {
     pub program: &'static str,
-    /// What it is asked to find out whether it is there: it prints its version.
+    /// Arguments with which it prints its version, if it is there.
     ask: &'static [&'static str],
     install: Install,
 }
@@ -65,7 +65,7 @@ const ALL: [Tool; 8] = [
 ];
 
 impl Tool {
-    /// What it says of its version, if it is there.
+    /// Its version, if it is there.
     pub fn version(&self) -> Option<String> {
         let output = Command::new(self.program)
             .args(self.ask)
@@ -91,7 +91,7 @@ impl Tool {
         format!("{} is missing: {install}", self.program)
     }
 
-    /// What installs it without a question.
+    /// A command that installs it without a question.
     fn installer(&self) -> Option<Command> {
         match self.install {
             Packages(names) => debian(names),
@@ -120,7 +120,7 @@ pub fn set_up() {
         }
         if let Some(mut command) = tool.installer() {
             println!("{}: installing", tool.program);
-            // What goes wrong is said by what is still missing.
+            // A failure shows when the tool is still missing.
             let _ = command.stdin(Stdio::null()).status();
         }
         if !tool.is_there() {

@@ -24,7 +24,7 @@ compile_error!("an image is for one sensor: choose one of sensor-tdc7200 and sen
 
 use crate::serial::Serial;
 
-/// What the main loop needs of a board.
+/// The parts of a board that the main loop needs.
 pub trait Board {
     /// Milliseconds since the start; after 2³² (49 days) from 0 again.
     fn now_ms(&self) -> u32;

@@ -7,7 +7,7 @@ use embedded_hal::delay::DelayNs;
 /// enough cycles for 32 bits.
 const PIECE_NS: u32 = 100_000;
 
-/// What the timer restarts from, so that a turn takes a millisecond of a processor
+/// The value the timer restarts from, so that a turn takes a millisecond of a processor
 /// at `hclk_hz`.
 #[must_use]
 pub const fn reload(hclk_hz: u32) -> u32 {

@@ -1,15 +1,15 @@
 //! One end of the link: messages arrive whole, once and in order, or not yet.
 //!
-//! Every frame carries, beside its message, the number of the message its
-//! sender expects next and the first number it has no room for. Messages are
-//! kept until they are acknowledged and sent again when that takes too long; a
-//! message that is not the one expected is dropped and comes again. A receiver
-//! that does not take its messages closes its window, which stops the sender:
-//! back-pressure, not loss.
+//! Every frame carries, beside its message, two numbers: that of the message its
+//! sender expects next, and the first one it has no room for. An end keeps a message
+//! until it is acknowledged, and sends it again when that takes too long. A message
+//! that is not the expected one is dropped and comes again. A receiver that does not
+//! take its messages closes its window, which stops the sender: back-pressure, not
+//! loss.
 //!
-//! Sequence numbers are 8 bits and a window holds a few messages, so that a
-//! number never stands for two messages at once. The session, drawn anew by the
-//! host at each start, keeps frames of an earlier life apart.
+//! Sequence numbers have 8 bits and a window holds a few messages, so a number never
+//! stands for two messages at once. The host draws a new session at each start, which
+//! keeps frames of an earlier life apart.
 
 mod receive;
 mod transmit;
@@ -18,20 +18,19 @@ use heapless::{Deque, Vec};
 
 use crate::frame::PAYLOAD_BYTES;
 
-/// What a message holds at most.
+/// The most bytes a message holds.
 pub const BODY_BYTES: usize = PAYLOAD_BYTES - HEADER_BYTES;
 /// Messages under way, and messages that wait to be taken.
 pub const WINDOW: usize = 4;
-/// A message not acknowledged for so long is sent again. Each time the wait
-/// doubles, to [`RETRANSMIT_MOST_MS`]; it halves with every eight messages that
-/// arrive without.
+/// A message not acknowledged for so long is sent again. Each repetition doubles the
+/// wait, up to [`RETRANSMIT_MOST_MS`]. Every eight messages that arrive at once halve it.
 pub const RETRANSMIT_MS: u32 = 100;
 /// The longest wait.
 pub const RETRANSMIT_MOST_MS: u32 = 1600;
 /// An end with nothing to say says so this often.
 pub const KEEP_ALIVE_MS: u32 = 50;
 
-/// What an end says of itself when a session begins.
+/// Bytes of a greeting, the description an end gives of itself when a session begins.
 pub const GREETING_BYTES: usize = 8;
 
 const HEADER_BYTES: usize = 6;
@@ -55,11 +54,11 @@ const NO_SESSION: u8 = 0xf3;
 pub struct Message {
     /// Its kind, below 0xf0.
     pub kind: u8,
-    /// What it says.
+    /// Its content.
     pub body: Vec<u8, BODY_BYTES>,
 }
 
-/// As many messages are under way as may be.
+/// The window is full: no further message may be under way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Full;
@@ -72,7 +71,7 @@ impl core::fmt::Display for Full {
 
 impl core::error::Error for Full {}
 
-/// What went wrong on the way, since the end was made.
+/// Losses and repairs on the way, since the end was made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinkCounters {
@@ -82,7 +81,7 @@ pub struct LinkCounters {
     pub corrupt: u32,
     /// Longer than a frame can be.
     pub oversized: u32,
-    /// Of another session, or of a kind that does not exist.
+    /// Frames of another session, or of a kind that does not exist.
     pub foreign: u32,
     /// Messages dropped because one before them is missing, or there is no
     /// room; they come again.
@@ -207,7 +206,7 @@ impl Endpoint {
         self.lost
     }
 
-    /// What the other end said of itself when the session began.
+    /// The greeting of the other end.
     #[must_use]
     pub const fn peer_greeting(&self) -> &[u8; GREETING_BYTES] {
         &self.peer_greeting
@@ -219,7 +218,7 @@ impl Endpoint {
         now_ms.wrapping_sub(self.heard_ms)
     }
 
-    /// What went wrong on the way so far.
+    /// Losses and repairs on the way so far.
     #[must_use]
     pub const fn counters(&self) -> &LinkCounters {
         &self.counters

@@ -1,4 +1,4 @@
-//! What an end does with a frame.
+//! The receiving half of an endpoint.
 
 use heapless::Vec;
 

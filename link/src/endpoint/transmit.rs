@@ -1,4 +1,4 @@
-//! What an end sends, and when.
+//! The sending half of an endpoint.
 
 use super::receive::count;
 use super::{
@@ -30,8 +30,8 @@ impl Endpoint {
         let number = self.first.wrapping_add(self.sent);
         let room = self.peer_limit.wrapping_sub(number);
         let next = self.outbox.iter().nth(self.sent.into());
-        // What is sent again goes alone until it arrives: a line that is slow
-        // rather than bad is not filled with repetitions.
+        // A repeated message goes alone until it arrives. So a slow line is not filled
+        // with repetitions.
         let held = self.alone && self.sent > 0;
         if let Some(message) = next.filter(|_| (1..128).contains(&room) && !held) {
             let header = self.header(message.kind, self.session, number);

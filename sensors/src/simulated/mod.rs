@@ -1,5 +1,5 @@
-//! A sensor that is not there: photons are drawn on the device, to bring a board
-//! up with nothing attached and to load it with known rates.
+//! A simulated sensor. The device draws the photons itself, to bring a board up with
+//! nothing attached and to load it with known rates.
 //!
 //! In every laser cycle each pixel sees a Poisson count of photons. Each of them
 //! is signal or background by their rates; a signal photon falls into the bins
@@ -98,7 +98,7 @@ impl<'a> Pulse<'a> {
     }
 }
 
-/// What a pixel sees in a laser cycle.
+/// The photons of a pixel in a laser cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SimulatedPixel {
@@ -153,7 +153,7 @@ impl SimulatedPixel {
     }
 }
 
-/// What all pixels share.
+/// The settings that all pixels share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {

@@ -20,7 +20,7 @@ pub enum Mode {
     Two,
 }
 
-/// What mode 1 measures, in picoseconds (section 6.6 of the data sheet).
+/// The range of mode 1 in picoseconds (section 6.6 of the data sheet).
 const MODE_1_PS: RangeInclusive<i64> = 12_000..=500_000;
 
 /// CONFIG2 field `NUM_STOP`: after how many stops a measurement is complete.
@@ -47,7 +47,7 @@ pub enum Edge {
     Falling,
 }
 
-/// What can be chosen. [`Config::new`] checks it.
+/// The choices there are. [`Config::new`] checks them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
@@ -130,7 +130,7 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    /// What is wrong, in one line.
+    /// The reason, in one line.
     #[must_use]
     pub const fn text(self) -> &'static str {
         match self {
@@ -169,7 +169,7 @@ impl Config {
         Ok(Self(settings))
     }
 
-    /// What was checked.
+    /// The checked settings.
     #[must_use]
     pub const fn settings(&self) -> &Settings {
         &self.0

@@ -1,4 +1,4 @@
-//! What can go wrong with a TDC7200.
+//! Errors of a TDC7200.
 
 use core::fmt;
 
@@ -15,18 +15,18 @@ pub enum Error<B, P> {
     /// After its reset the device does not hold what a TDC7200 holds there:
     /// CONFIG2 = 0x40, `INT_MASK` = 0x07. It has no identification register.
     WrongChip {
-        /// What CONFIG2 held.
+        /// The value of CONFIG2.
         config2: u8,
-        /// What `INT_MASK` held.
+        /// The value of `INT_MASK`.
         int_mask: u8,
     },
     /// A register does not hold what was written to it.
     NotTaken {
         /// Its address.
         register: u8,
-        /// What was written.
+        /// The value written.
         wrote: u8,
-        /// What was read.
+        /// The value read.
         read: u8,
     },
     /// No interrupt came: START does not come, or the sensor is gone.
@@ -95,7 +95,7 @@ impl<B, P> From<Error<B, P>> for SensorFault {
         match error {
             Error::Bus(_) => Self::Bus,
             Error::Pin(_) => Self::Pin,
-            // What a bus reads that nothing drives.
+            // A bus that nothing drives reads so.
             Error::NoAnswer
             | Error::WrongChip {
                 config2: 0x00,

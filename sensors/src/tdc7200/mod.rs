@@ -72,15 +72,15 @@ pub struct Tdc7200<SPI, INT, EN, const CHUNK: usize = RESULTS> {
     counts: Counts,
 }
 
-/// What has been measured so far. Every count sticks at `u32::MAX`.
+/// Counts of the measurements so far. Each sticks at `u32::MAX`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counts {
     /// Laser cycles given to the sink.
     pub cycles: u32,
-    /// Those of them without a photon.
+    /// Laser cycles without a photon.
     pub empty: u32,
-    /// Those of them that a counter's overflow ended.
+    /// Laser cycles ended by the overflow of a counter.
     pub overflowed: u32,
     /// Photons given to the sink.
     pub photons: u32,
@@ -88,7 +88,7 @@ pub struct Counts {
     pub errors: u32,
 }
 
-/// What the driver waits for.
+/// The state of the driver: each waits for something else.
 #[derive(Clone, Copy, Debug)]
 enum State {
     /// Nothing: to be reset.
@@ -131,7 +131,7 @@ where
         }
     }
 
-    /// What has been measured so far.
+    /// Counts of the measurements so far.
     pub const fn counts(&self) -> Counts {
         self.counts
     }

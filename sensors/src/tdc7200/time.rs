@@ -60,7 +60,7 @@ impl CalibrationPeriods {
     }
 }
 
-/// What a count is worth, from one measurement's own calibration.
+/// The time of a count, from one measurement's own calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Calibration {

@@ -54,7 +54,7 @@ impl Message {
     }
 }
 
-/// What the bootloader says.
+/// The answer of the bootloader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Answer {
     Done,

@@ -31,7 +31,7 @@ pub enum SpadMap {
     Map12 = 12,
 }
 
-/// What can be chosen. [`Config::new`] checks it.
+/// The choices there are. [`Config::new`] checks them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
@@ -94,7 +94,7 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    /// What is wrong, in one line.
+    /// The reason, in one line.
     #[must_use]
     pub const fn text(self) -> &'static str {
         match self {
@@ -136,7 +136,7 @@ impl Config {
         Ok(Self(settings))
     }
 
-    /// What was checked.
+    /// The checked settings.
     #[must_use]
     pub const fn settings(&self) -> &Settings {
         &self.0

@@ -1,11 +1,11 @@
-//! What can go wrong with a TMF8820/21/28.
+//! Errors of a TMF8820/21/28.
 
 use core::fmt;
 
 use super::registers::{BootCommand, Command};
 use crate::SensorFault;
 
-/// What was waited for.
+/// The step that took too long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Waiting {
@@ -37,12 +37,12 @@ pub enum Error<B, P> {
     Timeout(Waiting),
     /// The register ID is not that of a TMF8820/21/28.
     WrongChip {
-        /// What ID holds.
+        /// The value of ID.
         id: u8,
     },
     /// Neither the bootloader nor the measurement application runs.
     WrongApplication {
-        /// What APPID holds.
+        /// The value of APPID.
         id: u8,
     },
     /// The bootloader runs, but there is no image to load.
@@ -58,17 +58,17 @@ pub enum Error<B, P> {
     Refused {
         /// The command.
         command: Command,
-        /// What `CMD_STAT` holds.
+        /// The value of `CMD_STAT`.
         status: u8,
     },
     /// The application shows another page than the common configuration.
     WrongPage {
-        /// What `CONFIG_RESULT` holds.
+        /// The value of `CONFIG_RESULT`.
         page: u8,
     },
     /// INT stays low while `INT_STATUS` names no reason, or none but results.
     StuckInterrupt {
-        /// What `INT_STATUS` holds.
+        /// The value of `INT_STATUS`.
         status: u8,
     },
     /// A result that is no raw histogram. The set is given up.

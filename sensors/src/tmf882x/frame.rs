@@ -111,7 +111,10 @@ impl Assembly {
         };
         if plane < 2 {
             for (low, &byte) in low.iter_mut().zip(packet.data) {
-                *low = if plane == 0 { 0 } else { *low } | u16::from(byte) << (8 * plane);
+                *low = match plane {
+                    0 => byte.into(),
+                    _ => *low | u16::from(byte) << 8,
+                };
             }
             return result;
         }
@@ -123,7 +126,7 @@ impl Assembly {
     }
 }
 
-/// What became of a packet.
+/// The use of a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(
     clippy::large_enum_variant,

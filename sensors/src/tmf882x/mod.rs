@@ -1,8 +1,8 @@
 //! ams OSRAM TMF8820, TMF8821 and TMF8828: nine zones of raw 128-bin histograms
 //! over I²C, at most 1 MHz.
 //!
-//! The sensor's program is the vendor's and not part of this crate: whoever uses
-//! the driver supplies the bytes of the RAM image, from RAM address 0x0000 on.
+//! The sensor's program is the vendor's and not part of this crate. Pass the bytes of
+//! its RAM image to the driver, from RAM address 0x0000 on.
 //! It is loaded when the bootloader runs; a sensor that already runs the
 //! application is configured anew and not loaded again.
 //!
@@ -103,7 +103,7 @@ pub struct Tmf882x<'a, I2C, INT, EN, const CHUNK: usize = PACKET> {
     counts: Counts,
 }
 
-/// What has come so far. Every count sticks at `u32::MAX`.
+/// Counts of the data so far. Each sticks at `u32::MAX`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counts {
@@ -111,13 +111,13 @@ pub struct Counts {
     pub histograms: u32,
     /// Packets of raw histograms.
     pub packets: u32,
-    /// Those of them left out while waiting for packet 0 of a set.
+    /// Packets left out while waiting for packet 0 of a set.
     pub left_out: u32,
     /// Errors.
     pub errors: u32,
 }
 
-/// What the driver waits for.
+/// The state of the driver: each waits for something else.
 #[derive(Clone, Copy, Debug)]
 enum State {
     /// Nothing: to be switched on, or off and on again.
@@ -185,7 +185,7 @@ where
         }
     }
 
-    /// What has come so far.
+    /// Counts of the data so far.
     pub const fn counts(&self) -> Counts {
         self.counts
     }
@@ -301,7 +301,7 @@ fn count(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }
 
-/// Who does not acknowledge a byte has acknowledged the address: somebody is there.
+/// A device that does not acknowledge a byte has acknowledged its address, so it is there.
 fn bus_error<B: embedded_hal::i2c::Error, P>(error: B) -> Error<B, P> {
     use NoAcknowledgeSource::{Address, Unknown};
     match error.kind() {

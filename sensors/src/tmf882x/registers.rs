@@ -80,7 +80,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// What `CMD_STAT` holds in the end.
+    /// The value of `CMD_STAT` when the command is done.
     pub(super) const fn done(self) -> u8 {
         match self {
             Self::Measure => STAT_ACCEPTED,

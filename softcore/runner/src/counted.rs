@@ -1,4 +1,4 @@
-//! What comes of photons in a run, and whether it is right.
+//! The counts of a run, and whether they are right.
 
 use anyhow::{Context, Result, ensure};
 use dtof_softcore::stream::FEW;
@@ -7,7 +7,7 @@ use crate::events;
 use crate::photons::Photon;
 use crate::program::Ran;
 
-/// What the testbench and the program say of a run.
+/// The report of the testbench and the program on a run.
 pub struct Counted {
     pub cycles: u64,
     pub looks: u64,
@@ -19,7 +19,7 @@ pub struct Counted {
     pub stack: u64,
     pub lost: u64,
     pub fill: u64,
-    /// Of each part of the run.
+    /// The lowest fill of the FIFO in each part of the run.
     pub lowest: Vec<u64>,
     /// The event words over the link.
     pub words: Vec<u128>,

@@ -10,7 +10,7 @@ use crate::table::{COLD, Row};
 /// The page but for its tables, each of which stands where its name is in braces.
 const PAGE: &str = include_str!("../page.md");
 
-/// What 2.4 µs are at 100 MHz.
+/// Clock cycles in 2.4 µs at 100 MHz.
 const CYCLES: u64 = 240;
 /// Operations from a look to what comes of it.
 const AGAINST: [&str; 5] = [
@@ -88,7 +88,7 @@ fn cycles(rows: &[Row]) -> String {
     text
 }
 
-/// What is within [`CYCLES`], in bold.
+/// Operations against [`CYCLES`]; bold ones are within.
 fn against(rows: &[Row]) -> String {
     let mut text = "| core |".to_owned();
     for operation in AGAINST {
@@ -186,7 +186,7 @@ mod tests {
                 _ => assert_eq!((decision, look), ([false; 2], [false; 2])),
             }
         }
-        // What is more cold is lines of ten to fourteen cycles, most of them code.
+        // Cold, each line filled costs ten to fourteen cycles. Most lines are code.
         let (warm, cold) = find(&rows, cores(&rows)[0], AGAINST[0]);
         let (warm, cold) = (warm.unwrap(), cold.unwrap());
         let more = cold.code_lines + cold.data_lines - warm.code_lines - warm.data_lines;

@@ -1,4 +1,4 @@
-//! What a soft-core decides against what the host decides from the same photons.
+//! The events of a soft-core against those of the host from the same photons.
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::{
@@ -27,8 +27,8 @@ pub fn decoded(words: &[u128]) -> Result<Vec<DepthEvent>> {
     Ok(events)
 }
 
-/// What `pixels` macropixels decide on the host that are looked at when the soft-core
-/// looked, and whose events are taken when it took them: those events, and what all pixels count.
+/// The events of `pixels` macropixels on the host, and the counts of all of them. The host
+/// looks when the soft-core looked, and takes events when it took them.
 ///
 /// # Errors
 /// If an event is taken that is not there.

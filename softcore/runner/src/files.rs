@@ -49,7 +49,7 @@ pub struct Files {
 }
 
 impl Files {
-    /// What the files say.
+    /// The figures in the files.
     pub fn read(root: &Path) -> Result<Self> {
         Ok(Self {
             rows: lines(root, ROWS, table::HEADER, Row::parse)?,
@@ -92,14 +92,14 @@ impl Files {
         ]
     }
 
-    /// Those of the processors that `wants` wants.
+    /// The figures of the processors that `wants` selects.
     pub fn only(mut self, wants: impl Fn(&str) -> bool) -> Self {
         self.rows.retain(|row| wants(&row.core));
         self.photons.retain(|sustained| wants(&sustained.core));
         self
     }
 
-    /// What of `measured` is not as here. A stack that was not measured differs from none.
+    /// Lines of `measured` that differ. A stack that was not measured never differs.
     pub fn differences(&self, measured: &Self) -> Vec<String> {
         let mut expected = self.clone();
         for (expected, measured) in expected.memory.iter_mut().zip(&measured.memory) {

@@ -105,7 +105,7 @@ fn flat(elf: &[u8]) -> Result<Vec<u8>> {
 pub struct Sizes {
     /// Instructions and constants.
     pub code: u64,
-    /// What changes, the stack apart.
+    /// Variables, without the stack.
     pub data: u64,
 }
 

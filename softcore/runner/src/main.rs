@@ -34,16 +34,16 @@ use trials::{Cycles, Found, Trials};
 const HELP: &str = "\
 cargo softcore [--qemu-only] [--core NAME]... [--check]
 
-The core on RV32 processors: golden vectors in QEMU and on the Verilog of VexRiscv,
-Ibex, PicoRV32 and SERV, cycles and photon rates there. If all cores run, writes
-docs/bench/softcore*.csv and softcore.md.
+Runs the core on RV32 processors: golden vectors in QEMU, and golden vectors, cycles and
+photon rates on the Verilog of VexRiscv, Ibex, PicoRV32 and SERV. If all of them run, it
+writes docs/bench/softcore*.csv and softcore.md.
 
-  --qemu-only   no cycles, no Verilator
-  --core NAME   this processor only, more of them if given more than once:
+  --qemu-only   run QEMU only: no cycles, no Verilator
+  --core NAME   run this processor only; may be repeated:
                 vexriscv, ibex, picorv32, picorv32-rv32i or serv
-  --check       compare with the files and write none";
+  --check       compare with the files instead of writing them";
 
-/// What every program is compared with.
+/// The lines that every program has to print.
 const EXPECTED: &str = "firmware/self-test.out";
 
 /// The instruction sets with an image, the least first.
@@ -51,17 +51,17 @@ const ISAS: [&str; 3] = ["rv32i", "rv32im", "rv32imc"];
 
 /// Far more than any program takes on the slowest processor.
 const MOST_CYCLES: u64 = 2_000_000_000;
-/// What ends a loop without end, which would take the others' limit.
+/// The limit for the endless loop, which would use up a larger one.
 const ENDLESS_CYCLES: u64 = 1_000_000;
 
-/// What must fail, and what it says before that.
+/// Programs that must fail, and what they print first.
 const MUST_FAIL: [(&str, &str); 3] = [
     ("wrong-vector", "vector 5 WRONG"),
     ("illegal-instruction", "an illegal instruction follows"),
     ("endless-loop", "an endless loop follows"),
 ];
 
-/// What is said last of what must fail in simulation.
+/// The last line of a program that must fail in simulation.
 fn last_words(core: Core, program: &str) -> &'static str {
     match (core.name, program) {
         ("picorv32" | "picorv32-rv32i", "illegal-instruction") => "the processor stops cycle",
@@ -73,7 +73,7 @@ fn last_words(core: Core, program: &str) -> &'static str {
     }
 }
 
-/// What the trap handler says.
+/// The line of the trap handler.
 const ILLEGAL: &str = "trap: illegal instruction";
 
 fn main() -> ExitCode {
@@ -93,7 +93,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// What is asked for.
+/// The options of the command line.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Options {
     qemu_only: bool,

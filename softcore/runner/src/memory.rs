@@ -10,23 +10,23 @@ use crate::image::{Images, Sizes};
 /// Macropixels of the programs.
 pub const MACROPIXELS: [u8; 3] = [1, 4, 64];
 
-/// Of the program for so many macropixels of an instruction set.
+/// The bytes of a program for so many macropixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Memory {
     pub isa: String,
     pub macropixels: u8,
     pub sizes: Sizes,
-    /// If a processor of that instruction set was run.
+    /// The stack, if a processor of this instruction set was run.
     pub stack: Option<u64>,
 }
 
-/// What the stack was, by instruction set and macropixels.
+/// Stacks by instruction set and macropixels.
 pub type Stacks = Vec<(&'static str, u8, u64)>;
 
 impl Memory {
     pub const HEADER: &str = "isa,macropixels,code and constants,data,stack";
 
-    /// Of all of them.
+    /// Builds and measures all programs.
     pub fn of_all(root: &Path, stacks: &Stacks) -> Result<Vec<Self>> {
         let mut all = Vec::new();
         for isa in ISAS {
@@ -58,7 +58,7 @@ impl Memory {
         format!("{isa},{macropixels},{code},{data},{stack}")
     }
 
-    /// What a line of the file says.
+    /// Reads a line of the file.
     pub fn parse(line: &str) -> Option<Self> {
         let words: Vec<&str> = line.split(',').collect();
         let [isa, macropixels, code, data, stack] = words[..] else {

@@ -22,8 +22,8 @@ pub struct Photon {
 /// In the order of their laser cycles.
 pub type Photons = Vec<Photon>;
 
-/// Those of so many `pixels` at a `rate` of all of them in [`UNIT`], of which a part is `signal`,
-/// over so many laser cycles.
+/// Photons of so many `pixels` over so many laser cycles. The `rate` is that of all pixels
+/// in [`UNIT`]; `signal` is a share of it.
 pub fn photons(pixels: u8, rate: u32, signal: f64, length: u32) -> Result<Photons> {
     let bins = u16::try_from(BINS)?;
     let each = f64::from(rate) * UNIT / f64::from(pixels);

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 
-/// What came of a program.
+/// The end of a program and its output.
 pub struct Ran {
     /// Its exit code; `None` if it was ended.
     pub code: Option<i32>,
@@ -81,7 +81,7 @@ pub fn run(command: &mut Command, limit: Limit) -> Result<Ran> {
         }
         if Instant::now() > end {
             if cfg!(unix) {
-                // What it has started holds the other ends of the pipes.
+                // Its children hold the other ends of the pipes.
                 let kill = format!("kill -s KILL -- -{}", child.id());
                 let killed = Command::new("sh").args(["-c", &kill]).status();
                 killed.context("sh does not start")?;
@@ -101,7 +101,7 @@ pub fn run(command: &mut Command, limit: Limit) -> Result<Ran> {
     })
 }
 
-/// What a thread reads.
+/// Text that a thread reads.
 struct Text {
     bytes: Arc<Mutex<Vec<u8>>>,
     reader: JoinHandle<()>,
@@ -113,7 +113,7 @@ impl Text {
         let read = Arc::clone(&bytes);
         let reader = thread::spawn(move || {
             let mut part = [0; 1 << 14];
-            // What came before an error is all.
+            // Text before an error is kept.
             while let Ok(length @ 1..) = source.read(&mut part) {
                 if let (Ok(mut read), Some(part)) = (read.lock(), part.get(..length)) {
                     read.extend_from_slice(part);
@@ -134,7 +134,7 @@ impl Text {
     }
 }
 
-/// What has been read.
+/// The text read so far.
 fn text(bytes: &Mutex<Vec<u8>>) -> String {
     let bytes = bytes.lock().map(|bytes| bytes.clone());
     String::from_utf8_lossy(&bytes.unwrap_or_default()).into_owned()

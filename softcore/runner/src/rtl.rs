@@ -100,7 +100,7 @@ impl Simulator {
     }
 }
 
-/// What sends photons, and what takes events.
+/// The sender of photons and the taker of events.
 pub struct Laser<'a> {
     /// Lines `laser cycle, macropixel, TDC code`.
     pub photons: &'a Path,

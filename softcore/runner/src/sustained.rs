@@ -2,7 +2,7 @@
 
 use crate::photons::UNIT;
 
-/// What a run at such a rate came to.
+/// The results of a run at one rate.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sustained {
     /// Core and instruction set, with a comma between.
@@ -36,7 +36,7 @@ impl Sustained {
         format!("{core},{rate:.5},{between},{photons},{events},{expired},{fill}")
     }
 
-    /// What a line of the file says.
+    /// Reads a line of the file.
     pub fn parse(line: &str) -> Option<Self> {
         let words: Vec<&str> = line.split(',').collect();
         let [core, isa, rate, between, photons, events, expired, fill] = words[..] else {

@@ -6,13 +6,12 @@ use anyhow::{Context, Result, ensure};
 
 use crate::program::Ran;
 
-/// What the first operation of the bench is: a call that does nothing, taken off the
-/// others.
+/// The first operation of the bench: a call that does nothing, taken off the others.
 const CALL: &str = "call";
 
-/// What ends the name of an operation that a cache holds nothing of.
+/// The end of an operation's name when no cache holds any of it.
 pub const COLD: &str = "; cold";
-/// What ends the name of one that was done just before.
+/// The end of an operation's name when it was done just before.
 const WARM: &str = "; warm";
 
 /// One figure of one processor.
@@ -34,7 +33,7 @@ pub struct Row {
 
 pub const HEADER: &str = "core,isa,operation,cycles,instructions,code lines,data lines";
 
-/// What the testbench counts: cycles, instructions, lines of code and of data.
+/// The counts of the testbench: cycles, instructions, lines of code and of data.
 const COUNTS: [&str; 4] = ["cycle", "instructions", "code", "data"];
 type Counts = [u64; COUNTS.len()];
 
@@ -107,7 +106,7 @@ pub fn rows(core: &str, caches: bool, ran: &Ran) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// What was counted between marks 2 k + 1 and 2 k + 2, and how often, by k.
+/// Counts between marks 2 k + 1 and 2 k + 2, and how often, by k.
 fn totals(lines: &str) -> Result<BTreeMap<u64, (Counts, u64)>> {
     let mut totals = BTreeMap::<u64, (Counts, u64)>::new();
     let mut begun: Option<(u64, Counts)> = None;
@@ -155,7 +154,7 @@ impl Row {
         format!("{},{},{counted},{lines}", self.core, self.operation)
     }
 
-    /// What a line of the file says.
+    /// Reads a line of the file.
     pub fn parse(line: &str) -> Option<Self> {
         let words: Vec<&str> = line.split(',').collect();
         let (&[core, isa, operation], figures) = words.split_first_chunk()?;

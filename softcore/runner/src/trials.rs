@@ -18,7 +18,7 @@ use crate::table::Row;
 /// other rates a run has as many laser cycles.
 const PHOTONS: u32 = 50_000;
 const LONGEST: u32 = 4_000_000;
-/// Of the photons of a macropixel, background included.
+/// The share of signal among the photons of a macropixel.
 const SIGNAL: f64 = 0.5;
 /// Macropixels that share a processor.
 const PIXELS: u8 = 4;
@@ -27,10 +27,10 @@ const CLOCKS: u64 = 10;
 /// The highest rate is known to a part of so many: a tenth of a run has 5000 photons, give or
 /// take 1.4 %.
 const PARTS: u32 = 25;
-/// Of the highest rate, the rates whose looks and events are told: one part in so many.
+/// The rates whose looks and events are told, as divisors of the highest rate.
 const RATES: [u32; 3] = [1, 2, 4];
 
-/// Of the runs in which events are certain: laser cycles, and photons of a macropixel a
+/// Runs in which events are certain: their laser cycles, and the photons of a macropixel a
 /// laser cycle, all of them signal.
 const CERTAIN: u32 = 1500;
 const CERTAIN_RATE: u32 = PER_PHOTON / 50;
@@ -45,7 +45,7 @@ pub struct Cycles {
 }
 
 impl Cycles {
-    /// As the bench counted them.
+    /// The counts of the bench.
     pub fn of(rows: &[Row]) -> Option<Self> {
         let of = |operation| {
             let row = rows.iter().find(|row| row.operation == operation);
@@ -58,17 +58,17 @@ impl Cycles {
     }
 }
 
-/// What the photons of a processor are tried with.
+/// The set-up for trying photons on a processor.
 pub struct Trials<'a> {
     pub simulator: &'a Simulator,
-    /// Of the image `stream-N`.
+    /// The path of the image `stream-N`.
     pub image: &'a dyn Fn(u8) -> PathBuf,
     pub folder: &'a Path,
     pub core: &'a str,
     pub cycles: Cycles,
 }
 
-/// What they come to.
+/// The results of the trials.
 pub struct Found {
     pub sustained: Vec<Sustained>,
     /// Bytes of the stack with so many macropixels.

@@ -10,7 +10,7 @@ use crate::program::{self, Limit, Ran};
 
 /// Whatever ends, ends in a fraction of this.
 const PATIENCE: Duration = Duration::from_secs(120);
-/// What is long enough to see that a loop has no end.
+/// Long enough to see that a loop has no end.
 const A_MOMENT: Duration = Duration::from_secs(1);
 
 /// Runs an image until it ends, or a moment longer than it takes to print a line, after which

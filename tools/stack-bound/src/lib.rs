@@ -19,8 +19,8 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 
 use thumb::Effect;
 
-/// What the processor saves when an interrupt comes: 26 words with those of the
-/// floating-point unit, and a word so that the stack stays aligned.
+/// Bytes the processor saves when an interrupt comes: 26 words with those of the
+/// floating-point unit, and a word that keeps the stack aligned.
 const EXCEPTION_FRAME: u32 = 27 * 4;
 /// Entries of the vector table: those of the NMI and the hard fault, which
 /// interrupt all others, come after the stack's start and Reset.
@@ -84,7 +84,7 @@ struct Function {
     sets_stack_pointer: bool,
 }
 
-/// What functions need with all they go to.
+/// The stack that functions need, with all functions they go to.
 struct Needs {
     functions: BTreeMap<u32, Function>,
     known: BTreeMap<u32, u32>,
@@ -92,7 +92,7 @@ struct Needs {
 }
 
 impl Needs {
-    /// Those of [`DEFMT_RTT`] call one of two, by the channel's mode.
+    /// The functions of [`DEFMT_RTT`] call one of two, by the channel's mode.
     fn resolve_defmt_rtt(&mut self) {
         let writes = |(_, function): &(&u32, &Function)| function.name.contains("blocking_write");
         let found = self.functions.iter().filter(writes);
@@ -110,7 +110,7 @@ impl Needs {
         }
     }
 
-    /// What the function at `address` needs.
+    /// The stack that the function at `address` needs.
     fn of(&mut self, address: u32) -> Result<u32> {
         if let Some(&known) = self.known.get(&address) {
             return Ok(known);
@@ -223,8 +223,8 @@ impl Function {
 mod tests {
     use super::*;
 
-    /// What the first of these functions needs, each at its index with what it
-    /// takes and goes to. The last is the panic handler.
+    /// The stack that the first of these functions needs. Each stands at its index with
+    /// the bytes it takes and the functions it goes to. The last is the panic handler.
     fn need(functions: &[(u32, &[u32])], unbounded: Option<u32>) -> Result<u32> {
         let last = functions.len() - 1;
         let function = |(index, (takes, goes_to)): (usize, &(u32, &[u32]))| Function {

@@ -2,7 +2,7 @@
 //! takes of it and where it goes. Encodings: Armv7-M Architecture Reference
 //! Manual (DDI 0403), A5 and A7.7.
 
-/// What an instruction does.
+/// The effect of an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
     /// Nothing of interest; gives back some of the stack; returns.

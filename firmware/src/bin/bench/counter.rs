@@ -10,8 +10,8 @@
 
 use crate::State;
 
-/// What is measured: it is called with a state and a number, and returns
-/// something, so that nothing is optimised away.
+/// An operation to measure. It takes a state and a number and returns something, so
+/// that nothing is optimised away.
 pub type Operation = extern "C" fn(&mut State, u32) -> u32;
 
 /// A running counter, and what measuring itself takes.

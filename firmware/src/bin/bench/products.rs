@@ -1,4 +1,4 @@
-//! What is made of the events of a pixel.
+//! The products of a pixel's events.
 
 use core::hint::black_box;
 

@@ -1,4 +1,4 @@
-//! What the operations work on: exposures of 256 photons over 44 laser cycles
+//! The photons that the operations work on: exposures of 256 photons over 44 laser cycles
 //! into 128 bins, with and without a target.
 
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
@@ -50,7 +50,7 @@ pub struct State {
     pub changes: DynamicDepthPixel<3>,
     /// Which is measured.
     pub dynamic_depth: DynamicDepthConfig,
-    /// With a threshold that no change exceeds, and with one that nearly all do.
+    /// One with a threshold that no change exceeds, one that nearly all changes exceed.
     pub dynamic_depths: [DynamicDepthConfig; 2],
     pub reflectivity: Reflectivity,
 }

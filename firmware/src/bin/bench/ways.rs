@@ -16,7 +16,7 @@ pub extern "C" fn add_batch(state: &mut State, _: u32) -> u32 {
     0
 }
 
-/// Something of a decision, so that nothing of it is optimised away.
+/// A number of the decision, so that no part of it is optimised away.
 #[inline(always)]
 pub fn offset(detection: Option<Detection>) -> u32 {
     detection.map_or(0, |found| found.depth.offset.raw().unsigned_abs().into())

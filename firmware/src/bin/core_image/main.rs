@@ -120,7 +120,7 @@ fn words() {
     keep(AerWord::end(double(), word()).to_le_bytes());
 }
 
-/// What is made of the events of a pixel.
+/// The products of a pixel's events.
 #[inline(never)]
 fn products() {
     products_of::<1>();
@@ -227,7 +227,7 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
             keep(detect(&histogram, &gate, &rule, &estimator()));
         }
 
-        // As another detection rule may ask: about a peak of its own.
+        // Another detection rule may ask about a peak of its own.
         let peak = Peak {
             bin: bin(),
             count: count(),

@@ -56,7 +56,7 @@ pub fn estimator() -> DepthEstimator {
     }
 }
 
-/// Of any fraction, and whole.
+/// A level with any fraction, or a whole one.
 pub fn background_level() -> U24F8 {
     if more() {
         U24F8::from_bits(word())
