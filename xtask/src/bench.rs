@@ -10,7 +10,7 @@ use anyhow::{Context, Result, ensure};
 use crate::firmware::Board;
 use crate::qemu;
 
-const FILE: &str = "docs/bench/instructions.csv";
+const FILE: &str = "docs/results/bench/instructions.csv";
 const HEADER: &str = "operation,variant,opt,instructions";
 
 /// An instruction takes 256 ns of the emulator's clock: see

@@ -47,7 +47,7 @@ cargo xtask <command>
                 firmware/self-test.out; --bless writes the file
   bench [--check]
                 count the instructions of the core's operations in QEMU and write
-                docs/bench/instructions.csv; --check compares with the file instead
+                docs/results/bench/instructions.csv; --check compares with the file instead
   python FILE   install the packages of a requirements file below the build folder
                 and print the path of a Python that has them";
 

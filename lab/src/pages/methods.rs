@@ -22,7 +22,7 @@ use std::path::PathBuf;
 pub use self::recorded::RECORDED;
 
 /// The instruction counts, below the documentation.
-pub const INSTRUCTIONS: &str = "bench/instructions.csv";
+pub const INSTRUCTIONS: &str = "results/bench/instructions.csv";
 /// The cheapest method that may be no more than this share above the best is chosen.
 const MARGIN: f64 = 0.1;
 
@@ -393,6 +393,6 @@ mod tests {
             Instructions("operation,variant,opt,instructions\na,b; c,3,12.5\na,b; c,s,9\n");
         assert_eq!(counts.of("a", "b; c").unwrap(), 12.5);
         let error = counts.of("a", "b").unwrap_err().to_string();
-        assert_eq!(error, "bench/instructions.csv: no `a,b,3,`");
+        assert_eq!(error, "results/bench/instructions.csv: no `a,b,3,`");
     }
 }

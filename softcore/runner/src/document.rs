@@ -1,4 +1,4 @@
-//! `docs/bench/softcore.md`: the figures of the files as tables.
+//! `docs/results/bench/softcore.md`: the figures of the files as tables.
 
 use std::fmt::Write as _;
 

@@ -11,10 +11,10 @@ use crate::memory::Memory;
 use crate::sustained::Sustained;
 use crate::table::{self, Row};
 
-const ROWS: &str = "docs/bench/softcore.csv";
-const PHOTONS: &str = "docs/bench/softcore-photons.csv";
-const MEMORY: &str = "docs/bench/softcore-bytes.csv";
-pub const DOCUMENT: &str = "docs/bench/softcore.md";
+const ROWS: &str = "docs/results/bench/softcore.csv";
+const PHOTONS: &str = "docs/results/bench/softcore-photons.csv";
+const MEMORY: &str = "docs/results/bench/softcore-bytes.csv";
+pub const DOCUMENT: &str = "docs/results/bench/softcore.md";
 
 /// How a column is compared.
 #[derive(Clone, Copy)]

@@ -36,7 +36,7 @@ cargo softcore [--qemu-only] [--core NAME]... [--check]
 
 Runs the core on RV32 processors: golden vectors in QEMU, and golden vectors, cycles and
 photon rates on the Verilog of VexRiscv, Ibex, PicoRV32 and SERV. If all of them run, it
-writes docs/bench/softcore*.csv and softcore.md.
+writes docs/results/bench/softcore*.csv and softcore.md.
 
   --qemu-only   run QEMU only: no cycles, no Verilator
   --core NAME   run this processor only; may be repeated:

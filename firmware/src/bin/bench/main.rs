@@ -1,5 +1,5 @@
 //! How many instructions the operations of `dtof-core` take:
-//! `cargo xtask bench`, and `docs/bench/README.md` for what is counted.
+//! `cargo xtask bench`, and `docs/results/bench/README.md` for what is counted.
 //!
 //! The emulator counts instructions. On a board (feature `stm32f405`) the same
 //! lines hold clock cycles; a debugger shows them. That has not been tried.
