@@ -28,20 +28,14 @@ fn expected(parts: &[Part]) -> Vec<Seen> {
     for (index, part) in parts.iter().enumerate() {
         if index == 0 || reads(parts[index - 1]) != reads(part) {
             seen.push(Seen::Start);
-            seen.push(Seen::Address {
-                address: ADDRESS,
-                reads: reads(part),
-            });
+            seen.push(Seen::Address(ADDRESS, reads(part)));
         }
         match part {
             Part::Write(bytes) => seen.extend(bytes.iter().copied().map(Seen::Written)),
             Part::Read(count) => {
                 let goes_on = parts.get(index + 1).is_some_and(|next| reads(next));
                 for left in (0..*count).rev() {
-                    seen.push(Seen::Read {
-                        byte: next,
-                        acknowledged: left > 0 || goes_on,
-                    });
+                    seen.push(Seen::Read(next, left > 0 || goes_on));
                     // A device sends what it has got ready anew after a START.
                     next += 1;
                 }
@@ -152,10 +146,7 @@ fn a_packet_of_135_bytes_takes_3_to_4_ms() {
 fn nobody_there_is_said_at_the_address_and_stops() {
     let (mut bus, wires) = bus();
     assert_eq!(bus.write(0x42, &[1, 2]), Err(Error::NoDevice));
-    let address = Seen::Address {
-        address: 0x42,
-        reads: false,
-    };
+    let address = Seen::Address(0x42, false);
     assert_eq!(wires.borrow().seen, [Seen::Start, address, Seen::Stop]);
     // And the next works.
     assert_eq!(bus.write(ADDRESS, &[3]), Ok(()));
@@ -246,7 +237,7 @@ fn a_device_stuck_in_a_byte_is_clocked_free() {
         {
             let mut wires = wires.borrow_mut();
             wires.hold(SDA, true);
-            wires.phase = Phase::Send { byte: 0, bits };
+            wires.phase = Phase::Send(0, bits);
         }
         let mut byte = [0xAA];
         assert_eq!(bus.write_read(ADDRESS, &[7], &mut byte), Ok(()));

@@ -17,9 +17,11 @@ pub const LOOK_NS: u64 = 100;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
     Start,
-    Address { address: u8, reads: bool },
+    /// An address, and whether it reads.
+    Address(u8, bool),
     Written(u8),
-    Read { byte: u8, acknowledged: bool },
+    /// A byte, and whether it is acknowledged.
+    Read(u8, bool),
     Stop,
 }
 
@@ -27,36 +29,15 @@ pub enum Seen {
 pub enum Phase {
     /// Not addressed.
     Idle,
-    /// Takes bits, the most significant first.
-    Receive {
-        byte: u8,
-        bits: u8,
-        address: bool,
-    },
+    /// Takes bits, the most significant first: the byte so far, its bits, and whether it
+    /// is an address.
+    Receive(u8, u8, bool),
     /// Acknowledges; then it sends or takes bytes.
-    Acknowledge {
-        sends: bool,
-    },
-    Send {
-        byte: u8,
-        bits: u8,
-    },
-    /// Is acknowledged, or not.
-    Acknowledged {
-        byte: u8,
-        high: bool,
-    },
-}
-
-impl Phase {
-    fn receive(address: bool) -> Self {
-        let (byte, bits) = (0, 0);
-        Self::Receive {
-            byte,
-            bits,
-            address,
-        }
-    }
+    Acknowledge { sends: bool },
+    /// Sends a byte, of which so many bits are out.
+    Send(u8, u8),
+    /// Is acknowledged, or not: SDA is high.
+    Acknowledged(u8, bool),
 }
 
 /// Two wires and a device on them.
@@ -187,7 +168,7 @@ impl Wires {
             (true, true) if sda && !self.level(SDA) => {
                 self.seen.push(Seen::Start);
                 self.is_plain_period = false;
-                self.phase = Phase::receive(true);
+                self.phase = Phase::Receive(0, 0, true);
             }
             (true, true) if !sda && self.level(SDA) => {
                 self.seen.push(Seen::Stop);
@@ -213,11 +194,11 @@ impl Wires {
         self.rose_ns = self.now_ns;
         let sda = self.level(SDA);
         match &mut self.phase {
-            Phase::Receive { byte, bits, .. } => {
+            Phase::Receive(byte, bits, _) => {
                 *byte = *byte << 1 | u8::from(sda);
                 *bits += 1;
             }
-            Phase::Acknowledged { high, .. } => *high = sda,
+            Phase::Acknowledged(_, high) => *high = sda,
             _ => {}
         }
     }
@@ -229,63 +210,46 @@ impl Wires {
         self.fell_ns = self.now_ns;
         self.falls += 1;
         match self.phase {
-            Phase::Receive {
-                byte,
-                bits: 8,
-                address,
-            } => {
+            Phase::Receive(byte, 8, address) => {
                 let taken = if address {
-                    self.seen.push(Seen::Address {
-                        address: byte >> 1,
-                        reads: byte & 1 == 1,
-                    });
+                    self.seen.push(Seen::Address(byte >> 1, byte & 1 == 1));
                     byte >> 1 == ADDRESS
                 } else {
                     self.seen.push(Seen::Written(byte));
                     self.takes = self.takes.saturating_sub(1);
                     self.takes > 0
                 };
+                self.phase = Phase::Idle;
                 if taken {
                     self.device[SDA] = false;
-                    self.phase = Phase::Acknowledge {
-                        sends: address && byte & 1 == 1,
-                    };
-                } else {
-                    self.phase = Phase::Idle;
+                    let sends = address && byte & 1 == 1;
+                    self.phase = Phase::Acknowledge { sends };
                 }
             }
             Phase::Acknowledge { sends } => {
                 self.stretched_until = self.now_ns + self.stretch_ns;
                 self.device[SDA] = true;
+                self.phase = Phase::Receive(0, 0, false);
                 if sends {
                     self.send();
-                } else {
-                    self.phase = Phase::receive(false);
                 }
             }
-            Phase::Send { byte, bits: 8 } => {
+            Phase::Send(byte, 8) => {
                 self.device[SDA] = true;
-                self.phase = Phase::Acknowledged { byte, high: true };
+                self.phase = Phase::Acknowledged(byte, true);
             }
-            Phase::Send { byte, bits } => {
+            Phase::Send(byte, bits) => {
                 self.device[SDA] = byte >> (7 - bits) & 1 == 1;
-                self.phase = Phase::Send {
-                    byte,
-                    bits: bits + 1,
-                };
+                self.phase = Phase::Send(byte, bits + 1);
             }
-            Phase::Acknowledged { byte, high } => {
-                self.seen.push(Seen::Read {
-                    byte,
-                    acknowledged: !high,
-                });
-                if high {
-                    self.phase = Phase::Idle;
-                } else {
+            Phase::Acknowledged(byte, high) => {
+                self.seen.push(Seen::Read(byte, !high));
+                self.phase = Phase::Idle;
+                if !high {
                     self.send();
                 }
             }
-            Phase::Idle | Phase::Receive { .. } => {}
+            Phase::Idle | Phase::Receive(..) => {}
         }
     }
 
@@ -293,7 +257,7 @@ impl Wires {
         let byte = self.next;
         self.next = self.next.wrapping_add(1);
         self.device[SDA] = byte >> 7 == 1;
-        self.phase = Phase::Send { byte, bits: 1 };
+        self.phase = Phase::Send(byte, 1);
     }
 }
 
