@@ -154,23 +154,34 @@ fn results_of_an_earlier_run_are_replaced() {
     assert!(scratch.simulate(&scene, &["--quiet"]).status.success());
 }
 
-/// What cannot be moved to its place leaves a folder that does not look complete.
+/// What came into the way during a run stays, and so does all of the run before.
 #[test]
-fn a_folder_that_cannot_be_completed_has_no_summary() {
+fn a_folder_that_cannot_be_completed_is_left_as_it_was() {
     let scratch = Scratch::new();
     let photons = scratch.file("photons.csv", PHOTONS);
     scratch.replayed(&photons, &[]);
     let source = PhotonCsv::open(&photons, 128, None, 1).unwrap();
     let settings = scene::settings(1);
     let out = scratch.path("out");
-    let output = Output::create(&out, &settings, &source, None).unwrap();
-    fs::remove_file(out.join("report.html")).unwrap();
-    fs::create_dir(out.join("report.html")).unwrap();
     let summary = Summary::new(&Statistics::default(), &source, 0, &settings);
-    let error = output.finish(&summary, "", "", &[]).unwrap_err();
-    assert!(format!("{error:#}").contains("report.html: "), "{error:#}");
-    assert!(!out.join("summary.json").exists());
-    assert!(names(&out).iter().all(|name| !name.starts_with('.')));
+    let before = scratch.read("out/summary.json");
+    let finish = |come: &dyn Fn()| {
+        let output = Output::create(&out, &settings, &source, None).unwrap();
+        fs::remove_file(out.join("report.html")).unwrap();
+        come();
+        let error = output.finish(&summary, "", "", &[]).unwrap_err();
+        assert!(format!("{error:#}").contains("report.html: "), "{error:#}");
+        assert_eq!(scratch.read("out/summary.json"), before);
+        assert!(names(&out).iter().all(|name| !name.starts_with('.')));
+    };
+    finish(&|| fs::write(out.join("report.html"), "mine\n").unwrap());
+    assert_eq!(scratch.read("out/report.html"), "mine\n");
+    fs::write(
+        out.join("report.html"),
+        "<meta name=\"generator\" content=\"dtof\">",
+    )
+    .unwrap();
+    finish(&|| fs::create_dir(out.join("report.html")).unwrap());
 }
 
 #[test]
