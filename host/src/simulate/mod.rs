@@ -6,7 +6,7 @@
 //! pulse position (Eq. 1 to 3, one object). A signal photon outside the
 //! histogram is not detected.
 //!
-//! That is the plain model, and all there is unless [`Effects`] say otherwise.
+//! That is the plain model, and all there is unless [`Effects`](effects::Effects) say otherwise.
 //! With effects the same photons, drawn from the same random numbers, take a
 //! longer way:
 //!
