@@ -15,7 +15,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 MOST_BYTES = 5_000_000
-SCRIPTS = Path(__file__).parent.parent.parent / "host/src/report"
+SCRIPTS = Path(__file__).parent.parent.parent / "host/src/view/report"
 
 
 def check(what, holds):
