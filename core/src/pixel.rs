@@ -261,7 +261,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     fn leave_out(&mut self, photons: u32) {
         // Most often none.
         if photons > 0 {
-            self.gated_out = self.gated_out.saturating_add(photons);
+            self.gated_out = self.gated_out.wrapping_add(photons);
         }
     }
 

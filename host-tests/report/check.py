@@ -218,6 +218,7 @@ def places_are_true(browser):
     ranges = [500, 1000, 2000, 9000]
     records = b"".join(struct.pack("<IfH", at, mm, 0) for at, mm in enumerate(ranges))
     data = {"columns": 1, "rows": 1, "cycles": 4, "unit": 1, "oneOf": 1, "low": 1000, "high": 2000}
+    data |= {"sides": ["column", "row"], "events": "events"}
     data |= {"colours": "000000" * 256, "records": base64.b64encode(records).decode()}
     page = browser.new_page()
     page.set_content(f'<script type="application/json" id="data">{json.dumps(data)}</script>')

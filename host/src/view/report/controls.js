@@ -166,7 +166,7 @@ far.addEventListener("input", chooseFar);
 function chooseThird() {
   view.third = element("third").value;
   const third = view.third === "range" ? "range" : "laser cycle";
-  const by = [...data.sides, third].join(", ");
+  const by = `${data.sides.join(", ")} and ${third}`;
   cloud.setAttribute("aria-label", `${capital(data.events)} by ${by}, coloured by range`);
   redraw();
 }
