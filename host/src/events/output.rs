@@ -63,9 +63,7 @@ impl Output {
         let scale = settings.range_scale()?;
         fs::create_dir_all(folder)
             .with_context(|| format!("{}: cannot be the output folder", folder.display()))?;
-        for (name, mark) in results() {
-            may_replace(&folder.join(name), mark, input.as_slice())?;
-        }
+        may_hold_results(folder, input)?;
         remove_leftovers(folder, input);
         let geometry = source.geometry();
         let mut csv = BufWriter::new(aside(folder, OF_A_RUN)?);
@@ -174,13 +172,7 @@ impl Output {
         ));
 
         // Something may have come there since.
-        for (name, mark) in results() {
-            may_replace(
-                &self.folder.join(name),
-                mark,
-                self.input.as_deref().as_slice(),
-            )?;
-        }
+        may_hold_results(&self.folder, self.input.as_deref())?;
         // Without a summary the folder does not look complete.
         let old = self.folder.join(SUMMARY);
         match fs::remove_file(&old) {
@@ -207,6 +199,11 @@ fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
         (REPORT, report::MARK),
         (SUMMARY, summary::MARK),
     ])
+}
+
+/// Checks that no result would replace `input`, or a file that no run has written.
+fn may_hold_results(folder: &Path, input: Option<&Path>) -> Result<()> {
+    results().try_for_each(|(name, mark)| may_replace(&folder.join(name), mark, input.as_slice()))
 }
 
 /// Removes what a killed run has left, and nothing of an export or a recording, which
