@@ -13,7 +13,7 @@
 //! photon (TDC code)
 //!   → Histogram     saturating counters, highest bin kept while counting
 //!   → [every X laser cycles, once L1 < N < L2]
-//!     DetectionRule the peak against the background: PaperRule, WindowRule, AnyRule
+//!     DetectionRule the peak against the background: PaperRule, AverageRule, WindowRule, AnyRule
 //!     DepthEstimator where in its bins the pulse lies: centroid, CentredWindow
 //!   → DepthEvent    pixel, laser cycle, exposure, sub-bin depth, counts, flags
 //!   → AerWord       128 bits
@@ -127,8 +127,9 @@ pub use config::{ConfigError, PixelConfig, PixelConfigBuilder};
 pub use counter::{Count10, Count16, Count24, CounterWidth, PhotonCount};
 pub use depth::{CentredWindow, Depth, DepthEstimator, RangeScale, RangeScaleError, centroid};
 pub use detect::{
-    AnyRule, ComparatorTree, Detection, DetectionRule, HIGHEST_Z, PaperRule, Threshold, WindowRule,
-    WindowWidthError, detect, isqrt, quadrant_background, whole_background, z_for,
+    AnyRule, AverageRule, ComparatorTree, Detection, DetectionRule, HIGHEST_Z, PaperRule,
+    Threshold, WindowRule, WindowWidthError, detect, isqrt, quadrant_background, whole_background,
+    z_for,
 };
 pub use event::DepthEvent;
 pub use events::{

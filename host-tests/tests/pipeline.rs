@@ -2,18 +2,18 @@
 //! cycle on the same photons.
 //!
 //! Both must agree on every decision: taken when, on which peak, with which
-//! background, fired or not. The one difference allowed is the integer square
-//! root's: its floor lowers the threshold by less than α, so that a peak between
+//! background, fired or not. With the quadrants one difference is allowed, the integer
+//! square root's: its floor lowers the threshold by less than α, so that a peak between
 //! the two thresholds fires in integers alone. Wherever that is claimed the test
-//! proves it from the counts.
+//! proves it from the counts. With the average there is no root, and no difference.
 
 use dtof::simulate::SimulatedPixel;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AsyncPixel, Count, LaserCycle, Look, PaperRule, PixelAddress, PixelConfig, RangeGate,
-    Statistics,
+    AnyRule, AsyncPixel, AverageRule, Count, LaserCycle, Look, PaperRule, PixelAddress,
+    PixelConfig, RangeGate, Statistics,
 };
-use dtof_host_tests::reference;
+use dtof_host_tests::reference::{self, Background};
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 use rand_core::Rng;
@@ -81,12 +81,16 @@ fn draw<const BINS: usize>(rng: &mut impl Rng) -> Draw {
 }
 
 /// Runs one pixel until `exposures` of its exposures have ended.
-fn run<const BINS: usize>(seed: u64, exposures: u32, tally: &mut Tally) {
+fn run<const BINS: usize>(seed: u64, background: Background, exposures: u32, tally: &mut Tally) {
     let mut rng = pixel_rng(seed, PixelAddress(0));
     let draw = draw::<BINS>(&mut rng);
     let gate = RangeGate::new(draw.first, draw.last).unwrap();
-    let rule = PaperRule::new(draw.alpha, Count::saturating(draw.minimum_count.into()));
-    let config = PixelConfig::<BINS>::with_rule(rule)
+    let minimum_count = Count::saturating(draw.minimum_count.into());
+    let rule: AnyRule = match background {
+        Background::Quadrants => PaperRule::new(draw.alpha, minimum_count).into(),
+        Background::Average => AverageRule::new(draw.alpha, minimum_count).into(),
+    };
+    let config = PixelConfig::<BINS, _>::with_rule(rule)
         .x(draw.x)
         .l1(draw.l1)
         .l2(draw.l2)
@@ -98,6 +102,7 @@ fn run<const BINS: usize>(seed: u64, exposures: u32, tally: &mut Tally) {
         x: draw.x.into(),
         l1: draw.l1.into(),
         l2: draw.l2.into(),
+        background,
         alpha,
         minimum_count: draw.minimum_count.into(),
         first: draw.first.into(),
@@ -164,16 +169,26 @@ fn run<const BINS: usize>(seed: u64, exposures: u32, tally: &mut Tally) {
         tally.saturated += u32::from(peak.count.raw() == 1023);
         assert_eq!((event.cycle, event.exposure), (LaserCycle(cycle), exposure));
         assert_eq!((event.peak_bin, event.peak_count), (peak.bin, peak.count));
-        assert_eq!(float.background, f64::from(event.background.raw()));
+        // The average is rounded, to 1/256 for the depth and to whole counts in the event.
+        let (rounding, shift) = match background {
+            Background::Quadrants => (0.0, 0.0),
+            Background::Average => {
+                let above = float.peak_count - float.background;
+                (0.5 + 1.0 / 256.0, 3.0 / 256.0 / above)
+            }
+        };
+        let reported = f64::from(event.background.raw());
+        assert!((float.background - reported).abs() <= rounding);
         if float.fired {
             let twin_event = twin.event().expect("a look that fired left an event");
             let position = f64::from(event.position().raw()) / 256.0;
             assert!(
-                (position - twin_event.position).abs() <= 1.0 / 512.0 + 1e-9,
+                (position - twin_event.position).abs() <= 1.0 / 512.0 + shift + 1e-9,
                 "{position} bins, the reference has {}",
                 twin_event.position
             );
         } else {
+            assert_eq!(background, Background::Quadrants);
             let background = event.background.raw();
             let root = f64::from(reference::floor_square_root(background));
             let background = f64::from(background);
@@ -193,10 +208,10 @@ fn run<const BINS: usize>(seed: u64, exposures: u32, tally: &mut Tally) {
     }
 }
 
-fn agree<const BINS: usize>(pixels: u64) {
+fn agree<const BINS: usize>(pixels: u64, background: Background) {
     let mut tally = Tally::default();
     for seed in 0..pixels {
-        run::<BINS>(seed, 10, &mut tally);
+        run::<BINS>(seed, background, 10, &mut tally);
     }
     println!("{BINS} bins: {tally:?}");
     assert!(tally.exposures >= 10_000);
@@ -205,15 +220,18 @@ fn agree<const BINS: usize>(pixels: u64) {
         tally.events > 1000 && tally.expired > 100 && tally.saturated > 10,
         "{tally:?}"
     );
-    assert!(tally.explained_by_floor > 0, "{tally:?}");
+    let has_root = background == Background::Quadrants;
+    assert_eq!(tally.explained_by_floor > 0, has_root, "{tally:?}");
 }
 
 #[test]
 fn integer_pipeline_and_float_reference_agree_on_128_bins() {
-    agree::<128>(1000);
+    agree::<128>(1000, Background::Quadrants);
+    agree::<128>(1000, Background::Average);
 }
 
 #[test]
 fn integer_pipeline_and_float_reference_agree_on_8_bins() {
-    agree::<8>(1000);
+    agree::<8>(1000, Background::Quadrants);
+    agree::<8>(1000, Background::Average);
 }

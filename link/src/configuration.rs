@@ -1,7 +1,10 @@
 //! How the host wants the pixels to operate.
 
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
-use dtof_core::{AnyRule, CentredWindow, Count, DepthEstimator, PaperRule, Reference, WindowRule};
+use dtof_core::{
+    AnyRule, AverageRule, CentredWindow, Count, DepthEstimator, PaperRule, Reference, Threshold,
+    WindowRule,
+};
 
 use crate::dynamic_depth::DynamicDepth;
 use crate::refusal::Refusal;
@@ -52,6 +55,7 @@ const FROM_LINK: u8 = 0;
 const FROM_SENSOR: u8 = 1;
 const PAPER_RULE: u8 = 0;
 const WINDOW_RULE: u8 = 1;
+const AVERAGE_RULE: u8 = 2;
 const CENTROID: u8 = 0;
 const CENTRED_WINDOW: u8 = 1;
 const DEPTH_EVENTS: u8 = 0;
@@ -70,12 +74,13 @@ impl Configuration {
     /// As it is sent.
     #[must_use]
     pub fn to_le_bytes(&self) -> [u8; Self::BYTES] {
+        let with_alpha = |rule, threshold: &Threshold| {
+            let (alpha, minimum_count) = (threshold.alpha(), threshold.minimum_count());
+            (rule, alpha, minimum_count, 0, U4F12::ZERO)
+        };
         let (rule, alpha, minimum_count, window, z) = match self.rule {
-            AnyRule::Paper(rule) => {
-                let threshold = rule.threshold();
-                let (alpha, minimum_count) = (threshold.alpha(), threshold.minimum_count());
-                (PAPER_RULE, alpha, minimum_count, 0, U4F12::ZERO)
-            }
+            AnyRule::Paper(rule) => with_alpha(PAPER_RULE, rule.threshold()),
+            AnyRule::Average(rule) => with_alpha(AVERAGE_RULE, rule.threshold()),
             AnyRule::Window(rule) => {
                 let minimum_count = rule.minimum_count();
                 (
@@ -169,6 +174,7 @@ impl Configuration {
         Ok(Self {
             rule: match rule {
                 PAPER_RULE => PaperRule::new(alpha, minimum_count).into(),
+                AVERAGE_RULE => AverageRule::new(alpha, minimum_count).into(),
                 WINDOW_RULE => WindowRule::new(window, z, minimum_count)?.into(),
                 _ => return Err(Refusal::Unknown),
             },

@@ -4,7 +4,9 @@
 use std::fmt::Display;
 
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
-use dtof_core::{AnyRule, CentredWindow, Count, DepthEstimator, PaperRule, Reference, WindowRule};
+use dtof_core::{
+    AnyRule, AverageRule, CentredWindow, Count, DepthEstimator, PaperRule, Reference, WindowRule,
+};
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, FrameError, PAYLOAD_BYTES, WIRE_BYTES, encode};
 use dtof_link::message::greeting;
@@ -179,6 +181,8 @@ fn configuration() -> impl Strategy<Value = Configuration> {
     let count = || (1u32..=1023).prop_map(Count::saturating);
     let paper = (any::<u16>(), count())
         .prop_map(|(alpha, count)| PaperRule::new(U8F8::from_bits(alpha), count).into());
+    let average = (any::<u16>(), count())
+        .prop_map(|(alpha, count)| AverageRule::new(U8F8::from_bits(alpha), count).into());
     let window = (1u8..=7, any::<u16>(), count()).prop_map(|(width, z, count)| {
         let window = WindowRule::new(width, U4F12::from_bits(z), count);
         AnyRule::Window(window.unwrap())
@@ -196,7 +200,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
     });
     let source = prop_oneof![Just(Source::Link), Just(Source::Sensor)];
     (
-        prop_oneof![paper, window],
+        prop_oneof![paper, average, window],
         prop_oneof![Just(DepthEstimator::Centroid3), centred],
         prop::option::of(changes),
         source,
@@ -259,11 +263,12 @@ proptest! {
     #[test]
     fn what_any_bytes_configure_comes_back(
         numbers in any::<[u8; Configuration::BYTES]>(), minimum_count in 1u16..=1023,
-        choices in prop::array::uniform6(0u8..3), width in 0u8..9, half_width in 200u16..1100,
+        choices in prop::array::uniform5(0u8..3), rule in 0u8..4, width in 0u8..9,
+        half_width in 200u16..1100,
     ) {
         let mut bytes = numbers;
         bytes[2..4].copy_from_slice(&minimum_count.to_le_bytes());
-        let [source, rule, estimator, output, reference, hits] = choices;
+        let [source, estimator, output, reference, hits] = choices;
         for (at, value) in [
             (24, source), (25, rule), (26, width), (29, estimator), (32, output),
             (33, reference), (38, hits),
@@ -272,7 +277,7 @@ proptest! {
         }
         bytes[30..32].copy_from_slice(&half_width.to_le_bytes());
         let found = Configuration::from_le_bytes(&bytes);
-        let unknown = source == 2 || rule == 2 || estimator == 2 || output == 2 || hits == 2
+        let unknown = source == 2 || rule == 3 || estimator == 2 || output == 2 || hits == 2
             || (output == 1 && reference == 2);
         prop_assert_eq!(
             found.is_err(),

@@ -6,9 +6,10 @@
 //! upper limit has to be below by the table's [`MARGIN`]; where the table saw no events,
 //! or was not made for the settings, from the sum over looks of the exact
 //! single-look probability, which it cannot exceed. Of all L1 the one with the shortest mean
-//! time to an event is taken, found by simulating exposures ([`window`] does the same for
-//! the window rule).
+//! time to an event is taken, found by simulating exposures ([`average`] and [`window`] do
+//! the same for the other rules).
 
+pub mod average;
 mod shortest;
 pub mod window;
 

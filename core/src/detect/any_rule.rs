@@ -20,10 +20,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Cost: one comparison a look more than the rule itself, and a call for window rules.
+//! Cost: one comparison a look more than the rule itself, and a call for all but the paper's.
 
 use fixed::types::U24F8;
 
+use super::average::AverageRule;
 use super::quadrant::PaperRule;
 use super::rule::DetectionRule;
 use super::window::WindowRule;
@@ -37,6 +38,8 @@ use crate::histogram::{Histogram, Peak};
 pub enum AnyRule {
     /// The paper's.
     Paper(PaperRule),
+    /// The paper's threshold over the average of all bins.
+    Average(AverageRule),
     /// All photons of the pulse against all the others.
     Window(WindowRule),
 }
@@ -44,6 +47,12 @@ pub enum AnyRule {
 impl From<PaperRule> for AnyRule {
     fn from(rule: PaperRule) -> Self {
         Self::Paper(rule)
+    }
+}
+
+impl From<AverageRule> for AnyRule {
+    fn from(rule: AverageRule) -> Self {
+        Self::Average(rule)
     }
 }
 
@@ -65,6 +74,7 @@ impl DetectionRule for AnyRule {
             // The looks of a pixel with the default rule stay as fast as they are.
             Self::Paper(rule) if W::BITS <= 10 => rule.detect(histogram, gate, peak),
             Self::Paper(rule) => once(rule, histogram, gate, peak),
+            Self::Average(rule) => once(rule, histogram, gate, peak),
             Self::Window(rule) => once(rule, histogram, gate, peak),
         }
     }

@@ -4,12 +4,14 @@
 //! |---|---|
 //! | `rule` | what a detection rule is |
 //! | `quadrant` | the paper's rule, with its `background`, `threshold` and square `root` |
+//! | `average` | the same threshold over the average of all bins |
 //! | `window`, `window_z` | the window rule, a CFAR test over all photons of the pulse, and its z |
 //! | `any_rule` | a rule that is chosen when the program runs |
 //! | `decision` | one decision on one histogram |
 //! | `comparator_tree` | the paper's search for the peak, as a model of its hardware |
 
 mod any_rule;
+mod average;
 mod background;
 mod comparator_tree;
 mod decision;
@@ -21,6 +23,7 @@ mod window;
 mod window_z;
 
 pub use any_rule::AnyRule;
+pub use average::AverageRule;
 pub use background::quadrant_background;
 pub use comparator_tree::ComparatorTree;
 pub use decision::{Detection, detect};

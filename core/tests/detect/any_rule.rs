@@ -2,8 +2,8 @@
 
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
-    AnyRule, CentredWindow, Count, Count10, Count24, CounterWidth, DepthEstimator, Detection,
-    DetectionRule, Histogram, PaperRule, RangeGate, WindowRule, detect,
+    AnyRule, AverageRule, CentredWindow, Count, Count10, Count24, CounterWidth, DepthEstimator,
+    Detection, DetectionRule, Histogram, PaperRule, RangeGate, WindowRule, detect,
 };
 use proptest::prelude::*;
 use rand_core::SeedableRng;
@@ -30,16 +30,19 @@ fn check<const BINS: usize, W: CounterWidth>(
     (alpha, z, width): (u16, u16, u8),
     minimum: u32,
     half_width: u16,
-) -> Result<[bool; 2], TestCaseError> {
+) -> Result<[bool; 3], TestCaseError> {
     let mut rng = Pcg32::seed_from_u64(seed);
     let (gate, histogram, _) = crate::common::histogram::<BINS, W>(&mut rng, round);
     let minimum = Count::saturating(minimum);
-    let paper = PaperRule::new(U8F8::from_bits(alpha), minimum);
+    let alpha = U8F8::from_bits(alpha);
+    let paper = PaperRule::new(alpha, minimum);
+    let average = AverageRule::new(alpha, minimum);
     let window = WindowRule::new(width, U4F12::from_bits(z), minimum).unwrap();
     let centred = CentredWindow::new(U8F8::from_bits(half_width)).unwrap();
     let estimator = DepthEstimator::CentredWindow(centred);
     Ok([
         decides(paper, &histogram, &gate, &estimator)?.is_some(),
+        decides(average, &histogram, &gate, &estimator)?.is_some(),
         decides(window, &histogram, &gate, &estimator)?.is_some(),
     ])
 }
@@ -58,10 +61,10 @@ proptest! {
     }
 }
 
-/// The histograms above are some on either side of both rules.
+/// The histograms above are some on either side of each rule.
 #[test]
-fn both_rules_fire_and_do_not() {
-    let mut fired = [0; 2];
+fn all_rules_fire_and_do_not() {
+    let mut fired = [0; 3];
     for seed in 0..200 {
         let found = check::<128, Count10>((seed, 1), (1024, 4 << 12, 3), 5, 512).unwrap();
         for (fired, found) in fired.iter_mut().zip(found) {

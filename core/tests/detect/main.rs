@@ -3,6 +3,7 @@
 #![allow(clippy::cast_possible_truncation, reason = "small numbers")]
 
 mod any_rule;
+mod average;
 mod background;
 mod common;
 mod peak;

@@ -1,4 +1,16 @@
-//! Background estimation (sec. IV-B).
+//! Background estimation (sec. II-A and sec. IV-B).
+
+/// The background level `λ_b` as the mean of all bins of the gate: what sec. IV-B calls
+/// "the average of all 128 bins". The bins of the pulse are among them.
+///
+/// # Panics
+///
+/// If `first..=last` is empty or reaches beyond the histogram.
+#[must_use]
+pub fn average_background(counts: &[f64], first: usize, last: usize) -> f64 {
+    let window = &counts[first..=last];
+    window.iter().sum::<f64>() / window.len() as f64
+}
 
 /// The background level `λ_b` by the rule of the FPGA prototype (sec. IV-B).
 ///
@@ -56,6 +68,13 @@ mod tests {
         // Were bin 63 the peak, it would be bins 64 to 95 (maximum 90) against
         // bins 96 to 127 (maximum 1).
         assert_eq!(quadrant_background(&counts, 0, 127, 63), 1.0);
+    }
+
+    #[test]
+    fn the_average_is_that_of_the_gated_bins() {
+        let counts = [100.0, 1.0, 2.0, 9.0, 100.0];
+        assert_eq!(average_background(&counts, 1, 3), 4.0);
+        assert_eq!(average_background(&counts, 4, 4), 100.0);
     }
 
     #[test]

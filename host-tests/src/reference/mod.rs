@@ -9,7 +9,7 @@
 //! |----------------|------------------------------------------------|----------------------|
 //! | `histogram`    | photon counts per bin, saturating counters     | sec. II-A, sec. IV-B |
 //! | `peak`         | the bin with the largest count                 | sec. II-A            |
-//! | `background`   | the background level next to a peak            | sec. IV-B            |
+//! | `background`   | the background level next to a peak            | sec. II-A, sec. IV-B |
 //! | `threshold`    | whether a peak is significant                  | Eq. 5                |
 //! | `depth`        | sub-bin position of a peak, and its range      | sec. III-A           |
 //! | `pixel`        | the asynchronous operation of a pixel          | sec. II-B            |
@@ -25,10 +25,10 @@ mod pixel;
 mod square_root;
 mod threshold;
 
-pub use background::quadrant_background;
+pub use background::{average_background, quadrant_background};
 pub use depth::{centroid, range_mm};
 pub use histogram::Histogram;
 pub use peak::peak;
-pub use pixel::{Config, Event, Look, Pixel};
+pub use pixel::{Background, Config, Event, Look, Pixel};
 pub use square_root::floor_square_root;
 pub use threshold::{stands_clear, threshold};

@@ -1,7 +1,16 @@
 //! The asynchronous operation of a pixel (sec. II-B and its figure "Pixel
 //! operation flow chart").
 
-use super::{Histogram, centroid, peak, quadrant_background, stands_clear};
+use super::{Histogram, average_background, centroid, peak, quadrant_background, stands_clear};
+
+/// What the background `λ_b` is estimated from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Background {
+    /// Two quadrants (sec. IV-B).
+    Quadrants,
+    /// All bins (sec. II-A).
+    Average,
+}
 
 /// The hyperparameters of a pixel (sec. II-B) and its range gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,6 +23,8 @@ pub struct Config {
     pub l1: u32,
     /// `L_2`: the exposure ends when it has this many laser cycles (sec. II-B).
     pub l2: u32,
+    /// Where `λ_b` comes from.
+    pub background: Background,
     /// `α`: how many standard deviations above the background a peak has to
     /// stand (Eq. 5).
     pub alpha: f64,
@@ -156,6 +167,7 @@ impl Pixel {
     /// The decision: peak, background, threshold (sec. II-B, Eq. 5).
     fn look(&self, cycle: u64) -> Look {
         let Config {
+            background,
             alpha,
             minimum_count,
             first,
@@ -164,7 +176,10 @@ impl Pixel {
         } = self.config;
         let counts = self.histogram.counts();
         let (peak_bin, peak_count) = peak(counts, first, last);
-        let background = quadrant_background(counts, first, last, peak_bin);
+        let background = match background {
+            Background::Quadrants => quadrant_background(counts, first, last, peak_bin),
+            Background::Average => average_background(counts, first, last),
+        };
         Look {
             cycle,
             exposure: self.exposure,
@@ -202,6 +217,7 @@ mod tests {
         x: 4,
         l1: 8,
         l2: 20,
+        background: Background::Quadrants,
         alpha: 2.0,
         minimum_count: 0.0,
         first: 0,
@@ -309,6 +325,21 @@ mod tests {
         assert_eq!(fired, [(12, false), (16, true)]);
         assert_eq!(events.len(), 1);
         assert_eq!(events[0].peak_count, 32.0);
+    }
+
+    #[test]
+    fn the_average_of_all_bins_as_background() {
+        // After 12 cycles 12, 12, 24, 12 counts, 60 in all: the average is 7.5 and the
+        // threshold with alpha = 6 is 7.5 + 6 * 2.74 = 23.9. Above the background: 0, 16.5
+        // and 4.5 in bins 4, 5 and 6.
+        let config = Config {
+            background: Background::Average,
+            alpha: 6.0,
+            ..CONFIG
+        };
+        let (looks, events) = run(&mut Pixel::new(8, 1023.0, config), 12, &[0, 2, 5, 5, 6]);
+        assert_eq!((looks[0].background, looks[0].fired), (7.5, true));
+        assert!((events[0].position - (5.5 + 4.5 / 21.0)).abs() < 1e-12);
     }
 
     #[test]

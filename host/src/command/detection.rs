@@ -5,14 +5,14 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use dtof::cli::arguments::{fixed, positive, whole};
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{AnyRule, CentredWindow, Count, PaperRule, WindowRule};
+use dtof_core::{AnyRule, AverageRule, CentredWindow, Count, PaperRule, WindowRule};
 
 #[derive(Args)]
 pub struct Detection {
     /// The rule that decides whether a peak stands clear of the background
     #[arg(long, value_enum, default_value_t = RuleName::Paper)]
     rule: RuleName,
-    /// Paper's rule: standard deviations of the background a peak must exceed it by, 0 to 255.996,
+    /// Rules paper and average: standard deviations of the background a peak must exceed it by, 0 to 255.996,
     /// rounded to 1/256 [default: 4]
     #[arg(long, value_parser = fixed::<U8F8>, allow_hyphen_values = true)]
     alpha: Option<U8F8>,
@@ -36,8 +36,10 @@ pub struct Detection {
 /// The rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum RuleName {
-    /// The highest bin against the background, as in the paper
+    /// The highest bin against the background of two quadrants, as on the paper's FPGA
     Paper,
+    /// The highest bin against the average of all bins, as the paper defines the background
+    Average,
     /// All photons in a window around the highest bin against all the others
     Window,
 }
@@ -50,7 +52,7 @@ impl Detection {
         z_for: impl FnOnce(f64) -> Result<U4F12>,
     ) -> Result<AnyRule> {
         match self.rule {
-            RuleName::Paper => {
+            RuleName::Paper | RuleName::Average => {
                 let of_window = [
                     ("--window", self.window.is_some()),
                     ("--z", self.z.is_some()),
@@ -60,11 +62,16 @@ impl Detection {
                     bail!("{option} is for --rule window");
                 }
                 let alpha = self.alpha.unwrap_or(const { U8F8::lit("4") });
-                Ok(PaperRule::new(alpha, minimum_count).into())
+                Ok(match self.rule {
+                    RuleName::Average => AverageRule::new(alpha, minimum_count).into(),
+                    _ => PaperRule::new(alpha, minimum_count).into(),
+                })
             }
             RuleName::Window => {
                 if self.alpha.is_some() {
-                    bail!("--alpha is for --rule paper; --rule window takes --z or --false-alarm");
+                    bail!(
+                        "--alpha is for --rule paper or average; --rule window takes --z or --false-alarm"
+                    );
                 }
                 let suits = self.sigma_bins.map(WindowRule::width_for_pulse);
                 let width = self

@@ -1,5 +1,6 @@
 //! `dtof tune`: the threshold and L1 for a wanted rate of false alarms.
 
+mod average;
 mod window;
 
 use std::fmt::Write as _;
@@ -108,6 +109,7 @@ impl Tune {
         let request = self.request()?;
         let (lines, rule) = match self.rule {
             RuleName::Paper => self.paper(&request)?,
+            RuleName::Average => self.average(&request)?,
             RuleName::Window => self.window(&request)?,
         };
         let mut out = io::stdout().lock();
@@ -205,6 +207,16 @@ impl Tune {
             None => format!("shortest time to an event; {}", self.simulated(detections)),
         };
         Line("l1", l1.into(), source)
+    }
+
+    /// False alarms counted in so many exposures, of which so many have an event.
+    #[allow(clippy::cast_precision_loss)]
+    fn counted(&self, (exposures, events): (u64, u64)) -> Line {
+        let source = format!(
+            "simulation: seed {}, {events} events in {exposures} exposures without a target",
+            self.seed
+        );
+        Line("false_alarms", events as f64 / exposures as f64, source)
     }
 
     /// Time, depth error and SNR to expect, with any rule.

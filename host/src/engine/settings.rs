@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
-use dtof_core::{AnyRule, DepthEstimator, PixelConfig, RangeGate, RangeScale};
+use dtof_core::{AnyRule, DepthEstimator, PixelConfig, RangeGate, RangeScale, Threshold};
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
@@ -53,12 +53,8 @@ fn number<S: Serializer>(number: &impl Fixed, serializer: S) -> Result<S::Ok, S:
 fn rule<S: Serializer>(rule: &AnyRule, serializer: S) -> Result<S::Ok, S::Error> {
     let mut fields = serializer.serialize_map(None)?;
     match rule {
-        AnyRule::Paper(rule) => {
-            let threshold = rule.threshold();
-            fields.serialize_entry("rule", "paper")?;
-            fields.serialize_entry("alpha", &threshold.alpha().to_num::<f64>())?;
-            fields.serialize_entry("min_count", &threshold.minimum_count().raw())?;
-        }
+        AnyRule::Paper(rule) => with_alpha(&mut fields, "paper", rule.threshold())?,
+        AnyRule::Average(rule) => with_alpha(&mut fields, "average", rule.threshold())?,
         AnyRule::Window(rule) => {
             fields.serialize_entry("rule", "window")?;
             fields.serialize_entry("window", &rule.width())?;
@@ -67,6 +63,17 @@ fn rule<S: Serializer>(rule: &AnyRule, serializer: S) -> Result<S::Ok, S::Error>
         }
     }
     fields.end()
+}
+
+/// A rule with a threshold.
+fn with_alpha<M: SerializeMap>(
+    fields: &mut M,
+    rule: &str,
+    threshold: &Threshold,
+) -> Result<(), M::Error> {
+    fields.serialize_entry("rule", rule)?;
+    fields.serialize_entry("alpha", &threshold.alpha().to_num::<f64>())?;
+    fields.serialize_entry("min_count", &threshold.minimum_count().raw())
 }
 
 /// An estimator by its name, with the pulse it suits.

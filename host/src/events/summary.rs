@@ -3,7 +3,7 @@
 
 pub mod truth;
 
-use dtof_core::{AnyRule, DepthEstimator, Statistics};
+use dtof_core::{AnyRule, DepthEstimator, Statistics, Threshold};
 use serde::Serialize;
 
 use crate::engine::settings::Settings;
@@ -237,17 +237,19 @@ impl Settings {
     }
 }
 
+fn with_alpha(background: &str, threshold: &Threshold) -> String {
+    format!(
+        "{background} + {} × its square root (α), at least {} photons",
+        threshold.alpha(),
+        threshold.minimum_count()
+    )
+}
+
 /// The threshold that a detection exceeds.
 fn threshold(rule: &AnyRule) -> String {
     match rule {
-        AnyRule::Paper(rule) => {
-            let threshold = rule.threshold();
-            format!(
-                "background + {} × its square root (α), at least {} photons",
-                threshold.alpha(),
-                threshold.minimum_count()
-            )
-        }
+        AnyRule::Paper(rule) => with_alpha("background", rule.threshold()),
+        AnyRule::Average(rule) => with_alpha("average of all bins", rule.threshold()),
         AnyRule::Window(rule) => format!(
             "in a window of {} bins: background + {} standard deviations (z), at least {} photons",
             rule.width(),

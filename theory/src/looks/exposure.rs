@@ -126,7 +126,7 @@ impl Exposures {
 
     /// Calls `look` with the histogram at each look until it returns `true` or
     /// the exposure expires. Gives the laser cycles it lasted.
-    fn run<const BINS: usize>(
+    pub(crate) fn run<const BINS: usize>(
         &self,
         rng: &mut Pcg64,
         mut look: impl FnMut(u32, &Histogram<BINS>) -> bool,

@@ -7,6 +7,23 @@ use super::Request;
 use crate::looks::detections::{Decisions, Detections};
 use crate::rates::Rates;
 
+/// The function for so many bins, which [`check`](super::check) has let through.
+macro_rules! of_bins {
+    ($bins:expr, $($function:ident)::+) => {
+        match $bins {
+            8 => $($function)::+::<8>,
+            16 => $($function)::+::<16>,
+            32 => $($function)::+::<32>,
+            64 => $($function)::+::<64>,
+            128 => $($function)::+::<128>,
+            256 => $($function)::+::<256>,
+            512 => $($function)::+::<512>,
+            _ => $($function)::+::<1024>,
+        }
+    };
+}
+pub(super) use of_bins;
+
 /// Places of the pulse within a bin that are simulated, evenly spread.
 const POSITIONS: u16 = 8;
 /// Exposures at each place to compare settings with, and for those chosen.
@@ -72,16 +89,7 @@ fn detections(
     first_trial: u16,
     exposures: u32,
 ) -> Result<Detections> {
-    let trial = match request.bins {
-        8 => Detections::trial::<8>,
-        16 => Detections::trial::<16>,
-        32 => Detections::trial::<32>,
-        64 => Detections::trial::<64>,
-        128 => Detections::trial::<128>,
-        256 => Detections::trial::<256>,
-        512 => Detections::trial::<512>,
-        _ => Detections::trial::<1024>,
-    };
+    let trial = of_bins!(request.bins, Detections::trial);
     let trials: Vec<Detections> = (0..POSITIONS)
         .into_par_iter()
         .map(|place| {

@@ -8,7 +8,6 @@ use super::{Line, Tune, number};
 
 impl Tune {
     /// z, L1 and what to expect of them; the options for it.
-    #[allow(clippy::cast_precision_loss)]
     pub(super) fn window(&self, request: &Request) -> Result<(Vec<Line>, String)> {
         let widest = CentredWindow::WIDEST_PULSE;
         ensure!(
@@ -18,7 +17,6 @@ impl Tune {
             number(request.sigma)
         );
         let tuned = window::tune(request)?;
-        let (exposures, events) = tuned.false_alarms;
         let z = format!(
             "for a false alarm in {} exposures; simulation: table",
             tuned.one_in
@@ -32,13 +30,9 @@ impl Tune {
             let source = "formula: 2σ + 1/2, from 1 to 4; centred window".to_owned();
             lines.push(Line("half_width", window.half_width().to_num(), source));
         }
-        let source = format!(
-            "simulation: seed {}, {events} events in {exposures} exposures without a target",
-            self.seed
-        );
         lines.extend([
             self.l1(tuned.l1, &tuned.detections),
-            Line("false_alarms", events as f64 / exposures as f64, source),
+            self.counted(tuned.false_alarms),
         ]);
         lines.extend(self.expected(request, &tuned.detections));
         // All digits: fewer may be another multiple of the smallest step.

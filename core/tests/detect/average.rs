@@ -1,0 +1,141 @@
+//! The average rule decides as Eq. 5 has it, in exact numbers.
+
+use dtof_core::fixed::types::{U8F8, U24F8};
+use dtof_core::{
+    AverageRule, Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DetectionRule,
+    Histogram, RangeGate, detect,
+};
+use proptest::prelude::*;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+/// `peak > T/B + α·√(T/B)` in whole numbers that cannot overflow, and the mean in 1/256
+/// rounded down.
+fn as_written<const BINS: usize, W: CounterWidth>(
+    rule: &AverageRule,
+    histogram: &Histogram<BINS, W>,
+    gate: &RangeGate<BINS>,
+) -> Option<U24F8> {
+    let gated = gate.first()..=gate.last();
+    let counts = gated
+        .clone()
+        .map(|bin| histogram.count(bin.into()).unwrap());
+    let (bins, total) = (
+        gated.len() as u128,
+        counts.clone().map(u128::from).sum::<u128>(),
+    );
+    let peak = u128::from(counts.max().unwrap());
+    let alpha = u128::from(rule.threshold().alpha().to_bits());
+    // Both sides times 256, squared.
+    let clear = (256 * (bins * peak - total)).pow(2) > alpha.pow(2) * bins * total;
+    let fires = clear && peak >= u128::from(rule.threshold().minimum_count().raw());
+    fires.then(|| U24F8::from_bits((total * 256 / bins) as u32))
+}
+
+/// Random histograms with a peak that stands more or less clear; how many fired.
+fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) -> u32 {
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let mut fired = 0;
+    for round in 0..rounds {
+        let (gate, histogram, most) = crate::common::histogram::<BINS, W>(&mut rng, round);
+        let alpha = U8F8::from_bits(rng.next_u32() as u16 >> (rng.next_u32() % 16));
+        let minimum = rng.next_u32() % (2 * most) * (round % 2);
+        let rule = AverageRule::new(alpha, Count::saturating(minimum));
+        let expected = as_written(&rule, &histogram, &gate);
+        assert_eq!(rule.detect(&histogram, &gate, histogram.peak()), expected);
+        let detection = detect(&histogram, &gate, &rule, &DepthEstimator::default());
+        let rounded = detection.map(|detection| detection.background.raw());
+        assert_eq!(rounded, expected.map(|level| (level.to_bits() + 128) >> 8));
+        fired += u32::from(expected.is_some());
+    }
+    fired
+}
+
+#[test]
+fn it_decides_as_it_is_written() {
+    for (fired, rounds) in [
+        (check::<8, Count10>(20_000, 1), 20_000),
+        (check::<128, Count10>(5000, 2), 5000),
+        (check::<128, Count16>(5000, 3), 5000),
+        (check::<128, Count24>(5000, 4), 5000),
+        (check::<1024, Count10>(500, 5), 500),
+    ] {
+        let often = rounds / 20..rounds - rounds / 20;
+        assert!(often.contains(&fired), "{fired}");
+    }
+}
+
+/// Every count of the highest bin around the threshold, for every number of other photons
+/// up to 200 and the ends of α.
+#[test]
+fn every_threshold_of_eight_bins_is_exact() {
+    let gate = RangeGate::full();
+    for alpha in [0, 1, 819, 1024, 2048, u16::MAX] {
+        let rule = AverageRule::new(U8F8::from_bits(alpha), Count::saturating(0));
+        for rest in 0..200u32 {
+            for peak in rest.div_ceil(7)..=(rest + 60).min(1023) {
+                // The rest lies in the other bins as evenly as it can.
+                let frame: [u32; 8] = core::array::from_fn(|bin| match bin as u32 {
+                    0 => peak,
+                    bin => (rest + bin - 1) / 7,
+                });
+                let mut histogram = Histogram::<8>::new();
+                histogram.add_frame(&frame, &gate);
+                let expected = as_written(&rule, &histogram, &gate);
+                assert_eq!(rule.detect(&histogram, &gate, histogram.peak()), expected);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_widest_counters_do_not_overflow() {
+    let gate = RangeGate::full();
+    let largest = Count24::MAX;
+    for others in [0, 1, largest / 2, largest - 1, largest] {
+        let mut frame = [others; 256];
+        frame[9] = largest;
+        let mut histogram = Histogram::<256, Count24>::new();
+        histogram.add_frame(&frame, &gate);
+        for alpha in [0, 1, 256, u16::MAX] {
+            let rule = AverageRule::new(U8F8::from_bits(alpha), Count::saturating(1));
+            let expected = as_written(&rule, &histogram, &gate);
+            assert_eq!(rule.detect(&histogram, &gate, histogram.peak()), expected);
+        }
+    }
+}
+
+#[test]
+fn an_empty_histogram_is_no_detection() {
+    let rule = AverageRule::new(U8F8::ZERO, Count::default());
+    let (empty, estimator) = (Histogram::<8>::new(), DepthEstimator::default());
+    assert!(detect(&empty, &RangeGate::full(), &rule, &estimator).is_none());
+}
+
+proptest! {
+    /// One photon more in the peak never takes a detection away; one more elsewhere never
+    /// makes one.
+    #[test]
+    fn it_rises_with_the_peak_and_falls_with_the_rest(
+        frame in proptest::array::uniform8(0u32..40), alpha in 0u16..2048, bin in 0usize..8,
+    ) {
+        let rule = AverageRule::new(U8F8::from_bits(alpha), Count::saturating(3));
+        let gate = RangeGate::full();
+        let fires = |frame: &[u32; 8]| {
+            let mut histogram = Histogram::<8>::new();
+            histogram.add_frame(frame, &gate);
+            rule.detect(&histogram, &gate, histogram.peak()).is_some()
+        };
+        let highest = *frame.iter().max().unwrap();
+        let peak = frame.iter().position(|&count| count == highest).unwrap();
+        let before = fires(&frame);
+        let mut more = frame;
+        more[bin] += 1;
+        let after = fires(&more);
+        if bin == peak {
+            prop_assert!(after || !before);
+        } else if frame[bin] < highest {
+            prop_assert!(before || !after);
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! Settings of the average rule for a wanted rate of false alarms.
+//!
+//! There is no table for it: exposures without a target are simulated. Each gives the
+//! highest α with which one of its looks fires. α is the smallest that so few exceed that
+//! the upper 99 % limit of their share is not above the wanted one. Of all L1 the one with
+//! the shortest mean time to an event is taken. False alarms are counted in other exposures.
+
+use anyhow::{Result, ensure};
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{AverageRule, Count, DepthEstimator, Histogram};
+use rayon::prelude::*;
+
+use super::shortest::{false_alarms, of_bins, shortest};
+use super::{Request, candidates, check};
+use crate::counts::binomial;
+use crate::looks::detections::{Decisions, Detections};
+use crate::looks::exposure::{Exposures, Looks};
+use crate::random::trial_rng;
+use crate::rates::Rates;
+
+/// Photons of all simulated exposures, about: some seconds' work.
+const PHOTONS: f64 = 5e8;
+/// Exposures are simulated in as many trials, of at most so many exposures.
+const TRIALS: u16 = 64;
+const LONGEST_TRIAL: f64 = 2000.0;
+/// The first of their trials, which no other simulation here takes.
+const FIRST_TRIAL: u16 = 1000;
+/// Above the upper limit of a simulated share lie as many of its samples.
+const UPPER_TAIL: f64 = 0.01;
+
+/// The settings and what to expect of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tuned {
+    /// α.
+    pub alpha: U8F8,
+    /// L1.
+    pub l1: u16,
+    /// Exposures without a target that α was found with.
+    pub exposures: u64,
+    /// Other exposures without a target, and those of them with an event.
+    pub false_alarms: (u64, u64),
+    /// Exposures simulated with the target.
+    pub detections: Detections,
+}
+
+/// Finds α and L1.
+///
+/// # Errors
+/// What about the request cannot be met, in one line.
+pub fn tune(request: &Request) -> Result<Tuned> {
+    check(request)?;
+    let l1s = candidates(request);
+    let looks: Vec<Looks> = l1s
+        .iter()
+        .map(|&l1| Looks::new(request.x, l1, request.l2))
+        .collect();
+    let highest = highest_alphas(request, &looks)?;
+    let exposures = highest.len() as u64;
+    let minimum_count = Count::saturating(request.minimum_count.into());
+    let mut all = Vec::new();
+    let mut rarest = 1.0_f64;
+    for (at, (&l1, &looks)) in l1s.iter().zip(&looks).enumerate() {
+        let wanted = request.wanted.in_an_exposure(looks);
+        rarest = rarest.min(wanted);
+        let highest = highest.iter().map(|of| of[at]).collect();
+        let Some(alpha) = smallest_alpha(highest, wanted) else {
+            continue;
+        };
+        let decisions = Decisions {
+            looks,
+            rule: AverageRule::new(alpha, minimum_count).into(),
+            estimator: DepthEstimator::Centroid3,
+        };
+        all.push((decisions, (decisions, alpha, l1)));
+    }
+    ensure!(
+        !all.is_empty(),
+        "no α found for a false alarm in {:.0} exposures, as {exposures} are simulated: allow more \
+         false alarms, or take --rule window",
+        1.0 / rarest
+    );
+    let ((decisions, alpha, l1), detections) = shortest(request, &all)?;
+    Ok(Tuned {
+        alpha,
+        l1,
+        exposures,
+        false_alarms: false_alarms(request, &decisions)?,
+        detections,
+    })
+}
+
+/// The smallest α that so few of the `highest` reach that no more than `wanted` do, with
+/// 99 % confidence; `None` if there is none.
+fn smallest_alpha(mut highest: Vec<Option<u16>>, wanted: f64) -> Option<U8F8> {
+    let times = highest.len();
+    let holds = |&reached: &usize| {
+        let (_, upper) = binomial::interval(reached as u64, times as u64, UPPER_TAIL);
+        upper <= wanted
+    };
+    // The limit grows with the count.
+    let reached = (0..times).take_while(holds).last()?;
+    highest.sort_unstable();
+    let first_above = highest.get(times - 1 - reached)?;
+    let alpha = first_above.map_or(Some(0), |highest| highest.checked_add(1))?;
+    Some(U8F8::from_bits(alpha))
+}
+
+/// Of many exposures without a target the highest α, in 1/256, that fires at any of the
+/// looks of each candidate; `None` where none fires.
+fn highest_alphas(request: &Request, looks: &[Looks]) -> Result<Vec<Vec<Option<u16>>>> {
+    let trial = of_bins!(request.bins, trial);
+    let photons = request.background * f64::from(request.bins) * f64::from(request.l2);
+    let most = (PHOTONS / photons / f64::from(TRIALS)).clamp(1.0, LONGEST_TRIAL);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let exposures = most as u32;
+    let trials = (0..TRIALS)
+        .into_par_iter()
+        .map(|number| trial(request, looks, FIRST_TRIAL + number, exposures))
+        .collect::<Result<Vec<_>>>()?;
+    Ok(trials.into_iter().flatten().collect())
+}
+
+fn trial<const BINS: usize>(
+    request: &Request,
+    looks: &[Looks],
+    number: u16,
+    exposures: u32,
+) -> Result<Vec<Vec<Option<u16>>>> {
+    let rates = Rates {
+        background: request.background,
+        signal: 0.0,
+        position: 0.0,
+        sigma: 1.0,
+    };
+    let minimum_count = Count::saturating(request.minimum_count.into());
+    // Of all candidates the first look and the last.
+    let first = looks.iter().map(|looks| looks.first).min().unwrap_or(1);
+    let all = Looks { first, ..looks[0] };
+    let simulated = Exposures::new(&rates, request.bins, all)?;
+    let mut rng = trial_rng(request.seed, number);
+    let exposure = |_| {
+        let mut highest = vec![None; looks.len()];
+        simulated.run::<BINS>(&mut rng, |step, histogram| {
+            let found = highest_alpha(histogram, minimum_count);
+            for (highest, looks) in highest.iter_mut().zip(looks) {
+                if step >= looks.first {
+                    *highest = found.max(*highest);
+                }
+            }
+            false
+        });
+        highest
+    };
+    Ok((0..exposures).map(exposure).collect())
+}
+
+/// The highest α in 1/256 with which the average rule fires on `histogram`: it fires if
+/// `(256·(B·peak - T))² > α²·B·T`, in α's units.
+fn highest_alpha<const BINS: usize>(
+    histogram: &Histogram<BINS>,
+    minimum_count: Count,
+) -> Option<u16> {
+    let peak = histogram.peak().count;
+    let (bins, total) = (BINS as u64, u64::from(histogram.total()));
+    let above = bins * u64::from(peak.raw()) - total;
+    if peak < minimum_count || above == 0 {
+        return None;
+    }
+    let squared = ((256 * above).pow(2) - 1) / (bins * total);
+    Some(u16::try_from(squared.isqrt()).unwrap_or(u16::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use dtof_core::{RangeGate, detect};
+
+    use super::*;
+
+    #[test]
+    fn the_highest_alpha_is_the_last_that_fires() {
+        let mut fired = 0;
+        for seed in 0..2000u32 {
+            let frame: [u32; 8] =
+                std::array::from_fn(|bin| (seed.wrapping_mul(2_654_435_761) >> (4 * bin)) & 15);
+            let mut histogram = Histogram::<8>::new();
+            histogram.add_frame(&frame, &RangeGate::full());
+            let minimum = Count::saturating(5);
+            let fires = |alpha: u16| {
+                let rule = AverageRule::new(U8F8::from_bits(alpha), minimum);
+                let (gate, estimator) = (RangeGate::full(), DepthEstimator::default());
+                detect(&histogram, &gate, &rule, &estimator).is_some()
+            };
+            match highest_alpha(&histogram, minimum) {
+                None => assert!(!fires(0)),
+                Some(alpha) => {
+                    assert!(fires(alpha) && !fires(alpha + 1), "{frame:?}");
+                    fired += 1;
+                }
+            }
+        }
+        assert!(fired > 1000, "{fired}");
+    }
+
+    #[test]
+    fn the_limit_of_the_share_is_below_the_wanted_one() {
+        let highest = |reached: usize| {
+            let reach = (0..1000).map(|at| (at < reached).then_some(700));
+            smallest_alpha(reach.collect(), 0.01)
+        };
+        // 2 of 1,000 are at most 1 % with 99 % confidence, 3 are not.
+        assert_eq!(highest(2), Some(U8F8::ZERO));
+        assert_eq!(highest(3), Some(U8F8::from_bits(701)));
+        assert_eq!(smallest_alpha(vec![None; 400], 0.01), None);
+    }
+}
