@@ -359,7 +359,8 @@ impl<const BINS: usize, W: CounterWidth> Default for Histogram<BINS, W> {
 }
 
 /// The mean of `photons` in so many `bins`, in 1/256 rounded down; `None` of no bins.
-#[inline(always)]
+// Once in a program: only detections ask for it.
+#[inline(never)]
 pub(crate) fn mean(photons: u32, bins: u32) -> Option<U24F8> {
     let whole = photons.checked_div(bins)?;
     // Less than 2¹⁰ bins, so that the rest fits.

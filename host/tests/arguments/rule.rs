@@ -48,6 +48,23 @@ fn without_an_option_it_is_the_papers_rule_and_centroid() {
     assert_eq!(replayed("--rule paper --alpha 4").1, events);
 }
 
+/// The peak has 44 of the 59 photons of 44 laser cycles in two bins: the average of 128 is
+/// 0.46, which is 0 as a whole count; the two quadrants have a photon in each.
+#[test]
+fn the_average_rule_takes_alpha() {
+    let (settings, events) = replayed("--rule average --alpha 6");
+    assert_eq!(
+        (&settings["rule"], &settings["alpha"]),
+        (&"average".into(), &6.0.into())
+    );
+    let background = |events: &str| {
+        let first = events.lines().nth(1).unwrap();
+        first.split(',').nth(7).unwrap().to_owned()
+    };
+    assert_eq!(background(&events), "0");
+    assert_eq!(background(&replayed("--rule paper --alpha 6").1), "1");
+}
+
 #[test]
 fn the_pulse_chooses_estimator_and_window() {
     let (settings, events) = replayed("--rule window --sigma-bins 1 --l1 4");

@@ -210,6 +210,24 @@ fn the_window_rule_has_a_z_a_window_and_an_estimator() {
     assert_eq!(value(&result, "window"), 3.0);
 }
 
+const AVERAGE: &str = "--background 0.05 --signal 0.4 --sigma-bins 0.8 --rule average";
+
+#[test]
+fn the_average_rule_has_an_alpha_by_simulation() {
+    let text = text(AVERAGE);
+    let options: Vec<&str> = text.lines().last().unwrap().split_whitespace().collect();
+    let scratch = Scratch::new();
+    let photons = scratch.file("photons.csv", "pixel,cycle,bin\n0,1,2\n");
+    let settings = &scratch.replayed(&photons, &options)["settings"];
+    let result = json(AVERAGE);
+    assert_eq!(settings["rule"], "average");
+    assert_eq!(settings["alpha"].as_f64(), Some(value(&result, "alpha")));
+    assert_eq!(settings["l1"].as_f64(), Some(value(&result, "l1")));
+    // Of 4,000 exposures, 1 % and three standard deviations.
+    assert!(value(&result, "false_alarms") < 0.015, "{text}");
+    refused("PIXEL --false-alarm 1e-7 --rule average | no α found for a false alarm in 10000000");
+}
+
 #[test]
 fn z_is_that_of_the_core_and_keeps_false_alarms_down() {
     let gate = dtof_core::RangeGate::<128>::full();

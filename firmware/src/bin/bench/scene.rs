@@ -3,7 +3,7 @@
 
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
-    AerEncoder, AnyRule, AsyncPixel, ConfigError, Count, DepthEstimator, DepthEvent,
+    AerEncoder, AnyRule, AsyncPixel, AverageRule, ConfigError, Count, DepthEstimator, DepthEvent,
     DynamicDepthConfig, DynamicDepthPixel, Histogram, LaserCycle, Look, PaperRule, PixelAddress,
     PixelConfig, RangeGate, RangeScale, Reference, Reflectivity, RunningMean, Statistics,
     WindowRule,
@@ -53,6 +53,7 @@ pub struct State {
     /// One with a threshold that no change exceeds, one that nearly all changes exceed.
     pub dynamic_depths: [DynamicDepthConfig; 2],
     pub reflectivity: Reflectivity,
+    pub average: AverageRule,
 }
 
 impl State {
@@ -75,6 +76,7 @@ impl State {
             dynamic_depth: still,
             dynamic_depths: [still, moving],
             reflectivity: Reflectivity::new(),
+            average: AverageRule::new(const { U8F8::lit("4") }, Count::saturating(5)),
             codes: [0; PHOTONS as usize],
             pixel: AsyncPixel::new(PixelAddress(7)),
             statistics: Statistics::default(),

@@ -1,5 +1,5 @@
-//! Window rules and centred windows, which differ by their width, and rules chosen when the
-//! program runs.
+//! The average rule, window rules and centred windows, which differ by their width, and
+//! rules chosen when the program runs.
 
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
 use dtof_core::{
@@ -28,6 +28,14 @@ const PULSES: [(U8F8, &str); 4] = [
 
 /// Measures all.
 pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
+    undecided(
+        report,
+        counter,
+        state,
+        "average; no event",
+        decide_by_average,
+        average_fires,
+    );
     for (width, variant) in RULES {
         if let Some(rule) = window(width) {
             state.window = rule;
@@ -85,6 +93,14 @@ fn undecided(
 fn decided(state: &State, rule: &impl DetectionRule) -> Option<Detection> {
     let (gate, estimator) = (&RangeGate::full(), &state.estimator);
     detect(state.pixel.histogram(), gate, rule, estimator)
+}
+
+fn average_fires(state: &State) -> bool {
+    decided(state, &state.average).is_some()
+}
+
+extern "C" fn decide_by_average(state: &mut State, _: u32) -> u32 {
+    offset(decided(state, &state.average))
 }
 
 fn fires(state: &State) -> bool {

@@ -35,9 +35,9 @@ use dtof_core::{
 };
 
 use values::{
-    Link, address, alpha, background_level, bin, byte, change, count, cycle, distance, double,
-    estimator, event, flags, gate, half, keep, millimetres, more, position, rule, settings, some,
-    values, window_rule, word,
+    Link, address, alpha, average_rule, background_level, bin, byte, change, count, cycle,
+    distance, double, estimator, event, flags, gate, half, keep, millimetres, more, position, rule,
+    settings, some, values, window_rule, word,
 };
 
 #[allow(unsafe_code, reason = "the linker knows the entry by this name")]
@@ -223,6 +223,7 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
         keep((histogram.peak(), histogram.count(usize::from(half()))));
         let detection = detect(&histogram, &gate, &rule(), &estimator());
         keep(detection.map(|found| (found.position(), found.event(address(), cycle(), half()))));
+        keep(detect(&histogram, &gate, &average_rule(), &estimator()));
         if let Some(rule) = window_rule() {
             keep(detect(&histogram, &gate, &rule, &estimator()));
         }
@@ -247,11 +248,13 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
 fn pixels<const BINS: usize, W: CounterWidth>() {
     keep(z_for::<BINS>(word(), &gate(), half(), half(), half()));
     pixels_with::<BINS, W, _>(rule());
+    pixels_with::<BINS, W, _>(average_rule());
     if let Some(rule) = window_rule() {
         pixels_with::<BINS, W, _>(rule);
     }
     pixels_with::<BINS, W, _>(match window_rule() {
         Some(rule) => AnyRule::from(rule),
+        None if more() => AnyRule::from(average_rule()),
         None => AnyRule::from(rule()),
     });
 }

@@ -7,9 +7,9 @@ use core::sync::atomic::AtomicU32;
 
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U24F8};
 use dtof_core::{
-    BinIndex, BinPosition, CentredWindow, Count, DepthEstimator, DepthEvent, DetectionRule,
-    DynamicDepthEvent, Flags, LaserCycle, PaperRule, PixelAddress, PixelConfig, PixelConfigBuilder,
-    RangeGate, SubBinOffset, WindowRule, whole_background,
+    AverageRule, BinIndex, BinPosition, CentredWindow, Count, DepthEstimator, DepthEvent,
+    DetectionRule, DynamicDepthEvent, Flags, LaserCycle, PaperRule, PixelAddress, PixelConfig,
+    PixelConfigBuilder, RangeGate, SubBinOffset, WindowRule, whole_background,
 };
 
 /// Valid or not.
@@ -29,6 +29,10 @@ pub fn gate<const BINS: usize>() -> RangeGate<BINS> {
 
 pub fn rule() -> PaperRule {
     PaperRule::new(alpha(), count())
+}
+
+pub fn average_rule() -> AverageRule {
+    AverageRule::new(alpha(), count())
 }
 
 pub fn window_rule() -> Option<WindowRule> {
