@@ -12,7 +12,7 @@ fn of<'a>(all: &'a [(Case, Vec<Outcome>)], name: &str) -> &'a [Outcome] {
     &found.unwrap_or_else(|| panic!("no case {name}")).1
 }
 
-/// The smallest share of false events that the interval allows.
+/// The smallest share of false alarms that the interval allows.
 fn surely_false(outcome: &Outcome) -> f64 {
     outcome.false_share.map_or(0.0, |share| share.interval.0)
 }
@@ -92,7 +92,7 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
     for outcome in of(&all, "hot pixel") {
         assert!(outcome.without.value > 0.8, "{outcome:?}");
     }
-    // A background that changes within the exposure makes no false events.
+    // A background that changes within the exposure makes no false alarms.
     for name in ["weak signal, background × 4", "weak signal, background / 4"] {
         for outcome in of(&all, name) {
             assert!(surely_false(outcome) < 0.02, "{outcome:?}");

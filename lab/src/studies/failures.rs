@@ -52,11 +52,11 @@ pub const STUDY: Study = Study {
 /// What decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
-    /// The paper's with this α. 4 is the least that gives at most one false event in 100
+    /// The paper's with this α. 4 is the least that gives at most one false alarm in 100
     /// exposures at the background of the plain scene (a step of its square root lies
     /// just below), 8 is the paper's own.
     Paper(u8),
-    /// The window of 3 bins, with the z for a false event in 100 exposures at any
+    /// The window of 3 bins, with the z for a false alarm in 100 exposures at any
     /// background.
     Window,
 }

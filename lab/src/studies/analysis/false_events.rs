@@ -1,4 +1,4 @@
-//! False events of the rule, which has to estimate the background, at one look and
+//! False alarms of the rule, which has to estimate the background, at one look and
 //! over an exposure: what `dtof tune` interpolates.
 
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Share, Table, Verdict, ends};
@@ -98,7 +98,7 @@ fn false_events(point: &PointTally) -> Result<(repeated_looks::Point, FalseAlarm
 }
 
 /// By background at the first look, exposures from the first look to `last` with a
-/// false event at α.
+/// false alarm at α.
 fn shares(part: &Part, last: u32, alpha: u16) -> Result<Vec<(f64, Share)>> {
     let mut shares = Vec::new();
     for point in part.at([("first_look", LOOKS.0.into())]) {
@@ -113,7 +113,7 @@ fn shares(part: &Part, last: u32, alpha: u16) -> Result<Vec<(f64, Share)>> {
     Ok(shares)
 }
 
-/// The exact probability of a false event at one look.
+/// The exact probability of a false alarm at one look.
 fn exact(background: f64, alpha: u16) -> f64 {
     let minimum_count = Count::saturating(MINIMUM_COUNT.into());
     let threshold = Threshold::new(U8F8::from_num(alpha), minimum_count);

@@ -13,9 +13,9 @@ use crate::sweep::{Part, PointTally};
 /// How a method does in a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// False events surely below 2 %, most exposures bring an event, and the error
+    /// False alarms surely below 2 %, most exposures bring an event, and the error
     /// is less than twice that of the plain scene. Without a target: no more than one
-    /// false event in 100 exposures.
+    /// false alarm in 100 exposures.
     Survives,
     /// Neither of the others.
     Degrades,
@@ -36,7 +36,7 @@ impl Verdict {
     }
 }
 
-/// Whether wrong events have a flag. Wrong are false events; and all, if the error is
+/// Whether wrong events have a flag. Wrong are false alarms; and all, if the error is
 /// surely twice that of the plain scene or more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Warning {
@@ -84,7 +84,7 @@ pub struct Outcome {
     pub method: Method,
     /// How many.
     pub events: u64,
-    /// False events an event, none without an event; without a target, false events an
+    /// False alarms an event, none without an event; without a target, false alarms an
     /// exposure.
     pub false_share: Option<Share>,
     /// Exposures without an event.

@@ -175,7 +175,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         let peak = histogram.peak();
         let middle = f64::from(peak.bin.raw()) + 0.5;
         if (middle - rates.position).abs() > 2.0 * sigma + 1.0 {
-            // A false event, not an error of depth.
+            // A false alarm, not an error of depth.
             count("elsewhere", 1);
             continue;
         }

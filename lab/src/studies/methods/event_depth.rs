@@ -76,7 +76,7 @@ fn pixels(sigma: f64, background: f64) -> Result<Vec<Pixel>> {
     Ok(pixels)
 }
 
-/// Each scene with a target, and without to count false events.
+/// Each scene with a target, and without to count false alarms.
 fn points() -> Vec<Point> {
     let mut points = Vec::new();
     for sigma in SIGMAS {
@@ -115,7 +115,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             add(&mut tally, &name, "events", 1);
             let middle = f64::from(event.peak) + 0.5;
             if (middle - rates.position).abs() > 2.0 * sigma + 1.0 {
-                // A false event, not an error of depth.
+                // A false alarm, not an error of depth.
                 add(&mut tally, &name, "elsewhere", 1);
                 continue;
             }

@@ -1,4 +1,4 @@
-//! How far one threshold holds: false events of an exposure when the background
+//! How far one threshold holds: false alarms of an exposure when the background
 //! goes over orders of magnitude and the threshold stays.
 
 use crate::studies::methods::passage::{BINS, LOOKS, Ladder, Method, Passage, count_false};
@@ -16,10 +16,10 @@ use std::fmt::Write as _;
 /// Mean background counts a bin at the first look, after 40 laser cycles; 25 times
 /// as many after 1000.
 const BACKGROUNDS: [f64; 9] = [0.4, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
-/// False events an exposure that are wanted, and the figures' names.
+/// False alarms an exposure that are wanted, and the figures' names.
 const WANTED: [(f64, &str); 2] = [(0.01, "false-rate"), (0.001, "false-rate-low")];
 /// Exposures of a trial at each background to set the threshold by, and others to count
-/// its false events.
+/// its false alarms.
 const CALIBRATED: u64 = 20;
 const TESTED: u64 = 50;
 
@@ -45,7 +45,7 @@ fn points() -> Vec<Point> {
     points
 }
 
-/// So fine that two neighbours differ by a third in their false events.
+/// So fine that two neighbours differ by a third in their false alarms.
 fn ladders() -> Vec<Ladder> {
     let ladder = |method| match method {
         Method::Paper => Ladder::new(method, 16, 64, 8),
@@ -76,13 +76,13 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 struct Outcome {
     method: Method,
     threshold: f64,
-    /// False events an exposure at each background.
+    /// False alarms an exposure at each background.
     shares: Vec<(f64, Share)>,
 }
 
 impl Outcome {
-    /// The threshold with `wanted` false events an exposure on average over the
-    /// backgrounds, and its false events in other exposures.
+    /// The threshold with `wanted` false alarms an exposure on average over the
+    /// backgrounds, and its false alarms in other exposures.
     fn new(ladder: &Ladder, part: &Part, wanted: f64) -> Self {
         let calibrated: Vec<&PointTally> = part.at([("tested", 0.0)]).collect();
         let index = ladder.nearest(ladder.calibrated(&calibrated, wanted));

@@ -22,7 +22,7 @@ pub const SIGMAS: [f64; 3] = [0.5, 1.0, 1.5];
 pub const BACKGROUNDS: [f64; 3] = [0.01, 0.05, 0.2];
 /// Where in its bin the pulse lies, and what that is called.
 pub const PLACES: [(f64, &str); 2] = [(0.5, "centred"), (0.0, "on an edge")];
-/// False events an exposure at which methods are compared.
+/// False alarms an exposure at which methods are compared.
 pub const FALSE_SHARE: f64 = 0.01;
 /// The signal is such that this many nats take 200 laser cycles, wherever the
 /// background: the likelihood ratio needs 100 to 300.
@@ -30,7 +30,7 @@ const INFORMATION: f64 = 9.0 / 200.0;
 /// Exposures of a trial.
 const EXPOSURES: u64 = 50;
 
-/// Against the likelihood ratio, at equal false events.
+/// Against the likelihood ratio, at equal false alarms.
 pub const STUDY: Study = Study {
     name: "time-to-detect",
     about: "laser cycles to an event against the likelihood ratio, by pulse and background",
@@ -128,7 +128,7 @@ pub struct Outcome {
     pub background: f64,
     /// What decides.
     pub method: Method,
-    /// With a share of [`FALSE_SHARE`] of false events.
+    /// With a share of [`FALSE_SHARE`] of false alarms.
     pub threshold: f64,
     /// Mean laser cycles to an event; an exposure that expires is followed by
     /// another. The interval is that of the times, of the share that expires and of

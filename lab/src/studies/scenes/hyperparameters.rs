@@ -1,4 +1,4 @@
-//! False events and depth error of a board, by SNR, α and L1 (section III-C).
+//! False alarms and depth error of a board, by SNR, α and L1 (section III-C).
 //!
 //! The paper's board stands where the pulse lies on an edge between two bins of 8.75
 //! ns, in a window of 8 bins; mini-frames of 5 laser cycles, so X = 5; L2 = 2000. It

@@ -14,7 +14,7 @@ use dtof_theory::looks::exposure::Exposures;
 use dtof_theory::rates::Rates;
 
 /// For each of [`FIRST_LOOKS`] and [`BACKGROUNDS`] the least α, in 1/16, with at most 1 %
-/// false events an exposure. There is none with 1 %: counts are whole, so that their
+/// false alarms an exposure. There is none with 1 %: counts are whole, so that their
 /// share falls in steps.
 const ALPHAS: [[f64; 3]; 2] = [[5.0, 4.0, 3.5], [3.6875, 3.1875, 3.0]];
 
@@ -32,7 +32,7 @@ pub struct Pixel {
 }
 
 impl Pixel {
-    /// With 1 % false events an exposure at this background.
+    /// With 1 % false alarms an exposure at this background.
     ///
     /// # Errors
     /// If the background or the first look is not one of the study's.

@@ -24,7 +24,7 @@ fn mean_and_variance(ladder: &Ladder, threshold: f64, point: &PointTally) -> (f6
     (mean, above.max(0.0) / (events * events))
 }
 
-/// Mean laser cycles to an event with [`FALSE_SHARE`] false events in the exposures of
+/// Mean laser cycles to an event with [`FALSE_SHARE`] false alarms in the exposures of
 /// `without`, the threshold, and what both are sure of.
 pub(super) fn time(
     ladder: &Ladder,
@@ -94,7 +94,7 @@ mod tests {
         );
     }
 
-    /// Times of 100, 110, … that vary by nothing, and false events that fall by a factor
+    /// Times of 100, 110, … that vary by nothing, and false alarms that fall by a factor
     /// of four a threshold: a hundred times the exposures, about a tenth of the interval.
     #[test]
     fn a_time_is_as_unsure_as_its_threshold() {
@@ -120,7 +120,7 @@ mod tests {
             assert!((threshold - 4.25).abs() < 1e-3 && (time.value - 120.0).abs() < 0.1);
             (time.interval.1 - time.interval.0) / 2.0
         };
-        // A factor of e in false events is 10 / ln 4 = 7.2 laser cycles, and a hundred of
+        // A factor of e in false alarms is 10 / ln 4 = 7.2 laser cycles, and a hundred of
         // them are sure to 26 %.
         let (few, many) = (half(10_000), half(1_000_000));
         assert!((1.4..2.6).contains(&few), "{few}");

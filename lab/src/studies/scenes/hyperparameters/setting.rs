@@ -50,7 +50,7 @@ impl<'a> Setting<'a> {
         self.by_snr(alpha, l1).into_iter().map(of).collect()
     }
 
-    /// Whether the false events are as many at every SNR, to a factor of 2 or the
+    /// Whether the false alarms are as many at every SNR, to a factor of 2 or the
     /// intervals. `None` with fewer than two points to compare.
     pub fn false_events_ignore_snr(self) -> Option<bool> {
         let shares = self.shares(4, 20, false_share);
