@@ -14,4 +14,4 @@ mod scale;
 mod tests;
 
 pub use draw::chart;
-pub use parts::{Axis, Chart, Finding, Key, Panel, Point, Series, Style, Unit};
+pub use parts::{Axis, Chart, Key, Panel, Point, Series, Style};

@@ -82,6 +82,13 @@ pub fn escape(text: &str) -> String {
     escaped
 }
 
+/// The room around every picture.
+pub const EDGE: f64 = 14.0;
+/// Size of a title, and the height of its lines.
+pub const TITLE: (f64, f64) = (20.0, 25.0);
+/// Size of all other texts.
+pub const TEXT: f64 = 14.5;
+
 /// A coordinate: at most one digit after the point.
 #[derive(Clone, Copy, Debug)]
 pub struct At(pub f64);
@@ -126,14 +133,6 @@ impl Svg {
         ));
     }
 
-    /// A rectangle from its left upper corner.
-    pub fn rect(&mut self, class: &str, corner: (f64, f64), size: (f64, f64)) {
-        let [x, y, width, height] = [corner.0, corner.1, size.0, size.1].map(At);
-        self.raw(&format!(
-            "<rect class=\"{class}\" x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/>"
-        ));
-    }
-
     /// A line of text, the middle of its small letters at `place`.
     pub fn text(&mut self, class: &str, place: (f64, f64), size: f64, anchor: Anchor, text: &str) {
         let [x, y] = [At(place.0), At(place.1 + 0.36 * size)];
@@ -146,6 +145,22 @@ impl Svg {
         self.raw(&format!(
             "<text class=\"{class}\" x=\"{x}\" y=\"{y}\" font-size=\"{size}\"{anchor}>{text}</text>"
         ));
+    }
+
+    /// Lines of text from `place` on, each `height` below the one before. Gives where they end.
+    pub fn lines(
+        &mut self,
+        class: &str,
+        (x, mut y): (f64, f64),
+        (size, height): (f64, f64),
+        anchor: Anchor,
+        lines: &[String],
+    ) -> f64 {
+        for line in lines {
+            self.text(class, (x, y + height / 2.0), size, anchor, line);
+            y += height;
+        }
+        y
     }
 
     /// The document, of this `size`, and with `title` for those who do not see it.

@@ -13,11 +13,12 @@ use crate::studies::failures::STUDY as FAILURES;
 use crate::studies::methods::{depth_error, event_depth, time_to_detect};
 use crate::sweep::results::{Claim, Figure};
 use crate::sweep::values::Values;
-use crate::sweep::{Part, SeedRange, Study};
+use crate::sweep::{Part, Study};
 use crate::{studies, sweep};
 use anyhow::{Context, Result, ensure};
 use std::collections::BTreeMap;
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -45,48 +46,38 @@ pub fn documents(
     anew: Anew,
     mut progress: impl FnMut(&Study),
 ) -> Result<Vec<(PathBuf, String)>> {
-    let data = |study: &Study, which| format!("results/data/{}.{which}.json", study.name);
     let mut documents = Vec::new();
     let mut all = Vec::new();
     let mut parts = BTreeMap::new();
     for study in studies::ALL {
         progress(study);
-        let [few, rest] = [
-            ("few", (0, study.few_seeds), anew != Anew::None),
-            (
-                "rest",
-                (study.few_seeds, study.all_seeds),
-                anew == Anew::All,
-            ),
-        ]
-        .map(|(which, (first, end), is_anew)| {
-            let kept = data(study, which);
+        let Study {
+            name,
+            few_seeds,
+            all_seeds,
+            ..
+        } = *study;
+        let mut taken = |which, seeds, is_anew| {
+            let kept = format!("results/data/{name}.{which}.json");
             let part = if is_anew {
-                work_out(study, first, end)?
+                work_out(study, seeds)?
             } else {
                 Part::load(&docs.join(&kept))?
             };
             documents.push((kept.into(), part.to_json()?));
             anyhow::Ok(part)
-        });
-        let (few, rest) = (few?, rest?);
-        let mut part = few;
-        part.add(&rest)
-            .with_context(|| format!("{}: the kept rest", study.name))?;
-        let all_seeds = SeedRange {
-            first: 0,
-            end: study.all_seeds,
         };
+        let mut part = taken("few", 0..few_seeds, anew != Anew::None)?;
+        let rest = taken("rest", few_seeds..all_seeds, anew == Anew::All)?;
+        part.add(&rest)
+            .with_context(|| format!("{name}: the kept rest"))?;
         ensure!(
-            part.seeds() == [all_seeds],
-            "{}: the kept rest is not of the seeds {}..{}",
-            study.name,
-            study.few_seeds,
-            study.all_seeds
+            part.seeds() == [(0, all_seeds)],
+            "{name}: the kept rest is not of the seeds {few_seeds}..{all_seeds}"
         );
-        let results = (study.results)(&part).with_context(|| study.name.to_owned())?;
+        let results = (study.results)(&part).context(name)?;
         all.push((study, results));
-        parts.insert(study.name, part);
+        parts.insert(name, part);
     }
     let figures = all.iter().flat_map(|(_, results)| &results.figures);
     let wrong = figures.filter(|figure| !figure.holds);
@@ -101,23 +92,19 @@ pub fn documents(
             let path = format!("figures/{}.svg", figure.name);
             documents.push((path.into(), figure.svg.clone()));
         }
-        for table in &results.tables {
-            documents.push((table.path.into(), table.csv.clone()));
+        for (path, csv) in &results.tables {
+            documents.push((path.into(), csv.clone()));
         }
     }
     let part = |study: Study| parts.get(study.name).context(study.name);
-    let used = [
-        time_to_detect::STUDY,
-        depth_error::STUDY,
-        event_depth::STUDY,
-    ];
-    let [time, depth, events] = used.map(part);
+    let time = part(time_to_detect::STUDY)?;
+    let (depth, events) = (part(depth_error::STUDY)?, part(event_depth::STUDY)?);
     let read = |path| {
         let path = docs.join(path);
         fs::read_to_string(&path).with_context(|| path.display().to_string())
     };
     let (counts, recorded) = (read(methods::INSTRUCTIONS)?, read(methods::RECORDED)?);
-    let methods = methods::documents(&counts, &recorded, time?, depth?, events?)?;
+    let methods = methods::documents(&counts, &recorded, time, depth, events)?;
     documents.extend(methods);
     let mut values = Values::default();
     for (study, results) in &all {
@@ -157,11 +144,11 @@ pub fn documents(
     Ok(documents)
 }
 
-fn work_out(study: &Study, first: u64, end: u64) -> Result<Part> {
+fn work_out(study: &Study, seeds: Range<u64>) -> Result<Part> {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("part");
     let hour = Duration::from_secs(3600);
-    sweep::run(study, SeedRange { first, end }, &path, hour, |_| ())
+    sweep::run(study, seeds, &path, hour, |_| ())
 }
 
 /// Writes documents below `docs` and gives those that changed.
@@ -169,17 +156,17 @@ fn work_out(study: &Study, first: u64, end: u64) -> Result<Part> {
 /// # Errors
 /// If one cannot be written.
 pub fn write(docs: &Path, documents: &[(PathBuf, String)]) -> Result<Vec<PathBuf>> {
-    let mut changed = Vec::new();
-    for path in different(docs, documents) {
+    let changed = different(docs, documents);
+    for (path, content) in documents {
+        let path = docs.join(path);
         let name = || path.display().to_string();
+        if !changed.contains(&path) {
+            continue;
+        }
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).with_context(name)?;
         }
-        let content = documents.iter().find(|(of, _)| docs.join(of) == path);
-        if let Some((_, content)) = content {
-            fs::write(&path, content).with_context(name)?;
-        }
-        changed.push(path);
+        fs::write(&path, content).with_context(name)?;
     }
     Ok(changed)
 }

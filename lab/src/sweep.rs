@@ -26,7 +26,7 @@ use rand_pcg::Pcg64;
 
 use self::results::Results;
 
-pub use self::part::{Part, PointTally, SeedRange, merge};
+pub use self::part::{Part, PointTally, merge};
 pub use self::run::run;
 
 /// The parameters of a point, by name.
@@ -79,17 +79,42 @@ const fn mixed(mut bits: u64) -> u64 {
 /// A point of these parameters.
 #[must_use]
 pub fn point<const N: usize>(parameters: [(&str, f64); N]) -> Point {
-    let parameters = parameters.into_iter();
     parameters
         .map(|(name, value)| (name.to_owned(), value))
-        .collect()
+        .into()
+}
+
+/// Every point of the grid of these values, those of the last parameter one after the other.
+#[must_use]
+pub fn grid<const N: usize>(parameters: [(&str, &[f64]); N]) -> Vec<Point> {
+    let mut points = vec![Point::new()];
+    for (name, values) in parameters {
+        let with = |point: &Point, value: f64| {
+            let mut point = point.clone();
+            point.insert(name.to_owned(), value);
+            point
+        };
+        let longer = points
+            .iter()
+            .flat_map(|point| values.iter().map(|&value| with(point, value)));
+        points = longer.collect();
+    }
+    points
+}
+
+/// A parameter that is a small whole number.
+#[must_use]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "as it was written"
+)]
+pub fn whole(point: &Point, name: &str) -> u16 {
+    point[name] as u16
 }
 
 /// A tally of these counts.
 #[must_use]
 pub fn tally<const N: usize>(counts: [(&str, u64); N]) -> Tally {
-    let counts = counts.into_iter();
-    counts
-        .map(|(name, count)| (name.to_owned(), count))
-        .collect()
+    counts.map(|(name, count)| (name.to_owned(), count)).into()
 }

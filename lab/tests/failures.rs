@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use dtof_lab::studies::failures::cases::Case;
 use dtof_lab::studies::failures::{Outcome, Rule, STUDY, Verdict, Warning, outcomes};
-use dtof_lab::sweep::{self, SeedRange};
+use dtof_lab::sweep;
 
 /// Those of a case, whose name starts with `name`.
 fn of<'a>(all: &'a [(Case, Vec<Outcome>)], name: &str) -> &'a [Outcome] {
@@ -12,7 +12,7 @@ fn of<'a>(all: &'a [(Case, Vec<Outcome>)], name: &str) -> &'a [Outcome] {
     &found.unwrap_or_else(|| panic!("no case {name}")).1
 }
 
-/// The smallest share of false events that the interval allows.
+/// The smallest share of false alarms that the interval allows.
 fn surely_false(outcome: &Outcome) -> f64 {
     outcome.false_share.map_or(0.0, |share| share.interval.0)
 }
@@ -20,9 +20,8 @@ fn surely_false(outcome: &Outcome) -> f64 {
 #[test]
 fn a_few_seeds_show_what_fails_and_what_is_flagged() {
     let folder = tempfile::tempdir().unwrap();
-    let seeds = SeedRange { first: 0, end: 5 };
     let path = folder.path().join("part");
-    let part = sweep::run(&STUDY, seeds, &path, Duration::MAX, |_| ()).unwrap();
+    let part = sweep::run(&STUDY, 0..5, &path, Duration::MAX, |_| ()).unwrap();
     let all = outcomes(&part).unwrap();
 
     for outcome in of(&all, "plain") {
@@ -92,7 +91,7 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
     for outcome in of(&all, "hot pixel") {
         assert!(outcome.without.value > 0.8, "{outcome:?}");
     }
-    // A background that changes within the exposure makes no false events.
+    // A background that changes within the exposure makes no false alarms.
     for name in ["weak signal, background × 4", "weak signal, background / 4"] {
         for outcome in of(&all, name) {
             assert!(surely_false(outcome) < 0.02, "{outcome:?}");
@@ -110,9 +109,8 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
 #[test]
 fn the_page_has_a_row_for_every_case() {
     let folder = tempfile::tempdir().unwrap();
-    let seeds = SeedRange { first: 7, end: 8 };
     let path = folder.path().join("part");
-    let part = sweep::run(&STUDY, seeds, &path, Duration::MAX, |_| ()).unwrap();
+    let part = sweep::run(&STUDY, 7..8, &path, Duration::MAX, |_| ()).unwrap();
     let values = dtof_lab::pages::failures::tables(&part).unwrap();
     let text = values.fill("{table}{reports}{silent}{advice}").unwrap();
     assert!(!text.contains("NaN"), "{text}");

@@ -1,5 +1,5 @@
 //! Recorded photons with ground truth, decided by the paper's rule and by window
-//! rules at equal rates of false events: how many photons an event takes, and how far
+//! rules at equal rates of false alarms: how many photons an event takes, and how far
 //! off it is. Needs the public TMF8820 capture log, as `recorded.rs` does, prints a
 //! table, and holds it against `docs/results/data/recorded_rules.csv`.
 
@@ -43,7 +43,7 @@ const MINIMUM: u32 = 5;
 const RECORDED: f64 = 0.0003;
 /// Background that is added to the recorded photons.
 const ADDED: [f64; 3] = [0.0, 0.01, 0.05];
-/// False events an exposure without a target to which all rules are set.
+/// False alarms an exposure without a target to which all rules are set.
 const WANTED: f64 = 0.01;
 /// Exposures without a target they are set by.
 const EXPOSURES: u64 = 3000;
@@ -123,7 +123,7 @@ impl Recording<'_> {
     }
 }
 
-/// For each method the least threshold with no more false events than wanted, in
+/// For each method the least threshold with no more false alarms than wanted, in
 /// simulated exposures to a background and nothing else, and their share there.
 fn calibrated(methods: &[Method], background: f64) -> Vec<(f64, f64)> {
     let rates = Rates {

@@ -4,17 +4,13 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use dtof_lab::studies;
-use dtof_lab::sweep::{self, Part, SeedRange, Study};
+use dtof_lab::sweep::{self, Part, Study};
 
 /// One seed of a study.
 fn part(study: &Study, seed: u64) -> Part {
     let folder = tempfile::tempdir().unwrap();
-    let seeds = SeedRange {
-        first: seed,
-        end: seed + 1,
-    };
     let path = folder.path().join("part");
-    sweep::run(study, seeds, &path, Duration::MAX, |_| ()).unwrap()
+    sweep::run(study, seed..seed + 1, &path, Duration::MAX, |_| ()).unwrap()
 }
 
 #[test]

@@ -12,7 +12,7 @@
 //! small counts, whose distribution is skew. They are those of Cornish and Fisher, `z²/6` and
 //! `-z³/(72·√V)`; the second stands in the form that fits below one photon as well, where the
 //! series does not. What the
-//! background is need not be known, so that one `z` gives the same rate of false events
+//! background is need not be known, so that one `z` gives the same rate of false alarms
 //! from fractions of a count a bin to hundreds, for every width and from 8 bins on, where
 //! the α of the paper's rule has to follow the background. The total of the histogram is
 //! known, so that this takes no pass over the bins.

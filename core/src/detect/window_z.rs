@@ -1,4 +1,4 @@
-//! The z that gives a wanted rate of false events.
+//! The z that gives a wanted rate of false alarms.
 //!
 //! Without a target the window rule tries its luck once a bin and look. Neighbouring
 //! windows and successive looks share photons: the looks of an exposure are worth fewer
@@ -18,7 +18,7 @@ use crate::gate::RangeGate;
 const LOOKS: [u16; 11] = [12, 23, 45, 73, 112, 164, 222, 300, 388, 469, 573];
 
 /// The highest z that [`z_for`] gives, 6.44: for 2³⁴ trials or more, so that more false
-/// events may come than wanted.
+/// alarms may come than wanted.
 pub const HIGHEST_Z: U4F12 = U4F12::from_bits(26394);
 
 /// z in 1/4096 for 2⁶, 2⁸, … trials.
@@ -28,7 +28,7 @@ const Z: [u16; 15] = [
 ];
 
 /// The z of a [`WindowRule`](crate::WindowRule) with which one in `one_in` exposures
-/// without a target brings a false event: 100 for 1 %, 1000 for 0.1 %.
+/// without a target brings a false alarm: 100 for 1 %, 1000 for 0.1 %.
 ///
 /// `gate`, `x`, `l1` and `l2` are those of the [`PixelConfig`](crate::PixelConfig). With 8 to
 /// 128 bins, 1 in 100 or 1000 and many looks an exposure, at most 1.5 times as many come as

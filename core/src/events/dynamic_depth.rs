@@ -8,7 +8,7 @@
 //! mean of `N` events by an `N`th of it at each of `N` events, so that one of up to `N`
 //! times the threshold is not seen so, nor is slow motion; [`Reference::Reported`] sees
 //! what is more than the threshold. What is reported on the way of the mean are places
-//! where nothing need stand. A false event moves the mean twice, when it comes and when it
+//! where nothing need stand. A false alarm moves the mean twice, when it comes and when it
 //! leaves. Means know no time: an event after a long pause is averaged with those before it.
 //!
 //! ```

@@ -1,4 +1,4 @@
-//! One z, the wanted rate of false events, whatever the background, the width of the
+//! One z, the wanted rate of false alarms, whatever the background, the width of the
 //! window and the number of bins. Shown with `--nocapture`.
 
 use dtof_core::{

@@ -3,16 +3,14 @@
 use anyhow::{Result, ensure};
 
 use super::names::Area;
-use super::panel::{self, LINE, Names, TEXT};
+use super::panel::{self, LINE, Names};
 use super::parts::{Chart, Panel};
 use super::scale::{GAP, Scale, Tick};
-use crate::svg::{Anchor, Svg, text_width, wrapped};
+use crate::svg::{Anchor, EDGE, Svg, TEXT, TITLE, text_width, wrapped};
 
 /// Width of every chart. At 400 pixels its smallest letters are 10 high.
 const WIDTH: f64 = 560.0;
-const EDGE: f64 = 14.0;
-const TITLE: f64 = 20.0;
-const TITLE_LINE: f64 = 25.0;
+const INNER: f64 = WIDTH - 2.0 * EDGE;
 /// Of a plot: the only one, those of one row, those of several.
 const HEIGHTS: [f64; 3] = [300.0, 210.0, 165.0];
 /// Between two rows of panels, beside titles and labels.
@@ -27,68 +25,36 @@ const BETWEEN: f64 = 14.0;
 pub fn chart(chart: &Chart) -> Result<String> {
     let layout = Layout::new(chart)?;
     let mut svg = Svg::default();
-    let title = chart.finding.title();
-    let mut y = EDGE;
-    for line in wrapped(&title, TITLE, WIDTH - 2.0 * EDGE) {
-        svg.text(
-            "ink title",
-            (EDGE, y + TITLE_LINE / 2.0),
-            TITLE,
-            Anchor::Start,
-            &line,
-        );
-        y += TITLE_LINE;
-    }
-    y += 6.0;
-    y = key(&mut svg, chart, y);
-    for line in wrapped(&chart.y.label, TEXT, WIDTH - 2.0 * EDGE) {
-        svg.text("soft", (EDGE, y + LINE / 2.0), TEXT, Anchor::Start, &line);
-        y += LINE;
-    }
-    y += 8.0;
+    let title = chart.title();
+    let lines = wrapped(&title, TITLE.0, INNER);
+    let mut y = svg.lines("ink title", (EDGE, EDGE), TITLE, Anchor::Start, &lines);
+    y = key(&mut svg, chart, y + 6.0);
+    let soft = |svg: &mut Svg, y, text| {
+        let lines = wrapped(text, TEXT, INNER);
+        svg.lines("soft", (EDGE, y), (TEXT, LINE), Anchor::Start, &lines)
+    };
+    y = soft(&mut svg, y, &chart.y.label) + 8.0;
     let rows: Vec<&[Panel]> = chart.panels.chunks(layout.columns).collect();
     for (row, panels) in rows.iter().enumerate() {
         let title_lines = panels.iter().map(|panel| layout.title(panel).len());
-        let top = y + LINE * lines(title_lines.max().unwrap_or(0));
+        let top = y + LINE * title_lines.max().unwrap_or(0) as f64;
         let below = rows.get(row + 1).map_or(0, |below| below.len());
         for (column, of) in panels.iter().enumerate() {
             let area = layout.area(column, top);
-            for (number, line) in layout.title(of).iter().enumerate() {
-                let at = (area.left, y + LINE * (lines(number) + 0.4));
-                svg.text("ink panel", at, TEXT, Anchor::Start, line);
-            }
+            let (at, lines) = ((area.left, y - LINE / 10.0), layout.title(of));
+            svg.lines("ink panel", at, (TEXT, LINE), Anchor::Start, &lines);
             layout.frame(&mut svg, &area, column, column >= below);
-            panel::draw(
-                &mut svg,
-                of,
-                (&layout.x, &layout.y),
-                &area,
-                &layout.names[column],
-            );
+            let scales = (&layout.x, &layout.y);
+            panel::draw(&mut svg, of, scales, &area, &layout.names[column]);
         }
         y = top + layout.height + BETWEEN;
     }
     y += LINE - BETWEEN + 6.0;
     let right = layout.area(layout.columns - 1, 0.0).right;
-    let middle = f64::midpoint(layout.left, right);
-    svg.text(
-        "soft",
-        (middle, y + LINE / 2.0),
-        TEXT,
-        Anchor::Middle,
-        &chart.x.label,
-    );
-    y += LINE + 8.0;
-    for line in wrapped(&chart.note, TEXT, WIDTH - 2.0 * EDGE) {
-        svg.text("soft", (EDGE, y + LINE / 2.0), TEXT, Anchor::Start, &line);
-        y += LINE;
-    }
+    let middle = (f64::midpoint(layout.left, right), y + LINE / 2.0);
+    svg.text("soft", middle, TEXT, Anchor::Middle, &chart.x.label);
+    y = soft(&mut svg, y + LINE + 8.0, &chart.note);
     Ok(svg.document((WIDTH, y + EDGE - 4.0), &title))
-}
-
-#[allow(clippy::cast_precision_loss, reason = "a few lines")]
-fn lines(count: usize) -> f64 {
-    count as f64
 }
 
 /// What kinds of dots and lines mean. Gives where it ends.
@@ -107,13 +73,8 @@ fn key(svg: &mut Svg, chart: &Chart, mut y: f64) -> f64 {
             panel::dot(svg, key.pen.mark, (middle, y + LINE / 2.0), 4.2, true);
         }
         svg.raw("</g>");
-        svg.text(
-            "ink",
-            (x + 34.0, y + LINE / 2.0),
-            TEXT,
-            Anchor::Start,
-            &key.text,
-        );
+        let at = (x + 34.0, y + LINE / 2.0);
+        svg.text("ink", at, TEXT, Anchor::Start, &key.text);
         x += width + 14.0;
     }
     if chart.key.is_empty() {
@@ -143,11 +104,7 @@ struct Layout {
 impl Layout {
     fn new(chart: &Chart) -> Result<Self> {
         let columns = chart.columns.clamp(1, chart.panels.len().max(1));
-        ensure!(
-            !chart.panels.is_empty(),
-            "{}: no panels",
-            chart.finding.text
-        );
+        ensure!(!chart.panels.is_empty(), "{}: no panels", chart.finding);
         let all = || chart.panels.iter().flat_map(|panel| &panel.series);
         let points = || all().flat_map(|series| &series.points);
         let x = Scale::new(&chart.x, points().map(|point| point.x))?;
@@ -186,7 +143,7 @@ impl Layout {
             .collect();
         let beside: f64 = names.iter().map(|names| names.width).sum();
         let whole = WIDTH - left - EDGE - beside;
-        let plot = |gap: f64| (whole - gap * (lines(columns) - 1.0)) / lines(columns);
+        let plot = |gap: f64| (whole - gap * (columns as f64 - 1.0)) / columns as f64;
         let ticks = |gap| x.ticks(plot(gap), |label| text_width(label, TEXT));
         // The last label of a plot and the first of the next stand half beyond their ends.
         let gap = widest(&ticks(20.0)) + GAP;
@@ -207,13 +164,8 @@ impl Layout {
     /// The plot in a `column`, from `top` on.
     fn area(&self, column: usize, top: f64) -> Area {
         let before: f64 = self.names[..column].iter().map(|names| names.width).sum();
-        let left = self.left + lines(column) * (self.width + self.gap) + before;
-        Area {
-            left,
-            top,
-            right: left + self.width,
-            bottom: top + self.height,
-        }
+        let left = self.left + column as f64 * (self.width + self.gap) + before;
+        Area::around((left, top), (left + self.width, top + self.height), 0.0)
     }
 
     fn title(&self, panel: &Panel) -> Vec<String> {

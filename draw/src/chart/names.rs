@@ -30,7 +30,6 @@ pub(super) fn apart(wanted: &[Wanted], top: f64, bottom: f64) -> Vec<f64> {
             sum += wanted[index].y - above - height / 2.0;
             above += height;
         }
-        #[allow(clippy::cast_precision_loss, reason = "a few names")]
         let mean = sum / block.len() as f64;
         mean.min(bottom - above).max(top)
     };
@@ -68,6 +67,16 @@ pub(super) struct Area {
 }
 
 impl Area {
+    /// That with these two corners, and `margin` more on every side.
+    pub fn around(from: (f64, f64), to: (f64, f64), margin: f64) -> Self {
+        Self {
+            left: from.0.min(to.0) - margin,
+            top: from.1.min(to.1) - margin,
+            right: from.0.max(to.0) + margin,
+            bottom: from.1.max(to.1) + margin,
+        }
+    }
+
     fn common(&self, other: &Self) -> f64 {
         let width = self.right.min(other.right) - self.left.max(other.left);
         let height = self.bottom.min(other.bottom) - self.top.max(other.top);
@@ -97,12 +106,7 @@ pub(super) fn beside(
             (x - away.min(12.0) - width, below),
         ];
         for (left, top) in corners {
-            let area = Area {
-                left,
-                top,
-                right: left + width,
-                bottom: top + height,
-            };
+            let area = Area::around((left, top), (left + width, top + height), 0.0);
             let inside = area.common(bounds) / (width * height);
             let hidden: f64 = taken.iter().map(|other| area.common(other)).sum();
             let cost = hidden + 1e4 * (1.0 - inside) + away;

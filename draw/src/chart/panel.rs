@@ -4,10 +4,9 @@ use super::names::{Area, Wanted, apart, beside};
 use super::parts::{Panel, Point, Series, Style};
 use super::scale::Scale;
 use crate::palette::Mark;
-use crate::svg::{Anchor, At, Svg, text_width, wrapped};
+use crate::svg::{Anchor, At, Svg, TEXT, text_width, wrapped};
 
-/// Size of all texts but the title, and the height of a line.
-pub(super) const TEXT: f64 = 14.5;
+/// The height of a line.
 pub(super) const LINE: f64 = 18.0;
 /// Between a plot and its names, and between two names.
 const TO_NAME: f64 = 16.0;
@@ -143,11 +142,11 @@ pub(super) fn draw(
                 if let Some((low, high)) = ends {
                     let ends = (place(point.x, low), place(point.x, high));
                     interval(svg, ends.0, ends.1);
-                    taken.push(around(ends.0, ends.1, 3.0));
+                    taken.push(Area::around(ends.0, ends.1, 3.0));
                 }
                 let at = place(point.x, point.y);
                 dot(svg, series.pen.mark, at, radius, true);
-                taken.push(around(at, at, radius + 2.0));
+                taken.push(Area::around(at, at, radius + 2.0));
             } else if let Some((_, high)) = ends.filter(|_| y.logarithmic && point.y <= 0.0) {
                 let (foot, at) = (place(point.x, y.low), place(point.x, high));
                 interval(svg, foot, at);
@@ -182,18 +181,19 @@ pub(super) fn draw(
     for (name, _) in within {
         let lines = wrapped(name.text, TEXT, BESIDE);
         let widths = lines.iter().map(|line| text_width(line, TEXT));
-        let size = (widths.fold(0.0, f64::max), LINE * count(lines.len()));
+        let size = (widths.fold(0.0, f64::max), LINE * lines.len() as f64);
         let (left, top) = beside(name.end, size, &bounds, &taken);
-        taken.push(around((left, top), (left + size.0, top + size.1), 2.0));
+        taken.push(Area::around(
+            (left, top),
+            (left + size.0, top + size.1),
+            2.0,
+        ));
         let (x, anchor) = if left + size.0 < name.end.0 {
             (left + size.0, Anchor::End)
         } else {
             (left, Anchor::Start)
         };
-        for (number, line) in lines.iter().enumerate() {
-            let y = top + LINE * (count(number) + 0.5);
-            svg.text(&name.class, (x, y), TEXT, anchor, line);
-        }
+        svg.lines(&name.class, (x, top), (TEXT, LINE), anchor, &lines);
     }
 }
 
@@ -218,17 +218,8 @@ fn along(from: (f64, f64), to: (f64, f64)) -> impl Iterator<Item = Area> {
             from.0 + (to.0 - from.0) * part,
             from.1 + (to.1 - from.1) * part,
         );
-        around(at, at, GRAIN / 2.0)
+        Area::around(at, at, GRAIN / 2.0)
     })
-}
-
-fn around(from: (f64, f64), to: (f64, f64), margin: f64) -> Area {
-    Area {
-        left: from.0.min(to.0) - margin,
-        top: from.1.min(to.1) - margin,
-        right: from.0.max(to.0) + margin,
-        bottom: from.1.max(to.1) + margin,
-    }
 }
 
 /// Each with a line to the end of its curve unless that is near.
@@ -237,7 +228,7 @@ fn names_beside_the_plot(svg: &mut Svg, ends: &[Name], area: &Area, names: &Name
     let texts: Vec<Vec<String>> = texts.collect();
     let wanted = ends.iter().zip(&texts).map(|(name, lines)| Wanted {
         y: name.end.1,
-        height: LINE * count(lines.len()) - 2.0 + NAME_GAP,
+        height: LINE * lines.len() as f64 - 2.0 + NAME_GAP,
     });
     let wanted: Vec<Wanted> = wanted.collect();
     let places = apart(&wanted, area.top - LINE / 2.0, area.bottom + LINE / 2.0);
@@ -249,14 +240,7 @@ fn names_beside_the_plot(svg: &mut Svg, ends: &[Name], area: &Area, names: &Name
                 "<g class=\"{class}\"><path class=\"stroke\" stroke-width=\"1\" d=\"M{x1} {y1}L{x2} {y2}\"/></g>"
             ));
         }
-        for (number, line) in lines.iter().enumerate() {
-            let y = middle + LINE * (count(number) - (count(lines.len()) - 1.0) / 2.0);
-            svg.text(class, (x, y), TEXT, Anchor::Start, line);
-        }
+        let top = middle - LINE * lines.len() as f64 / 2.0;
+        svg.lines(class, (x, top), (TEXT, LINE), Anchor::Start, lines);
     }
-}
-
-#[allow(clippy::cast_precision_loss, reason = "a few lines")]
-fn count(number: usize) -> f64 {
-    number as f64
 }

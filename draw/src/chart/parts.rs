@@ -1,42 +1,14 @@
 //! What a chart is made of.
 
-use crate::palette::{self, Pen};
-
-/// What a chart shows, and whether its points say so.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Finding {
-    /// A sentence without its full stop.
-    pub text: String,
-    /// Whether the data show it.
-    pub holds: bool,
-}
-
-impl Finding {
-    /// `text`, which the data show if it `holds`.
-    #[must_use]
-    pub fn new(text: impl Into<String>, holds: bool) -> Self {
-        Self {
-            text: text.into(),
-            holds,
-        }
-    }
-
-    /// What stands above the chart: never what its points do not show.
-    #[must_use]
-    pub fn title(&self) -> String {
-        if self.holds {
-            self.text.clone()
-        } else {
-            format!("These data do not show: {}", self.text)
-        }
-    }
-}
+use crate::palette::{NEUTRAL, Pen};
 
 /// A chart.
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// Its title.
-    pub finding: Finding,
+    /// What it shows: a sentence without its full stop.
+    pub finding: String,
+    /// Whether the data show it.
+    pub holds: bool,
     /// What dots, lines and intervals are; drawn below it.
     pub note: String,
     /// What runs to the right.
@@ -51,6 +23,18 @@ pub struct Chart {
     pub panels: Vec<Panel>,
 }
 
+impl Chart {
+    /// What stands above it: never what its points do not show.
+    #[must_use]
+    pub fn title(&self) -> String {
+        if self.holds {
+            self.finding.clone()
+        } else {
+            format!("These data do not show: {}", self.finding)
+        }
+    }
+}
+
 /// A kind of dots or lines.
 #[derive(Clone, Debug)]
 pub struct Key {
@@ -63,11 +47,11 @@ pub struct Key {
 }
 
 impl Key {
-    /// Dots or lines in the colour of texts.
+    /// What dots or lines of this look are.
     #[must_use]
-    pub fn new(style: Style, text: impl Into<String>) -> Self {
+    pub fn new(pen: Pen, style: Style, text: impl Into<String>) -> Self {
         Self {
-            pen: palette::NEUTRAL,
+            pen,
             style,
             text: text.into(),
         }
@@ -77,9 +61,9 @@ impl Key {
     #[must_use]
     pub fn simulated(printed: &str) -> Vec<Self> {
         vec![
-            Self::new(Style::Dots, "simulated"),
-            Self::new(Style::Line, "exact"),
-            Self::new(Style::Dashed, printed),
+            Self::new(NEUTRAL, Style::Dots, "simulated"),
+            Self::new(NEUTRAL, Style::Line, "exact"),
+            Self::new(NEUTRAL, Style::Dashed, printed),
         ]
     }
 }
@@ -104,22 +88,13 @@ impl Panel {
     }
 }
 
-/// How the numbers of an axis are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unit {
-    /// As they are.
-    Plain,
-    /// Shares as hundredths.
-    Percent,
-}
-
 /// An axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// What it is, with its unit.
     pub label: String,
-    /// How its numbers are written.
-    pub unit: Unit,
+    /// Whether its numbers are shares, written as hundredths.
+    pub is_percent: bool,
     /// Whether equal steps are equal factors.
     pub logarithmic: bool,
     /// From where to where; by the points where not given. A linear one has 0 then.
@@ -132,7 +107,7 @@ impl Axis {
     pub fn linear(label: impl Into<String>) -> Self {
         Self {
             label: label.into(),
-            unit: Unit::Plain,
+            is_percent: false,
             logarithmic: false,
             range: None,
         }
@@ -149,20 +124,16 @@ impl Axis {
 
     /// Its numbers are shares.
     #[must_use]
-    pub fn percent(self) -> Self {
-        Self {
-            unit: Unit::Percent,
-            ..self
-        }
+    pub const fn percent(mut self) -> Self {
+        self.is_percent = true;
+        self
     }
 
     /// From `low` to `high`.
     #[must_use]
-    pub fn within(self, low: f64, high: f64) -> Self {
-        Self {
-            range: Some((low, high)),
-            ..self
-        }
+    pub const fn within(mut self, low: f64, high: f64) -> Self {
+        self.range = Some((low, high));
+        self
     }
 }
 
@@ -249,13 +220,17 @@ impl Point {
         }
     }
 
+    /// A curve, worked out at each of `xs`.
+    pub fn curve(xs: impl IntoIterator<Item = f64>, of: impl Fn(f64) -> f64) -> Vec<Self> {
+        let points = xs.into_iter().map(|x| Self::exact(x, of(x)));
+        points.collect()
+    }
+
     /// So many steps of a tenth to the right on a logarithmic axis, beside others that
     /// would hide it.
     #[must_use]
-    pub fn aside(self, steps: f64) -> Self {
-        Self {
-            x: self.x * 1.1f64.powf(steps),
-            ..self
-        }
+    pub fn aside(mut self, steps: f64) -> Self {
+        self.x *= 1.1f64.powf(steps);
+        self
     }
 }

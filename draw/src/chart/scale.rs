@@ -2,7 +2,7 @@
 
 use anyhow::{Result, ensure};
 
-use super::parts::{Axis, Unit};
+use super::parts::Axis;
 
 /// Least distance of two labels, in the unit of the picture.
 pub(super) const GAP: f64 = 10.0;
@@ -22,7 +22,7 @@ pub(super) struct Scale {
     pub low: f64,
     pub high: f64,
     pub logarithmic: bool,
-    unit: Unit,
+    is_percent: bool,
 }
 
 impl Scale {
@@ -33,7 +33,7 @@ impl Scale {
             low,
             high,
             logarithmic,
-            unit: axis.unit,
+            is_percent: axis.is_percent,
         };
         let drawn = values.filter(|&value| value.is_finite() && (value > 0.0 || !logarithmic));
         let (low, high) = drawn.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
@@ -150,14 +150,12 @@ impl Scale {
     }
 
     fn tick(&self, value: f64) -> Tick {
-        let shown = match self.unit {
-            Unit::Plain => value,
-            Unit::Percent => value * 100.0,
-        };
-        Tick {
-            value,
-            label: number(shown),
-        }
+        let label = number(if self.is_percent {
+            value * 100.0
+        } else {
+            value
+        });
+        Tick { value, label }
     }
 }
 
@@ -191,15 +189,9 @@ pub(super) fn number(value: f64) -> String {
     format!("{head},{tail}{rest}").replace('-', "−")
 }
 
+/// A digit, or the sign, of an exponent.
 fn raised(c: char) -> char {
-    match c {
-        '-' => '⁻',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        _ => c
-            .to_digit(10)
-            .and_then(|digit| char::from_u32(0x2070 + digit))
-            .unwrap_or(c),
-    }
+    let digit = c.to_digit(10).map(|digit| digit as usize);
+    let raised = digit.and_then(|digit| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit));
+    raised.unwrap_or('⁻')
 }

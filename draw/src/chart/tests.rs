@@ -12,19 +12,16 @@ fn of(logarithmic: bool, points: Vec<Point>) -> Chart {
         logarithmic,
         ..Axis::linear(label)
     };
+    let series = Series::named("series", EVENTS, Style::JoinedDots, points);
     Chart {
-        finding: Finding::new("A <title> & more", true),
+        finding: "A <title> & more".to_owned(),
+        holds: true,
         note: "A note.".to_owned(),
         x: axis("x"),
         y: axis("y"),
         key: Vec::new(),
         columns: 1,
-        panels: vec![Panel::only(vec![Series::named(
-            "series",
-            EVENTS,
-            Style::JoinedDots,
-            points,
-        )])],
+        panels: vec![Panel::only(vec![series])],
     }
 }
 
@@ -67,7 +64,7 @@ fn nothing_to_draw_is_an_error() {
 #[test]
 fn a_title_says_nothing_that_the_data_do_not_show() {
     let mut chart_of = of(false, vec![Point::exact(0.0, 1.0)]);
-    chart_of.finding.holds = false;
+    chart_of.holds = false;
     let svg = chart(&chart_of).unwrap();
     assert!(svg.contains("<title>These data do not show: A &lt;title"));
 }
@@ -169,35 +166,16 @@ proptest! {
 
 #[test]
 fn a_name_alone_stands_where_its_curve_ends() {
-    let wanted = [
-        Wanted {
-            y: 50.0,
-            height: 20.0,
-        },
-        Wanted {
-            y: 200.0,
-            height: 20.0,
-        },
-    ];
+    let wanted = [50.0, 200.0].map(|y| Wanted { y, height: 20.0 });
     assert_eq!(apart(&wanted, 0.0, 300.0), [50.0, 200.0]);
 }
 
 #[test]
 fn a_name_beside_a_dot_avoids_what_is_there() {
-    let bounds = Area {
-        left: 0.0,
-        top: 0.0,
-        right: 200.0,
-        bottom: 100.0,
-    };
+    let bounds = Area::around((0.0, 0.0), (200.0, 100.0), 0.0);
     let free = beside((20.0, 50.0), (60.0, 18.0), &bounds, &[]);
     assert_eq!(free, (29.0, 41.0));
-    let there = Area {
-        left: 25.0,
-        top: 40.0,
-        right: 100.0,
-        bottom: 60.0,
-    };
+    let there = Area::around((25.0, 40.0), (100.0, 60.0), 0.0);
     let (_, top) = beside((20.0, 50.0), (60.0, 18.0), &bounds, &[there]);
     assert!(!(22.0..60.0).contains(&top), "{top}");
     // No room to the right.

@@ -1,11 +1,10 @@
 //! What the sides of a map count.
 
-use crate::svg::text_width;
+use crate::svg::{TEXT, text_width};
 
 /// A single line of more pixels is wrapped.
 const MOST_IN_LINE: usize = 256;
-/// Size of the numbers, and their least distance along an axis.
-pub(super) const TEXT: f64 = 14.5;
+/// Least distance of the numbers along an axis.
 const GAP: f64 = 14.0;
 
 /// The name and the numbers along one side of a map.

@@ -2,13 +2,12 @@
 
 use anyhow::{Result, ensure};
 
-use super::axis::TEXT;
 use super::cells;
-use super::layout::{Bar, EDGE, Frame, LINE, Layout, TITLE};
+use super::layout::{Bar, Frame, LINE, Layout};
 use super::map::Map;
 use super::scale::{Scale, levels};
 use crate::palette::{NO_EVENT, hex};
-use crate::svg::{Anchor, At, Svg};
+use crate::svg::{Anchor, At, EDGE, Svg, TEXT, TITLE};
 
 /// Draws `map` as a complete SVG document.
 ///
@@ -42,13 +41,8 @@ pub fn heat_map(map: &Map) -> Result<String> {
     let mut svg = Svg::default();
     texts(&mut svg, &layout);
     axes(&mut svg, &layout);
-    cells::draw(
-        &mut svg,
-        &levels,
-        layout.columns,
-        layout.plot.corner,
-        layout.cell,
-    );
+    let corner = layout.plot.corner;
+    cells::draw(&mut svg, &levels, layout.columns, corner, layout.cell);
     if let Some(of) = &layout.bar {
         bar(&mut svg, of);
     }
@@ -57,23 +51,19 @@ pub fn heat_map(map: &Map) -> Result<String> {
 
 /// Title and notes.
 fn texts(svg: &mut Svg, layout: &Layout) {
-    let mut y = EDGE + 12.5;
-    for line in &layout.title {
-        svg.text("ink title", (EDGE, y), TITLE, Anchor::Start, line);
-        y += 25.0;
-    }
+    let start = (EDGE, EDGE);
+    svg.lines("ink title", start, TITLE, Anchor::Start, &layout.title);
     let mut y = layout.notes_y + LINE / 2.0;
-    for note in &layout.notes {
+    for (index, note) in layout.notes.iter().enumerate() {
         let mut x = EDGE;
-        if note.no_event {
-            let (top, fill) = (At(y - 7.0), hex(NO_EVENT));
+        if layout.has_silent && index == 0 {
+            let (left, top, fill) = (At(x), At(y - 7.0), hex(NO_EVENT));
             svg.raw(&format!(
-                "<rect fill=\"{fill}\" x=\"{}\" y=\"{top}\" width=\"14\" height=\"14\"/>",
-                At(x)
+                "<rect fill=\"{fill}\" x=\"{left}\" y=\"{top}\" width=\"14\" height=\"14\"/>"
             ));
             x += 22.0;
         }
-        svg.text("soft", (x, y), TEXT, Anchor::Start, &note.text);
+        svg.text("soft", (x, y), TEXT, Anchor::Start, note);
         y += LINE;
     }
 }

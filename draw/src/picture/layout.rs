@@ -1,9 +1,9 @@
 //! Where everything in a picture is.
 
-use super::axis::{Axis, Lines, TEXT};
+use super::axis::{Axis, Lines};
 use super::map::Map;
 use super::scale::{Mark, Scale};
-use crate::svg::{one_line, text_width, wrapped};
+use crate::svg::{EDGE, TEXT, TITLE, one_line, text_width, wrapped};
 
 /// The room for the pixels of a map.
 const MOST_WIDTH: f64 = 400.0;
@@ -13,12 +13,10 @@ const MOST_CELL: f64 = 64.0;
 /// Thinner maps are stretched.
 const LEAST_SIDE: f64 = 40.0;
 
-pub(super) const EDGE: f64 = 14.0;
 const LEAST_CANVAS: f64 = 400.0;
 /// Between the map and the colour bar.
 const BAR_DISTANCE: f64 = 22.0;
 const BAR_WIDTH: f64 = 16.0;
-pub(super) const TITLE: f64 = 20.0;
 pub(super) const LINE: f64 = 22.0;
 
 /// A rectangle.
@@ -38,14 +36,6 @@ pub(super) struct Bar {
     pub levels: Vec<Option<u8>>,
 }
 
-/// A line of text below the map.
-#[derive(Debug)]
-pub(super) struct Note {
-    pub text: String,
-    /// It explains the colour of the pixels without a value.
-    pub no_event: bool,
-}
-
 /// A picture but for the values of its pixels.
 #[derive(Debug)]
 pub(super) struct Layout {
@@ -59,7 +49,10 @@ pub(super) struct Layout {
     /// The axis below the map and the one left of it.
     pub axes: [Axis; 2],
     pub bar: Option<Bar>,
-    pub notes: Vec<Note>,
+    /// Lines of text below the map.
+    pub notes: Vec<String>,
+    /// Whether the first explains the colour of the pixels without a value.
+    pub has_silent: bool,
     /// Top of the first note.
     pub notes_y: f64,
 }
@@ -96,9 +89,9 @@ impl Layout {
         };
         let canvas = (left + width + right + EDGE).ceil().max(LEAST_CANVAS);
 
-        let title = wrapped(&one_line(map.title), TITLE, canvas - 2.0 * EDGE);
+        let title = wrapped(&one_line(map.title), TITLE.0, canvas - 2.0 * EDGE);
         // The line above the map is for the name of its rows and for the bar's unit.
-        let top = EDGE + 25.0 * title.len() as f64 + LINE + 10.0;
+        let top = EDGE + TITLE.1 * title.len() as f64 + LINE + 10.0;
         let plot = Frame {
             corner: (left, top),
             size: (width, height),
@@ -125,28 +118,22 @@ impl Layout {
             axes,
             bar,
             notes,
+            has_silent: silent > 0,
             notes_y,
         }
     }
 }
 
-fn notes(map: &Map, scale: Option<&Scale>, silent: usize) -> Vec<Note> {
+fn notes(map: &Map, scale: Option<&Scale>, silent: usize) -> Vec<String> {
     let mut notes = Vec::new();
     let (missing, pixels) = (map.missing, map.columns * map.rows);
     if silent > 0 {
-        let text = if silent == pixels {
+        notes.push(if silent == pixels {
             format!("no {missing} in any pixel")
         } else {
             format!("no {missing}: {silent} of {pixels} pixels")
-        };
-        notes.push(Note {
-            text,
-            no_event: true,
         });
     }
-    notes.extend(scale.map(|scale| Note {
-        text: scale.note().into(),
-        no_event: false,
-    }));
+    notes.extend(scale.map(|scale| scale.note().to_owned()));
     notes
 }

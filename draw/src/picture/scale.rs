@@ -124,25 +124,13 @@ impl Scale {
         let digits = (1.0 - step.log10().floor()).clamp(0.0, 12.0);
         let decimals = if self.whole { 0 } else { digits as usize };
 
-        let low = self.number(self.low, decimals);
-        let high = self.number(self.high, decimals);
+        let end = |value, sign: Option<&str>| {
+            let number = self.number(value, decimals);
+            sign.map_or(number.clone(), |sign| format!("{sign} {number}"))
+        };
         let mut marks = vec![
-            mark(
-                0.0,
-                if self.below {
-                    format!("≤ {low}")
-                } else {
-                    low
-                },
-            ),
-            mark(
-                1.0,
-                if self.above {
-                    format!("≥ {high}")
-                } else {
-                    high
-                },
-            ),
+            mark(0.0, end(self.low, self.below.then_some("≤"))),
+            mark(1.0, end(self.high, self.above.then_some("≥"))),
         ];
         let margin = 0.7 * SPACING / length;
         let first = (self.low / step).ceil();

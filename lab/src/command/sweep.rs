@@ -1,6 +1,7 @@
 //! `cargo lab sweep` and `cargo lab merge`: Monte-Carlo trials in parts.
 
 use std::io::{self, Write};
+use std::ops::Range;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -9,7 +10,7 @@ use clap::Args;
 use dtof::cli::arguments::{path, whole};
 use dtof::rows::grouped;
 use dtof_lab::studies;
-use dtof_lab::sweep::{self, Part, SeedRange};
+use dtof_lab::sweep::{self, Part};
 use indicatif::{ProgressBar, ProgressStyle};
 
 #[derive(Args)]
@@ -18,7 +19,7 @@ pub struct Sweep {
     study: Option<String>,
     /// First seed, and one past the last
     #[arg(long, value_name = "A..B", value_parser = seeds, requires = "out")]
-    seeds: Option<SeedRange>,
+    seeds: Option<Range<u64>>,
     /// The part: a new file, or one that an earlier run with the same seeds left
     #[arg(long, value_name = "FILE", requires = "seeds", value_parser = path())]
     out: Option<PathBuf>,
@@ -30,15 +31,13 @@ pub struct Sweep {
     quiet: bool,
 }
 
-fn seeds(text: &str) -> Result<SeedRange> {
+fn seeds(text: &str) -> Result<Range<u64>> {
     let (first, end) = text.split_once("..").context("not A..B")?;
     let seed = |text: &str| whole(0..=u64::MAX)(text).ok();
-    let range = SeedRange {
-        first: seed(first).context("the first is no seed")?,
-        end: seed(end).context("the last is no seed")?,
-    };
-    ensure!(range.first < range.end, "no seed lies between them");
-    Ok(range)
+    let first = seed(first).context("the first is no seed")?;
+    let end = seed(end).context("the last is no seed")?;
+    ensure!(first < end, "no seed lies between them");
+    Ok(first..end)
 }
 
 impl Sweep {
@@ -47,14 +46,14 @@ impl Sweep {
             return list();
         };
         let study = studies::named(name)?;
-        let (Some(seeds), Some(out)) = (self.seeds, &self.out) else {
+        let (Some(seeds), Some(out)) = (self.seeds.clone(), &self.out) else {
             bail!("{name}: --seeds A..B and --out FILE say what to do");
         };
         let bar = if self.quiet {
             ProgressBar::hidden()
         } else {
             // Hidden where standard error is not a terminal.
-            ProgressBar::new(seeds.end - seeds.first)
+            ProgressBar::new(seeds.end - seeds.start)
         };
         bar.set_style(ProgressStyle::with_template(
             "{bar:40} {human_pos} of {human_len} seeds, {eta} left",
@@ -86,7 +85,7 @@ fn show(part: &Part) -> Result<()> {
     let seeds: Vec<String> = part
         .seeds()
         .iter()
-        .map(|range| format!("{}..{}", range.first, range.end))
+        .map(|(first, end)| format!("{first}..{end}"))
         .collect();
     writeln!(
         io::stdout(),

@@ -11,10 +11,11 @@ use crate::studies::methods::passage::Method as Rule;
 use crate::studies::methods::time_to_detect::Outcome;
 use crate::studies::methods::{depth_error, time_to_detect};
 use crate::sweep::mean::Measured;
+use crate::sweep::results::ends;
 use crate::sweep::values::Values;
 use crate::sweep::{Part, PointTally};
 use anyhow::{Context, Result, ensure};
-use dtof_draw::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style, chart};
+use dtof_draw::chart::{Axis, Chart, Panel, Point as Dot, Series, Style, chart};
 use dtof_draw::palette;
 use dtof_draw::palette::Pen;
 use std::path::PathBuf;
@@ -51,13 +52,9 @@ impl Instructions<'_> {
     fn estimator(&self, estimator: Estimator, sigma: f64) -> Result<f64> {
         let centred = |sigma: f64| {
             // The next wider pulse that was counted.
-            let counted = [0.4, 0.5, 1.0]
-                .into_iter()
-                .find(|&counted| sigma <= counted);
-            self.of(
-                "depth",
-                &format!("centred window, σ {}", counted.unwrap_or(1.5)),
-            )
+            let counted = [0.4, 0.5, 1.0].into_iter().find(|&of| sigma <= of);
+            let variant = format!("centred window, σ {}", counted.unwrap_or(1.5));
+            self.of("depth", &variant)
         };
         match estimator {
             Estimator::HighestBin => Ok(0.0),
@@ -81,9 +78,7 @@ struct Entry {
 }
 
 impl Entry {
-    #[allow(clippy::cast_precision_loss, reason = "a few scenes")]
     fn new(label: String, pen: Pen, cost: f64, scenes: &[Measured]) -> Self {
-        let values = || scenes.iter().map(|scene| scene.value);
         let mean = |of: fn(&Measured) -> f64| {
             scenes.iter().map(of).sum::<f64>() / scenes.len().max(1) as f64
         };
@@ -98,21 +93,21 @@ impl Entry {
                     mean(|scene| scene.interval.1),
                 ),
             },
-            range: (
-                values().fold(f64::INFINITY, f64::min),
-                values().fold(0.0, f64::max),
-            ),
+            range: ends(scenes.iter().map(|scene| scene.value)),
         }
     }
+}
+
+/// That of the smallest mean.
+fn best(entries: &[Entry]) -> Result<&Entry> {
+    let by_mean = |a: &&Entry, b: &&Entry| a.mean.value.total_cmp(&b.mean.value);
+    entries.iter().min_by(by_mean).context("no methods")
 }
 
 /// The chosen: the cheapest whose interval ends within [`MARGIN`] of the best's mean, or
 /// the best.
 fn chosen(entries: &[Entry]) -> Result<&Entry> {
-    let best = entries
-        .iter()
-        .min_by(|a, b| a.mean.value.total_cmp(&b.mean.value));
-    let best = best.context("no methods")?;
+    let best = best(entries)?;
     let limit = best.mean.value * (1.0 + MARGIN);
     let good = entries
         .iter()
@@ -144,8 +139,14 @@ fn frontier(entries: &[Entry]) -> Vec<Dot> {
 }
 
 /// The cost of entries against how they do.
-fn against_cost(finding: Finding, y: Axis, note: &str, entries: &[Entry]) -> Result<String> {
-    ensure!(finding.holds, "the data no longer show: {}", finding.text);
+fn against_cost(
+    finding: String,
+    holds: bool,
+    y: Axis,
+    note: &str,
+    entries: &[Entry],
+) -> Result<String> {
+    ensure!(holds, "the data no longer show: {finding}");
     let frontier = frontier(entries);
     let mut series = vec![Series::unnamed(palette::REFERENCE, Style::Dashed, frontier)];
     series.extend(entries.iter().map(|entry| {
@@ -161,6 +162,7 @@ fn against_cost(finding: Finding, y: Axis, note: &str, entries: &[Entry]) -> Res
     }));
     chart(&Chart {
         finding,
+        holds,
         note: format!("{note} Dashed: nothing is both cheaper and better."),
         x: Axis::linear("instructions on a Cortex-M4F"),
         y,
@@ -173,10 +175,8 @@ fn against_cost(finding: Finding, y: Axis, note: &str, entries: &[Entry]) -> Res
 /// How `label` does.
 fn value(entries: &[Entry], label: &str) -> Result<f64> {
     let found = entries.iter().find(|entry| entry.label == label);
-    Ok(found
-        .with_context(|| format!("no method {label}"))?
-        .mean
-        .value)
+    let found = found.with_context(|| format!("no method {label}"))?;
+    Ok(found.mean.value)
 }
 
 /// Every rule over the outcomes that `of` takes.
@@ -195,12 +195,8 @@ fn rules(
             outcome.cycles.times(one)
         });
         let ratios: Vec<Measured> = ratios.collect();
-        Ok(Entry::new(
-            rule.label(),
-            rule.pen(),
-            counts.rule(rule)?,
-            &ratios,
-        ))
+        let cost = counts.rule(rule)?;
+        Ok(Entry::new(rule.label(), rule.pen(), cost, &ratios))
     };
     Rule::RULES.into_iter().map(entry).collect()
 }
@@ -209,27 +205,19 @@ fn rules(
 const SUITED: &str = "best for the pulse";
 
 /// For each pulse the rule that is fastest over its scenes.
-#[allow(clippy::float_cmp, reason = "parameters are as they were written")]
 fn suited(counts: &Instructions, outcomes: &[Outcome]) -> Result<Entry> {
     let (mut ratios, mut cost) = (Vec::new(), 0.0f64);
     for sigma in time_to_detect::SIGMAS {
         let entries = rules(counts, outcomes, |outcome| outcome.sigma == sigma)?;
-        let fastest = entries
-            .iter()
-            .min_by(|a, b| a.mean.value.total_cmp(&b.mean.value));
-        let fastest = fastest.context("no rules")?;
+        let fastest = best(&entries)?;
         cost = cost.max(fastest.cost);
         let those = outcomes
             .iter()
             .filter(|outcome| outcome.sigma == sigma && outcome.method.label() == fastest.label);
         ratios.extend(those.map(|outcome| outcome.ratio));
     }
-    Ok(Entry::new(
-        SUITED.to_owned(),
-        palette::NEUTRAL,
-        cost,
-        &ratios,
-    ))
+    let (label, pen) = (SUITED.to_owned(), palette::NEUTRAL);
+    Ok(Entry::new(label, pen, cost, &ratios))
 }
 
 /// Every estimator over the points that `of` takes.
@@ -244,12 +232,8 @@ fn estimators(
             cost = cost.max(counts.estimator(estimator, point.parameter("sigma"))?);
             ratios.push(depth_error::over_bound(point, name));
         }
-        Ok(Entry::new(
-            estimator.label(),
-            estimator.pen(),
-            cost,
-            &ratios,
-        ))
+        let (label, pen) = (estimator.label(), estimator.pen());
+        Ok(Entry::new(label, pen, cost, &ratios))
     };
     Estimator::ALL.into_iter().map(entry).collect()
 }
@@ -276,13 +260,11 @@ pub fn documents(
     let suits = value(&all_rules, SUITED)?;
     let papers = value(&all_rules, &Rule::Paper.label())?;
     let decision_svg = against_cost(
-        Finding::new(
-            format!(
-                "A window that suits the pulse reports {:.1} times sooner than the paper's rule",
-                papers / suits
-            ),
-            papers > 1.5 * suits,
+        format!(
+            "A window that suits the pulse reports {:.1} times sooner than the paper's rule",
+            papers / suits
         ),
+        papers > 1.5 * suits,
         Axis::logarithmic("laser cycles to an event over the likelihood ratio's"),
         "Dots are means over all scenes, bars go from the best scene to the worst. Windows have their width as a name.",
         &all_rules,
@@ -290,12 +272,10 @@ pub fn documents(
     let own = value(&all_estimators, &Estimator::OwnWindow.label())?;
     let papers = value(&all_estimators, &Estimator::Paper.label())?;
     let depth_svg = against_cost(
-        Finding::new(
-            format!(
-                "A centred window for the pulse takes the depth error from {papers:.1} times the bound to {own:.2}"
-            ),
-            own < papers / 1.5,
+        format!(
+            "A centred window for the pulse takes the depth error from {papers:.1} times the bound to {own:.2}"
         ),
+        own < papers / 1.5,
         Axis::logarithmic("root mean square depth error over the Cramér-Rao bound"),
         "Dots are means over all scenes, bars go from the best scene to the worst. σ: centred windows for such a pulse.",
         &all_estimators,
@@ -304,13 +284,11 @@ pub fn documents(
         .map(|estimator| value(&recorded, &format!("{}, {estimator}", Rule::Paper.label())));
     let gain = 1.0 - centred? / mass?;
     let recorded_svg = against_cost(
-        Finding::new(
-            format!(
-                "On recorded photons a centred window lowers the error by {:.0} %",
-                gain * 100.0
-            ),
-            gain > 0.1,
+        format!(
+            "On recorded photons a centred window lowers the error by {:.0} %",
+            gain * 100.0
         ),
+        gain > 0.1,
         Axis::linear("depth error of recorded photons, mm"),
         "Dots are medians, bars end where 95 % of the errors are smaller. Windows have their width as a name.",
         &recorded,
@@ -344,12 +322,8 @@ mod tests {
     /// As sure as 0.02 either way.
     fn entry(cost: f64, value: f64) -> Entry {
         let interval = (value - 0.02, value + 0.02);
-        Entry::new(
-            format!("{cost}"),
-            palette::NEUTRAL,
-            cost,
-            &[Measured { value, interval }],
-        )
+        let scene = Measured { value, interval };
+        Entry::new(format!("{cost}"), palette::NEUTRAL, cost, &[scene])
     }
 
     #[test]
@@ -362,10 +336,7 @@ mod tests {
             (250.0, 1.7),
         ]
         .map(|(cost, mean)| entry(cost, mean));
-        let found: Vec<(f64, f64)> = frontier(&entries)
-            .iter()
-            .map(|dot| (dot.x, dot.y))
-            .collect();
+        let found = frontier(&entries).into_iter().map(|dot| (dot.x, dot.y));
         let expected = [
             (100.0, 2.0),
             (250.0, 2.0),
@@ -373,7 +344,7 @@ mod tests {
             (300.0, 1.5),
             (300.0, 1.0),
         ];
-        assert_eq!(found, expected);
+        assert!(found.eq(expected));
     }
 
     /// Intervals end at 1.02 times the mean: a tenth above the best is where one of 1.078 ends.

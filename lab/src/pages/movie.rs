@@ -14,7 +14,7 @@ use dtof::rows::grouped;
 use dtof::simulate::scene::{self, Scene};
 use dtof_draw::palette;
 use dtof_draw::picture::{levels, span};
-use dtof_draw::svg::{Anchor, At, Svg, wrapped};
+use dtof_draw::svg::{Anchor, At, EDGE, Svg, TEXT, TITLE, wrapped};
 
 /// Laser cycles that are shown, and moments into which they are cut.
 const CYCLES: u16 = 2000;
@@ -26,9 +26,7 @@ const WHOLE: f64 = 12.0;
 const STEP: u8 = 15;
 
 const WIDTH: f64 = 560.0;
-const EDGE: f64 = 14.0;
-const TITLE: f64 = 20.0;
-const TEXT: f64 = 14.5;
+const INNER: f64 = WIDTH - 2.0 * EDGE;
 const LINE: f64 = 19.0;
 /// Seconds that a flash takes to fade, of [`WHOLE`], in percent.
 const FADE: f64 = 6.0;
@@ -88,27 +86,18 @@ pub fn demo() -> Result<String> {
         };
         notes.push(format!("{} {first}", surface.name));
     }
-    Ok(draw(
-        scene.geometry,
-        &flashes,
-        "Each flash is an event: bright pixels report often, dim ones later",
-        &format!(
-            "First event of a typical pixel, in laser cycles: {}.",
-            notes.join(", ")
-        ),
-    ))
+    let title = "Each flash is an event: bright pixels report often, dim ones later";
+    let notes = notes.join(", ");
+    let note = format!("First event of a typical pixel, in laser cycles: {notes}.");
+    Ok(draw(scene.geometry, &flashes, title, &note))
 }
 
 fn draw(geometry: Geometry, flashes: &[Flash], title: &str, note: &str) -> String {
     let mut svg = Svg::default();
     svg.raw(&format!("<style>{}</style>", sheet()));
-    let mut y = EDGE;
-    for line in wrapped(title, TITLE, WIDTH - 2.0 * EDGE) {
-        svg.text("ink title", (EDGE, y + 12.5), TITLE, Anchor::Start, &line);
-        y += 25.0;
-    }
-    y += 8.0;
-    let side = (WIDTH - 2.0 * EDGE) / f64::from(geometry.columns);
+    let lines = wrapped(title, TITLE.0, INNER);
+    let mut y = svg.lines("ink title", (EDGE, EDGE), TITLE, Anchor::Start, &lines) + 8.0;
+    let side = INNER / f64::from(geometry.columns);
     svg.raw(&format!(
         "<g transform=\"translate({} {})scale({side})\">",
         At(EDGE),
@@ -148,32 +137,25 @@ fn draw(geometry: Geometry, flashes: &[Flash], title: &str, note: &str) -> Strin
         "<rect class=\"edge\" fill=\"none\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>",
         At(EDGE),
         At(y),
-        At(WIDTH - 2.0 * EDGE),
+        At(INNER),
         At(height)
     ));
     y = time(&mut svg, y + height + 14.0);
     y = colours(&mut svg, span(&ranges).unwrap_or_default(), y + 10.0);
-    for line in wrapped(note, TEXT, WIDTH - 2.0 * EDGE) {
-        svg.text("soft", (EDGE, y + LINE / 2.0), TEXT, Anchor::Start, &line);
-        y += LINE;
-    }
+    let lines = wrapped(note, TEXT, INNER);
+    y = svg.lines("soft", (EDGE, y), (TEXT, LINE), Anchor::Start, &lines);
     svg.document((WIDTH, y + EDGE - 4.0), title)
 }
 
 /// The pixels of one moment, a path a colour.
 fn shapes(those: &[(&Flash, u8)], moment: u16, geometry: Geometry) -> String {
     let mut text = String::new();
-    let here: Vec<_> = those
-        .iter()
-        .filter(|(flash, _)| flash.moment == moment)
-        .collect();
+    let here = those.iter().filter(|(flash, _)| flash.moment == moment);
     for step in (0..=u8::MAX).step_by(STEP.into()) {
         let mut path = String::new();
-        for (flash, _) in here.iter().filter(|(_, of)| *of == step) {
-            let (row, column) = (
-                u32::from(flash.pixel) / geometry.columns,
-                u32::from(flash.pixel) % geometry.columns,
-            );
+        for (flash, _) in here.clone().filter(|(_, of)| *of == step) {
+            let pixel = u32::from(flash.pixel);
+            let (row, column) = (pixel / geometry.columns, pixel % geometry.columns);
             path += &format!("M{column} {row}h1.05v1.05h-1.05z");
         }
         if !path.is_empty() {
@@ -208,16 +190,15 @@ fn sheet() -> String {
 
 /// The laser cycles as a bar that grows. Gives where it ends.
 fn time(svg: &mut Svg, y: f64) -> f64 {
-    let width = WIDTH - 2.0 * EDGE;
     svg.raw(&format!(
         "<g class=\"soft\"><rect class=\"fill t\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"5\"/></g>",
         At(EDGE),
         At(y),
-        At(width)
+        At(INNER)
     ));
     for quarter in 0..=4u16 {
         let cycles = CYCLES / 4 * quarter;
-        let x = EDGE + width * f64::from(quarter) / 4.0;
+        let x = EDGE + INNER * f64::from(quarter) / 4.0;
         svg.line("edge", (x, y - 3.0), (x, y + 8.0));
         let (anchor, text) = match quarter {
             0 => (Anchor::Start, "laser cycle 0".to_owned()),
@@ -231,19 +212,13 @@ fn time(svg: &mut Svg, y: f64) -> f64 {
 
 /// What the colours mean. Gives where it ends.
 fn colours(svg: &mut Svg, (low, high): (f64, f64), y: f64) -> f64 {
-    let steps: Vec<u8> = (0..=u8::MAX).step_by(STEP.into()).collect();
     let name = "range, mm:";
     svg.text("soft", (EDGE, y + LINE / 2.0), TEXT, Anchor::Start, name);
     let mut x = EDGE + 86.0;
-    svg.text(
-        "soft",
-        (x, y + LINE / 2.0),
-        TEXT,
-        Anchor::Start,
-        &format!("{low:.0}"),
-    );
+    let place = (x, y + LINE / 2.0);
+    svg.text("soft", place, TEXT, Anchor::Start, &format!("{low:.0}"));
     x += 44.0;
-    for step in steps {
+    for step in (0..=u8::MAX).step_by(STEP.into()) {
         svg.raw(&format!(
             "<rect fill=\"{}\" x=\"{}\" y=\"{}\" width=\"10\" height=\"11\" shape-rendering=\"crispEdges\"/>",
             palette::hex(palette::level(step)),

@@ -7,16 +7,16 @@ mod outcome;
 use self::cases::{BACKGROUNDS, Case, background_name, cases};
 use crate::studies::scenes::one_pixel::{PER_BIN, in_parts};
 use crate::sweep::mean::{add, add_error};
-use crate::sweep::results::{Figure, Results, Table};
-use crate::sweep::{Part, Point, Study, Tally, point};
+use crate::sweep::results::{Figure, Results};
+use crate::sweep::{Part, Point, Study, Tally, grid, whole};
 use anyhow::{Context, Result};
 use dtof::rows::grouped;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AsyncPixel, Count, DepthEstimator, DepthEvent, DetectionRule, Flags, LaserCycle, Look,
-    PaperRule, PixelAddress, PixelConfig, Statistics, WindowRule, z_for,
+    AnyRule, AsyncPixel, Count, DepthEstimator, DepthEvent, Flags, LaserCycle, Look, PaperRule,
+    PixelAddress, PixelConfig, Statistics, WindowRule, z_for,
 };
-use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
 use dtof_draw::palette;
 use dtof_draw::palette::Pen;
 use rand_pcg::Pcg64;
@@ -52,11 +52,11 @@ pub const STUDY: Study = Study {
 /// What decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
-    /// The paper's with this α. 4 is the least that gives at most one false event in 100
+    /// The paper's with this α. 4 is the least that gives at most one false alarm in 100
     /// exposures at the background of the plain scene (a step of its square root lies
     /// just below), 8 is the paper's own.
     Paper(u8),
-    /// The window of 3 bins, with the z for a false event in 100 exposures at any
+    /// The window of 3 bins, with the z for a false alarm in 100 exposures at any
     /// background.
     Window,
 }
@@ -74,9 +74,7 @@ impl Rule {
             Self::Window => "window of 3",
         }
     }
-}
 
-impl Rule {
     /// What it looks like in a chart.
     const fn pen(self) -> Pen {
         match self {
@@ -120,20 +118,15 @@ impl Method {
     }
 
     /// A pixel of `case` that runs it.
-    fn pixel(self, case: &Case) -> Result<Box<dyn Pixel>> {
+    fn pixel(self, case: &Case) -> Result<(PixelConfig<BINS, AnyRule>, AsyncPixel<BINS>)> {
         let minimum = Count::saturating(MINIMUM_COUNT);
-        Ok(match self.rule {
-            Rule::Paper(alpha) => {
-                self.with(case, PaperRule::new(U8F8::from_num(alpha), minimum))?
-            }
+        let rule: AnyRule = match self.rule {
+            Rule::Paper(alpha) => PaperRule::new(U8F8::from_num(alpha), minimum).into(),
             Rule::Window => {
                 let z = z_for(100, &case.gate, X, L1, L2);
-                self.with(case, WindowRule::new(3, z, minimum)?)?
+                WindowRule::new(3, z, minimum)?.into()
             }
-        })
-    }
-
-    fn with<R: DetectionRule + 'static>(self, case: &Case, rule: R) -> Result<Box<dyn Pixel>> {
+        };
         let estimator = if self.is_centred {
             DepthEstimator::for_pulse(U8F8::from_num(SIGMA))
         } else {
@@ -147,37 +140,19 @@ impl Method {
             .estimator(estimator)
             .one_hit_tdc(case.is_one_hit())
             .build()?;
-        Ok(Box::new((config, AsyncPixel::new(PixelAddress(0)))))
-    }
-}
-
-/// A pixel of any rule.
-trait Pixel {
-    /// The photons of laser cycle number `cycle`, and its end.
-    fn laser_cycle(&mut self, codes: &[u16], cycle: u32) -> (Look, Option<DepthEvent>);
-}
-
-impl<R: DetectionRule> Pixel for (PixelConfig<BINS, R>, AsyncPixel<BINS>) {
-    fn laser_cycle(&mut self, codes: &[u16], cycle: u32) -> (Look, Option<DepthEvent>) {
-        let (config, pixel) = self;
-        pixel.count_batch(config, codes);
-        let look = pixel.end_laser_cycle(config, &mut Statistics::new(), LaserCycle(cycle.into()));
-        (look, pixel.acknowledge())
+        Ok((config, AsyncPixel::new(PixelAddress(0))))
     }
 }
 
 fn points() -> Vec<Point> {
     let count = cases().map_or(0, |cases| cases.len());
-    let numbers = (0u32..).take(count);
-    numbers
-        .map(|number| point([("case", f64::from(number))]))
-        .collect()
+    let numbers = (0u32..).map(f64::from).take(count);
+    grid([("case", &numbers.collect::<Vec<f64>>())])
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    let mut numbered = (0u32..).map(f64::from).zip(cases()?);
-    let case = numbered.find(|(number, _)| (number - point["case"]).abs() < 0.5);
-    let (_, case) = case.context("no such case")?;
+    let number = usize::from(whole(point, "case"));
+    let case = cases()?.into_iter().nth(number).context("no such case")?;
     let mut tally = Tally::from([("exposures".to_owned(), case.exposures)]);
     for _ in 0..case.exposures {
         exposure(&case, rng, &mut tally)?;
@@ -196,11 +171,13 @@ fn exposure(case: &Case, rng: &mut Pcg64, tally: &mut Tally) -> Result<()> {
         cycle += 1;
         codes.clear();
         photons.next_cycle(cycle, |code| codes.push(code))?;
-        waiting.retain_mut(|(name, pixel)| {
-            let (look, event) = pixel.laser_cycle(&codes, cycle);
-            if let Some(event) = &event {
+        waiting.retain_mut(|(name, (config, pixel))| {
+            pixel.count_batch(config, &codes);
+            let now = LaserCycle(cycle.into());
+            let look = pixel.end_laser_cycle(config, &mut Statistics::new(), now);
+            if let Some(event) = pixel.acknowledge() {
                 add(tally, name, "cycles", cycle.into());
-                add_event(tally, name, event, case.surfaces(cycle));
+                add_event(tally, name, &event, case.surfaces(cycle));
             }
             !matches!(look, Look::Event | Look::Expired)
         });
@@ -256,14 +233,13 @@ fn results(part: &Part) -> Result<Results> {
     ];
     let panels = panels.map(|(is_weak, title)| {
         let series = Rule::ALL.map(|rule| {
-            let dots = BACKGROUNDS.into_iter();
-            let dots = dots.filter_map(|background| share(rule, background, is_weak));
             let steps = match rule {
                 Rule::Paper(4) => -1.0,
                 Rule::Paper(_) => 0.0,
                 Rule::Window => 1.0,
             };
-            let dots = dots.map(|dot| dot.aside(steps));
+            let dots = BACKGROUNDS.into_iter();
+            let dots = dots.filter_map(|at| Some(share(rule, at, is_weak)?.aside(steps)));
             Series::unnamed(rule.pen(), Style::JoinedDots, dots.collect())
         });
         Panel {
@@ -278,10 +254,7 @@ fn results(part: &Part) -> Result<Results> {
         all.map(|dot| dot.y).fold(0.0, f64::max)
     };
     let chart = Chart {
-        finding: Finding::new(
-            "A weak signal brings false alarms with α = 4, none with α = 8",
-            most(Rule::Paper(4)) > 0.01 && most(Rule::Paper(8)) == 0.0,
-        ),
+        finding: "A weak signal brings false alarms with α = 4, none with α = 8".to_owned(), holds: most(Rule::Paper(4)) > 0.01 && most(Rule::Paper(8)) == 0.0,
         note: "Bars hold 99 %. A dot is missing where fewer than a tenth of the exposures brought an event."
             .to_owned(),
         x: Axis::logarithmic("background counts a bin after 40 laser cycles"),
@@ -289,26 +262,16 @@ fn results(part: &Part) -> Result<Results> {
             .percent()
             .within(0.0, 0.03),
         key: Rule::ALL
-            .map(|rule| Key {
-                pen: rule.pen(),
-                style: Style::JoinedDots,
-                text: rule.name().to_owned(),
-            })
+            .map(|rule| Key::new(rule.pen(), Style::JoinedDots, rule.name()))
             .into(),
         columns: 2,
         panels: panels.into(),
     };
-    let exposures = part
-        .points()
-        .first()
-        .map_or(0, |point| point.count("exposures"));
+    let exposures = part.one([])?.count("exposures");
     Ok(Results {
         figures: vec![Figure::new("failures-background", &chart)?],
         values: [("exposures", grouped(exposures))].into(),
-        tables: vec![Table {
-            path: "results/data/failures.csv",
-            csv: csv(&outcomes)?,
-        }],
+        tables: vec![("results/data/failures.csv", csv(&outcomes)?)],
         ..Results::default()
     })
 }
@@ -319,10 +282,8 @@ fn csv(outcomes: &[(Case, Vec<Outcome>)]) -> Result<String> {
         .to_owned();
     for (case, outcomes) in outcomes {
         for outcome in outcomes {
-            let share = outcome.false_share.map_or(",,".to_owned(), |share| {
-                let (low, high) = share.interval;
-                format!("{:.4},{low:.4},{high:.4}", share.value)
-            });
+            let share = outcome.false_share.map(|share| share.cells(4));
+            let share = share.unwrap_or(",,".to_owned());
             writeln!(
                 csv,
                 "\"{}\",{},{},{},{share},{:.4},{:.1},{:.3},{:.3},{:.3},{:.3},{:.3},{:.3},{},{}",
@@ -352,7 +313,7 @@ mod tests {
 
     use super::*;
     use crate::studies::methods::passage::{Ladder, Method as Passed, Passage, count_false};
-    use crate::sweep::results::Share;
+    use crate::sweep::mean::Measured;
     use dtof_theory::looks::exposure::{Exposures, Looks};
     use dtof_theory::random::trial_rng;
     use dtof_theory::rates::Rates;
@@ -379,7 +340,7 @@ mod tests {
             .collect();
         let share = |index| {
             let key = ladders[0].key(index, "false");
-            Share::new(tallies.iter().map(|tally| tally[&key]).sum(), 16_000)
+            Measured::share(tallies.iter().map(|tally| tally[&key]).sum(), 16_000)
         };
         let (below, at) = (share(0), share(1));
         assert!(

@@ -6,6 +6,8 @@
 
 use super::results::Z_99;
 use super::{PointTally, Tally};
+use dtof_draw::chart;
+use dtof_theory::counts::binomial;
 
 /// Adds `amount` to a count.
 pub fn add(tally: &mut Tally, name: &str, what: &str, amount: u64) {
@@ -43,7 +45,6 @@ pub struct Measured {
 
 /// The mean of `values` whole numbers of this `sum` and sum of `squares`, and half
 /// the width of its 99 % interval by the central limit theorem.
-#[allow(clippy::cast_precision_loss, reason = "to a part in 2^53")]
 fn mean_and_half(values: u128, sum: i128, squares: u128) -> (f64, f64) {
     // values² times the variance; never below 0 (Cauchy and Schwarz).
     let spread = (values * squares).saturating_sub(sum.unsigned_abs().pow(2));
@@ -54,6 +55,39 @@ fn mean_and_half(values: u128, sum: i128, squares: u128) -> (f64, f64) {
 }
 
 impl Measured {
+    /// The share of `successes` in `trials`, with the interval (Clopper and Pearson's, never
+    /// less sure than 99 %) in which the probability lies.
+    #[must_use]
+    pub fn share(successes: u64, trials: u64) -> Self {
+        Self {
+            value: successes as f64 / trials as f64,
+            interval: binomial::interval(successes, trials, 0.005),
+        }
+    }
+
+    /// Whether the interval holds `value`.
+    #[must_use]
+    pub fn holds(&self, value: f64) -> bool {
+        (self.interval.0..=self.interval.1).contains(&value)
+    }
+
+    /// A point of a chart, above `x`.
+    #[must_use]
+    pub const fn at(&self, x: f64) -> chart::Point {
+        chart::Point {
+            x,
+            y: self.value,
+            interval: Some(self.interval),
+        }
+    }
+
+    /// With `digits` after the point, and from where to where: three cells of a CSV table.
+    #[must_use]
+    pub fn cells(&self, digits: usize) -> String {
+        let (low, high) = self.interval;
+        format!("{:.digits$},{low:.digits$},{high:.digits$}", self.value)
+    }
+
     /// The mean of the values of `name`, by the central limit theorem. NaN
     /// without a value.
     #[must_use]
@@ -67,16 +101,10 @@ impl Measured {
         }
     }
 
-    /// The root mean square of the errors of all `names` together. NaN without an
-    /// error.
+    /// The root mean square of the errors of `name`. NaN without an error.
     #[must_use]
-    pub fn root_mean_square(point: &PointTally, names: &[String]) -> Self {
-        let sum = |what: &str| {
-            let counts = names
-                .iter()
-                .map(|name| point.count(&format!("{name} {what}")));
-            counts.map(u128::from).sum::<u128>()
-        };
+    pub fn root_mean_square(point: &PointTally, name: &str) -> Self {
+        let sum = |what: &str| u128::from(point.count(&format!("{name} {what}")));
         Self::root_of_squares(sum("values"), sum("squares"), sum("fourths"))
     }
 
@@ -129,14 +157,6 @@ impl Measured {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sweep::Point;
-
-    fn point(tally: Tally) -> PointTally {
-        PointTally {
-            parameters: Point::new(),
-            tally,
-        }
-    }
 
     #[test]
     fn the_mean_and_the_root_mean_square_of_known_values() {
@@ -144,13 +164,13 @@ mod tests {
         for value in [-3, 1, 4, 10] {
             add_error(&mut tally, "a", value);
         }
-        let point = point(tally);
+        let point = tally.into();
         let mean = Measured::mean(&point, "a");
         assert!((mean.value - 3.0).abs() < 1e-12);
         // Squared deviations 36 + 4 + 1 + 49, over 4 and 3.
         let half = Z_99 * (90.0_f64 / 12.0).sqrt();
         assert!((mean.interval.1 - 3.0 - half).abs() < 1e-9);
-        let rms = Measured::root_mean_square(&point, &["a".to_owned()]);
+        let rms = Measured::root_mean_square(&point, "a");
         assert!((rms.value - 31.5_f64.sqrt()).abs() < 1e-12);
         assert!((mean.over(mean).value - 1.0).abs() < 1e-12);
     }
@@ -171,6 +191,6 @@ mod tests {
 
     #[test]
     fn no_value_has_no_mean() {
-        assert!(Measured::mean(&point(Tally::new()), "a").value.is_nan());
+        assert!(Measured::mean(&Tally::new().into(), "a").value.is_nan());
     }
 }

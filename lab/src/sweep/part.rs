@@ -10,28 +10,6 @@ use serde::{Deserialize, Serialize};
 use super::{Point, Study, Tally};
 use dtof::files::{aside, place_of};
 
-/// Seeds `first` to `end - 1`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(from = "(u64, u64)", into = "(u64, u64)")]
-pub struct SeedRange {
-    /// The first seed.
-    pub first: u64,
-    /// One past the last.
-    pub end: u64,
-}
-
-impl From<(u64, u64)> for SeedRange {
-    fn from((first, end): (u64, u64)) -> Self {
-        Self { first, end }
-    }
-}
-
-impl From<SeedRange> for (u64, u64) {
-    fn from(range: SeedRange) -> Self {
-        (range.first, range.end)
-    }
-}
-
 /// One point with the sum of its trials.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -40,6 +18,14 @@ pub struct PointTally {
     pub parameters: Point,
     /// The sum over the seeds of the part.
     pub tally: Tally,
+}
+
+#[cfg(test)]
+impl From<Tally> for PointTally {
+    fn from(tally: Tally) -> Self {
+        let parameters = Point::new();
+        Self { parameters, tally }
+    }
 }
 
 impl PointTally {
@@ -65,8 +51,8 @@ impl PointTally {
 pub struct Part {
     study: String,
     revision: u32,
-    /// Disjoint, ascending, none next to another.
-    seeds: Vec<SeedRange>,
+    /// From the first to before the last; disjoint, ascending, none next to another.
+    seeds: Vec<(u64, u64)>,
     points: Vec<PointTally>,
 }
 
@@ -74,17 +60,16 @@ impl Part {
     /// Without a seed.
     #[must_use]
     pub fn empty(study: &Study) -> Self {
+        let without_trials = |parameters| PointTally {
+            parameters,
+            tally: Tally::new(),
+        };
         let points = (study.points)().into_iter();
         Self {
             study: study.name.to_owned(),
             revision: study.revision,
             seeds: Vec::new(),
-            points: points
-                .map(|parameters| PointTally {
-                    parameters,
-                    tally: Tally::new(),
-                })
-                .collect(),
+            points: points.map(without_trials).collect(),
         }
     }
 
@@ -94,16 +79,16 @@ impl Part {
         &self.study
     }
 
-    /// The seeds whose trials are in it.
+    /// The seeds whose trials are in it: ranges of the first and one past the last.
     #[must_use]
-    pub fn seeds(&self) -> &[SeedRange] {
+    pub fn seeds(&self) -> &[(u64, u64)] {
         &self.seeds
     }
 
     /// How many seeds those are.
     #[must_use]
     pub fn seed_count(&self) -> u64 {
-        let lengths = self.seeds.iter().map(|range| range.end - range.first);
+        let lengths = self.seeds.iter().map(|(first, end)| end - first);
         lengths.sum()
     }
 
@@ -116,7 +101,7 @@ impl Part {
     /// Adds the tallies of `seed`, one a point.
     pub(super) fn add_seed(&mut self, seed: u64, tallies: Vec<Tally>) -> Result<()> {
         let end = seed.checked_add(1).context("the last seed is too large")?;
-        self.add_range(SeedRange { first: seed, end })?;
+        self.add_range((seed, end))?;
         for (point, tally) in self.points.iter_mut().zip(tallies) {
             add(&mut point.tally, &tally)?;
         }
@@ -137,13 +122,10 @@ impl Part {
             self.study,
             self.revision
         );
-        let same = self.points.len() == other.points.len()
-            && self
-                .points
-                .iter()
-                .zip(&other.points)
-                .all(|(a, b)| a.parameters == b.parameters);
-        ensure!(same, "{}: not the same points", self.study);
+        let parameters = |point: &PointTally| point.parameters.clone();
+        let [own, others] =
+            [&self.points, &other.points].map(|points| points.iter().map(parameters));
+        ensure!(own.eq(others), "{}: not the same points", self.study);
         // Aside, so that an error leaves this part as it was.
         let mut sum = self.clone();
         for &range in &other.seeds {
@@ -157,23 +139,17 @@ impl Part {
     }
 
     /// Notes seeds, which must be new.
-    fn add_range(&mut self, range: SeedRange) -> Result<()> {
-        ensure!(
-            range.first < range.end,
-            "no seeds: {}..{}",
-            range.first,
-            range.end
-        );
-        let at = self.seeds.partition_point(|seeds| seeds.end <= range.first);
-        if let Some(shared) = self.seeds.get(at).filter(|next| next.first < range.end) {
-            let first = shared.first.max(range.first);
-            bail!("seed {first} would count twice");
+    fn add_range(&mut self, (first, end): (u64, u64)) -> Result<()> {
+        ensure!(first < end, "no seeds: {first}..{end}");
+        let at = self.seeds.partition_point(|seeds| seeds.1 <= first);
+        if let Some(shared) = self.seeds.get(at).filter(|next| next.0 < end) {
+            bail!("seed {} would count twice", shared.0.max(first));
         }
-        self.seeds.insert(at, range);
+        self.seeds.insert(at, (first, end));
         self.seeds.dedup_by(|next, before| {
-            let touches = before.end == next.first;
+            let touches = before.1 == next.0;
             if touches {
-                before.end = next.end;
+                before.1 = next.1;
             }
             touches
         });

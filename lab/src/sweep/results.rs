@@ -1,11 +1,11 @@
 //! What a study comes to: figures, and verdicts on what the paper claims.
 
+use super::mean::Measured;
 use super::values::Values;
 use super::{Part, PointTally};
 use anyhow::{Context, Result};
 use dtof_draw::chart;
 use dtof_draw::chart::Chart;
-use dtof_theory::counts::binomial;
 use dtof_theory::counts::poisson::Poisson;
 use std::fmt;
 
@@ -18,17 +18,8 @@ pub struct Results {
     pub claims: Vec<Claim>,
     /// What the pages say of it beside these.
     pub values: Values,
-    /// For programs.
-    pub tables: Vec<Table>,
-}
-
-/// Numbers kept in a file.
-#[derive(Clone, Debug)]
-pub struct Table {
-    /// The file, as seen from `docs`.
-    pub path: &'static str,
-    /// Its content.
-    pub csv: String,
+    /// Numbers for programs: files as seen from `docs`, and their content.
+    pub tables: Vec<(&'static str, String)>,
 }
 
 /// A picture and what it shows.
@@ -50,7 +41,7 @@ impl Figure {
     pub fn new(name: &'static str, chart: &Chart) -> Result<Self> {
         Ok(Self {
             name,
-            holds: chart.finding.holds,
+            holds: chart.holds,
             svg: chart::chart(chart)?,
         })
     }
@@ -71,10 +62,9 @@ impl Claim {
     /// The claim of this name.
     #[must_use]
     pub fn new(name: &'static str, here: impl Into<String>, verdict: Verdict) -> Self {
-        let here = here.into();
         Self {
             name,
-            here,
+            here: here.into(),
             verdict,
         }
     }
@@ -97,7 +87,17 @@ impl Verdict {
     /// [`Self::Agrees`] or [`Self::Refuted`].
     #[must_use]
     pub const fn of(holds: bool) -> Self {
-        if holds { Self::Agrees } else { Self::Refuted }
+        Self::graded(holds, false)
+    }
+
+    /// [`Self::Agrees`] or else [`Self::Differs`] if what they ask for holds.
+    #[must_use]
+    pub const fn graded(agrees: bool, differs: bool) -> Self {
+        match (agrees, differs) {
+            (true, _) => Self::Agrees,
+            (_, true) => Self::Differs,
+            _ => Self::Refuted,
+        }
     }
 }
 
@@ -123,44 +123,6 @@ pub fn ends(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
 /// Standard deviations of an interval that holds 99 %.
 pub const Z_99: f64 = 2.575_829_303_548_9;
 
-/// A share, and the 99 % interval (Clopper and Pearson's, never less sure than that) in
-/// which the probability lies.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Share {
-    /// Successes a trial.
-    pub value: f64,
-    /// From where to where.
-    pub interval: (f64, f64),
-}
-
-impl Share {
-    /// Of `successes` in `trials`.
-    #[must_use]
-    #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
-    pub fn new(successes: u64, trials: u64) -> Self {
-        Self {
-            value: successes as f64 / trials as f64,
-            interval: binomial::interval(successes, trials, 0.005),
-        }
-    }
-
-    /// Whether the interval holds `probability`.
-    #[must_use]
-    pub fn holds(&self, probability: f64) -> bool {
-        (self.interval.0..=self.interval.1).contains(&probability)
-    }
-
-    /// A point of a chart, above `x`.
-    #[must_use]
-    pub const fn at(&self, x: f64) -> chart::Point {
-        chart::Point {
-            x,
-            y: self.value,
-            interval: Some(self.interval),
-        }
-    }
-}
-
 /// Shares beside what was predicted for them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Comparison {
@@ -175,7 +137,7 @@ pub struct Comparison {
 impl Comparison {
     /// Of shares with the probabilities predicted.
     #[must_use]
-    pub fn of(pairs: impl IntoIterator<Item = (Share, f64)>) -> Self {
+    pub fn of(pairs: impl IntoIterator<Item = (Measured, f64)>) -> Self {
         let mut comparison = Self::default();
         for (share, predicted) in pairs {
             comparison.points += 1;
@@ -196,13 +158,12 @@ impl Comparison {
 impl PointTally {
     /// How many of `trials` were `successes`, both names of counts.
     #[must_use]
-    pub fn share(&self, successes: &str, trials: &str) -> Share {
-        Share::new(self.count(successes), self.count(trials))
+    pub fn share(&self, successes: &str, trials: &str) -> Measured {
+        Measured::share(self.count(successes), self.count(trials))
     }
 
     /// Whether the point has these parameters.
     #[must_use]
-    #[allow(clippy::float_cmp, reason = "parameters are as they were written")]
     pub fn is_at<const N: usize>(&self, parameters: [(&str, f64); N]) -> bool {
         let mut parameters = parameters.into_iter();
         parameters.all(|(name, value)| self.parameters.get(name) == Some(&value))
@@ -236,14 +197,14 @@ mod tests {
     /// From the sums of binomial terms, for 10 of 100.
     #[test]
     fn the_interval_is_exact() {
-        let share = Share::new(10, 100);
+        let share = Measured::share(10, 100);
         assert!((share.value - 0.1).abs() < 1e-15);
         assert!((share.interval.0 - 0.03820).abs() < 1e-5);
         assert!((share.interval.1 - 0.20195).abs() < 1e-5);
         assert!(share.holds(0.1) && !share.holds(0.03) && !share.holds(0.21));
         // No success is no proof that there is none.
-        assert!(Share::new(0, 100).holds(0.05) && Share::new(100, 100).holds(0.95));
-        assert!(!Share::new(0, 100).holds(0.053));
+        assert!(Measured::share(0, 100).holds(0.05) && Measured::share(100, 100).holds(0.95));
+        assert!(!Measured::share(0, 100).holds(0.053));
     }
 
     /// However rare the event, the interval misses the probability in at most 1 % of
@@ -255,7 +216,7 @@ mod tests {
             let probability = mean / f64::from(trials);
             let law = Poisson::new(mean);
             let missed = (0..60)
-                .filter(|&count| !Share::new(count.into(), trials.into()).holds(probability))
+                .filter(|&count| !Measured::share(count.into(), trials.into()).holds(probability))
                 .map(|count| law.mass(count));
             // Poisson instead of binomial: a thousandth of 1 % off.
             assert!(missed.sum::<f64>() < 0.010_01, "{mean}");
@@ -267,7 +228,7 @@ mod tests {
     fn a_few_points_lie_outside_by_chance() {
         let of = |outside: usize| {
             let predicted = |index| if index < outside { 0.9 } else { 0.5 };
-            Comparison::of((0..100).map(|index| (Share::new(50, 100), predicted(index))))
+            Comparison::of((0..100).map(|index| (Measured::share(50, 100), predicted(index))))
         };
         assert_eq!((of(5).points, of(5).outside, of(5).largest), (100, 5, 0.4));
         assert!(of(0).is_chance() && of(5).is_chance() && !of(6).is_chance());

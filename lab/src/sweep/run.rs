@@ -1,12 +1,13 @@
 //! Running the seeds of a part.
 
+use std::ops::Range;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
 
-use super::{Part, SeedRange, Study, Tally};
+use super::{Part, Study, Tally};
 
 /// Works out `seeds` into the file at `path`. If there is a part of them already,
 /// as a run that was ended early leaves it, the rest is added. It is saved every
@@ -16,7 +17,7 @@ use super::{Part, SeedRange, Study, Tally};
 /// If the file holds something else, or cannot be written, or a trial fails.
 pub fn run(
     study: &Study,
-    seeds: SeedRange,
+    seeds: Range<u64>,
     path: &Path,
     save_every: Duration,
     mut progress: impl FnMut(u64),
@@ -24,7 +25,7 @@ pub fn run(
     let mut part = Part::empty(study);
     if path.exists() {
         let before = Part::load(path)?;
-        let inside = |range: &SeedRange| seeds.first <= range.first && range.end <= seeds.end;
+        let inside = |&(first, end): &(u64, u64)| seeds.start <= first && end <= seeds.end;
         ensure!(
             before.seeds().iter().all(inside),
             "{}: holds seeds that are not asked for",
@@ -34,16 +35,12 @@ pub fn run(
             .with_context(|| path.display().to_string())?;
     }
     let done = part.seeds().to_vec();
-    let is_left = |seed: &u64| {
-        !done
-            .iter()
-            .any(|range| (range.first..range.end).contains(seed))
-    };
+    let is_left = |seed: &u64| !done.iter().any(|range| (range.0..range.1).contains(seed));
     let points = (study.points)();
     // As many trials at once as keep every thread busy.
     let at_once = (8 * rayon::current_num_threads()).div_ceil(points.len().max(1));
     let mut saved = Instant::now();
-    let mut left = (seeds.first..seeds.end).filter(is_left);
+    let mut left = seeds.filter(is_left);
     loop {
         let chunk: Vec<u64> = left.by_ref().take(at_once).collect();
         if chunk.is_empty() {

@@ -10,7 +10,6 @@ use crate::studies::methods::time_to_detect::{self, Outcome};
 use crate::sweep::Part;
 
 /// The rule for each pulse and background.
-#[allow(clippy::float_cmp, reason = "parameters are as they were written")]
 pub(super) fn rules(counts: &Instructions, outcomes: &[Outcome]) -> Result<String> {
     let mut text = String::new();
     for sigma in time_to_detect::SIGMAS {
@@ -26,7 +25,6 @@ pub(super) fn rules(counts: &Instructions, outcomes: &[Outcome]) -> Result<Strin
             let first = those.first().context("no outcome")?;
             let signal = time_to_detect::signal(sigma, background);
             let cycles = those.iter().map(|outcome| outcome.cycles.value);
-            #[allow(clippy::cast_precision_loss, reason = "two")]
             let photons = signal * cycles.sum::<f64>() / those.len() as f64;
             writeln!(
                 text,

@@ -1,14 +1,15 @@
-//! False events of the rule, which has to estimate the background, at one look and
+//! False alarms of the rule, which has to estimate the background, at one look and
 //! over an exposure: what `dtof tune` interpolates.
 
-use crate::sweep::results::{Claim, Comparison, Figure, Results, Share, Table, Verdict, ends};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
+use crate::sweep::mean::Measured;
+use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict, ends};
+use crate::sweep::{self, Part, Point, PointTally, Study, Tally};
 use anyhow::{Context, Result};
 use dtof::rows::grouped;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, Threshold};
-use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
-use dtof_draw::palette::alpha as pen;
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::{NEUTRAL, alpha as pen};
 use dtof_theory::gaussian::false_positive_rate;
 use dtof_theory::looks::repeated_looks::{ALPHA_STEPS, FalseAlarms, MINIMUM_COUNT, alpha_bits};
 use dtof_theory::looks::single_look::SingleLook;
@@ -36,27 +37,20 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    let points = table::points().into_iter();
-    points
-        .map(|of| {
-            point([
-                ("first_mean", of.first_mean),
-                ("first_look", of.first.into()),
-            ])
-        })
-        .collect()
+    table::points().iter().map(of_study).collect()
+}
+
+fn of_study(point: &repeated_looks::Point) -> Point {
+    sweep::point([
+        ("first_mean", point.first_mean),
+        ("first_look", point.first.into()),
+    ])
 }
 
 /// The table's point.
 fn of_table(parameters: &Point) -> Result<repeated_looks::Point> {
-    let is_it = |of: &repeated_looks::Point| {
-        let of = [
-            ("first_mean", of.first_mean),
-            ("first_look", of.first.into()),
-        ];
-        point(of) == *parameters
-    };
-    let found = table::points().into_iter().find(is_it);
+    let mut points = table::points().into_iter();
+    let found = points.find(|point| of_study(point) == *parameters);
     found.context("not a point of the table")
 }
 
@@ -98,8 +92,8 @@ fn false_events(point: &PointTally) -> Result<(repeated_looks::Point, FalseAlarm
 }
 
 /// By background at the first look, exposures from the first look to `last` with a
-/// false event at α.
-fn shares(part: &Part, last: u32, alpha: u16) -> Result<Vec<(f64, Share)>> {
+/// false alarm at α.
+fn shares(part: &Part, last: u32, alpha: u16) -> Result<Vec<(f64, Measured)>> {
     let mut shares = Vec::new();
     for point in part.at([("first_look", LOOKS.0.into())]) {
         let (of, found) = false_events(point)?;
@@ -108,12 +102,12 @@ fn shares(part: &Part, last: u32, alpha: u16) -> Result<Vec<(f64, Share)>> {
         };
         let step = (0..ALPHA_STEPS).find(|&step| alpha_bits(step) == alpha * 256);
         let events = found.events[at][step.context("an α that is not simulated")?];
-        shares.push((of.first_mean, Share::new(events, found.exposures)));
+        shares.push((of.first_mean, Measured::share(events, found.exposures)));
     }
     Ok(shares)
 }
 
-/// The exact probability of a false event at one look.
+/// The exact probability of a false alarm at one look.
 fn exact(background: f64, alpha: u16) -> f64 {
     let minimum_count = Count::saturating(MINIMUM_COUNT.into());
     let threshold = Threshold::new(U8F8::from_num(alpha), minimum_count);
@@ -141,10 +135,7 @@ fn results(part: &Part) -> Result<Results> {
         ],
         claims: claims(part)?,
         values: [("exposures", exposures)].into(),
-        tables: vec![Table {
-            path: "../theory/data/repeated_looks.csv",
-            csv: table::csv(&tallies)?,
-        }],
+        tables: vec![("../theory/data/repeated_looks.csv", table::csv(&tallies)?)],
     })
 }
 
@@ -205,20 +196,17 @@ fn chart(part: &Part, last: u32) -> Result<Chart> {
             .into_iter()
             .map(|(background, share)| share.at(background));
         let line = |of: fn(f64, u16) -> f64| {
-            let points = fine_backgrounds();
-            points
-                .map(|background| Dot::exact(background, of(background, alpha)))
-                .collect()
+            Dot::curve(fine_backgrounds(), |background| of(background, alpha))
         };
-        let pen = pen(alpha.into());
-        let dots = dots.collect();
-        if is_look {
-            let name = format!("α = {alpha}");
-            series.push(Series::named(name, pen, Style::Dots, dots));
-            series.push(Series::unnamed(pen, Style::Line, line(exact)));
+        let (name, pen) = (format!("α = {alpha}"), pen(alpha.into()));
+        let style = if is_look {
+            Style::Dots
         } else {
-            let name = format!("α = {alpha}");
-            series.push(Series::named(name, pen, Style::JoinedDots, dots));
+            Style::JoinedDots
+        };
+        series.push(Series::named(name, pen, style, dots.collect()));
+        if is_look {
+            series.push(Series::unnamed(pen, Style::Line, line(exact)));
         }
         let printed = line(|_, alpha| printed(alpha));
         series.push(Series::unnamed(pen, Style::Dashed, printed));
@@ -234,13 +222,14 @@ fn chart(part: &Part, last: u32) -> Result<Chart> {
     } else {
         let text = "One α cannot hold the rate of false alarms: it changes with the background";
         let key = vec![
-            Key::new(Style::JoinedDots, "simulated"),
-            Key::new(Style::Dashed, "Eq. 10"),
+            Key::new(NEUTRAL, Style::JoinedDots, "simulated"),
+            Key::new(NEUTRAL, Style::Dashed, "Eq. 10"),
         ];
         (text, key)
     };
     Ok(Chart {
-        finding: Finding::new(finding, spread),
+        finding: finding.to_owned(),
+        holds: spread,
         note: "Bars hold 99 %; an open dot is an upper limit where there was none.".to_owned(),
         x: Axis::logarithmic("mean background counts a bin at the first look"),
         y: Axis::logarithmic(if is_look {

@@ -3,11 +3,11 @@
 
 use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target};
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict, ends};
-use crate::sweep::{Part, Point, Study, Tally, point};
+use crate::sweep::{Part, Point, Study, Tally, grid};
 use anyhow::Result;
 use dtof::rows::grouped;
 use dtof_core::isqrt;
-use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::alpha as pen;
 use dtof_theory::gaussian::threshold;
 use dtof_theory::{gaussian as printed, known_background};
@@ -38,15 +38,7 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    let backgrounds = BACKGROUNDS.into_iter();
-    backgrounds
-        .map(|background| point([("background", background)]))
-        .collect()
-}
-
-/// Counts of α: pulses that passed, and histograms with a background bin that did.
-fn names(alpha: u32) -> [String; 2] {
-    [format!("pass {alpha}"), format!("false {alpha}")]
+    grid([("background", &BACKGROUNDS)])
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
@@ -65,7 +57,8 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     }
     let mut tally = Tally::from([("histograms".to_owned(), HISTOGRAMS)]);
     for (alpha, (_, counts)) in ALPHAS.into_iter().zip(counts) {
-        tally.extend(names(alpha).into_iter().zip(counts));
+        let names = [Rate::Pass, Rate::FalsePositive].map(|rate| rate.name(alpha));
+        tally.extend(names.into_iter().zip(counts));
     }
     Ok(tally)
 }
@@ -78,11 +71,11 @@ enum Rate {
 }
 
 impl Rate {
+    /// What counts the pulses that passed α, or histograms with a background bin that did.
     fn name(self, alpha: u32) -> String {
-        let [pass, false_positive] = names(alpha);
         match self {
-            Self::Pass => pass,
-            Self::FalsePositive => false_positive,
+            Self::Pass => format!("pass {alpha}"),
+            Self::FalsePositive => format!("false {alpha}"),
         }
     }
 
@@ -147,6 +140,8 @@ fn claims(part: &Part) -> Vec<Claim> {
             .map(|background| times(background, alpha))
             .fold(0.0, f64::max)
     };
+    let is_pass_near = pass_off < 0.05;
+    let is_false_near = ALPHAS.iter().all(|&alpha| false_off(alpha) < 2.0);
     let at_4 = BACKGROUNDS.map(|background| Rate::FalsePositive.exact(background, 4));
     let (low, high) = ends(at_4);
     let root_error = (0..=1023u32)
@@ -165,14 +160,7 @@ fn claims(part: &Part) -> Vec<Claim> {
             ),
             // Both equations: probabilities to a twentieth, the rare ones to a factor
             // of 2; one of the two is a part.
-            match (
-                pass_off < 0.05,
-                ALPHAS.iter().all(|&alpha| false_off(alpha) < 2.0),
-            ) {
-                (true, true) => Verdict::Agrees,
-                (false, false) => Verdict::Refuted,
-                _ => Verdict::Differs,
-            },
+            Verdict::graded(is_pass_near && is_false_near, is_pass_near || is_false_near),
         ),
         Claim::new(
             "alpha",
@@ -209,10 +197,7 @@ fn rates(part: &Part, rate: Rate) -> Chart {
     let mut series = Vec::new();
     for alpha in ALPHAS {
         let line = |of: fn(Rate, f64, u32) -> f64| {
-            let points = fine_backgrounds();
-            let points =
-                points.map(|background| Dot::exact(background, of(rate, background, alpha)));
-            points.collect()
+            Dot::curve(fine_backgrounds(), |background| of(rate, background, alpha))
         };
         let dots = part.points().iter().map(|point| {
             let share = point.share(&rate.name(alpha), "histograms");
@@ -230,28 +215,19 @@ fn rates(part: &Part, rate: Rate) -> Chart {
         let of = |of: fn(Rate, f64, u32) -> f64| of(rate, background, alpha);
         (of(Rate::exact), of(Rate::gaussian))
     };
-    let x = Axis::logarithmic("mean background counts a bin");
-    let note = "Bars hold 99 %; most are smaller than their dots.".to_owned();
-    match rate {
+    let (finding, holds, y, printed) = match rate {
         Rate::FalsePositive => {
             let more = |alpha| {
                 let mut pairs = fine_backgrounds().map(|background| off(background, alpha));
                 pairs.all(|(exact, printed)| exact > printed)
             };
-            Chart {
-                finding: Finding::new(
-                    "At a high α there are more false alarms than Eq. 10 says",
-                    exact.is_chance() && [4, 5].into_iter().all(more),
-                ),
-                note,
-                x,
-                y: Axis::logarithmic("histograms with a false alarm, %")
-                    .percent()
-                    .within(1e-7, 1.0),
-                key: Key::simulated("Eq. 10"),
-                columns: 1,
-                panels: vec![Panel::only(series)],
-            }
+            let y = Axis::logarithmic("histograms with a false alarm, %").within(1e-7, 1.0);
+            (
+                "At a high α there are more false alarms than Eq. 10 says",
+                [4, 5].into_iter().all(more),
+                y,
+                "Eq. 10",
+            )
         }
         Rate::Pass => {
             let near = |alpha| {
@@ -259,21 +235,24 @@ fn rates(part: &Part, rate: Rate) -> Chart {
                 let mut pairs = enough.map(|background| off(background, alpha));
                 pairs.all(|(exact, printed)| (exact - printed).abs() < 0.05)
             };
-            Chart {
-                finding: Finding::new(
-                    "From 30 background counts a bin on Eq. 8 is right to 5 points",
-                    exact.is_chance() && ALPHAS.into_iter().all(near),
-                ),
-                note,
-                x,
-                y: Axis::linear("pulses above the threshold, %")
-                    .percent()
-                    .within(0.0, 1.0),
-                key: Key::simulated("Eq. 8"),
-                columns: 1,
-                panels: vec![Panel::only(series)],
-            }
+            let y = Axis::linear("pulses above the threshold, %").within(0.0, 1.0);
+            (
+                "From 30 background counts a bin on Eq. 8 is right to 5 points",
+                ALPHAS.into_iter().all(near),
+                y,
+                "Eq. 8",
+            )
         }
+    };
+    Chart {
+        finding: finding.to_owned(),
+        holds: exact.is_chance() && holds,
+        note: "Bars hold 99 %; most are smaller than their dots.".to_owned(),
+        x: Axis::logarithmic("mean background counts a bin"),
+        y: y.percent(),
+        key: Key::simulated(printed),
+        columns: 1,
+        panels: vec![Panel::only(series)],
     }
 }
 
@@ -283,21 +262,16 @@ fn ratio() -> Chart {
         of(Rate::gaussian) / of(Rate::exact)
     };
     let series = ALPHAS.into_iter().map(|alpha| {
-        let points =
-            fine_backgrounds().map(|background| Dot::exact(background, of(background, alpha)));
-        Series::named(
-            format!("α = {alpha}"),
-            pen(alpha),
-            Style::Line,
-            points.collect(),
-        )
+        let points = Dot::curve(fine_backgrounds(), |background| of(background, alpha));
+        Series::named(format!("α = {alpha}"), pen(alpha), Style::Line, points)
     });
     let series = series.collect();
     let ordered = ALPHAS
         .windows(2)
         .all(|pair| of(ENOUGH, pair[1]) < of(ENOUGH, pair[0]) && of(ENOUGH, pair[0]) < 1.0);
     Chart {
-        finding: Finding::new("The larger α, the more false alarms Eq. 10 misses", ordered),
+        finding: "The larger α, the more false alarms Eq. 10 misses".to_owned(),
+        holds: ordered,
         note: "Worked out, for 7 background bins; at 1 Eq. 10 would be right.".to_owned(),
         x: Axis::logarithmic("mean background counts a bin"),
         y: Axis::logarithmic("Eq. 10 over the exact share of false alarms"),

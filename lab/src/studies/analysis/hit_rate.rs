@@ -2,11 +2,11 @@
 
 use super::paper_setting::{Histograms, gaussian, means, target};
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point, tally};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, tally};
 use anyhow::{Context, Result};
 use dtof::rows::grouped;
 use dtof_core::ComparatorTree;
-use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::NEUTRAL;
 use dtof_theory::known_background;
 use rand_pcg::Pcg64;
@@ -31,19 +31,12 @@ pub const STUDY: Study = Study {
 /// SNR 1 to 30 at all backgrounds; with and without the signal in the bins beside
 /// the pulse's, which Eq. 7 leaves out.
 fn points() -> Vec<Point> {
-    let mut points = Vec::new();
-    for neighbours in [0.0, 1.0] {
-        for background in BACKGROUNDS {
-            for snr in 1..=30 {
-                points.push(point([
-                    ("neighbours", neighbours),
-                    ("background", background),
-                    ("snr", snr.into()),
-                ]));
-            }
-        }
-    }
-    points
+    let snrs: Vec<f64> = (1..=30).map(f64::from).collect();
+    grid([
+        ("neighbours", &[0.0, 1.0]),
+        ("background", &BACKGROUNDS),
+        ("snr", &snrs),
+    ])
 }
 
 fn means_at(point: &Point) -> [f64; super::paper_setting::BINS] {
@@ -159,13 +152,7 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
             format!("99 % intervals by background counts a bin: {misses}"),
             // Within the interval everywhere; or at least to what can be told apart
             // on a plot, a fiftieth, at the largest background.
-            if found.iter().all(Comparison::is_chance) {
-                Verdict::Agrees
-            } else if best.largest < 0.02 {
-                Verdict::Differs
-            } else {
-                Verdict::Refuted
-            },
+            Verdict::graded(found.iter().all(Comparison::is_chance), best.largest < 0.02),
         ),
         Claim::new(
             "poisson",
@@ -185,11 +172,7 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
                 of_level(0),
                 of_level(2)
             ),
-            match near_18.iter().filter(|&&near| near).count() {
-                0 => Verdict::Refuted,
-                near if near == near_18.len() => Verdict::Agrees,
-                _ => Verdict::Differs,
-            },
+            Verdict::graded(near_18 == [true; 5], near_18 != [false; 5]),
         ),
     ])
 }
@@ -207,10 +190,7 @@ fn chart(part: &Part, neighbours: f64) -> Result<Chart> {
             let dot = |point: &PointTally| point.share(of, "histograms").at(point.parameter("snr"));
             points.clone().map(dot).collect()
         };
-        let line = |of: &dyn Fn(f64) -> f64| {
-            let points = snrs.clone().map(|snr| Dot::exact(snr, of(snr)));
-            points.collect()
-        };
+        let line = |of: &dyn Fn(f64) -> f64| Dot::curve(snrs.clone(), of);
         let exact = |snr| exact(&means(background, snr, with_neighbours));
         let series = |style, points| Series::unnamed(NEUTRAL, style, points);
         let series = if with_neighbours {
@@ -233,15 +213,13 @@ fn chart(part: &Part, neighbours: f64) -> Result<Chart> {
             series,
         }
     };
-    let finding = if with_neighbours {
+    let (finding, holds) = if with_neighbours {
         let alone = part.at([("neighbours", 1.0), ("snr", 30.0)]);
         let near_half = alone
             .filter(|point| SHOWN.contains(&point.parameter("background")))
             .all(|point| (point.share("hits", "histograms").value - 0.5).abs() < 0.1);
-        Finding::new(
-            "On the edge of two bins either is the highest, each about half of the time",
-            near_half,
-        )
+        let text = "On the edge of two bins either is the highest, each about half of the time";
+        (text, near_half)
     } else {
         let printed = |background, snr| gaussian(background, snr).hit_probability();
         let points = part.at([("neighbours", 0.0), ("background", SHOWN[0])]);
@@ -255,22 +233,21 @@ fn chart(part: &Part, neighbours: f64) -> Result<Chart> {
         let exact = comparison(part, &BACKGROUNDS, |background, snr| {
             exact(&means(background, snr, false)).0
         });
-        Finding::new(
-            "With few photons the pulse's bin is the highest less often than Eq. 7 says",
-            exact.is_chance() && mostly && many < 0.02,
-        )
+        let text = "With few photons the pulse's bin is the highest less often than Eq. 7 says";
+        (text, exact.is_chance() && mostly && many < 0.02)
     };
     let key = if with_neighbours {
         vec![
-            Key::new(Style::Dots, "simulated"),
-            Key::new(Style::Line, "exact, either of the two"),
-            Key::new(Style::Dashed, "exact, the lower of them"),
+            Key::new(NEUTRAL, Style::Dots, "simulated"),
+            Key::new(NEUTRAL, Style::Line, "exact, either of the two"),
+            Key::new(NEUTRAL, Style::Dashed, "exact, the lower of them"),
         ]
     } else {
         Key::simulated("Eq. 7")
     };
     Ok(Chart {
-        finding,
+        finding: finding.to_owned(),
+        holds,
         note: format!(
             "{} Bars hold 99 %; most are smaller than their dots.",
             if with_neighbours {

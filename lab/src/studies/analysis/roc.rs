@@ -2,12 +2,13 @@
 //! at several SNR.
 
 use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target};
-use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point, tally};
+use crate::sweep::mean::Measured;
+use crate::sweep::results::{Claim, Figure, Results, Verdict};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, tally};
 use anyhow::Result;
 use dtof::rows::grouped;
 use dtof_core::ComparatorTree;
-use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::STEPS;
 use dtof_theory::counts::binomial;
 use dtof_theory::gaussian::{false_positive_rate, threshold};
@@ -39,8 +40,8 @@ fn alphas() -> impl Iterator<Item = f64> + Clone {
 }
 
 fn points() -> Vec<Point> {
-    let of = |snr| alphas().map(move |alpha| point([("snr", snr), ("alpha", alpha)]));
-    SNRS.into_iter().flat_map(of).collect()
+    let alphas: Vec<f64> = alphas().collect();
+    grid([("snr", &SNRS), ("alpha", &alphas)])
 }
 
 /// A true positive is a histogram whose peak is the pulse's bin and exceeds the
@@ -68,11 +69,11 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     ]))
 }
 
-fn true_positives(point: &PointTally) -> Share {
+fn true_positives(point: &PointTally) -> Measured {
     point.share("true", "histograms")
 }
 
-fn false_positives(point: &PointTally) -> Share {
+fn false_positives(point: &PointTally) -> Measured {
     point.share("false", "histograms")
 }
 
@@ -119,11 +120,11 @@ fn claims(part: &Part) -> Vec<Claim> {
     for snr in SNRS {
         let points: Vec<&PointTally> = part.at([("snr", snr)]).collect();
         for rate in [true_positives, false_positives] {
-            let shares: Vec<Share> = points.iter().map(|point| rate(point)).collect();
+            let shares: Vec<Measured> = points.iter().map(|point| rate(point)).collect();
             if let [first, .., last] = shares[..] {
                 falls &= last.interval.1 < first.interval.0;
             }
-            let significant = |pair: &[Share]| pair[1].interval.0 > pair[0].interval.1;
+            let significant = |pair: &[Measured]| pair[1].interval.0 > pair[0].interval.1;
             for pair in shares.windows(2) {
                 rises += u32::from(significant(pair));
                 steps += 1;
@@ -135,7 +136,7 @@ fn claims(part: &Part) -> Vec<Claim> {
         let falls = |pair: &[(f64, f64)]| pair[1].0 <= pair[0].0 && pair[1].1 <= pair[0].1;
         curve.windows(2).all(falls)
     });
-    let ends = |rate: fn(&PointTally) -> Share, alpha| {
+    let ends = |rate: fn(&PointTally) -> Measured, alpha| {
         let found = part.one([("snr", 9.0), ("alpha", alpha)]);
         found.map_or(f64::NAN, |point| rate(point).value)
     };
@@ -225,10 +226,8 @@ fn chart(part: &Part) -> Chart {
     }
     let areas = SNRS.map(|snr| area(part, snr));
     Chart {
-        finding: Finding::new(
-            "The more signal, the more hits at the same rate of false alarms",
-            areas.windows(2).all(|pair| pair[0] < pair[1]),
-        ),
+        finding: "The more signal, the more hits at the same rate of false alarms".to_owned(),
+        holds: areas.windows(2).all(|pair| pair[0] < pair[1]),
         note: "Along a curve α falls from 5 (left) to 0 (right). Bars hold 99 %.".to_owned(),
         x: Axis::linear("histograms with a false alarm, %")
             .percent()

@@ -7,15 +7,14 @@ use super::Method;
 use super::cases::{Case, cases};
 use crate::studies::scenes::one_pixel::PER_BIN;
 use crate::sweep::mean::Measured;
-use crate::sweep::results::Share;
 use crate::sweep::{Part, PointTally};
 
 /// How a method does in a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// False events surely below 2 %, most exposures bring an event, and the error
+    /// False alarms surely below 2 %, most exposures bring an event, and the error
     /// is less than twice that of the plain scene. Without a target: no more than one
-    /// false event in 100 exposures.
+    /// false alarm in 100 exposures.
     Survives,
     /// Neither of the others.
     Degrades,
@@ -36,7 +35,7 @@ impl Verdict {
     }
 }
 
-/// Whether wrong events have a flag. Wrong are false events; and all, if the error is
+/// Whether wrong events have a flag. Wrong are false alarms; and all, if the error is
 /// surely twice that of the plain scene or more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Warning {
@@ -64,8 +63,8 @@ impl Warning {
     /// bring an event it takes few to be wrong: more than a tenth of them, for sure.
     fn new(wrong: u64, flagged: u64, events: u64, exposures: u64) -> Self {
         let are_many = |wrong| {
-            Share::new(wrong, exposures).interval.0 > 0.01
-                || (events > 0 && Share::new(wrong, events).interval.0 > 0.1)
+            Measured::share(wrong, exposures).interval.0 > 0.01
+                || (events > 0 && Measured::share(wrong, events).interval.0 > 0.1)
         };
         if are_many(wrong - flagged) {
             Self::Silent
@@ -84,11 +83,11 @@ pub struct Outcome {
     pub method: Method,
     /// How many.
     pub events: u64,
-    /// False events an event, none without an event; without a target, false events an
+    /// False alarms an event, none without an event; without a target, false alarms an
     /// exposure.
-    pub false_share: Option<Share>,
+    pub false_share: Option<Measured>,
     /// Exposures without an event.
-    pub without: Share,
+    pub without: Measured,
     /// Mean laser cycles of the exposure of an event; 0 if there are none.
     pub cycles: f64,
     /// Root mean square error of the events that are not false, in bins; 0 if there
@@ -125,8 +124,6 @@ pub fn outcomes(part: &Part) -> Result<Vec<(Case, Vec<Outcome>)>> {
     };
     Ok(cases()?.into_iter().zip(part.points()).map(of).collect())
 }
-
-#[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
 fn outcome(case: &Case, point: &PointTally, plain: &PointTally, method: Method) -> Outcome {
     let name = method.name();
     let count = |what: &str| point.count(&format!("{name} {what}"));
@@ -140,17 +137,14 @@ fn outcome(case: &Case, point: &PointTally, plain: &PointTally, method: Method) 
             parts / PER_BIN as f64
         }
     };
-    let [error, plain_error] = [point, plain].map(|point| {
-        let names = std::slice::from_ref(&name);
-        Measured::root_mean_square(point, names)
-    });
+    let [error, plain_error] = [point, plain].map(|point| Measured::root_mean_square(point, &name));
     let has_target = case.surfaces(0).next().is_some();
     let false_share = if has_target {
-        (events > 0).then(|| Share::new(false_events, events))
+        (events > 0).then(|| Measured::share(false_events, events))
     } else {
-        Some(Share::new(false_events, exposures))
+        Some(Measured::share(false_events, exposures))
     };
-    let without = Share::new(exposures - events, exposures);
+    let without = Measured::share(exposures - events, exposures);
     let is_far_off = error.interval.0 >= 2.0 * plain_error.value;
     let verdict = match false_share {
         Some(share) if !has_target && share.interval.0 <= 0.01 => Verdict::Survives,

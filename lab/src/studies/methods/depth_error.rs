@@ -1,8 +1,8 @@
 //! How well a pulse is placed, against the Cramér-Rao bound.
 
 use crate::sweep::mean::Measured;
-use crate::sweep::results::{Figure, Results, Table};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
+use crate::sweep::results::{Figure, Results, ends};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::{Context, Result};
 use dtof::rows::grouped;
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
@@ -10,7 +10,7 @@ use dtof_core::{
     BinPosition, Count, Count10, DepthEstimator, DetectionRule, Histogram, Peak, RangeGate,
     SubBinOffset, WindowRule, quadrant_background, whole_background,
 };
-use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette;
 use dtof_draw::palette::Pen;
 use dtof_theory::bounds::cramer_rao::Pulse;
@@ -98,28 +98,20 @@ impl Method {
     /// Where the pulse, whose standard deviation is `sigma`, lies.
     fn position(self, histogram: &Histogram<BINS>, peak: Peak, sigma: f64) -> BinPosition {
         let gate = RangeGate::full();
-        let estimate = |estimator: DepthEstimator, background| {
-            estimator
-                .estimate(histogram, &gate, peak, background)
-                .offset
+        let centred = |sigma| DepthEstimator::for_pulse(U8F8::saturating_from_num::<f64>(sigma));
+        let mean = mean_background(histogram, peak);
+        let (estimator, background) = match self {
+            Self::HighestBin => return BinPosition::of(peak.bin, SubBinOffset::CENTRE),
+            Self::Paper => {
+                let background = quadrant_background(histogram.counts(), &gate, peak.bin);
+                (DepthEstimator::Centroid3, whole_background(background))
+            }
+            Self::CentreOfMass3 => (DepthEstimator::Centroid3, mean),
+            Self::CentredWindow(for_sigma) => (centred(for_sigma), mean),
+            Self::OwnWindow => (centred(sigma), mean),
         };
-        let centred = |sigma: f64| {
-            let estimator = DepthEstimator::for_pulse(U8F8::saturating_from_num(sigma));
-            estimate(estimator, mean_background(histogram, peak))
-        };
-        let mass = |background| estimate(DepthEstimator::Centroid3, background);
-        let offset = match self {
-            Self::HighestBin => SubBinOffset::CENTRE,
-            Self::Paper => mass(whole_background(quadrant_background(
-                histogram.counts(),
-                &gate,
-                peak.bin,
-            ))),
-            Self::CentreOfMass3 => mass(mean_background(histogram, peak)),
-            Self::CentredWindow(for_sigma) => centred(for_sigma),
-            Self::OwnWindow => centred(sigma),
-        };
-        BinPosition::of(peak.bin, offset)
+        let depth = estimator.estimate(histogram, &gate, peak, background);
+        BinPosition::of(peak.bin, depth.offset)
     }
 }
 
@@ -132,19 +124,11 @@ fn mean_background(histogram: &Histogram<BINS>, peak: Peak) -> U24F8 {
 }
 
 fn points() -> Vec<Point> {
-    let mut points = Vec::new();
-    for sigma in SIGMAS {
-        for signal in SIGNALS {
-            for background in BACKGROUNDS {
-                points.push(point([
-                    ("sigma", sigma),
-                    ("signal", signal),
-                    ("background", background),
-                ]));
-            }
-        }
-    }
-    points
+    grid([
+        ("sigma", &SIGMAS),
+        ("signal", &SIGNALS),
+        ("background", &BACKGROUNDS),
+    ])
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
@@ -175,7 +159,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         let peak = histogram.peak();
         let middle = f64::from(peak.bin.raw()) + 0.5;
         if (middle - rates.position).abs() > 2.0 * sigma + 1.0 {
-            // A false event, not an error of depth.
+            // A false alarm, not an error of depth.
             count("elsewhere", 1);
             continue;
         }
@@ -222,29 +206,22 @@ pub fn elsewhere(part: &Part) -> Result<(&PointTally, f64)> {
 
 /// Over all signals and backgrounds: the root mean square of [`over_bound`], and the
 /// least and the largest.
-fn summary(part: &Part, sigma: f64, name: &str) -> (f64, (f64, f64)) {
+fn summary(part: &Part, sigma: f64, name: &str) -> Measured {
     let ratios: Vec<f64> = part
         .at([("sigma", sigma)])
         .map(|point| over_bound(point, name).value)
         .collect();
     let squares: f64 = ratios.iter().map(|ratio| ratio * ratio).sum();
-    #[allow(clippy::cast_precision_loss)]
-    let mean = (squares / ratios.len().max(1) as f64).sqrt();
-    let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
-    (mean, (least, ratios.into_iter().fold(0.0, f64::max)))
+    Measured {
+        value: (squares / ratios.len().max(1) as f64).sqrt(),
+        interval: ends(ratios),
+    }
 }
 
 fn results(part: &Part) -> Result<Results> {
     let bound = [SIGMAS[0], SIGMAS[SIGMAS.len() - 1]].map(|sigma| Dot::exact(sigma, 1.0));
     let panels = Method::ALL.map(|(method, name)| {
-        let dots = SIGMAS.map(|sigma| {
-            let (mean, range) = summary(part, sigma, name);
-            Dot {
-                x: sigma,
-                y: mean,
-                interval: Some(range),
-            }
-        });
+        let dots = SIGMAS.map(|sigma| summary(part, sigma, name).at(sigma));
         Panel {
             title: method.label(),
             series: vec![
@@ -253,42 +230,27 @@ fn results(part: &Part) -> Result<Results> {
             ],
         }
     });
-    let own = SIGMAS.map(|sigma| summary(part, sigma, "centred"));
-    let most = own
-        .iter()
-        .fold(0.0f64, |most, (_, range)| most.max(range.1));
+    let own = SIGMAS.map(|sigma| summary(part, sigma, "centred").interval.1);
+    let most = own.into_iter().fold(0.0, f64::max);
     let chart = Chart {
-        finding: Finding::new(
-            format!(
+        finding: format!(
                 "A centred window for the pulse errs {:.0} % more than the bound at most",
                 (most - 1.0) * 100.0
-            ),
-            most < 1.2,
-        ),
+            ), holds: most < 1.2,
         note: "Dots are means over 16 pairs of signal and background, bars go from the best pair to the worst."
             .to_owned(),
         x: Axis::linear("pulse σ, bins"),
         y: Axis::logarithmic("root mean square depth error over the Cramér-Rao bound")
             .within(0.9, 9.0),
-        key: vec![Key {
-            pen: palette::REFERENCE,
-            style: Style::Dashed,
-            text: "the bound: pulse shape known, signal and background not".to_owned(),
-        }],
+        key: vec![Key::new(palette::REFERENCE, Style::Dashed, "the bound: pulse shape known, signal and background not")],
         columns: 3,
         panels: panels.into(),
     };
-    let histograms = part
-        .points()
-        .first()
-        .map_or(0, |point| point.count("histograms"));
+    let histograms = part.one([])?.count("histograms");
     Ok(Results {
         figures: vec![Figure::new("depth-error", &chart)?],
         values: [("histograms", grouped(histograms))].into(),
-        tables: vec![Table {
-            path: "results/data/depth_error.csv",
-            csv: csv(part)?,
-        }],
+        tables: vec![("results/data/depth_error.csv", csv(part)?)],
         ..Results::default()
     })
 }
@@ -300,11 +262,10 @@ fn csv(part: &Part) -> Result<String> {
             ["sigma", "signal", "background"].map(|name| point.parameter(name));
         let elsewhere = point.share("elsewhere", "histograms").value;
         for (_, name) in Method::ALL {
-            let Measured { value, interval } = over_bound(point, name);
-            let (low, high) = interval;
+            let error = over_bound(point, name).cells(3);
             writeln!(
                 csv,
-                "{sigma},{signal},{background},{elsewhere:.4},{name},{value:.3},{low:.3},{high:.3}"
+                "{sigma},{signal},{background},{elsewhere:.4},{name},{error}"
             )?;
         }
     }

@@ -10,13 +10,13 @@ use self::pixel::{Pixel, exposure};
 use crate::studies::methods::passage::Method;
 use crate::studies::methods::time_to_detect::signal;
 use crate::sweep::mean::{add, add_error, add_value};
-use crate::sweep::results::{Figure, Results, Table};
-use crate::sweep::{Part, Point, Study, Tally, point};
+use crate::sweep::results::{Figure, Results};
+use crate::sweep::{Part, Point, Study, Tally, grid};
 use anyhow::Result;
 use dtof::rows::grouped;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{DepthEstimator, WindowRule};
-use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
 use dtof_draw::palette::{CENTRED, PAPER, REFERENCE};
 use dtof_theory::rates::Rates;
 use rand_core::Rng;
@@ -76,21 +76,13 @@ fn pixels(sigma: f64, background: f64) -> Result<Vec<Pixel>> {
     Ok(pixels)
 }
 
-/// Each scene with a target, and without to count false events.
+/// Each scene with a target, and without to count false alarms.
 fn points() -> Vec<Point> {
-    let mut points = Vec::new();
-    for sigma in SIGMAS {
-        for background in BACKGROUNDS {
-            for target in [0.0, 1.0] {
-                points.push(point([
-                    ("sigma", sigma),
-                    ("background", background),
-                    ("target", target),
-                ]));
-            }
-        }
-    }
-    points
+    grid([
+        ("sigma", &SIGMAS),
+        ("background", &BACKGROUNDS),
+        ("target", &[0.0, 1.0]),
+    ])
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
@@ -115,7 +107,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             add(&mut tally, &name, "events", 1);
             let middle = f64::from(event.peak) + 0.5;
             if (middle - rates.position).abs() > 2.0 * sigma + 1.0 {
-                // A false event, not an error of depth.
+                // A false alarm, not an error of depth.
                 add(&mut tally, &name, "elsewhere", 1);
                 continue;
             }
@@ -137,21 +129,16 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 
 fn results(part: &Part) -> Result<Results> {
     let outcomes = outcomes(part)?;
-    let exposures = part.at([("target", 1.0)]).next();
-    let exposures = exposures.map_or(0, |point| point.count("exposures"));
+    let exposures = part.one([("target", 1.0)])?.count("exposures");
     Ok(Results {
         figures: vec![Figure::new("event-depth", &chart(&outcomes))?],
         values: [("exposures", grouped(exposures))].into(),
-        tables: vec![Table {
-            path: "results/data/event_depth.csv",
-            csv: csv(&outcomes)?,
-        }],
+        tables: vec![("results/data/event_depth.csv", csv(&outcomes)?)],
         ..Results::default()
     })
 }
 
 /// A panel for each rule and pulse, from the earlier first look.
-#[allow(clippy::float_cmp, reason = "parameters are as they were written")]
 fn chart(outcomes: &[Outcome]) -> Chart {
     let pens = [PAPER, CENTRED, REFERENCE];
     let early = || {
@@ -161,11 +148,8 @@ fn chart(outcomes: &[Outcome]) -> Chart {
     let mut panels = Vec::new();
     for (is_paper, rule) in [(true, "paper's rule"), (false, "window rule")] {
         for sigma in SIGMAS {
-            let of_rule = move |outcome: &&Outcome| (outcome.method == Method::Paper) == is_paper;
-            let those = || {
-                early()
-                    .filter(of_rule)
-                    .filter(|outcome| outcome.sigma == sigma)
+            let is_here = |outcome: &&Outcome| {
+                (outcome.method == Method::Paper) == is_paper && outcome.sigma == sigma
             };
             // A window rule's background is a mean as well.
             let count = if is_paper { 3 } else { 2 };
@@ -174,13 +158,9 @@ fn chart(outcomes: &[Outcome]) -> Chart {
                 .enumerate()
                 .take(count)
                 .map(|(number, pen)| {
-                    let dots = those().map(|outcome| {
+                    let dots = early().filter(is_here).map(|outcome| {
                         let error = outcome.placed[number].error;
-                        Dot {
-                            x: outcome.background,
-                            y: error.value,
-                            interval: Some(error.interval),
-                        }
+                        error.at(outcome.background)
                     });
                     Series::unnamed(pen, Style::JoinedDots, dots.collect())
                 });
@@ -191,20 +171,16 @@ fn chart(outcomes: &[Outcome]) -> Chart {
         }
     }
     let names = ESTIMATORS.map(|(_, name)| name);
-    let key = names.into_iter().zip(pens).map(|(text, pen)| Key {
-        pen,
-        style: Style::JoinedDots,
-        text: text.to_owned(),
-    });
+    let key = names
+        .into_iter()
+        .zip(pens)
+        .map(|(text, pen)| Key::new(pen, Style::JoinedDots, text));
     // The paper's rule chooses events with a centroid that the window betters.
     let of_paper = || early().filter(|outcome| outcome.method == Method::Paper);
     let better = of_paper().filter(|outcome| outcome.better() == Some(1));
     let worse = of_paper().any(|outcome| outcome.better() == Some(0));
     Chart {
-        finding: Finding::new(
-            "With the paper's rule, a centred window places events better than the centroid",
-            2 * better.count() > of_paper().count() && !worse,
-        ),
+        finding: "With the paper's rule, a centred window places events better than the centroid".to_owned(), holds: 2 * better.count() > of_paper().count() && !worse,
         note: "Bars hold 99 %. No pixel's window has the rule's background: it tells what its own is for."
             .to_owned(),
         x: Axis::logarithmic("background photons a bin and laser cycle"),
@@ -222,14 +198,10 @@ fn csv(outcomes: &[Outcome]) -> Result<String> {
     for outcome in outcomes {
         let better = outcome.better();
         for (index, (name, _)) in ESTIMATORS.into_iter().enumerate() {
-            let Placed {
-                error,
-                bias,
-                over_bound,
-            } = outcome.placed[index];
+            let placed = outcome.placed[index];
             writeln!(
                 csv,
-                "{},{},{},{},{:.4},{:.4},{},{:.4},{:.4},{:.1},{:.1},{name},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4},{:.3},{}",
+                "{},{},{},{},{:.4},{:.4},{},{:.4},{:.4},{:.1},{:.1},{name},{},{},{:.3},{}",
                 outcome.first_look,
                 outcome.sigma,
                 outcome.background,
@@ -241,17 +213,12 @@ fn csv(outcomes: &[Outcome]) -> Result<String> {
                 outcome.in_pulse.value,
                 outcome.cycles,
                 outcome.signal,
-                error.value,
-                error.interval.0,
-                error.interval.1,
-                bias.value,
-                bias.interval.0,
-                bias.interval.1,
-                over_bound.value,
+                placed.error.cells(4),
+                placed.bias.cells(4),
+                placed.over_bound.value,
                 match better {
-                    Some(better) if index < 2 => {
-                        if better == index { "yes" } else { "no" }
-                    }
+                    Some(better) if better == index => "yes",
+                    Some(_) if index < 2 => "no",
                     _ => "",
                 }
             )?;

@@ -1,12 +1,13 @@
-//! How far one threshold holds: false events of an exposure when the background
+//! How far one threshold holds: false alarms of an exposure when the background
 //! goes over orders of magnitude and the threshold stays.
 
 use crate::studies::methods::passage::{BINS, LOOKS, Ladder, Method, Passage, count_false};
-use crate::sweep::results::{Figure, Results, Share, Table};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
+use crate::sweep::mean::Measured;
+use crate::sweep::results::{Figure, Results};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::Result;
 use dtof::rows::grouped;
-use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::REFERENCE;
 use dtof_theory::looks::exposure::Exposures;
 use dtof_theory::rates::Rates;
@@ -16,10 +17,10 @@ use std::fmt::Write as _;
 /// Mean background counts a bin at the first look, after 40 laser cycles; 25 times
 /// as many after 1000.
 const BACKGROUNDS: [f64; 9] = [0.4, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
-/// False events an exposure that are wanted, and the figures' names.
+/// False alarms an exposure that are wanted, and the figures' names.
 const WANTED: [(f64, &str); 2] = [(0.01, "false-rate"), (0.001, "false-rate-low")];
 /// Exposures of a trial at each background to set the threshold by, and others to count
-/// its false events.
+/// its false alarms.
 const CALIBRATED: u64 = 20;
 const TESTED: u64 = 50;
 
@@ -36,16 +37,10 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    let mut points = Vec::new();
-    for first_mean in BACKGROUNDS {
-        for tested in [0.0, 1.0] {
-            points.push(point([("first_mean", first_mean), ("tested", tested)]));
-        }
-    }
-    points
+    grid([("first_mean", &BACKGROUNDS), ("tested", &[0.0, 1.0])])
 }
 
-/// So fine that two neighbours differ by a third in their false events.
+/// So fine that two neighbours differ by a third in their false alarms.
 fn ladders() -> Vec<Ladder> {
     let ladder = |method| match method {
         Method::Paper => Ladder::new(method, 16, 64, 8),
@@ -76,13 +71,13 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 struct Outcome {
     method: Method,
     threshold: f64,
-    /// False events an exposure at each background.
-    shares: Vec<(f64, Share)>,
+    /// False alarms an exposure at each background.
+    shares: Vec<(f64, Measured)>,
 }
 
 impl Outcome {
-    /// The threshold with `wanted` false events an exposure on average over the
-    /// backgrounds, and its false events in other exposures.
+    /// The threshold with `wanted` false alarms an exposure on average over the
+    /// backgrounds, and its false alarms in other exposures.
     fn new(ladder: &Ladder, part: &Part, wanted: f64) -> Self {
         let calibrated: Vec<&PointTally> = part.at([("tested", 0.0)]).collect();
         let index = ladder.nearest(ladder.calibrated(&calibrated, wanted));
@@ -102,18 +97,13 @@ impl Outcome {
     /// false alarm at all, the one that is sure.
     fn worst_factor(&self, wanted: f64) -> f64 {
         let factor = |value: f64| (value / wanted).max(wanted / value);
-        let sure = |(low, high): (f64, f64)| {
-            if low <= wanted && wanted <= high {
+        let factors = self.shares.iter().map(|(_, share)| {
+            if !self.has_none() {
+                factor(share.value)
+            } else if share.holds(wanted) {
                 1.0
             } else {
-                factor(low).min(factor(high))
-            }
-        };
-        let factors = self.shares.iter().map(|(_, share)| {
-            if self.has_none() {
-                sure(share.interval)
-            } else {
-                factor(share.value)
+                factor(share.interval.0).min(factor(share.interval.1))
             }
         });
         factors.fold(1.0, f64::max)
@@ -148,10 +138,8 @@ impl Outcome {
 fn results(part: &Part) -> Result<Results> {
     let mut figures = Vec::new();
     let mut csv = "wanted,method,threshold,first_mean,share,low,high\n".to_owned();
-    let exposures = |tested: f64| {
-        let point = part.at([("tested", tested)]).next();
-        grouped(point.map_or(0, |point| point.count("exposures")))
-    };
+    let exposures =
+        |tested| anyhow::Ok(grouped(part.one([("tested", tested)])?.count("exposures")));
     for (wanted, name) in WANTED {
         let outcomes: Vec<Outcome> = ladders()
             .iter()
@@ -159,48 +147,39 @@ fn results(part: &Part) -> Result<Results> {
             .collect();
         for outcome in &outcomes {
             for (background, share) in &outcome.shares {
-                let (low, high) = share.interval;
-                writeln!(
-                    csv,
-                    "{wanted},{},{:.3},{background},{:.6},{low:.6},{high:.6}",
-                    outcome.method.name(),
-                    outcome.threshold,
-                    share.value
-                )?;
+                let (method, threshold) = (outcome.method.name(), outcome.threshold);
+                let share = share.cells(6);
+                writeln!(csv, "{wanted},{method},{threshold:.3},{background},{share}")?;
             }
         }
         let percent = wanted * 100.0;
-        let is_paper = |outcome: &&Outcome| outcome.method == Method::Paper;
-        let worst = |is_paper: bool| {
-            let those = outcomes.iter();
-            let those = those.filter(|outcome| (outcome.method == Method::Paper) == is_paper);
-            those
-                .map(|outcome| outcome.worst_factor(wanted))
-                .fold(1.0, f64::max)
+        // The paper's is the first of the rules.
+        let (papers, windows) = outcomes.split_at(1);
+        let worst = |outcomes: &[Outcome]| {
+            let factors = outcomes.iter().map(|outcome| outcome.worst_factor(wanted));
+            factors.fold(1.0, f64::max)
         };
-        let (paper, windows) = (worst(true), worst(false));
-        let least = outcomes
-            .iter()
-            .find(is_paper)
-            .is_some_and(Outcome::has_none);
-        let least = if least { "at least " } else { "" };
+        let (paper, windows) = (worst(papers), worst(windows));
+        let least = if papers[0].has_none() {
+            "at least "
+        } else {
+            ""
+        };
         let chart = Chart {
-            finding: Finding::new(
-                format!(
-                    "One z holds {percent} % false alarms at any background; one α is off by a factor of {least}{paper:.0}"
-                ),
-                windows < 1.5 && paper > 10.0,
+            finding: format!(
+                "One z holds {percent} % false alarms at any background; one α is off by a factor of {least}{paper:.0}"
             ),
+            holds: windows < 1.5 && paper > 10.0,
             note: "Bars hold 99 %; an open dot is an upper limit where there was none.".to_owned(),
             x: Axis::logarithmic("background counts a bin at the first look"),
             y: Axis::logarithmic("exposures with a false alarm, %")
                 .percent()
                 .within(wanted / 100.0, wanted * 10.0),
-            key: vec![Key {
-                pen: REFERENCE,
-                style: Style::Dashed,
-                text: format!("{percent} %, as wanted"),
-            }],
+            key: vec![Key::new(
+                REFERENCE,
+                Style::Dashed,
+                format!("{percent} %, as wanted"),
+            )],
             columns: 3,
             panels: outcomes
                 .iter()
@@ -211,11 +190,8 @@ fn results(part: &Part) -> Result<Results> {
     }
     Ok(Results {
         figures,
-        values: [("calibrated", exposures(0.0)), ("tested", exposures(1.0))].into(),
-        tables: vec![Table {
-            path: "results/data/false_rate.csv",
-            csv,
-        }],
+        values: [("calibrated", exposures(0.0)?), ("tested", exposures(1.0)?)].into(),
+        tables: vec![("results/data/false_rate.csv", csv)],
         ..Results::default()
     })
 }

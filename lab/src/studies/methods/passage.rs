@@ -3,9 +3,11 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{Count, Count16, DetectionRule, Histogram, PaperRule, Peak, RangeGate, WindowRule};
+use dtof_core::{
+    AnyRule, Count, Count16, DetectionRule, Histogram, PaperRule, Peak, RangeGate, WindowRule,
+};
 use rand_pcg::Pcg64;
 
 use crate::sweep::{PointTally, Tally};
@@ -46,6 +48,21 @@ impl Method {
         Self::Window(5),
         Self::Window(7),
     ];
+
+    /// The core's rule with this threshold and minimum count.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn rule(self, threshold: f64, minimum: u32) -> Result<AnyRule> {
+        let minimum = Count::saturating(minimum);
+        Ok(match self {
+            Self::Paper => PaperRule::new(U8F8::saturating_from_num(threshold), minimum).into(),
+            Self::Window(width) => {
+                WindowRule::new(width, U4F12::saturating_from_num(threshold), minimum)?.into()
+            }
+            Self::Oracle => bail!("no pixel knows the scene"),
+        })
+    }
 
     /// Its name in tallies and tables.
     #[must_use]
@@ -122,7 +139,6 @@ impl Ladder {
     /// `"false"` of `points`, in `exposures`: between two thresholds the share falls
     /// by equal factors. The first or the last if it lies beyond.
     #[must_use]
-    #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
     pub fn calibrated(&self, points: &[&PointTally], share: f64) -> f64 {
         let exposures: u64 = points.iter().map(|point| point.count("exposures")).sum();
         let wanted = (share * exposures as f64).ln();
@@ -176,29 +192,19 @@ impl Ladder {
 
 /// The decisions of one exposure.
 enum Decisions<'a> {
-    Paper(Vec<PaperRule>),
-    Window(Vec<WindowRule>),
+    Rules(Vec<AnyRule>),
     Oracle(Vec<f64>, Evidence<'a>),
 }
 
 impl<'a> Decisions<'a> {
     fn new(ladder: &Ladder, oracle: Option<&'a LikelihoodRatio>) -> Result<Self> {
+        if ladder.method == Method::Oracle {
+            let scene = oracle.context("no scene for the likelihood ratio")?;
+            return Ok(Self::Oracle(ladder.thresholds.clone(), scene.evidence()));
+        }
         let thresholds = ladder.thresholds.iter();
-        let count = Count::saturating(MINIMUM_COUNT);
-        Ok(match ladder.method {
-            Method::Paper => {
-                let rule = |&alpha: &f64| PaperRule::new(U8F8::saturating_from_num(alpha), count);
-                Self::Paper(thresholds.map(rule).collect())
-            }
-            Method::Window(width) => {
-                let rule = |&z: &f64| WindowRule::new(width, U4F12::saturating_from_num(z), count);
-                Self::Window(thresholds.map(rule).collect::<Result<_, _>>()?)
-            }
-            Method::Oracle => {
-                let scene = oracle.context("no scene for the likelihood ratio")?;
-                Self::Oracle(ladder.thresholds.clone(), scene.evidence())
-            }
-        })
+        let rules = thresholds.map(|&threshold| ladder.method.rule(threshold, MINIMUM_COUNT));
+        Ok(Self::Rules(rules.collect::<Result<_>>()?))
     }
 }
 
@@ -249,8 +255,7 @@ impl<'a> Passage<'a> {
             let mut all = true;
             for ((rules, passed), ladder) in rules.iter_mut().zip(&mut passed).zip(ladders) {
                 match rules {
-                    Decisions::Paper(rules) => climb(rules, &histogram, peak, cycles, passed),
-                    Decisions::Window(rules) => climb(rules, &histogram, peak, cycles, passed),
+                    Decisions::Rules(rules) => climb(rules, &histogram, peak, cycles, passed),
                     Decisions::Oracle(thresholds, evidence) => {
                         for (bin, &photons) in (0..).zip(frame) {
                             if photons > 0 {
@@ -272,8 +277,8 @@ impl<'a> Passage<'a> {
 
 /// Notes the rules that fire for the first time. One that fires lets no lower
 /// threshold wait, so that only the next has to be asked.
-fn climb<R: DetectionRule>(
-    rules: &[R],
+fn climb(
+    rules: &[AnyRule],
     histogram: &Histogram<BINS, Count16>,
     peak: Peak,
     cycles: u32,
@@ -313,11 +318,12 @@ pub fn count_false(passage: &mut Passage, exposures: u64, rng: &mut Pcg64) -> Ta
 }
 
 #[cfg(test)]
-mod tests {
-    use dtof_core::{AsyncPixel, LaserCycle, PixelAddress, PixelConfig, Statistics};
+pub(crate) mod tests {
+    use dtof_core::{
+        AsyncPixel, CounterWidth, DepthEvent, LaserCycle, PixelAddress, PixelConfig, Statistics,
+    };
 
     use super::*;
-    use crate::sweep::point;
     use dtof_theory::random::trial_rng;
     use dtof_theory::rates::Rates;
 
@@ -331,27 +337,21 @@ mod tests {
         Exposures::new(&rates, 128, LOOKS).unwrap()
     }
 
-    /// When a pixel reports first, if it does.
-    fn event<R: DetectionRule>(rule: R, frames: &[(u32, [u16; BINS])]) -> Option<u32> {
-        let config = PixelConfig::with_rule(rule)
-            .x(4)
-            .l1(39)
-            .l2(1000)
-            .build()
-            .unwrap();
-        let mut pixel = AsyncPixel::<BINS, Count16>::new(PixelAddress(0));
-        let (mut before, mut statistics) = (0, Statistics::new());
-        for (cycles, frame) in frames {
-            pixel.count_frame(&config, frame);
+    /// What a pixel reports first, if it does.
+    pub(crate) fn event<W: CounterWidth>(
+        config: &PixelConfig<BINS, AnyRule>,
+        frames: &[(u32, [u16; BINS])],
+    ) -> Option<DepthEvent> {
+        let mut pixel = AsyncPixel::<BINS, W>::new(PixelAddress(0));
+        let mut before = 0;
+        frames.iter().find_map(|(cycles, frame)| {
+            pixel.count_frame(config, frame);
             let passed = u16::try_from(cycles - before).unwrap();
-            let last = LaserCycle((*cycles).into());
-            let _ = pixel.end_laser_cycles(&config, &mut statistics, last, passed);
-            if let Some(event) = pixel.acknowledge() {
-                return Some(event.exposure.into());
-            }
             before = *cycles;
-        }
-        None
+            let last = LaserCycle(before.into());
+            let _ = pixel.end_laser_cycles(config, &mut Statistics::new(), last, passed);
+            pixel.acknowledge()
+        })
     }
 
     #[test]
@@ -360,7 +360,6 @@ mod tests {
             Ladder::new(Method::Paper, 8, 24, 4),
             Ladder::new(Method::Window(3), 12, 24, 4),
         ];
-        let count = Count::saturating(MINIMUM_COUNT);
         let mut fired = 0;
         for seed in 0..20 {
             let signal = if seed < 10 { 0.4 } else { 0.0 };
@@ -373,13 +372,14 @@ mod tests {
                 false
             });
             assert_eq!(frames.len(), 240);
-            for (index, &threshold) in ladders[0].thresholds.iter().enumerate() {
-                let rule = PaperRule::new(U8F8::from_num(threshold), count);
-                assert_eq!(passed[0].get(index).copied(), event(rule, &frames));
-            }
-            for (index, &threshold) in ladders[1].thresholds.iter().enumerate() {
-                let rule = WindowRule::new(3, U4F12::from_num(threshold), count).unwrap();
-                assert_eq!(passed[1].get(index).copied(), event(rule, &frames));
+            for (ladder, passed) in ladders.iter().zip(&passed) {
+                for (index, &threshold) in ladder.thresholds.iter().enumerate() {
+                    let rule = ladder.method.rule(threshold, MINIMUM_COUNT).unwrap();
+                    let config = PixelConfig::with_rule(rule).x(4).l1(39).l2(1000);
+                    let event = event::<Count16>(&config.build().unwrap(), &frames);
+                    let cycles = event.map(|event| event.exposure.into());
+                    assert_eq!(passed.get(index).copied(), cycles);
+                }
             }
             fired += passed[1].len();
         }
@@ -394,10 +394,7 @@ mod tests {
             tally.insert(ladder.key(index, "false"), count);
         }
         assert_eq!(ladder.key(1, "false"), "w2 3.25 false");
-        let point = PointTally {
-            parameters: point([]),
-            tally,
-        };
+        let point = tally.into();
         let at = |share: f64| ladder.calibrated(&[&point], share);
         assert!((at(0.1) - 3.25).abs() < 1e-12);
         // Equal factors: 10 is halfway from 100 to 1.

@@ -5,11 +5,11 @@ mod time;
 use self::time::time;
 use crate::studies::methods::passage::{BINS, LOOKS, Ladder, Method, Passage, count_false};
 use crate::sweep::mean::Measured;
-use crate::sweep::results::{Figure, Results, Table};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
+use crate::sweep::results::{Figure, Results};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, point};
 use anyhow::Result;
 use dtof::rows::grouped;
-use dtof_draw::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Panel, Series, Style};
 use dtof_theory::bounds::likelihood_ratio::{LikelihoodRatio, signal_for_information};
 use dtof_theory::looks::exposure::Exposures;
 use dtof_theory::rates::Rates;
@@ -18,11 +18,17 @@ use std::fmt::Write as _;
 
 /// Standard deviations of the pulse in bins.
 pub const SIGMAS: [f64; 3] = [0.5, 1.0, 1.5];
+/// The figure of each.
+const FIGURES: [&str; 3] = [
+    "time-to-detect-0.5",
+    "time-to-detect-1.0",
+    "time-to-detect-1.5",
+];
 /// Background photons a bin and laser cycle.
 pub const BACKGROUNDS: [f64; 3] = [0.01, 0.05, 0.2];
 /// Where in its bin the pulse lies, and what that is called.
 pub const PLACES: [(f64, &str); 2] = [(0.5, "centred"), (0.0, "on an edge")];
-/// False events an exposure at which methods are compared.
+/// False alarms an exposure at which methods are compared.
 pub const FALSE_SHARE: f64 = 0.01;
 /// The signal is such that this many nats take 200 laser cycles, wherever the
 /// background: the likelihood ratio needs 100 to 300.
@@ -30,7 +36,7 @@ const INFORMATION: f64 = 9.0 / 200.0;
 /// Exposures of a trial.
 const EXPOSURES: u64 = 50;
 
-/// Against the likelihood ratio, at equal false events.
+/// Against the likelihood ratio, at equal false alarms.
 pub const STUDY: Study = Study {
     name: "time-to-detect",
     about: "laser cycles to an event against the likelihood ratio, by pulse and background",
@@ -46,18 +52,12 @@ pub const STUDY: Study = Study {
 /// one at each place.
 fn points() -> Vec<Point> {
     let mut points = Vec::new();
-    for sigma in SIGMAS {
-        for background in BACKGROUNDS {
-            let scene = [("sigma", sigma), ("background", background)];
-            points.push(point([scene[0], scene[1], ("target", 0.0), ("place", 0.0)]));
-            for (place, _) in PLACES {
-                points.push(point([
-                    scene[0],
-                    scene[1],
-                    ("target", 1.0),
-                    ("place", place),
-                ]));
-            }
+    for scene in grid([("sigma", &SIGMAS), ("background", &BACKGROUNDS)]) {
+        let with_target = PLACES.map(|(place, _)| (1.0, place));
+        for (target, place) in [(0.0, 0.0)].into_iter().chain(with_target) {
+            let mut point = point([("target", target), ("place", place)]);
+            point.extend(scene.clone());
+            points.push(point);
         }
     }
     points
@@ -128,7 +128,7 @@ pub struct Outcome {
     pub background: f64,
     /// What decides.
     pub method: Method,
-    /// With a share of [`FALSE_SHARE`] of false events.
+    /// With a share of [`FALSE_SHARE`] of false alarms.
     pub threshold: f64,
     /// Mean laser cycles to an event; an exposure that expires is followed by
     /// another. The interval is that of the times, of the share that expires and of
@@ -191,56 +191,32 @@ fn is(outcome: &Outcome, sigma: f64, method: Method) -> bool {
     (outcome.sigma - sigma).abs() < 0.01 && outcome.method == method
 }
 
-/// The mean of the ratios of a method over backgrounds and places of a pulse, and
-/// the largest.
-fn mean_and_worst(outcomes: &[Outcome], sigma: f64, method: Method) -> (f64, f64) {
+/// The mean of the ratios of a method over backgrounds and places of a pulse.
+fn mean_ratio(outcomes: &[Outcome], sigma: f64, method: Method) -> f64 {
     let ratios = outcomes.iter().filter(|outcome| is(outcome, sigma, method));
-    let ratios = ratios.map(|outcome| outcome.ratio.value);
-    let count = ratios.clone().count().max(1);
-    #[allow(clippy::cast_precision_loss)]
-    let mean = ratios.clone().sum::<f64>() / count as f64;
-    (mean, ratios.fold(0.0, f64::max))
+    let ratios: Vec<f64> = ratios.map(|outcome| outcome.ratio.value).collect();
+    ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
 }
 
 fn results(part: &Part) -> Result<Results> {
     let outcomes = outcomes(part)?;
     let mut figures = Vec::new();
-    let names = [
-        "time-to-detect-0.5",
-        "time-to-detect-1.0",
-        "time-to-detect-1.5",
-    ];
-    let exposures = part.at([("target", 1.0)]).next();
-    let exposures = exposures.map_or(0, |point| point.count("exposures"));
-    for (name, sigma) in names.into_iter().zip(SIGMAS) {
-        let means = Method::RULES.map(|method| {
-            let (mean, worst) = mean_and_worst(&outcomes, sigma, method);
-            (method, mean, worst)
-        });
+    let exposures = part.one([("target", 1.0)])?.count("exposures");
+    for (name, sigma) in FIGURES.into_iter().zip(SIGMAS) {
+        let means = Method::RULES.map(|method| (method, mean_ratio(&outcomes, sigma, method)));
         let best = means.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        let best = best.unwrap_or((Method::Paper, f64::NAN, f64::NAN));
+        let best = best.unwrap_or((Method::Paper, f64::NAN));
         let panels = PLACES.map(|(_, place)| {
             let series = Method::RULES.map(|method| {
                 let those = outcomes
                     .iter()
                     .filter(|outcome| is(outcome, sigma, method) && outcome.place == place);
-                let dots = those.map(|outcome| Dot {
-                    x: outcome.background,
-                    y: outcome.ratio.value,
-                    interval: Some(outcome.ratio.interval),
-                });
+                let dots = those.map(|outcome| outcome.ratio.at(outcome.background));
                 let name = method.short();
                 Series::named(name, method.pen(), Style::JoinedDots, dots.collect())
             });
             Panel {
-                title: format!(
-                    "pulse {place}{}",
-                    if place == "centred" {
-                        " in its bin"
-                    } else {
-                        ""
-                    }
-                ),
+                title: format!("pulse {}", place.replace("centred", "centred in its bin")),
                 series: series.into(),
             }
         });
@@ -249,13 +225,10 @@ fn results(part: &Part) -> Result<Results> {
             _ => String::new(),
         };
         let chart = Chart {
-            finding: Finding::new(
-                format!(
+            finding: format!(
                     "Pulse σ {sigma}: a window of {bins} bins is fastest, {:.0} % behind the likelihood ratio",
                     (best.1 - 1.0) * 100.0
-                ),
-                !bins.is_empty(),
-            ),
+                ), holds: !bins.is_empty(),
             note: "Bars hold 99 %, that of the threshold included. Names: the paper's rule, and windows of so many bins."
                 .to_owned(),
             x: Axis::logarithmic("background photons a bin and laser cycle"),
@@ -270,10 +243,7 @@ fn results(part: &Part) -> Result<Results> {
     Ok(Results {
         figures,
         values: [("exposures", grouped(exposures))].into(),
-        tables: vec![Table {
-            path: "results/data/time_to_detect.csv",
-            csv: csv(&outcomes)?,
-        }],
+        tables: vec![("results/data/time_to_detect.csv", csv(&outcomes)?)],
         ..Results::default()
     })
 }
@@ -283,16 +253,14 @@ fn csv(outcomes: &[Outcome]) -> Result<String> {
     for outcome in outcomes {
         writeln!(
             csv,
-            "{},{},{},{},{:.3},{:.1},{:.3},{:.3},{:.3}",
+            "{},{},{},{},{:.3},{:.1},{}",
             outcome.sigma,
             outcome.place,
             outcome.background,
             outcome.method.name(),
             outcome.threshold,
             outcome.cycles.value,
-            outcome.ratio.value,
-            outcome.ratio.interval.0,
-            outcome.ratio.interval.1
+            outcome.ratio.cells(3)
         )?;
     }
     Ok(csv)

@@ -3,15 +3,15 @@
 
 use super::mixed;
 use super::mixed::{MARGIN, add_pair, excess, is_sharp, neither};
-use super::one_pixel::{CODES, FRAMES, PER_BIN, Reading, SENSORS, in_parts, pen, prototype, watch};
+use super::one_pixel::{CODES, PER_BIN, Reading, SENSORS, in_parts, pen, phases, watch_step};
 use crate::sweep::mean::{Measured, add, add_value};
-use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
+use crate::sweep::results::{Claim, Figure, Results, Verdict};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::Result;
 use dtof::rows::grouped;
 use dtof::simulate::SimulatedPixel;
 use dtof_core::PixelAddress;
-use dtof_draw::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Panel, Series, Style};
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 use rand_core::Rng;
@@ -52,52 +52,30 @@ pub const STUDY: Study = Study {
 
 /// Steps towards the sensor of 75 mm to 0.75 m.
 fn points() -> Vec<Point> {
-    let mut points = Vec::new();
-    for step in STEPS_BINS {
-        for signal in [DIM, 0.2, SIGNAL, 1.0, BRIGHT] {
-            points.push(point([("step", step), ("signal", signal)]));
-        }
-    }
-    points
+    let signals = [DIM, 0.2, SIGNAL, 1.0, BRIGHT];
+    grid([("step", &STEPS_BINS), ("signal", &signals)])
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    let config = prototype(40)?;
     let mut tally = Tally::new();
     for _ in 0..STEPS {
         // A random place in a bin, and random phases of exposures and frames.
         let old = 60.0 + Uniform::new(0.0, 1.0)?.sample(rng);
         let new = old - point["step"];
         let at = 2000 + Uniform::new(0, 4000_u64)?.sample(rng);
-        let mut phases = FRAMES;
-        for phase in &mut phases {
-            *phase = Uniform::new(0, *phase)?.sample(rng);
-        }
+        let phases = phases(rng)?;
         let rates = |position| Rates {
             background: BACKGROUND,
             signal: point["signal"],
             position,
             sigma: 1.0,
         };
-        let mut pixel = SimulatedPixel::new(
-            &rates(old),
-            CODES,
-            pixel_rng(rng.next_u64(), PixelAddress(0)),
-        )?;
-        let mut same = pixel.clone();
-        let readings = watch(at + AFTER, &config, phases, |cycle, photon| {
-            if cycle == at {
-                pixel.set_rates(&rates(new))?;
-            }
-            pixel.next_cycle(photon);
-            Ok(())
-        })?;
-        let without = watch(at + OVER, &config, phases, |_, photon| {
-            same.next_cycle(photon);
-            Ok(())
-        })?;
+        let photons = pixel_rng(rng.next_u64(), PixelAddress(0));
+        let pixel = SimulatedPixel::new(&rates(old), CODES, photons)?;
+        let readings = |later, cycles| watch_step(&pixel, &rates(later), at, cycles, phases);
+        let (with, without) = (readings(new, at + AFTER)?, readings(old, at + OVER)?);
         let surfaces = [in_parts(old), in_parts(new)];
-        for ((sensor, with), without) in SENSORS.into_iter().zip(&readings).zip(&without) {
+        for ((sensor, with), without) in SENSORS.into_iter().zip(&with).zip(&without) {
             add_step(&mut tally, sensor, with, at, surfaces);
             add_pair(&mut tally, sensor, [with, without], at, &surfaces);
         }
@@ -124,11 +102,7 @@ fn results(part: &Part) -> Result<Results> {
         let lines = sensors.map(|(number, sensor)| {
             let points = part.at([("step", step)]).map(|point| {
                 let measured = y(point, sensor);
-                Dot {
-                    x: point.parameter("signal"),
-                    y: measured.value,
-                    interval: Some(measured.interval),
-                }
+                measured.at(point.parameter("signal"))
             });
             Series::named(sensor, pen(number), Style::JoinedDots, points.collect())
         });
@@ -142,14 +116,12 @@ fn results(part: &Part) -> Result<Results> {
     });
     let (events, frames) = (events?, frames?);
     let reaction = Chart {
-        finding: Finding::new(
-            format!(
-                "A bright pixel reports a step after {:.0} laser cycles, a dim one no sooner than a long frame",
-                events[0].value
-            ),
-            events[0].interval.1 < frames[0].interval.0 / 10.0
-                && events[1].interval.1 > frames[1].interval.0,
+        finding: format!(
+            "A bright pixel reports a step after {:.0} laser cycles, a dim one no sooner than a long frame",
+            events[0].value
         ),
+        holds: events[0].interval.1 < frames[0].interval.0 / 10.0
+            && events[1].interval.1 > frames[1].interval.0,
         note: format!(
             "Bars hold 99 %. A step not noticed in {} laser cycles counts as that many. Short frames of dim pixels are mostly false alarms.",
             grouped(AFTER)
@@ -167,10 +139,8 @@ fn results(part: &Part) -> Result<Results> {
     };
     let bright = |point: &&PointTally| point.parameter("signal") >= SIGNAL;
     let blur = Chart {
-        finding: Finding::new(
-            "A step of two bins within an exposure blurs events and frames alike",
-            part.at([("step", STEPS_BINS[0])]).filter(bright).all(blurs),
-        ),
+        finding: "A step of two bins within an exposure blurs events and frames alike".to_owned(),
+        holds: part.at([("step", STEPS_BINS[0])]).filter(bright).all(blurs),
         note:
             "Bars hold 99 %. Farther apart two surfaces do not mix: the centroid sees three bins."
                 .to_owned(),
@@ -179,8 +149,7 @@ fn results(part: &Part) -> Result<Results> {
         key: Vec::new(),
         columns: 1,
         panels: vec![series(STEPS_BINS[0], &|point, sensor| {
-            let Share { value, interval } = neither(point, sensor, "mixed");
-            Measured { value, interval }
+            neither(point, sensor, "mixed")
         })],
     };
     Ok(Results {
@@ -236,11 +205,7 @@ fn latency_claim(part: &Part) -> Result<Claim> {
             at_signals(part, EDGE, "frames of 100 not noticed"),
             at_signals(part, EDGE, "frames of 2000 not noticed"),
         ),
-        match (faster, events.interval.1 < frames[4].interval.0) {
-            (true, _) => Verdict::Agrees,
-            (false, true) => Verdict::Differs,
-            _ => Verdict::Refuted,
-        },
+        Verdict::graded(faster, events.interval.1 < frames[4].interval.0),
     ))
 }
 
@@ -279,6 +244,7 @@ fn blur_claim(part: &Part) -> Result<Claim> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::one_pixel::{prototype, watch};
     use super::*;
 
     /// One photon a laser cycle, in bin 40 and from laser cycle 1,010 on in bin 20.
@@ -292,13 +258,8 @@ mod tests {
         .unwrap();
         let mut tally = Tally::new();
         for (sensor, readings) in SENSORS.into_iter().zip(&readings) {
-            add_step(
-                &mut tally,
-                sensor,
-                readings,
-                1010,
-                [in_parts(40.5), in_parts(20.5)],
-            );
+            let surfaces = [40.5, 20.5].map(in_parts);
+            add_step(&mut tally, sensor, readings, 1010, surfaces);
         }
         // Exposures of 44: 968 to 1011 reads the old surface, 1012 to 1055 the new.
         assert_eq!(tally["events above 0"], 46);

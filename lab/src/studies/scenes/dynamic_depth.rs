@@ -13,7 +13,7 @@ use rand_pcg::Pcg64;
 
 use self::watched::{Watched, true_steps};
 use crate::sweep::mean::add;
-use crate::sweep::{Point, Study, Tally, point};
+use crate::sweep::{Point, Study, Tally, grid, whole};
 use dtof::engine::host::host_engine;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::scene::{self, Light, Scene, Shape};
@@ -53,24 +53,12 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    [0.0, 1.0, 2.0, 3.0]
-        .map(|scene| point([("scene", scene)]))
-        .to_vec()
-}
-
-/// Which of [`SCENES`].
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "0 to 3"
-)]
-fn number(point: &Point) -> usize {
-    point["scene"] as usize
+    grid([("scene", &[0.0, 1.0, 2.0, 3.0])])
 }
 
 /// The scene of a point on 8×8 macropixels, everything `shift` bins farther away.
 fn scene(point: &Point, shift: f64) -> Result<Scene> {
-    let number = number(point);
+    let number = whole(point, "scene");
     let text = if number == 2 {
         include_str!("../../../../scenes/fan.toml")
     } else {
@@ -125,7 +113,7 @@ fn scene(point: &Point, shift: f64) -> Result<Scene> {
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let scene = scene(point, Uniform::new(0.0, 1.0)?.sample(rng))?;
-    let cycles = CYCLES[number(point)];
+    let cycles = CYCLES[usize::from(whole(point, "scene"))];
     let mut settings = scene::settings(rng.next_u64());
     (settings.l1, settings.x) = (40, 4);
     settings.bins = scene.bins.into();
@@ -190,6 +178,7 @@ fn range_mm(scene: &Scene, address: PixelAddress, cycle: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sweep::point;
 
     #[test]
     fn the_car_makes_a_step_each_tenth_of_a_metre_and_the_wall_none() {

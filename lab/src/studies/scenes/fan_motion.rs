@@ -3,19 +3,18 @@
 
 use super::mixed;
 use super::mixed::{add_pair, excess, is_sharp, neither};
-use super::one_pixel::{CODES, FRAMES, Reading, SENSORS, in_parts, prototype, watch};
-use crate::sweep::mean::add;
-use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
+use super::one_pixel::{CODES, SENSORS, in_parts, phases, prototype, watch, watch_step};
+use crate::sweep::mean::{Measured, add};
+use crate::sweep::results::{Claim, Figure, Results, Verdict};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::{Result, bail, ensure};
 use dtof::rows::grouped;
 use dtof::simulate::SimulatedPixel;
 use dtof::simulate::scene::{Fan, Scene, Shape};
 use dtof_core::PixelAddress;
-use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
-use dtof_draw::palette::STEPS;
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::{NEUTRAL, STEPS};
 use dtof_theory::random::pixel_rng;
-use dtof_theory::rates::Rates;
 use rand_core::Rng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
@@ -56,9 +55,7 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    RATES_MHZ
-        .map(|rate| point([("laser_rate_mhz", rate)]))
-        .to_vec()
+    grid([("laser_rate_mhz", &RATES_MHZ)])
 }
 
 fn scene(point: &Point) -> Result<Scene> {
@@ -100,15 +97,6 @@ fn period(scene: &Scene) -> Result<u64> {
     Ok((2.0 / edges_per_cycle(scene)?) as u64)
 }
 
-/// Random phases of the frames.
-fn phases(rng: &mut Pcg64) -> Result<[u64; 4]> {
-    let mut phases = FRAMES;
-    for phase in &mut phases {
-        *phase = Uniform::new(0, *phase)?.sample(rng);
-    }
-    Ok(phases)
-}
-
 /// The first laser cycle after `from` in which the pixel sees another surface than
 /// in the one before.
 fn next_edge(scene: &Scene, address: PixelAddress, from: u64) -> Result<u64> {
@@ -139,23 +127,13 @@ fn add_edge(
     address: PixelAddress,
     rng: &mut Pcg64,
 ) -> Result<()> {
-    let config = prototype(40)?;
     let edge = next_edge(scene, address, Uniform::new(0, period(scene)?)?.sample(rng))?;
     let (before, after) = (scene.rates(address, edge - 1), scene.rates(address, edge));
     // When it is there, after the start of the readings.
     let at = 2000 + Uniform::new(0, 4000_u64)?.sample(rng);
     let phases = phases(rng)?;
     let pixel = SimulatedPixel::new(&before, CODES, pixel_rng(rng.next_u64(), address))?;
-    let readings = |later: &Rates| -> Result<[Vec<Reading>; 5]> {
-        let mut pixel = pixel.clone();
-        watch(at + OVER, &config, phases, |cycle, photon| {
-            if cycle == at {
-                pixel.set_rates(later)?;
-            }
-            pixel.next_cycle(photon);
-            Ok(())
-        })
-    };
+    let readings = |later| watch_step(&pixel, later, at, at + OVER, phases);
     let surfaces = [before, after].map(|rates| in_parts(rates.position));
     let (with, without) = (readings(&after)?, readings(&before)?);
     for ((sensor, with), without) in SENSORS.into_iter().zip(&with).zip(&without) {
@@ -206,17 +184,15 @@ struct Blur {
     /// Laser cycles of a mean exposure.
     exposure: f64,
     /// Exposures that an edge passes.
-    mixed: Share,
+    mixed: Measured,
 }
-
-#[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
 fn blur(point: &PointTally, sensor: &str) -> Blur {
     let count = |what: &str| point.count(&format!("{sensor} {what}"));
     let (mixed, clean) = (count("mixed"), count("clean"));
     Blur {
         readings: mixed + clean,
         exposure: count("cycles") as f64 / (mixed + clean) as f64,
-        mixed: Share::new(mixed, mixed + clean),
+        mixed: Measured::share(mixed, mixed + clean),
     }
 }
 
@@ -241,18 +217,17 @@ fn results(part: &Part) -> Result<Results> {
         series.push(Series::unnamed(pen, Style::Dots, dots.collect()));
     }
     let chart = Chart {
-        finding: Finding::new(
-            "The shorter its exposure, the more rarely an edge of the fan passes a reading",
-            holds,
-        ),
+        finding: "The shorter its exposure, the more rarely an edge of the fan passes a reading"
+            .to_owned(),
+        holds,
         note: "Dots from left to right: events, frames of 100, 500, 1000 and 2000 laser cycles. \
                Bars hold 99 %."
             .to_owned(),
         x: Axis::logarithmic("mean exposure, laser cycles"),
         y: Axis::logarithmic("readings that an edge passes, %").percent(),
         key: vec![
-            Key::new(Style::Dots, "simulated"),
-            Key::new(Style::Dashed, "edges a laser cycle × exposure"),
+            Key::new(NEUTRAL, Style::Dots, "simulated"),
+            Key::new(NEUTRAL, Style::Dashed, "edges a laser cycle × exposure"),
         ],
         columns: 1,
         panels: vec![Panel::only(series)],
@@ -282,7 +257,7 @@ fn claim(part: &Part) -> Result<Claim> {
         let path = events.exposure * tip;
         is_short &= path < 0.1;
         excesses.push(excess(point, SENSORS[0]));
-        let percent = |share: Share| share.value * 100.0;
+        let percent = |share: Measured| share.value * 100.0;
         here.push(format!(
             "{rate} MHz: a tip goes {path:.5} pixels in an event's exposure, {:.4} in a frame of 2000; an edge passes {:.3} % of events and {:.2} % of frames; of {} edges {:.1} % of the events over them are read as neither surface and {:.1} % without the edge, {} percentage points more (frames {}), {} expired",
             2000.0 * tip,
@@ -310,6 +285,7 @@ fn claim(part: &Part) -> Result<Claim> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sweep::point;
 
     #[test]
     fn edges_pass_as_often_as_the_scene_says() {
@@ -321,10 +297,8 @@ mod tests {
             let address = PixelAddress(row * 16 + column);
             let surface = |cycle| scene.truth(address, cycle).unwrap().surface;
             let views: Vec<usize> = (0..600_000).step_by(100).map(surface).collect();
-            assert_eq!(
-                views.windows(2).filter(|pair| pair[0] != pair[1]).count(),
-                6
-            );
+            let edges = views.windows(2).filter(|pair| pair[0] != pair[1]);
+            assert_eq!(edges.count(), 6);
         }
     }
 
@@ -336,11 +310,8 @@ mod tests {
             let surface = |cycle| scene.truth(address, cycle).unwrap().surface;
             let edge = next_edge(&scene, address, 1234).unwrap();
             assert!((1235..=101_235).contains(&edge));
-            assert!(
-                (1234..edge)
-                    .step_by(50)
-                    .all(|cycle| surface(cycle) == surface(1234))
-            );
+            let mut before = (1234..edge).step_by(50);
+            assert!(before.all(|cycle| surface(cycle) == surface(1234)));
             assert_eq!(surface(edge - 1), surface(1234));
             assert_ne!(surface(edge), surface(1234));
         }

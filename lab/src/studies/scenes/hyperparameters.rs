@@ -1,4 +1,4 @@
-//! False events and depth error of a board, by SNR, α and L1 (section III-C).
+//! False alarms and depth error of a board, by SNR, α and L1 (section III-C).
 //!
 //! The paper's board stands where the pulse lies on an edge between two bins of 8.75
 //! ns, in a window of 8 bins; mini-frames of 5 laser cycles, so X = 5; L2 = 2000. It
@@ -11,8 +11,9 @@
 mod setting;
 
 use self::setting::{NOTHING, Setting, error, false_share};
-use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point, tally};
+use crate::sweep::mean::Measured;
+use crate::sweep::results::{Claim, Figure, Results, Verdict};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, tally, whole};
 use anyhow::Result;
 use dtof::rows::grouped;
 use dtof::simulate::MM_PER_PS;
@@ -20,7 +21,7 @@ use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AsyncPixel, Count, LaserCycle, Look, PaperRule, PixelAddress, PixelConfig, Statistics,
 };
-use dtof_draw::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette;
 use dtof_draw::palette::STEPS;
 use dtof_theory::rates::bin_share;
@@ -58,30 +59,23 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    let mut points = Vec::new();
-    for (background, sigma) in SETTINGS {
-        for l1 in L1S {
-            for alpha in ALPHAS {
-                for snr in SNRS {
-                    points.push(point([
-                        ("background", background),
-                        ("sigma", sigma),
-                        ("l1", l1.into()),
-                        ("alpha", alpha.into()),
-                        ("snr", snr),
-                    ]));
-                }
-            }
-        }
-    }
-    points
+    let of_setting = |(background, sigma)| {
+        grid([
+            ("background", &[background]),
+            ("sigma", &[sigma]),
+            ("l1", &L1S.map(f64::from)),
+            ("alpha", &ALPHAS.map(f64::from)),
+            ("snr", &SNRS),
+        ])
+    };
+    SETTINGS.into_iter().flat_map(of_setting).collect()
 }
 
 /// A pixel in front of the board for 10,000 laser cycles.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "counts of a mini-frame, and parameters that are small whole numbers"
+    reason = "counts of a mini-frame"
 )]
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let background = point["background"];
@@ -96,7 +90,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let rule = PaperRule::new(alpha, Count::saturating(1));
     let config = PixelConfig::with_rule(rule)
         .x(FRAME)
-        .l1(point["l1"] as u16)
+        .l1(whole(point, "l1"))
         .l2(L2)
         .build()?;
     let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(0));
@@ -226,16 +220,12 @@ fn in_all(holds: impl IntoIterator<Item = Option<bool>>) -> Verdict {
 }
 
 /// Whether the whole interval lies below 0.1 %, or above; `None` if it holds it.
-fn below_a_thousandth(share: Share) -> Option<bool> {
-    if share.holds(0.001) {
-        None
-    } else {
-        Some(share.value < 0.001)
-    }
+fn below_a_thousandth(share: Measured) -> Option<bool> {
+    (!share.holds(0.001)).then_some(share.value < 0.001)
 }
 
 fn figures(setting: Setting) -> Result<Vec<Figure>> {
-    let dots = |points: Vec<&PointTally>, of: fn(&PointTally) -> Share| -> Vec<Dot> {
+    let dots = |points: Vec<&PointTally>, of: fn(&PointTally) -> Measured| -> Vec<Dot> {
         let points = points.into_iter();
         points
             .map(|point| of(point).at(point.parameter("snr")))
@@ -246,7 +236,7 @@ fn figures(setting: Setting) -> Result<Vec<Figure>> {
         let points = dots(setting.by_snr(alpha, 20), false_share);
         joined(format!("α = {alpha}"), palette::alpha(alpha.into()), points)
     });
-    let in_metres = |point: &PointTally| metres(error(point));
+    let in_metres = |point: &PointTally| error(point).times(METRES_A_BIN);
     let mut pens = STEPS.into_iter();
     let errors = L1S.map(|l1| {
         let points = dots(setting.by_snr(4, l1), in_metres);
@@ -270,7 +260,8 @@ fn figures(setting: Setting) -> Result<Vec<Figure>> {
         })
     };
     let chart = |text: &str, x: &str, y, series: Vec<Series>| Chart {
-        finding: Finding::new(text, falls(&series)),
+        finding: text.to_owned(),
+        holds: falls(&series),
         note: "Bars hold 99 %. Dots with fewer than 50 events are left out.".to_owned(),
         x: Axis::logarithmic(x),
         y,
@@ -317,17 +308,6 @@ fn figures(setting: Setting) -> Result<Vec<Figure>> {
     ])
 }
 
-/// From bins.
-fn metres(bins: Share) -> Share {
-    Share {
-        value: bins.value * METRES_A_BIN,
-        interval: (
-            bins.interval.0 * METRES_A_BIN,
-            bins.interval.1 * METRES_A_BIN,
-        ),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -339,7 +319,7 @@ mod tests {
         assert_eq!(in_all([Some(true), Some(true)]), Verdict::Agrees);
         assert_eq!(in_all([Some(false), Some(false)]), Verdict::Refuted);
         assert_eq!(in_all([Some(true), None, Some(false)]), Verdict::Differs);
-        assert_eq!(below_a_thousandth(Share::new(0, 50)), None);
-        assert_eq!(below_a_thousandth(Share::new(0, 50_000)), Some(true));
+        assert_eq!(below_a_thousandth(Measured::share(0, 50)), None);
+        assert_eq!(below_a_thousandth(Measured::share(0, 50_000)), Some(true));
     }
 }

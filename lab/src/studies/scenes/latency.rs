@@ -2,13 +2,13 @@
 
 use super::one_pixel::{BINS, CODES, PROTOTYPE_X, prototype};
 use crate::sweep::mean::{Measured, add, add_value};
-use crate::sweep::results::{Claim, Figure, Results, Share, Verdict};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
+use crate::sweep::results::{Claim, Figure, Results, Verdict};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
 use anyhow::Result;
 use dtof::rows::grouped;
 use dtof::simulate::SimulatedPixel;
 use dtof_core::{AsyncPixel, LaserCycle, PixelAddress, Statistics};
-use dtof_draw::chart::{Axis, Chart, Finding, Panel, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Panel, Series, Style};
 use dtof_draw::palette::STEPS;
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::{Rates, signal_for_snr};
@@ -49,28 +49,15 @@ pub const STUDY: Study = Study {
 
 /// The SNR is that of 40 laser cycles, whatever L1.
 fn points() -> Vec<Point> {
-    let mut points = Vec::new();
-    for l1 in [20.0, 40.0] {
-        for background in [0.02, 0.2] {
-            for snr in [4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 64.0] {
-                points.push(point([
-                    ("l1", l1),
-                    ("background", background),
-                    ("snr", snr),
-                ]));
-            }
-        }
-    }
-    points
+    grid([
+        ("l1", &[20.0, 40.0]),
+        ("background", &[0.02, 0.2]),
+        ("snr", &[4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 64.0]),
+    ])
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "20 or 40"
-    )]
-    let config = prototype(point["l1"] as u16)?;
+    let config = prototype(whole(point, "l1"))?;
     let background = point["background"];
     let rates = Rates {
         background,
@@ -111,22 +98,19 @@ fn add_waits(tally: &mut Tally, waited: u64, latency: u64) {
     add_value(tally, "waited", whole(waited));
     add_value(tally, "latency", whole(latency));
     for by in BY {
-        if waited <= by {
-            add(tally, "waited by", &by.to_string(), 1);
-        }
-        if latency <= by {
-            add(tally, "latency by", &by.to_string(), 1);
+        for (what, cycles) in [("waited by", waited), ("latency by", latency)] {
+            if cycles <= by {
+                add(tally, what, &by.to_string(), 1);
+            }
         }
     }
 }
 
 /// The share of events that are there `by` then, of all that could have been.
-fn share_by(point: &PointTally, what: &str, by: u64) -> Share {
+fn share_by(point: &PointTally, what: &str, by: u64) -> Measured {
     let all = point.count("latency values") + point.count("events cut off");
-    Share::new(point.count(&format!("{what} by {by}")), all)
+    Measured::share(point.count(&format!("{what} by {by}")), all)
 }
-
-#[allow(clippy::cast_precision_loss, reason = "some thousand laser cycles")]
 fn results(part: &Part) -> Result<Results> {
     let points = || part.at([("l1", 40.0), ("background", 0.02)]);
     let series = points().zip(STEPS).map(|(point, pen)| {
@@ -146,10 +130,7 @@ fn results(part: &Part) -> Result<Results> {
     let strongest = points().last();
     let soon = strongest.map_or(0.0, |point| share_by(point, "latency", 44).value);
     let chart = Chart {
-        finding: Finding::new(
-            "A strong signal is reported at the first decision, 44 laser cycles, a weak one later",
-            none_before && soon > 0.95,
-        ),
+        finding: "A strong signal is reported at the first decision, 44 laser cycles, a weak one later".to_owned(), holds: none_before && soon > 0.95,
         note: "A curve ends where all events are there. Bars hold 99 %. Ten laser cycles are a microsecond."
             .to_owned(),
         x: Axis::logarithmic("laser cycles from the first photon after a reset"),
@@ -209,6 +190,7 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sweep::point;
 
     #[test]
     fn a_wait_counts_by_every_later_time() {

@@ -8,7 +8,7 @@
 
 use super::one_pixel::{PER_BIN, Reading};
 use crate::sweep::mean::{Measured, add};
-use crate::sweep::results::{Share, Verdict, Z_99};
+use crate::sweep::results::{Verdict, Z_99};
 use crate::sweep::{PointTally, Tally};
 
 /// The paper's bound of a false detection: half a bin from the surface.
@@ -57,7 +57,7 @@ pub fn add_pair(
 
 /// Of the exposures with an edge (`mixed`) or without (`clean`), those read as
 /// neither surface.
-pub fn neither(point: &PointTally, sensor: &str, exposures: &str) -> Share {
+pub fn neither(point: &PointTally, sensor: &str, exposures: &str) -> Measured {
     point.share(
         &format!("{sensor} {exposures}, neither"),
         &format!("{sensor} pairs"),
@@ -66,7 +66,6 @@ pub fn neither(point: &PointTally, sensor: &str, exposures: &str) -> Share {
 
 /// How much more often an exposure with an edge is read as neither surface than the
 /// same without, with the 99 % interval of Agresti and Min for pairs.
-#[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
 pub fn excess(point: &PointTally, sensor: &str) -> Measured {
     let count = |what: &str| point.count(&format!("{sensor} {what}")) as f64;
     let pairs = count("pairs") + 2.0;
@@ -103,20 +102,13 @@ pub fn is_sharp(excesses: &[Measured]) -> Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sweep::Point;
+    use crate::sweep::tally;
 
     fn reading(first: u64, last: u64, position: i64) -> Reading {
         Reading {
             first,
             last,
             position,
-        }
-    }
-
-    fn of(tally: Tally) -> PointTally {
-        PointTally {
-            parameters: Point::new(),
-            tally,
         }
     }
 
@@ -135,22 +127,17 @@ mod tests {
         add(180, [&with, &without[..1]]);
         assert_eq!(tally["a between exposures"], 1);
         assert_eq!((tally["a pairs"], tally["a mixed alone"]), (1, 1));
-        assert_eq!(
-            (tally["a mixed, neither"], tally["a clean, neither"]),
-            (1, 0)
-        );
-        assert_eq!(
-            (tally["a mixed, not read"], tally["a clean, not read"]),
-            (1, 1)
-        );
+        for (what, mixed, clean) in [("neither", 1, 0), ("not read", 1, 1)] {
+            let both = ["mixed", "clean"].map(|which| tally[&format!("a {which}, {what}")]);
+            assert_eq!(both, [mixed, clean]);
+        }
     }
 
     #[test]
     fn few_pairs_decide_nothing() {
         let verdict = |pairs, alone| {
             let counts = [("a pairs", pairs), ("a mixed alone", alone)];
-            let point = of(crate::sweep::tally(counts));
-            is_sharp(&[excess(&point, "a")])
+            is_sharp(&[excess(&tally(counts).into(), "a")])
         };
         assert_eq!(verdict(0, 0), Verdict::NotDecided);
         assert_eq!(verdict(50, 0), Verdict::NotDecided);
@@ -168,7 +155,7 @@ mod tests {
             ("a mixed alone", 12),
             ("a clean alone", 3),
         ];
-        let excess = excess(&of(crate::sweep::tally(counts)), "a");
+        let excess = excess(&tally(counts).into(), "a");
         assert!((excess.value - 9.0 / 102.0).abs() < 1e-12);
         let half = Z_99 * (16.0 - 81.0 / 102.0_f64).sqrt() / 102.0;
         assert!((excess.interval.1 - excess.value - half).abs() < 1e-12);

@@ -4,13 +4,16 @@
 use anyhow::Result;
 use dtof::engine::frame::FramePixel;
 use dtof::engine::settings::Settings;
-use dtof::simulate::scene;
+use dtof::simulate::{SimulatedPixel, scene};
 use dtof_core::{
     AnyRule, AsyncPixel, BinPosition, DepthEstimator, DepthEvent, LaserCycle, PixelAddress,
     PixelConfig, RangeGate, Statistics,
 };
 use dtof_draw::palette;
 use dtof_draw::palette::Pen;
+use dtof_theory::rates::Rates;
+use rand_distr::{Distribution, Uniform};
+use rand_pcg::Pcg64;
 
 /// Bins of a histogram.
 pub const BINS: usize = CODES as usize;
@@ -123,9 +126,35 @@ pub fn watch(
     Ok(readings)
 }
 
+/// Random phases of the frames.
+pub fn phases(rng: &mut Pcg64) -> Result<[u64; 4]> {
+    let mut phases = FRAMES;
+    for phase in &mut phases {
+        *phase = Uniform::new(0, *phase)?.sample(rng);
+    }
+    Ok(phases)
+}
+
+/// What the sensors report of `pixel`, which has the rates `later` from laser cycle `at` on.
+pub fn watch_step(
+    pixel: &SimulatedPixel,
+    later: &Rates,
+    at: u64,
+    cycles: u64,
+    phases: [u64; 4],
+) -> Result<[Vec<Reading>; 5]> {
+    let mut pixel = pixel.clone();
+    watch(cycles, &prototype(40)?, phases, |cycle, photon| {
+        if cycle == at {
+            pixel.set_rates(later)?;
+        }
+        pixel.next_cycle(photon);
+        Ok(())
+    })
+}
+
 /// Bins as a position, rounded to the nearest.
 #[allow(clippy::cast_possible_truncation, reason = "some hundred bins")]
-#[allow(clippy::cast_precision_loss, reason = "256")]
 pub fn in_parts(bins: f64) -> i64 {
     (bins * PER_BIN as f64).round() as i64
 }
@@ -150,11 +179,8 @@ mod tests {
         assert!(events.iter().all(|event| event.exposure() == 44));
         assert_eq!(events[0].position, in_parts(40.5));
         assert_eq!((short[0].first, short[0].last), (30, 129));
-        assert!(
-            short
-                .windows(2)
-                .all(|pair| pair[0].last + 1 == pair[1].first)
-        );
+        let follows = |pair: &[Reading]| pair[0].last + 1 == pair[1].first;
+        assert!(short.windows(2).all(follows));
         assert!(short.iter().all(|frame| frame.exposure() == 100));
         assert_eq!(long.len(), 2);
     }
@@ -165,11 +191,8 @@ mod tests {
     fn a_frame_with_both_surfaces_reports_that_with_more_photons() {
         let [_, short, _, middle, long] = step();
         let at = |frames: &[Reading], last: u64| {
-            frames
-                .iter()
-                .find(|frame| frame.last == last)
-                .unwrap()
-                .position
+            let found = frames.iter().find(|frame| frame.last == last);
+            found.unwrap().position
         };
         assert_eq!(at(&short, 1029), in_parts(40.5));
         assert_eq!(at(&short, 1129), in_parts(20.5));

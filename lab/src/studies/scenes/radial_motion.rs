@@ -2,16 +2,17 @@
 //! (section III-D, radial motion).
 
 use super::one_pixel::{
-    BIN_WIDTH_PS, CODES, FRAMES, PER_BIN, SENSORS, in_parts, pen, prototype, watch,
+    BIN_WIDTH_PS, CODES, PER_BIN, SENSORS, in_parts, pen, phases, prototype, watch,
 };
 use crate::sweep::mean::{Measured, add, add_value};
 use crate::sweep::results::{Claim, Figure, Results, Verdict};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::Result;
 use dtof::rows::grouped;
 use dtof::simulate::{MM_PER_PS, SimulatedPixel};
 use dtof_core::PixelAddress;
-use dtof_draw::chart::{Axis, Chart, Finding, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::NEUTRAL;
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 use rand_core::Rng;
@@ -47,24 +48,16 @@ pub const STUDY: Study = Study {
 
 /// The laser rates of the paper's two systems.
 fn points() -> Vec<Point> {
-    let mut points = Vec::new();
-    for laser_rate_mhz in [PROTOTYPE_MHZ, 1.2] {
-        for speed in [0.1, 1.0, FAST, 100.0] {
-            points.push(point([
-                ("laser_rate_mhz", laser_rate_mhz),
-                ("metres_per_second", speed),
-            ]));
-        }
-    }
-    points
+    grid([
+        ("laser_rate_mhz", &[PROTOTYPE_MHZ, 1.2]),
+        ("metres_per_second", &[0.1, 1.0, FAST, 100.0]),
+    ])
 }
 
 /// Bins a laser cycle.
 fn bins_per_cycle(point: &Point) -> f64 {
     point["metres_per_second"] / point["laser_rate_mhz"] / 1000.0 / MM_PER_BIN
 }
-
-#[allow(clippy::cast_precision_loss, reason = "some thousand laser cycles")]
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let config = prototype(40)?;
     let speed = bins_per_cycle(point);
@@ -81,10 +74,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             position: start + speed * (cycle as f64 + 0.5),
             sigma: 1.0,
         };
-        let mut phases = FRAMES;
-        for phase in &mut phases {
-            *phase = Uniform::new(0, *phase)?.sample(rng);
-        }
+        let phases = phases(rng)?;
         let photons = pixel_rng(rng.next_u64(), PixelAddress(0));
         let mut pixel = SimulatedPixel::new(&rates(0), CODES, photons)?;
         let readings = watch(CYCLES, &config, phases, |cycle, photon| {
@@ -119,8 +109,6 @@ struct Lag {
     /// What the surface goes in a mean exposure, in millimetres.
     path_mm: f64,
 }
-
-#[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
 fn lag(point: &PointTally, sensor: &str) -> Lag {
     let count = |what: &str| point.count(&format!("{sensor} {what}")) as f64;
     let mean = Measured::mean(point, sensor);
@@ -133,6 +121,13 @@ fn lag(point: &PointTally, sensor: &str) -> Lag {
     }
 }
 
+fn at(part: &Part, laser_rate_mhz: f64, speed: f64) -> Result<&PointTally> {
+    part.one([
+        ("laser_rate_mhz", laser_rate_mhz),
+        ("metres_per_second", speed),
+    ])
+}
+
 fn figure(part: &Part, name: &'static str, laser_rate_mhz: f64) -> Result<Figure> {
     let mut series = Vec::new();
     for (number, sensor) in SENSORS.into_iter().enumerate() {
@@ -140,11 +135,7 @@ fn figure(part: &Part, name: &'static str, laser_rate_mhz: f64) -> Result<Figure
         let lags = lags.map(|point| (point.parameter("metres_per_second"), lag(point, sensor)));
         let steps = f64::from(u32::try_from(number)?) - 2.0;
         let measured = lags.clone().map(|(x, lag)| {
-            let dot = Dot {
-                x,
-                y: lag.mm.value,
-                interval: Some(lag.mm.interval),
-            };
+            let dot = lag.mm.at(x);
             dot.aside(steps)
         });
         let half = lags.map(|(x, lag)| Dot::exact(x, lag.path_mm / 2.0));
@@ -152,25 +143,19 @@ fn figure(part: &Part, name: &'static str, laser_rate_mhz: f64) -> Result<Figure
         series.push(Series::named(sensor, pen, Style::Dashed, half.collect()));
         series.push(Series::unnamed(pen, Style::Dots, measured.collect()));
     }
-    let fastest = part.one([
-        ("laser_rate_mhz", laser_rate_mhz),
-        ("metres_per_second", 100.0),
-    ])?;
+    let fastest = at(part, laser_rate_mhz, 100.0)?;
     let [events, frames] = [0, 4].map(|sensor| lag(fastest, SENSORS[sensor]).mm);
     let times = frames.value / events.value;
     let chart = Chart {
-        finding: Finding::new(
-            format!(
+        finding: format!(
                 "At {laser_rate_mhz} MHz events lag {times:.0} times less behind a moving surface than frames of 2000"
-            ),
-            events.interval.1 * 10.0 < frames.interval.0,
-        ),
+            ), holds: events.interval.1 * 10.0 < frames.interval.0,
         note: "Dots of one speed stand side by side. Bars hold 99 %; one that reaches the lower edge includes no lag at all.".to_owned(),
         x: Axis::logarithmic("speed, m/s").within(0.06, 150.0),
         y: Axis::logarithmic("lag of a reading at the end of its exposure, mm").within(1e-4, 200.0),
         key: vec![
-            Key::new(Style::Dots, "simulated"),
-            Key::new(Style::Dashed, "half of the path in a mean exposure"),
+            Key::new(NEUTRAL, Style::Dots, "simulated"),
+            Key::new(NEUTRAL, Style::Dashed, "half of the path in a mean exposure"),
         ],
         columns: 1,
         panels: vec![Panel::only(series)],
@@ -179,15 +164,9 @@ fn figure(part: &Part, name: &'static str, laser_rate_mhz: f64) -> Result<Figure
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let at = |laser_rate_mhz, speed| {
-        part.one([
-            ("laser_rate_mhz", laser_rate_mhz),
-            ("metres_per_second", speed),
-        ])
-    };
-    let fast = at(PROTOTYPE_MHZ, FAST)?;
+    let fast = at(part, PROTOTYPE_MHZ, FAST)?;
     let (event, frame) = (lag(fast, SENSORS[0]), lag(fast, SENSORS[4]));
-    let slow_laser = at(1.2, FAST)?;
+    let slow_laser = at(part, 1.2, FAST)?;
     let (slow_event, slow_frame) = (lag(slow_laser, SENSORS[0]), lag(slow_laser, SENSORS[4]));
     Ok(Results {
         figures: vec![
@@ -219,6 +198,7 @@ fn results(part: &Part) -> Result<Results> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sweep::point;
     use rand_core::SeedableRng;
 
     /// Frames have a known exposure, and so a known lag.

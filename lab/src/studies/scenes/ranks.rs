@@ -19,7 +19,6 @@ fn doubled_ranks(values: &[f64]) -> Vec<i64> {
 
 /// Spearman's rank correlation of pairs, equals at their mean rank. None if one
 /// side does not vary.
-#[allow(clippy::cast_precision_loss, reason = "some thousand values")]
 pub fn rank_correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     let mean = i64::try_from(a.len()).ok()? + 1; // of doubled ranks
     let centred = |values| -> Vec<i64> {

@@ -84,7 +84,6 @@ fn scene(point: &Point, shift: f64) -> Result<Scene> {
     let pixels = f64::from(scene.layout.columns - 1) * across;
     for surface in &mut scene.surfaces {
         // A surface that is turned already is as good.
-        #[allow(clippy::float_cmp, reason = "one is the default of the other")]
         if surface.range_right_mm == surface.range_mm {
             surface.range_right_mm += pixels / PIXELS_A_BIN * mm_per_bin;
         }
@@ -151,8 +150,6 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     add_scene(&mut tally, &scene, &addresses, &pixels);
     Ok(tally)
 }
-
-#[allow(clippy::cast_precision_loss, reason = "at most ten positions")]
 fn mean_of_last(positions: &[i64], most: usize) -> f64 {
     let last = &positions[positions.len().saturating_sub(most)..];
     last.iter().sum::<i64>() as f64 / last.len() as f64
@@ -219,7 +216,6 @@ fn add_depth(tally: &mut Tally, name: &str, error: i64) {
 
 /// Adds what is compared from pixel to pixel: ranks, and the reflectivity that
 /// follows from the events and the depth reported.
-#[allow(clippy::cast_precision_loss, reason = "some thousand events")]
 #[allow(clippy::cast_possible_truncation, reason = "some millions")]
 fn add_scene(tally: &mut Tally, scene: &Scene, addresses: &[PixelAddress], pixels: &[Pixel]) {
     let signals = addresses

@@ -6,7 +6,6 @@ use super::pixel::Pixel;
 use super::{BACKGROUNDS, ESTIMATORS, SIGMAS, pixels};
 use crate::studies::methods::passage::Method;
 use crate::sweep::mean::Measured;
-use crate::sweep::results::Share;
 use crate::sweep::{Part, PointTally};
 use dtof_theory::bounds::cramer_rao::Pulse;
 
@@ -36,13 +35,13 @@ pub struct Outcome {
     /// α or z.
     pub threshold: f64,
     /// Events an exposure without a target.
-    pub false_share: Share,
+    pub false_share: Measured,
     /// How many.
     pub events: u64,
     /// Events an exposure.
-    pub event_share: Share,
+    pub event_share: Measured,
     /// Of the events, those whose peak is in the pulse. What follows is of these.
-    pub in_pulse: Share,
+    pub in_pulse: Measured,
     /// Mean laser cycles.
     pub cycles: f64,
     /// Mean photons of the pulse.
@@ -58,22 +57,19 @@ impl Outcome {
     /// The number of the estimator that is better, if one surely is.
     #[must_use]
     pub fn better(&self) -> Option<usize> {
-        if self.excess.interval.0 > 0.0 {
+        let (low, high) = self.excess.interval;
+        if low > 0.0 {
             Some(0)
-        } else if self.excess.interval.1 < 0.0 {
-            Some(1)
         } else {
-            None
+            (high < 0.0).then_some(1)
         }
     }
-
-    #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
     fn new(scene: (f64, f64), pixel: &Pixel, without: &[&PointTally], with: &PointTally) -> Self {
         let (sigma, background) = scene;
         let name = pixel.name();
         let of = |point: &PointTally, what: &str| point.count(&format!("{name} {what}"));
         let sum = |what: &str| without.iter().map(|point| point.count(what)).sum();
-        let false_share = Share::new(sum(&format!("{name} events")), sum("exposures"));
+        let false_share = Measured::share(sum(&format!("{name} events")), sum("exposures"));
         let events = of(with, "events");
         let near = events - of(with, "elsewhere");
         let [cycles, signal] = ["cycles", "signal"].map(|what| of(with, what) as f64 / near as f64);
@@ -85,8 +81,7 @@ impl Outcome {
         let bound = bound.position_error();
         let placed = ESTIMATORS.map(|(estimator, _)| {
             let name = format!("{name} {estimator}");
-            let error = Measured::root_mean_square(with, std::slice::from_ref(&name));
-            let error = error.times(1.0 / 256.0);
+            let error = Measured::root_mean_square(with, &name).times(1.0 / 256.0);
             Placed {
                 error,
                 bias: Measured::mean(with, &name).times(1.0 / 256.0),
@@ -101,8 +96,8 @@ impl Outcome {
             threshold: pixel.threshold,
             false_share,
             events,
-            event_share: Share::new(events, with.count("exposures")),
-            in_pulse: Share::new(near, events),
+            event_share: Measured::share(events, with.count("exposures")),
+            in_pulse: Measured::share(near, events),
             cycles,
             signal,
             placed,
@@ -139,20 +134,13 @@ pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
 mod tests {
     use super::*;
     use crate::sweep::mean::{add, add_error, add_value};
-    use crate::sweep::{Tally, point};
-
-    fn point_of(tally: Tally) -> PointTally {
-        PointTally {
-            parameters: point([]),
-            tally,
-        }
-    }
+    use crate::sweep::tally;
 
     /// 400 events in 1000 exposures, 40 of them elsewhere; the centre of mass is half a bin
     /// off to either side, the window `centred` parts of 256, too far.
     fn outcome(centred: i64) -> Outcome {
         let pixel = Pixel::new(Method::Paper, 40, 0.05).unwrap();
-        let mut with = Tally::from([("exposures".to_owned(), 1000)]);
+        let mut with = tally([("exposures", 1000)]);
         let sums = [
             ("events", 400),
             ("elsewhere", 40),
@@ -169,12 +157,8 @@ mod tests {
             let excess = centred * centred - mass * mass;
             add_value(&mut with, "paper 40 excess", excess);
         }
-        let without = point_of(Tally::from([
-            ("exposures".to_owned(), 500),
-            ("paper 40 events".to_owned(), 5),
-        ]));
-        let with = point_of(with);
-        Outcome::new((1.0, 0.05), &pixel, &[&without, &without], &with)
+        let without = tally([("exposures", 500), ("paper 40 events", 5)]).into();
+        Outcome::new((1.0, 0.05), &pixel, &[&without, &without], &with.into())
     }
 
     #[test]

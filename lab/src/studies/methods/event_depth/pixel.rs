@@ -1,10 +1,8 @@
 //! Pixels that watch the same photons until each has had its event.
 
-use anyhow::{Result, ensure};
-use dtof_core::fixed::types::U8F8;
+use anyhow::{Context, Result};
 use dtof_core::{
-    AnyRule, BinPosition, Count, DepthEstimator, DetectionRule, Histogram, PaperRule, RangeGate,
-    WindowRule, detect, z_for,
+    AnyRule, BinPosition, DepthEstimator, DetectionRule, Histogram, RangeGate, detect, z_for,
 };
 use rand_pcg::Pcg64;
 
@@ -14,7 +12,7 @@ use dtof_theory::looks::exposure::Exposures;
 use dtof_theory::rates::Rates;
 
 /// For each of [`FIRST_LOOKS`] and [`BACKGROUNDS`] the least α, in 1/16, with at most 1 %
-/// false events an exposure. There is none with 1 %: counts are whole, so that their
+/// false alarms an exposure. There is none with 1 %: counts are whole, so that their
 /// share falls in steps.
 const ALPHAS: [[f64; 3]; 2] = [[5.0, 4.0, 3.5], [3.6875, 3.1875, 3.0]];
 
@@ -32,34 +30,30 @@ pub struct Pixel {
 }
 
 impl Pixel {
-    /// With 1 % false events an exposure at this background.
+    /// With 1 % false alarms an exposure at this background.
     ///
     /// # Errors
     /// If the background or the first look is not one of the study's.
     pub fn new(method: Method, first_look: u32, background: f64) -> Result<Self> {
-        let count = Count::saturating(MINIMUM_COUNT);
-        let (rule, threshold) = match method {
-            Method::Window(width) => {
+        let threshold = match method {
+            Method::Window(_) => {
                 // As the commands take it, L1 being one less than the first look.
                 let [x, l1, l2] = [LOOKS.x, first_look - 1, LOOKS.expiry()].map(u16::try_from);
-                let z = z_for(100, &RangeGate::<BINS>::full(), x?, l1?, l2?);
-                (WindowRule::new(width, z, count)?.into(), z.to_num())
+                z_for(100, &RangeGate::<BINS>::full(), x?, l1?, l2?).to_num()
             }
             _ => {
                 let looks = FIRST_LOOKS.into_iter().zip(ALPHAS);
                 let alphas = looks.filter(|(first, _)| *first == first_look);
                 let mut all = alphas.flat_map(|(_, alphas)| BACKGROUNDS.into_iter().zip(alphas));
                 let alpha = all.find(|(of, _)| of.total_cmp(&background).is_eq());
-                ensure!(alpha.is_some(), "no α for {background} from {first_look}");
-                let alpha = alpha.map_or(0.0, |(_, alpha)| alpha);
-                let rule = PaperRule::new(U8F8::saturating_from_num(alpha), count);
-                (rule.into(), alpha)
+                let no_alpha = || format!("no α for {background} from {first_look}");
+                alpha.with_context(no_alpha)?.1
             }
         };
         Ok(Self {
             method,
             first_look,
-            rule,
+            rule: method.rule(threshold, MINIMUM_COUNT)?,
             threshold,
         })
     }
@@ -162,10 +156,11 @@ pub fn exposure(
 
 #[cfg(test)]
 mod tests {
-    use dtof_core::{AsyncPixel, LaserCycle, PixelAddress, PixelConfig, Statistics};
+    use dtof_core::{Count10, PixelConfig};
 
     use super::super::estimators;
     use super::*;
+    use crate::studies::methods::passage::tests::event as of_core;
     use dtof_theory::random::trial_rng;
 
     const RATES: Rates = Rates {
@@ -218,23 +213,9 @@ mod tests {
                     let l1 = u16::try_from(pixel.first_look - 1).unwrap();
                     let config = PixelConfig::with_rule(pixel.rule).l1(l1).l2(1000);
                     let config = config.estimator(estimator).build().unwrap();
-                    let mut of_core = AsyncPixel::<BINS>::new(PixelAddress(0));
-                    let (mut before, mut statistics) = (0, Statistics::new());
-                    let mut found = None;
-                    for (cycles, frame) in &frames {
-                        of_core.count_frame(&config, frame);
-                        let passed = u16::try_from(cycles - before).unwrap();
-                        let cycle = LaserCycle((*cycles).into());
-                        let _ = of_core.end_laser_cycles(&config, &mut statistics, cycle, passed);
-                        before = *cycles;
-                        found = of_core.acknowledge();
-                        if found.is_some() {
-                            break;
-                        }
-                    }
                     let here = event.map(|event| (event.cycles, event.positions[index]));
-                    let there =
-                        found.map(|found| (u32::from(found.exposure), found.position().raw()));
+                    let there = of_core::<Count10>(&config, &frames)
+                        .map(|found| (found.exposure.into(), found.position().raw()));
                     assert_eq!(here, there);
                 }
                 differ += event.map_or(0, |event| {

@@ -4,10 +4,9 @@ use super::FALSE_SHARE;
 use crate::studies::methods::passage::{LOOKS, Ladder};
 use crate::sweep::PointTally;
 use crate::sweep::mean::Measured;
-use crate::sweep::results::{Share, Z_99};
+use crate::sweep::results::Z_99;
 
 /// Mean laser cycles to an event with a threshold, and the variance of that mean.
-#[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
 fn mean_and_variance(ladder: &Ladder, threshold: f64, point: &PointTally) -> (f64, f64) {
     let exposures = point.count("exposures") as f64;
     let of = |what: &str| {
@@ -24,7 +23,7 @@ fn mean_and_variance(ladder: &Ladder, threshold: f64, point: &PointTally) -> (f6
     (mean, above.max(0.0) / (events * events))
 }
 
-/// Mean laser cycles to an event with [`FALSE_SHARE`] false events in the exposures of
+/// Mean laser cycles to an event with [`FALSE_SHARE`] false alarms in the exposures of
 /// `without`, the threshold, and what both are sure of.
 pub(super) fn time(
     ladder: &Ladder,
@@ -38,11 +37,10 @@ pub(super) fn time(
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
         reason = "far fewer than 2^52"
     )]
     let events = (exposures as f64 * FALSE_SHARE).round() as u64;
-    let (fewer, more) = Share::new(events, exposures).interval;
+    let (fewer, more) = Measured::share(events, exposures).interval;
     let [late, early] = [fewer, more]
         .map(|share| mean_and_variance(ladder, ladder.calibrated(without, share), with_target).0);
     let half = Z_99 * variance.sqrt();
@@ -57,7 +55,7 @@ pub(super) fn time(
 mod tests {
     use super::*;
     use crate::studies::methods::passage::Method;
-    use crate::sweep::{Tally, point};
+    use crate::sweep::Tally;
 
     fn tally(counts: [(&str, u64); 4], ladder: &Ladder) -> PointTally {
         let mut tally = Tally::from([("exposures".to_owned(), counts[0].1)]);
@@ -66,10 +64,7 @@ mod tests {
                 tally.insert(ladder.key(index, what), *count);
             }
         }
-        PointTally {
-            parameters: point([]),
-            tally,
-        }
+        tally.into()
     }
 
     /// Half of the exposures expire: as many as there are events, and the delta method's
@@ -94,7 +89,7 @@ mod tests {
         );
     }
 
-    /// Times of 100, 110, … that vary by nothing, and false events that fall by a factor
+    /// Times of 100, 110, … that vary by nothing, and false alarms that fall by a factor
     /// of four a threshold: a hundred times the exposures, about a tenth of the interval.
     #[test]
     fn a_time_is_as_unsure_as_its_threshold() {
@@ -120,7 +115,7 @@ mod tests {
             assert!((threshold - 4.25).abs() < 1e-3 && (time.value - 120.0).abs() < 0.1);
             (time.interval.1 - time.interval.0) / 2.0
         };
-        // A factor of e in false events is 10 / ln 4 = 7.2 laser cycles, and a hundred of
+        // A factor of e in false alarms is 10 / ln 4 = 7.2 laser cycles, and a hundred of
         // them are sure to 26 %.
         let (few, many) = (half(10_000), half(1_000_000));
         assert!((1.4..2.6).contains(&few), "{few}");

@@ -2,19 +2,18 @@
 
 use super::{ALPHAS, SETTINGS, SNRS};
 use crate::sweep::mean::Measured;
-use crate::sweep::results::Share;
+use crate::sweep::results::ends;
 use crate::sweep::{Part, PointTally};
 
-pub fn false_share(point: &PointTally) -> Share {
+pub fn false_share(point: &PointTally) -> Measured {
     point.share("false", "events")
 }
 
 /// The root mean square error of all events in bins, with its 99 % interval.
-pub fn error(point: &PointTally) -> Share {
+pub fn error(point: &PointTally) -> Measured {
     let sum = |name| u128::from(point.count(name));
     let parts = Measured::root_of_squares(sum("events"), sum("squares"), sum("fourth"));
-    let Measured { value, interval } = parts.times(1.0 / 256.0);
-    Share { value, interval }
+    parts.times(1.0 / 256.0)
 }
 
 /// One of [`SETTINGS`].
@@ -46,16 +45,16 @@ impl<'a> Setting<'a> {
         points.filter(|point| point.count("events") >= 50).collect()
     }
 
-    pub fn shares(self, alpha: u16, l1: u16, of: fn(&PointTally) -> Share) -> Vec<Share> {
+    pub fn shares(self, alpha: u16, l1: u16, of: fn(&PointTally) -> Measured) -> Vec<Measured> {
         self.by_snr(alpha, l1).into_iter().map(of).collect()
     }
 
-    /// Whether the false events are as many at every SNR, to a factor of 2 or the
+    /// Whether the false alarms are as many at every SNR, to a factor of 2 or the
     /// intervals. `None` with fewer than two points to compare.
     pub fn false_events_ignore_snr(self) -> Option<bool> {
         let shares = self.shares(4, 20, false_share);
         let ignore = shares.iter().all(|a| {
-            let alike = |b: &Share| a.value <= 2.0 * b.value || a.interval.0 <= b.interval.1;
+            let alike = |b: &Measured| a.value <= 2.0 * b.value || a.interval.0 <= b.interval.1;
             shares.iter().all(alike)
         });
         (shares.len() > 1).then_some(ignore)
@@ -71,7 +70,7 @@ impl<'a> Setting<'a> {
             let [first, .., last] = errors[..] else {
                 return None;
             };
-            let no_rise = |pair: &[Share]| pair[1].value <= 1.05 * pair[0].value;
+            let no_rise = |pair: &[Measured]| pair[1].value <= 1.05 * pair[0].value;
             falls &= last.interval.1 < first.interval.0 && errors.windows(2).all(no_rise);
         }
         Some(falls)
@@ -88,9 +87,9 @@ impl<'a> Setting<'a> {
                     .filter(|point| point.is_at([("snr", snr)]))
                     .map(|point| error(point).value)
                     .collect();
-                if let (2.., Some((low, high))) = (errors.len(), ends(errors)) {
-                    let here = high / low;
-                    factor = Some(factor.map_or(here, |before| before.max(here)));
+                if errors.len() > 1 {
+                    let (low, high) = ends(errors);
+                    factor = Some(factor.unwrap_or(0.0).max(high / low));
                 }
             }
         }
@@ -99,7 +98,6 @@ impl<'a> Setting<'a> {
 
     /// The errors at several L1, averaged over the SNRs that have one at each of them,
     /// α = 4, and how many SNRs those are. `None` without one.
-    #[allow(clippy::cast_precision_loss, reason = "five")]
     pub fn mean_errors<const N: usize>(self, l1s: [u16; N]) -> Option<([f64; N], usize)> {
         let by_l1 = l1s.map(|l1| self.by_snr(4, l1));
         let at = |points: &[&PointTally], snr| {
@@ -140,14 +138,6 @@ impl<'a> Setting<'a> {
     pub fn text(self, of: impl Fn(Self) -> String) -> String {
         format!("B {}, σ {}: {}", self.background, self.sigma, of(self))
     }
-}
-
-/// The lowest and the highest, if there is one.
-fn ends(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
-    values.into_iter().fold(None, |ends, value| {
-        let (low, high) = ends.unwrap_or((value, value));
-        Some((low.min(value), high.max(value)))
-    })
 }
 
 /// Where no point has enough events.

@@ -8,7 +8,7 @@ use crate::sweep::{Part, PointTally};
 use anyhow::Result;
 use dtof::rows::grouped;
 use dtof_core::PixelAddress;
-use dtof_draw::chart::{Axis, Chart, Finding, Panel, Point as Dot, Series, Style};
+use dtof_draw::chart::{Axis, Chart, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{EVENTS, PAPER, Pen, STEPS, frames};
 use std::f64::consts::SQRT_2;
 
@@ -53,11 +53,7 @@ fn by_signal(
         for point in part.at([("pulse_sigma_bins", WIDE)]) {
             for (surface, signal) in surfaces(point)? {
                 let measured = measured(point, &format!("{surface}, {name}"));
-                dots.push(Dot {
-                    x: signal,
-                    y: measured.value,
-                    interval: Some(measured.interval),
-                });
+                dots.push(measured.at(signal));
             }
         }
         // Without an event there is nothing to draw.
@@ -65,16 +61,14 @@ fn by_signal(
         dots.sort_by(|a, b| a.x.total_cmp(&b.x));
         all.push(dots);
     }
-    let panels = shown
-        .names
-        .iter()
-        .zip(&all)
-        .map(|((_, title, pen), dots)| Panel {
-            title: (*title).to_owned(),
-            series: vec![Series::unnamed(*pen, Style::Dots, dots.clone())],
-        });
+    let panels = shown.names.iter().zip(&all);
+    let panels = panels.map(|(&(_, title, pen), dots)| Panel {
+        title: title.to_owned(),
+        series: vec![Series::unnamed(pen, Style::Dots, dots.clone())],
+    });
     Ok(Chart {
-        finding: Finding::new(shown.finding, holds(&all)),
+        finding: shown.finding.to_owned(),
+        holds: holds(&all),
         note: format!("A dot is a surface. Bars hold 99 %. {}", shown.note),
         x: Axis::logarithmic("signal photons a laser cycle, mean of a surface"),
         y: shown.y,
@@ -116,13 +110,7 @@ pub fn results(part: &Part) -> Result<Results> {
         },
     )?;
     let pens = [frames(2000), EVENTS, STEPS[1]];
-    let names = |names: [&'static str; 3]| -> Vec<(&'static str, &'static str, Pen)> {
-        let titles = DEPTHS.into_iter().zip(pens);
-        let named = names.into_iter().zip(titles);
-        named
-            .map(|(name, (title, pen))| (name, title, pen))
-            .collect()
-    };
+    let names = |names: [&'static str; 3]| [0, 1, 2].map(|at| (names[at], DEPTHS[at], pens[at]));
     let depth = by_signal(
         part,
         Shown {
@@ -131,9 +119,7 @@ pub fn results(part: &Part) -> Result<Results> {
             names: &names(DEPTHS),
             note: "Of pixels with ten events or more; errors beyond three bins are left out.",
         },
-        |point, name| {
-            Measured::root_mean_square(point, &[name.to_owned()]).times(1.0 / parts_a_bin())
-        },
+        |point, name| Measured::root_mean_square(point, name).times(1.0 / PER_BIN as f64),
         |all| is_below(&all[2], &all[1]),
     )?;
     let noise = by_signal(
@@ -145,24 +131,22 @@ pub fn results(part: &Part) -> Result<Results> {
             note: "From the difference of two depths of the same pixel, with twenty events or more.",
         },
         |point, name| {
-            let difference = Measured::root_mean_square(point, &[name.to_owned()]);
-            difference.times(1.0 / SQRT_2 / parts_a_bin())
+            let difference = Measured::root_mean_square(point, name);
+            difference.times(1.0 / SQRT_2 / PER_BIN as f64)
         },
         |all| is_below(&all[0], &all[1]) && is_below(&all[2], &all[0]),
     )?;
+    let by_events = (
+        ESTIMATES[0],
+        "by the number of events, as in the paper",
+        PAPER,
+    );
     let reflectivity = by_signal(
         part,
         Shown {
             finding: "Photons an exposure tell the reflectivity better than the number of events",
             y: Axis::linear("estimate over truth, after one scale for the scene"),
-            names: &[
-                (
-                    ESTIMATES[0],
-                    "by the number of events, as in the paper",
-                    PAPER,
-                ),
-                (ESTIMATES[1], "by photons and exposure", EVENTS),
-            ],
+            names: &[by_events, (ESTIMATES[1], "by photons and exposure", EVENTS)],
             note: "1 would be right. A pixel without an event counts as 0.",
         },
         |point, name| Measured::mean(point, name).times(1e-3),
@@ -183,12 +167,6 @@ pub fn results(part: &Part) -> Result<Results> {
         ..Results::default()
     })
 }
-
-#[allow(clippy::cast_precision_loss, reason = "256")]
-fn parts_a_bin() -> f64 {
-    PER_BIN as f64
-}
-
 /// For each scene what `text` makes of it.
 fn of_each(part: &Part, text: impl FnMut(&PointTally) -> Result<String>) -> Result<String> {
     let texts: Result<Vec<String>> = part.points().iter().map(text).collect();
@@ -221,7 +199,7 @@ fn noises(part: &Part, depth: &str) -> Result<(String, Vec<Measured>)> {
                 few.push(surface);
                 continue;
             }
-            let noise = |depth: &str| Measured::root_mean_square(point, &[name(depth)]);
+            let noise = |depth: &str| Measured::root_mean_square(point, &name(depth));
             ratios.push((noise(depth).over(noise(DEPTHS[0])), surface));
         }
         ratios.sort_by(|(a, _), (b, _)| a.value.total_cmp(&b.value));
@@ -273,32 +251,24 @@ fn comparable(ratios: &[Measured]) -> Verdict {
 }
 
 fn claims(part: &Part) -> Result<Vec<Claim>> {
-    let sum = |name: &str| {
-        part.points()
-            .iter()
-            .map(|point| point.count(name))
-            .sum::<u64>()
-    };
+    let sum = |name: &str| -> u64 { part.points().iter().map(|point| point.count(name)).sum() };
     let [by_100, by_109, at_110] = [100, 109, 110].map(|by| sum(&format!("events by {by}")));
-    let correlations = part
+    let correlation =
+        |point: &PointTally| Measured::mean(point, "rank correlation").times(1.0 / MILLION);
+    let lowest = part
         .points()
         .iter()
-        .map(|point| Measured::mean(point, "rank correlation"));
-    let lowest = correlations
-        .map(|measured| measured.interval.0 / MILLION)
-        .fold(1.0, f64::min);
+        .map(|point| correlation(point).interval.0);
+    let lowest = lowest.fold(1.0, f64::min);
     let (last, last_ratios) = noises(part, DEPTHS[1])?;
     let (mean, mean_ratios) = noises(part, DEPTHS[2])?;
-    let errors = |name: &str| -> Vec<Measured> {
-        let points = part.points().iter();
-        points
-            .map(|point| Measured::mean(point, name).times(100.0 / MILLION))
-            .collect()
-    };
-    let worst = errors(ESTIMATES[0])
+    let percent =
+        |point: &PointTally, name: &str| Measured::mean(point, name).times(100.0 / MILLION);
+    let errors = part
+        .points()
         .iter()
-        .map(|error| error.value)
-        .fold(0.0, f64::max);
+        .map(|point| percent(point, ESTIMATES[0]).value);
+    let worst = errors.fold(0.0, f64::max);
     Ok(vec![
         Claim::new(
             "first",
@@ -313,19 +283,9 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
             "bright",
             format!(
                 "rank correlation of events with the signal {}",
-                of_each(part, |point| {
-                    Ok(Measured::mean(point, "rank correlation")
-                        .times(1.0 / MILLION)
-                        .text(3))
-                })?
+                of_each(part, |point| Ok(correlation(point).text(3)))?
             ),
-            if lowest > 0.8 {
-                Verdict::Agrees
-            } else if lowest > 0.5 {
-                Verdict::Differs
-            } else {
-                Verdict::Refuted
-            },
+            Verdict::graded(lowest > 0.8, lowest > 0.5),
         ),
         Claim::new("last", last, noisier(&last_ratios)),
         Claim::new("mean", mean, comparable(&mean_ratios)),
@@ -334,8 +294,7 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
             format!(
                 "rms error after one scale {}",
                 of_each(part, |point| {
-                    let percent =
-                        |name: &str| Measured::mean(point, name).times(100.0 / MILLION).text(1);
+                    let percent = |name: &str| percent(point, name).text(1);
                     let without = surfaces(point)?
                         .into_iter()
                         .map(|(surface, _)| point.count(&format!("{surface} without an event")));
@@ -351,11 +310,7 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
                     ))
                 })?
             ),
-            match worst {
-                worst if worst < 10.0 => Verdict::Agrees,
-                worst if worst < 25.0 => Verdict::Differs,
-                _ => Verdict::Refuted,
-            },
+            Verdict::graded(worst < 10.0, worst < 25.0),
         ),
     ])
 }
