@@ -254,40 +254,28 @@ impl Figures {
 /// it. Counts of 0 are left out. `here` is what this end of the link has counted.
 #[must_use]
 pub fn losses(report: &Report, first: &Report, here: &LinkCounters) -> String {
-    let Statistics {
-        saturated,
-        rejected,
-        gated_out,
-        deferred,
-        expired,
-        expired_deferred,
-        ..
-    } = report.statistics;
+    let counted = &report.statistics;
     let there = since(&report.link, &first.link);
     let both = |count: fn(&LinkCounters) -> u32| u64::from(count(&there)) + u64::from(count(here));
     let sensor_errors = report.sensor_errors.wrapping_sub(first.sensor_errors);
+    let overrun = report.overrun.wrapping_sub(first.overrun);
+    let unknown = report.unknown.wrapping_sub(first.unknown);
     let counts = [
-        ("saturated", saturated),
-        ("rejected", rejected),
-        ("gated out", gated_out),
+        ("saturated", counted.saturated),
+        ("rejected", counted.rejected),
+        ("gated out", counted.gated_out),
         ("unaddressed", report.unaddressed),
-        ("deferred", deferred),
-        ("expired", expired),
-        ("expired and deferred", expired_deferred),
-        (
-            "lost bytes",
-            report.overrun.wrapping_sub(first.overrun).into(),
-        ),
+        ("deferred", counted.deferred),
+        ("expired", counted.expired),
+        ("expired and deferred", counted.expired_deferred),
+        ("lost bytes", overrun.into()),
         ("corrupt frames", both(|link| link.corrupt)),
         ("oversized frames", both(|link| link.oversized)),
         ("foreign frames", both(|link| link.foreign)),
         ("out of order", both(|link| link.out_of_order)),
         ("duplicates", both(|link| link.duplicate)),
         ("retransmissions", both(|link| link.retransmitted)),
-        (
-            "unknown messages",
-            report.unknown.wrapping_sub(first.unknown).into(),
-        ),
+        ("unknown messages", unknown.into()),
         ("sensor errors", sensor_errors.into()),
     ];
     let mut line = String::new();
