@@ -73,15 +73,7 @@ pub fn read(path: &Path) -> Result<Tmf8820Log> {
     }
     let rows = u32::try_from(entries.len())?;
     Ok(Tmf8820Log {
-        geometry: Geometry {
-            columns: ZONES,
-            rows,
-        },
-        captures: entries
-            .into_iter()
-            .map(|entry| Capture {
-                histograms: entry.hists,
-            })
-            .collect(),
+        geometry: Geometry::new(ZONES, rows),
+        captures: entries.into_iter().map(|entry| entry.hists).collect(),
     })
 }

@@ -2,9 +2,8 @@
 
 use std::fmt::Write;
 use std::path::PathBuf;
-use std::process::Output;
 
-use crate::common::Scratch;
+use crate::common::{Scratch, says};
 use serde_json::Value;
 
 /// A pulse over bins 60 and 61, and a background photon every third laser cycle.
@@ -24,14 +23,8 @@ fn photons(scratch: &Scratch) -> PathBuf {
 #[track_caller]
 fn replayed(options: &str) -> (Value, String) {
     let scratch = Scratch::new();
-    let options: Vec<&str> = options.split_whitespace().collect();
-    let summary = scratch.replayed(&photons(&scratch), &options);
+    let summary = scratch.replayed(&photons(&scratch), options);
     (summary["settings"].clone(), scratch.read("out/events.csv"))
-}
-
-fn replay(scratch: &Scratch, options: &str) -> Output {
-    let options: Vec<&str> = options.split_whitespace().collect();
-    scratch.replay(&photons(scratch), &options)
 }
 
 #[test]
@@ -137,11 +130,12 @@ fn the_summary_says_how_to_do_it_again() {
 #[test]
 fn what_was_used_is_printed_and_in_the_report() {
     let scratch = Scratch::new();
-    let output = replay(&scratch, "--rule window --sigma-bins 1 --z 4.5");
+    let options = "--rule window --sigma-bins 1 --z 4.5";
+    let output = scratch.replay(&photons(&scratch), options);
     let printed = String::from_utf8(output.stdout).unwrap();
     for text in [printed, scratch.read("out/report.html")] {
         for part in ["window of 3 bins", "4.5 standard deviations", "±2.5 bins"] {
-            assert!(text.contains(part), "{part}: {text}");
+            says(&text, part);
         }
     }
 }

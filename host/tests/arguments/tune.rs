@@ -1,22 +1,12 @@
 //! `dtof tune` as a user runs it.
 
-use std::process::Output;
-
 use crate::common::Scratch;
 use serde_json::Value;
 
-/// `dtof tune` with the options in `line`.
-fn tune(line: &str) -> Output {
-    let options: Vec<&str> = line.split_whitespace().collect();
-    Scratch::new().dtof(&[&["tune"], &options[..]].concat())
-}
-
+/// What `dtof tune` prints with the options in `line`.
 #[track_caller]
 fn text(line: &str) -> String {
-    let output = tune(line);
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{error}");
-    String::from_utf8(output.stdout).unwrap()
+    Scratch::new().printed(&format!("tune {line}"))
 }
 
 #[track_caller]
@@ -58,10 +48,10 @@ fn every_line_says_where_it_comes_from() {
 #[test]
 fn the_options_it_prints_are_options_of_replay() {
     let text = text(PIXEL);
-    let options: Vec<&str> = text.lines().last().unwrap().split_whitespace().collect();
+    let options = text.lines().last().unwrap();
     let scratch = Scratch::new();
     let photons = scratch.file("photons.csv", "pixel,cycle,bin\n0,1,2\n");
-    let summary = scratch.replayed(&photons, &options);
+    let summary = scratch.replayed(&photons, options);
     let result = json(PIXEL);
     assert_eq!(summary["settings"]["alpha"], result["alpha"]["value"]);
     assert_eq!(
@@ -157,7 +147,7 @@ fn what_cannot_be_met_is_refused_in_one_line() {
         "--background 0.05 --signal 1 --sigma-bins 1e308",
         "--background 0.05 --signal 1 --sigma-ps 1e308 --bin-width-ps 1e-300",
     ] {
-        let output = tune(line);
+        let output = Scratch::new().run(&format!("tune {line}"));
         let error = String::from_utf8(output.stderr).unwrap();
         assert!(!output.status.success(), "{line}");
         assert!(error.len() < 160 && !error.contains("--l2"), "{error}");
@@ -193,10 +183,9 @@ fn the_window_rule_has_a_z_a_window_and_an_estimator() {
         assert!(sources.iter().any(|source| line.contains(source)), "{line}");
     }
     assert!(!results.contains('α'), "{results}");
-    let options: Vec<&str> = options.split_whitespace().collect();
     let scratch = Scratch::new();
     let photons = scratch.file("photons.csv", "pixel,cycle,bin\n0,1,2\n");
-    let settings = &scratch.replayed(&photons, &options)["settings"];
+    let settings = &scratch.replayed(&photons, options)["settings"];
     let result = json(WINDOW);
     for (name, of_result) in [("z", "z"), ("window", "window"), ("l1", "l1")] {
         let value = value(&result, of_result);
