@@ -30,12 +30,17 @@ pub const CONFIGURATION: Configuration = Configuration {
     dynamic_depth: None,
 };
 
-/// A device of some pixels with a sensor, and a host that has configured it.
-pub fn configured<'a, const N: usize>(
-    pixels: &'a mut heapless::Vec<Pixel, N>,
-    wanted: &Configuration,
-) -> (Sidecar<'a>, Host) {
-    let mut device = Sidecar::new(pixels, Some(About::new(256)));
+/// A device with room for so many pixels, which stays until the tests have ended.
+pub fn device<const PIXELS: usize>(sensor: Option<About>) -> Sidecar<'static> {
+    Sidecar::new(
+        Box::leak(Box::new(heapless::Vec::<Pixel, PIXELS>::new())),
+        sensor,
+    )
+}
+
+/// A device with a sensor, and a host that has configured it.
+pub fn configured<const PIXELS: usize>(wanted: &Configuration) -> (Sidecar<'static>, Host) {
+    let mut device = device::<PIXELS>(Some(About::new(256)));
     let mut host = Host::new(1, 0);
     host.configure(&mut device, 0, wanted);
     (device, host)

@@ -49,7 +49,12 @@ impl Cycles {
     pub fn of(rows: &[Row]) -> Option<Self> {
         let of = |operation| {
             let row = rows.iter().find(|row| row.operation == operation);
-            row.map(|row| row.cycles / 100)
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "few, and not negative"
+            )]
+            row.map(|row| row.cycles as u64)
         };
         Some(Self {
             count: of("photon: AsyncPixel::count")?,
@@ -125,11 +130,11 @@ impl Trials<'_> {
             let run = at(held / part, cycles(held));
             let counted = self.checked(&run)?;
             ensure!(counted.is_sustained(), "a lower rate is not sustained");
+            let tenths = counted.cycles * u64::from(PIXELS) * 10;
             sustained.push(Sustained {
                 core: self.core.to_owned(),
                 rate: run.rate,
-                between_looks: (counted.cycles * u64::from(PIXELS) * 10)
-                    .div_ceil(counted.looks.max(1)),
+                between_looks: tenths.div_ceil(counted.looks.max(1)) as f64 / 10.0,
                 photons: counted.photons,
                 events: counted.events,
                 expired: counted.expired,
