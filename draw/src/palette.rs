@@ -73,6 +73,8 @@ const fn pen(colour: Colour, mark: Mark) -> Pen {
 
 /// The paper's rule, and its centroid.
 pub const PAPER: Pen = pen(Colour::Orange, Mark::Square);
+/// The paper's rule over the average of all bins.
+pub const AVERAGE: Pen = pen(Colour::Ink, Mark::Diamond);
 /// Events, where they are held against frames, and what is measured alone.
 pub const EVENTS: Pen = pen(Colour::Blue, Mark::Circle);
 /// The centred window for the pulse there is.

@@ -57,7 +57,9 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
     // With light in each quadrant the paper's rule has no background left; the mean has.
     for outcome in of(&all, "a pulse in each quadrant") {
         match outcome.method.rule {
-            Rule::Window => assert!(outcome.without.value < 0.1, "{outcome:?}"),
+            Rule::Window | Rule::Average(_) => {
+                assert!(outcome.without.value < 0.1, "{outcome:?}");
+            }
             Rule::Paper(_) => assert!(outcome.without.value > 0.3, "{outcome:?}"),
         }
     }

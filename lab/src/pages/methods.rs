@@ -44,6 +44,7 @@ impl Instructions<'_> {
     fn rule(&self, rule: Rule) -> Result<f64> {
         match rule {
             Rule::Window(width) => self.of("decision", &format!("window of {width}; no event")),
+            Rule::Average => self.of("decision", "average; no event"),
             _ => self.of("decision", "kept peak; no event"),
         }
     }

@@ -13,8 +13,8 @@ use anyhow::{Context, Result};
 use dtof::rows::grouped;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AnyRule, AsyncPixel, Count, DepthEstimator, DepthEvent, Flags, LaserCycle, Look, PaperRule,
-    PixelAddress, PixelConfig, Statistics, WindowRule, z_for,
+    AnyRule, AsyncPixel, AverageRule, Count, DepthEstimator, DepthEvent, Flags, LaserCycle, Look,
+    PaperRule, PixelAddress, PixelConfig, Statistics, WindowRule, z_for,
 };
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
 use dtof_draw::palette;
@@ -41,7 +41,7 @@ const FALSE: i64 = 3 * PER_BIN;
 pub const STUDY: Study = Study {
     name: "failures",
     about: "false alarms, missing and wrong events in scenes that are not plain, and their flags",
-    revision: 3,
+    revision: 4,
     few_seeds: 30,
     all_seeds: 200,
     points,
@@ -56,6 +56,9 @@ pub enum Rule {
     /// exposures at the background of the plain scene (a step of its square root lies
     /// just below), 8 is the paper's own.
     Paper(u8),
+    /// The average of all bins with this α, the least whole one with at most one false alarm
+    /// in 100 exposures at the background of the plain scene.
+    Average(u8),
     /// The window of 3 bins, with the z for a false alarm in 100 exposures at any
     /// background.
     Window,
@@ -63,7 +66,12 @@ pub enum Rule {
 
 impl Rule {
     /// All.
-    pub const ALL: [Self; 3] = [Self::Paper(4), Self::Paper(8), Self::Window];
+    pub const ALL: [Self; 4] = [
+        Self::Paper(4),
+        Self::Paper(8),
+        Self::Average(6),
+        Self::Window,
+    ];
 
     /// Its name in tallies and tables.
     #[must_use]
@@ -71,6 +79,7 @@ impl Rule {
         match self {
             Self::Paper(4) => "α = 4",
             Self::Paper(_) => "α = 8",
+            Self::Average(_) => "average, α = 6",
             Self::Window => "window of 3",
         }
     }
@@ -80,6 +89,7 @@ impl Rule {
         match self {
             Self::Paper(4) => palette::alpha(4),
             Self::Paper(_) => palette::PAPER,
+            Self::Average(_) => palette::AVERAGE,
             Self::Window => palette::window(3),
         }
     }
@@ -122,6 +132,7 @@ impl Method {
         let minimum = Count::saturating(MINIMUM_COUNT);
         let rule: AnyRule = match self.rule {
             Rule::Paper(alpha) => PaperRule::new(U8F8::from_num(alpha), minimum).into(),
+            Rule::Average(alpha) => AverageRule::new(U8F8::from_num(alpha), minimum).into(),
             Rule::Window => {
                 let z = z_for(100, &case.gate, X, L1, L2);
                 WindowRule::new(3, z, minimum)?.into()
@@ -234,9 +245,10 @@ fn results(part: &Part) -> Result<Results> {
     let panels = panels.map(|(is_weak, title)| {
         let series = Rule::ALL.map(|rule| {
             let steps = match rule {
-                Rule::Paper(4) => -1.0,
-                Rule::Paper(_) => 0.0,
-                Rule::Window => 1.0,
+                Rule::Paper(4) => -1.5,
+                Rule::Paper(_) => -0.5,
+                Rule::Average(_) => 0.5,
+                Rule::Window => 1.5,
             };
             let dots = BACKGROUNDS.into_iter();
             let dots = dots.filter_map(|at| Some(share(rule, at, is_weak)?.aside(steps)));

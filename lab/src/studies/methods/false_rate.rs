@@ -28,7 +28,7 @@ const TESTED: u64 = 50;
 pub const STUDY: Study = Study {
     name: "false-rate",
     about: "false alarms with one threshold from 0.4 to 200 background counts a bin",
-    revision: 3,
+    revision: 4,
     few_seeds: 40,
     all_seeds: 4000,
     points,
@@ -44,6 +44,7 @@ fn points() -> Vec<Point> {
 fn ladders() -> Vec<Ladder> {
     let ladder = |method| match method {
         Method::Paper => Ladder::new(method, 16, 64, 8),
+        Method::Average => Ladder::new(method, 28, 88, 8),
         _ => Ladder::new(method, 56, 88, 16),
     };
     Method::RULES.map(ladder).to_vec()
@@ -116,7 +117,7 @@ impl Outcome {
 
     /// A panel with what is `wanted`.
     fn panel(&self, wanted: f64) -> Panel {
-        let symbol = if self.method == Method::Paper {
+        let symbol = if matches!(self.method, Method::Paper | Method::Average) {
             "α"
         } else {
             "z"

@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use anyhow::{Context, Result, bail};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
-    AnyRule, Count, Count16, DetectionRule, Histogram, PaperRule, Peak, RangeGate, WindowRule,
+    AnyRule, AverageRule, Count, Count16, DetectionRule, Histogram, PaperRule, Peak, RangeGate,
+    WindowRule,
 };
 use rand_pcg::Pcg64;
 
@@ -31,6 +32,8 @@ pub const MINIMUM_COUNT: u32 = 5;
 pub enum Method {
     /// The paper's rule; its threshold is α.
     Paper,
+    /// The same over the average of all bins.
+    Average,
     /// The core's window rule with as many bins; its threshold is z.
     Window(u8),
     /// The largest likelihood ratio of a scene that is known; its threshold is in
@@ -40,8 +43,9 @@ pub enum Method {
 
 impl Method {
     /// Those that a pixel can run.
-    pub const RULES: [Self; 6] = [
+    pub const RULES: [Self; 7] = [
         Self::Paper,
+        Self::Average,
         Self::Window(1),
         Self::Window(2),
         Self::Window(3),
@@ -57,6 +61,7 @@ impl Method {
         let minimum = Count::saturating(minimum);
         Ok(match self {
             Self::Paper => PaperRule::new(U8F8::saturating_from_num(threshold), minimum).into(),
+            Self::Average => AverageRule::new(U8F8::saturating_from_num(threshold), minimum).into(),
             Self::Window(width) => {
                 WindowRule::new(width, U4F12::saturating_from_num(threshold), minimum)?.into()
             }
@@ -69,6 +74,7 @@ impl Method {
     pub fn name(self) -> String {
         match self {
             Self::Paper => "paper".to_owned(),
+            Self::Average => "average".to_owned(),
             Self::Window(width) => format!("w{width}"),
             Self::Oracle => "oracle".to_owned(),
         }
@@ -79,6 +85,7 @@ impl Method {
     pub const fn pen(self) -> Pen {
         match self {
             Self::Paper => palette::PAPER,
+            Self::Average => palette::AVERAGE,
             Self::Window(width) => palette::window(width),
             Self::Oracle => palette::REFERENCE,
         }
@@ -89,6 +96,7 @@ impl Method {
     pub fn short(self) -> String {
         match self {
             Self::Paper => "paper's".to_owned(),
+            Self::Average => "average".to_owned(),
             Self::Window(1) => "1 bin".to_owned(),
             Self::Window(width) => format!("{width} bins"),
             Self::Oracle => self.label(),
@@ -100,6 +108,7 @@ impl Method {
     pub fn label(self) -> String {
         match self {
             Self::Paper => "the paper's rule".to_owned(),
+            Self::Average => "average of all bins".to_owned(),
             Self::Window(1) => "window of 1 bin".to_owned(),
             Self::Window(width) => format!("window of {width} bins"),
             Self::Oracle => "likelihood ratio".to_owned(),

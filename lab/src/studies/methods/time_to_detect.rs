@@ -40,7 +40,7 @@ const EXPOSURES: u64 = 50;
 pub const STUDY: Study = Study {
     name: "time-to-detect",
     about: "laser cycles to an event against the likelihood ratio, by pulse and background",
-    revision: 3,
+    revision: 4,
     few_seeds: 20,
     all_seeds: 200,
     points,
@@ -67,6 +67,7 @@ fn points() -> Vec<Point> {
 fn ladders() -> Vec<Ladder> {
     let rules = Method::RULES.map(|method| match method {
         Method::Paper => Ladder::new(method, 12, 24, 4),
+        Method::Average => Ladder::new(method, 18, 36, 4),
         _ => Ladder::new(method, 15, 19, 4),
     });
     let mut ladders = rules.to_vec();

@@ -1,8 +1,7 @@
 //! What one background and pulse width say of the claims.
 
-use super::{ALPHAS, SETTINGS, SNRS};
+use super::{SETTINGS, SNRS};
 use crate::sweep::mean::Measured;
-use crate::sweep::results::ends;
 use crate::sweep::{Part, PointTally};
 
 pub fn false_share(point: &PointTally) -> Measured {
@@ -16,20 +15,33 @@ pub fn error(point: &PointTally) -> Measured {
     parts.times(1.0 / 256.0)
 }
 
-/// One of [`SETTINGS`].
+/// One of [`SETTINGS`], with its background.
 #[derive(Clone, Copy)]
 pub struct Setting<'a> {
     pub part: &'a Part,
+    /// Of all bins, or of two quadrants.
+    pub is_average: bool,
     pub background: f64,
     pub sigma: f64,
 }
 
 impl<'a> Setting<'a> {
+    /// All with the average of all bins.
     pub fn all(part: &'a Part) -> [Self; SETTINGS.len()] {
         SETTINGS.map(|(background, sigma)| Self {
             part,
+            is_average: true,
             background,
             sigma,
+        })
+    }
+
+    /// Those of the paper's B, which have both backgrounds.
+    pub fn at_low_background(part: &'a Part, is_average: bool) -> [Self; 2] {
+        let [first, second, ..] = Self::all(part);
+        [first, second].map(|setting| Self {
+            is_average,
+            ..setting
         })
     }
 
@@ -37,6 +49,7 @@ impl<'a> Setting<'a> {
     /// nothing, so that there may be fewer than SNRs, or none.
     pub fn by_snr(self, alpha: u16, l1: u16) -> Vec<&'a PointTally> {
         let points = self.part.at([
+            ("average", f64::from(self.is_average)),
             ("background", self.background),
             ("sigma", self.sigma),
             ("alpha", alpha.into()),
@@ -47,17 +60,6 @@ impl<'a> Setting<'a> {
 
     pub fn shares(self, alpha: u16, l1: u16, of: fn(&PointTally) -> Measured) -> Vec<Measured> {
         self.by_snr(alpha, l1).into_iter().map(of).collect()
-    }
-
-    /// Whether the false alarms are as many at every SNR, to a factor of 2 or the
-    /// intervals. `None` with fewer than two points to compare.
-    pub fn false_events_ignore_snr(self) -> Option<bool> {
-        let shares = self.shares(4, 20, false_share);
-        let ignore = shares.iter().all(|a| {
-            let alike = |b: &Measured| a.value <= 2.0 * b.value || a.interval.0 <= b.interval.1;
-            shares.iter().all(alike)
-        });
-        (shares.len() > 1).then_some(ignore)
     }
 
     /// Whether the error at the highest SNR lies below that at the lowest, intervals
@@ -74,26 +76,6 @@ impl<'a> Setting<'a> {
             falls &= last.interval.1 < first.interval.0 && errors.windows(2).all(no_rise);
         }
         Some(falls)
-    }
-
-    /// The greatest factor between the errors of two α, for L1 above 20 at one SNR.
-    /// `None` if no two can be compared.
-    pub fn error_by_alpha(self) -> Option<f64> {
-        let mut factor: Option<f64> = None;
-        for l1 in [40, 80] {
-            for snr in SNRS {
-                let at = ALPHAS.into_iter().flat_map(|alpha| self.by_snr(alpha, l1));
-                let errors: Vec<f64> = at
-                    .filter(|point| point.is_at([("snr", snr)]))
-                    .map(|point| error(point).value)
-                    .collect();
-                if errors.len() > 1 {
-                    let (low, high) = ends(errors);
-                    factor = Some(factor.unwrap_or(0.0).max(high / low));
-                }
-            }
-        }
-        factor
     }
 
     /// The errors at several L1, averaged over the SNRs that have one at each of them,

@@ -1,0 +1,284 @@
+//! What the paper says of section III-C's figure, and of what follows from it.
+
+use super::setting::{NOTHING, Setting, error, false_share};
+use super::{ALPHAS, ENOUGH, L1S, SNRS};
+use crate::sweep::mean::Measured;
+use crate::sweep::results::{Claim, Verdict, ends};
+use crate::sweep::{Part, PointTally};
+
+/// An SNR this many times another is a range in which a claim can hold.
+const RANGE: f64 = 5.0;
+
+pub fn claims(part: &Part) -> Vec<Claim> {
+    let all = Setting::all(part);
+    let settings = |of: &dyn Fn(Setting) -> String| all.map(|setting| setting.text(of)).join("; ");
+    let verdict = |holds: fn(Setting) -> Option<bool>| in_all(all.map(holds));
+    vec![
+        snr(part),
+        Claim::new(
+            "alpha-false",
+            format!(
+                "share of events that are false at α = 2, 4, 6, 8, L1 = 20, A/B = 5: {}",
+                settings(&|setting| setting.along(ALPHAS.map(|alpha| (alpha, 20))))
+            ),
+            verdict(|setting| setting.falls(ALPHAS.map(|alpha| (alpha, 20)))),
+        ),
+        Claim::new(
+            "l1-false",
+            format!(
+                "share of events that are false at L1 = 5, 10, 20, 40, 80, α = 4, A/B = 5: {}",
+                settings(&|setting| setting.along(L1S.map(|l1| (4, l1))))
+            ),
+            verdict(|setting| setting.falls(L1S.map(|l1| (4, l1)))),
+        ),
+        Claim::new(
+            "error",
+            format!(
+                "RMSE in bins, α = 4, L1 = 40: {}",
+                settings(&|setting| setting.list(4, 40, bins))
+            ),
+            verdict(|setting| setting.error_falls_with_snr()),
+        ),
+        alpha(part),
+        Claim::new(
+            "l1",
+            format!(
+                "mean RMSE in bins at L1 = 10, 20, 40, 80 over the SNRs that have enough events at each, \
+                 α = 4: {}",
+                settings(&|setting| match setting.mean_errors([10, 20, 40, 80]) {
+                    None => NOTHING.to_owned(),
+                    Some((errors, snrs)) => {
+                        let errors = errors.map(|error| format!("{error:.3}"));
+                        format!("{} ({snrs} SNRs)", errors.join(", "))
+                    }
+                })
+            ),
+            verdict(|setting| setting.little_gain_beyond_40()),
+        ),
+        Claim::new(
+            "rate",
+            format!(
+                "events outside ±0.5 bin: {}",
+                settings(&|setting| setting.list(4, 20, percent))
+            ),
+            // At every SNR of every setting, at none of any, or at some.
+            in_all(all.into_iter().flat_map(|setting| {
+                let shares = setting.shares(4, 20, false_share).into_iter();
+                shares.map(below_a_thousandth)
+            })),
+        ),
+        gaussian(),
+    ]
+}
+
+/// Whether the false alarms do not depend on the SNR: to a factor of 2, over a range of
+/// [`RANGE`] with each pulse, at the background of the paper's analysis.
+fn snr(part: &Part) -> Claim {
+    let mut here = Vec::new();
+    let mut agrees = true;
+    for setting in Setting::at_low_background(part, true) {
+        let points = setting.by_snr(4, 20);
+        let shares: Vec<(f64, f64)> = points
+            .iter()
+            .map(|point| (point.parameter("snr"), false_share(point).value))
+            .collect();
+        let (from, to, factor) = widest_level(&shares);
+        agrees &= to / from >= RANGE;
+        here.push(format!(
+            "σ {}: {}; within a factor of {factor:.1} from A/B = {from} to {to}",
+            setting.sigma,
+            setting.list(4, 20, percent)
+        ));
+    }
+    let quadrants = Setting::at_low_background(part, false).map(|setting| {
+        let (low, high) = ends(
+            setting
+                .shares(4, 20, false_share)
+                .iter()
+                .map(|share| share.value),
+        );
+        format!(
+            "{:.1} to {:.1} % (σ {})",
+            low * 100.0,
+            high * 100.0,
+            setting.sigma
+        )
+    });
+    Claim::new(
+        "snr",
+        format!(
+            "share of events that are false, α = 4, L1 = 20, B = 0.05, average: {}; with two quadrants of two bins {}",
+            here.join("; "),
+            quadrants.join(", ")
+        ),
+        Verdict::graded(agrees, true),
+    )
+}
+
+/// The widest range of `x` in which no two values differ by more than a factor of 2, and the
+/// factor there.
+fn widest_level(values: &[(f64, f64)]) -> (f64, f64, f64) {
+    let mut widest = (1.0, 1.0, 1.0);
+    for first in 0..values.len() {
+        for last in first..values.len() {
+            let (low, high) = ends(values[first..=last].iter().map(|value| value.1));
+            let (from, to) = (values[first].0, values[last].0);
+            if high <= 2.0 * low && to / from > widest.1 / widest.0 {
+                widest = (from, to, high / low);
+            }
+        }
+    }
+    widest
+}
+
+/// Whether α leaves the error alone, to a tenth, for L1 above 20: of the places at the
+/// background that the paper's own condition asks for. Differs if in more than half of them.
+fn alpha(part: &Part) -> Claim {
+    let of = |background: f64| {
+        let settings = Setting::all(part).into_iter();
+        let those = settings.filter(|setting| setting.background == background);
+        let factors: Vec<f64> = those.flat_map(Setting::errors_by_alpha).collect();
+        let alike = factors.iter().filter(|&&factor| factor <= 1.1).count();
+        (alike, factors.len(), ends(factors).1)
+    };
+    let (alike, all, most) = of(ENOUGH);
+    let (few_alike, few_all, few_most) = of(0.05);
+    Claim::new(
+        "alpha",
+        format!(
+            "between α = 2 and 8 at one SNR, pulse and L1 (40 and 80) the RMSE differs by at most a tenth at {alike} of {all} places with B = {ENOUGH} (at most {most:.2} times), and at {few_alike} of {few_all} with B = 0.05 ({few_most:.2} times)"
+        ),
+        Verdict::graded(alike == all, 2 * alike > all),
+    )
+}
+
+/// Whether L1 of 20 or 40 brings 30 counts a bin: by arithmetic.
+fn gaussian() -> Claim {
+    let counts = [20.0, 40.0].map(|l1| l1 * 0.05);
+    Claim::new(
+        "gaussian",
+        format!(
+            "at the B = 0.05 of its figures L1 = 20 and 40 give λ_b = {} and {}; 30 take B = {} and {}",
+            counts[0],
+            counts[1],
+            30.0 / 20.0,
+            30.0 / 40.0
+        ),
+        Verdict::graded(false, counts.iter().any(|&counts| counts >= 30.0)),
+    )
+}
+
+fn percent(point: &PointTally) -> String {
+    format!("{:.2} %", false_share(point).value * 100.0)
+}
+
+fn bins(point: &PointTally) -> String {
+    format!("{:.3}", error(point).value)
+}
+
+/// Whether a claim holds everywhere, nowhere, or in some places; what could not be told
+/// (`None`) leaves it open, unless places that could be told differ.
+fn in_all(holds: impl IntoIterator<Item = Option<bool>>) -> Verdict {
+    let [mut open, mut held, mut failed] = [false; 3];
+    for holds in holds {
+        match holds {
+            None => open = true,
+            Some(true) => held = true,
+            Some(false) => failed = true,
+        }
+    }
+    match (held, failed) {
+        (true, true) => Verdict::Differs,
+        (true, false) if !open => Verdict::Agrees,
+        (false, true) if !open => Verdict::Refuted,
+        _ => Verdict::NotDecided,
+    }
+}
+
+/// Whether the whole interval lies below 0.1 %, or above; `None` if it holds it.
+fn below_a_thousandth(share: Measured) -> Option<bool> {
+    (!share.holds(0.001)).then_some(share.value < 0.001)
+}
+
+impl Setting<'_> {
+    /// The shares of false alarms at A/B = 5 for each α and L1.
+    fn false_at_5<const N: usize>(self, at: [(u16, u16); N]) -> [Option<Measured>; N] {
+        at.map(|(alpha, l1)| {
+            let mut points = self.by_snr(alpha, l1).into_iter();
+            let point = points.find(|point| point.is_at([("snr", 5.0)]));
+            point.map(false_share)
+        })
+    }
+
+    fn along<const N: usize>(self, at: [(u16, u16); N]) -> String {
+        let text = |share: Option<Measured>| {
+            share.map_or(NOTHING.to_owned(), |share| {
+                format!("{:.2} %", share.value * 100.0)
+            })
+        };
+        self.false_at_5(at).map(text).join(", ")
+    }
+
+    /// Whether the last share lies surely below the first, and none surely above the one
+    /// before it.
+    fn falls<const N: usize>(self, at: [(u16, u16); N]) -> Option<bool> {
+        let shares: Vec<Measured> = self.false_at_5(at).into_iter().flatten().collect();
+        let [first, .., last] = shares[..] else {
+            return None;
+        };
+        let no_rise = |pair: &[Measured]| pair[1].interval.0 <= pair[0].interval.1;
+        let falls = last.interval.1 < first.interval.0 && shares.windows(2).all(no_rise);
+        (falls || first.value > 0.0).then_some(falls)
+    }
+
+    /// The factors between the errors of α = 2 to 8, for L1 above 20 at each SNR.
+    fn errors_by_alpha(self) -> Vec<f64> {
+        let mut factors = Vec::new();
+        for l1 in [40, 80] {
+            for snr in SNRS {
+                let at = ALPHAS.into_iter().flat_map(|alpha| self.by_snr(alpha, l1));
+                let errors: Vec<f64> = at
+                    .filter(|point| point.is_at([("snr", snr)]))
+                    .map(|point| error(point).value)
+                    .collect();
+                if errors.len() > 1 {
+                    let (low, high) = ends(errors);
+                    // Two full counters of a pulse on their edge err by nothing.
+                    factors.push(if high > low { high / low } else { 1.0 });
+                }
+            }
+        }
+        factors
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_not_seen_is_no_pass() {
+        assert_eq!(in_all([]), Verdict::NotDecided);
+        assert_eq!(in_all([Some(true), None]), Verdict::NotDecided);
+        assert_eq!(in_all([Some(true), Some(true)]), Verdict::Agrees);
+        assert_eq!(in_all([Some(false), Some(false)]), Verdict::Refuted);
+        assert_eq!(in_all([Some(true), None, Some(false)]), Verdict::Differs);
+        assert_eq!(below_a_thousandth(Measured::share(0, 50)), None);
+        assert_eq!(below_a_thousandth(Measured::share(0, 50_000)), Some(true));
+    }
+
+    #[test]
+    fn the_widest_level_is_within_a_factor_of_two() {
+        let values = [
+            (1.0, 21.0),
+            (2.0, 6.7),
+            (5.0, 6.7),
+            (10.0, 6.4),
+            (20.0, 5.1),
+        ];
+        let (from, to, factor) = widest_level(&values);
+        assert_eq!((from, to), (2.0, 20.0));
+        assert!((factor - 6.7 / 5.1).abs() < 1e-12);
+        assert_eq!(widest_level(&[(1.0, 9.0), (2.0, 1.0)]), (1.0, 1.0, 1.0));
+    }
+}
