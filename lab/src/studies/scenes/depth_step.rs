@@ -157,14 +157,10 @@ fn results(part: &Part) -> Result<Results> {
             Figure::new("step-reaction", &reaction)?,
             Figure::new("step-blur", &blur)?,
         ],
-        claims: claims(part)?,
+        claims: vec![latency_claim(part)?, blur_claim(part)?],
         values: [("steps", grouped(STEPS * part.seed_count()))].into(),
         ..Results::default()
     })
-}
-
-fn claims(part: &Part) -> Result<Vec<Claim>> {
-    Ok(vec![latency_claim(part)?, blur_claim(part)?])
 }
 
 /// What there are of `what` at every signal of a step, from dim to bright.

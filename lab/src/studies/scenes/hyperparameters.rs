@@ -259,15 +259,18 @@ fn figures(setting: Setting) -> Result<Vec<Figure>> {
             matches!(ends, (Some(first), Some(last)) if last.1 < first.0)
         })
     };
-    let chart = |text: &str, x: &str, y, series: Vec<Series>| Chart {
-        finding: text.to_owned(),
-        holds: falls(&series),
-        note: "Bars hold 99 %. Dots with fewer than 50 events are left out.".to_owned(),
-        x: Axis::logarithmic(x),
-        y,
-        key: Vec::new(),
-        columns: 1,
-        panels: vec![Panel::only(series)],
+    let figure = |name, text: &str, x: &str, y, series: Vec<Series>| {
+        let chart = Chart {
+            finding: text.to_owned(),
+            holds: falls(&series),
+            note: "Bars hold 99 %. Dots with fewer than 50 events are left out.".to_owned(),
+            x: Axis::logarithmic(x),
+            y,
+            key: Vec::new(),
+            columns: 1,
+            panels: vec![Panel::only(series)],
+        };
+        Figure::new(name, &chart)
     };
     let metres = |at: &str| {
         Axis::linear(format!(
@@ -276,34 +279,28 @@ fn figures(setting: Setting) -> Result<Vec<Figure>> {
     };
     let snr = "signal over background, A/B";
     Ok(vec![
-        Figure::new(
+        figure(
             "hyperparameters-false",
-            &chart(
-                "The stronger the signal, the fewer events are false alarms",
-                snr,
-                Axis::linear("events that are false alarms, % (L1 = 20)")
-                    .percent()
-                    .within(0.0, 1.0),
-                false_alarms.into(),
-            ),
+            "The stronger the signal, the fewer events are false alarms",
+            snr,
+            Axis::linear("events that are false alarms, % (L1 = 20)")
+                .percent()
+                .within(0.0, 1.0),
+            false_alarms.into(),
         )?,
-        Figure::new(
+        figure(
             "hyperparameters-error",
-            &chart(
-                "A stronger signal lowers the depth error at every L1",
-                snr,
-                metres("α = 4"),
-                errors.into(),
-            ),
+            "A stronger signal lowers the depth error at every L1",
+            snr,
+            metres("α = 4"),
+            errors.into(),
         )?,
-        Figure::new(
+        figure(
             "hyperparameters-alpha",
-            &chart(
-                "A larger L1 lowers the depth error at every α",
-                "L1, laser cycles",
-                metres("A/B = 5"),
-                by_l1.into(),
-            ),
+            "A larger L1 lowers the depth error at every α",
+            "L1, laser cycles",
+            metres("A/B = 5"),
+            by_l1.into(),
         )?,
     ])
 }
