@@ -100,8 +100,7 @@ impl Method {
     pub fn label(self) -> String {
         match self {
             Self::Paper => "the paper's rule".to_owned(),
-            Self::Window(1) => "window of 1 bin".to_owned(),
-            Self::Window(width) => format!("window of {width} bins"),
+            Self::Window(_) => format!("window of {}", self.short()),
             Self::Oracle => "likelihood ratio".to_owned(),
         }
     }
