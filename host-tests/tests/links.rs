@@ -5,10 +5,8 @@ use std::path::{Path, PathBuf};
 
 /// The pages in `folder`, and in `docs` below it.
 fn pages(folder: &Path, pages: &mut Vec<PathBuf>) {
-    for path in fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-    {
+    let entries = fs::read_dir(folder).unwrap();
+    for path in entries.map(|entry| entry.unwrap().path()) {
         if path.is_dir() {
             if path.ends_with("docs") || folder.ends_with("docs") || folder.ends_with("results") {
                 self::pages(&path, pages);
@@ -48,27 +46,20 @@ fn leads_somewhere(page: &Path, target: &str) -> bool {
 
 #[test]
 fn every_link_of_a_page_leads_somewhere() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("..")
-        .canonicalize()
-        .unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let root = root.canonicalize().unwrap();
     let mut found = Vec::new();
     pages(&root, &mut found);
     let (mut links, mut broken) = (0, Vec::new());
     for page in &found {
         let text = fs::read_to_string(page).unwrap();
-        let targets = text
-            .split("](")
-            .skip(1)
-            .filter_map(|rest| rest.split_once(')'));
-        let targets = targets.map(|(target, _)| target);
+        let targets = text.split("](").skip(1);
+        let targets = targets.filter_map(|rest| Some(rest.split_once(')')?.0));
         for target in targets.filter(|target| !target.contains("://") && !target.contains(' ')) {
             links += 1;
             if !leads_somewhere(page, target) {
-                broken.push(format!(
-                    "{}: {target}",
-                    page.strip_prefix(&root).unwrap().display()
-                ));
+                let page = page.strip_prefix(&root).unwrap().display();
+                broken.push(format!("{page}: {target}"));
             }
         }
     }

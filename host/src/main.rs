@@ -37,7 +37,7 @@ enum Command {
 
 fn main() -> ExitCode {
     cli::run::<Cli>(|cli| match cli.command {
-        None => command::demo::Demo::default().run(),
+        None => command::demo::Demo::parse_from(["demo"]).run(),
         Some(Command::Demo(demo)) => demo.run(),
         Some(Command::Simulate(simulate)) => simulate.run(),
         Some(Command::Replay(replay)) => replay.run(),

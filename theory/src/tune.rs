@@ -247,6 +247,7 @@ fn calibrated(
     let repeated = RepeatedLooks::new(steps, looks.first, looks.last);
     let first_mean = request.background * f64::from(looks.first * looks.x);
     let tabulated = usize::from(request.bins) == BINS && request.minimum_count == MINIMUM_COUNT;
+    // It, what it may be at most, and where it comes from.
     let probability = |alpha: u16| {
         let minimum_count = Count::saturating(request.minimum_count.into());
         let threshold = Threshold::new(U8F8::from_bits(alpha), minimum_count);
@@ -266,20 +267,14 @@ fn calibrated(
                 };
                 let [probability, at_most] =
                     [found.probability, found.at_most].map(|found| found.max(bounds.worst_look));
-                (probability, at_most, source, bounds)
+                // Whatever the table is off by, not above the bound.
+                let most = (at_most * MARGIN).min(bounds.sum);
+                (probability, most, source, bounds)
             }
             _ => (bounds.sum, bounds.sum, Source::Bound, bounds),
         }
     };
-    let kept = |alpha: u16| {
-        let (probability, at_most, source, bounds) = probability(alpha);
-        let most = match source {
-            Source::Bound => probability,
-            // Whatever the table is off by, not above the bound.
-            Source::Table | Source::TableAtMost => (at_most * MARGIN).min(bounds.sum),
-        };
-        most <= wanted
-    };
+    let kept = |alpha: u16| probability(alpha).1 <= wanted;
     let (mut low, mut high) = (0u16, u16::MAX);
     if !kept(high) {
         return None;

@@ -27,25 +27,6 @@ pub struct Config {
     pub last: usize,
 }
 
-/// A peak event: a significant peak, reported by the pixel (sec. II-B).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Event {
-    /// Index, from zero, of the laser cycle at whose end the event was made
-    /// (sec. II-B).
-    pub cycle: u64,
-    /// `N`: the laser cycles since the histogram was last cleared (sec. II-A).
-    pub exposure: u32,
-    /// `i_max`: the bin of the peak (sec. II-A).
-    pub peak_bin: usize,
-    /// `h_{i_max}`: the count in the peak bin (sec. II-B).
-    pub peak_count: f64,
-    /// `λ_b`: the background the peak was compared with (Eq. 5, sec. IV-B).
-    pub background: f64,
-    /// The sub-bin position of the peak, in bins from the start of bin 0
-    /// (sec. III-A); see [`centroid`].
-    pub position: f64,
-}
-
 /// One decision, whether or not it made an event: what the pixel saw at a check
 /// with `L_1 < N < L_2` (sec. II-B).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +44,16 @@ pub struct Look {
     pub background: f64,
     /// Whether the peak was significant and made an [`Event`] (Eq. 5).
     pub fired: bool,
+}
+
+/// A peak event: a significant peak, reported by the pixel (sec. II-B).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Event {
+    /// The decision that made it.
+    pub look: Look,
+    /// The sub-bin position of the peak, in bins from the start of bin 0
+    /// (sec. III-A); see [`centroid`].
+    pub position: f64,
 }
 
 /// An asynchronous pixel (sec. II-B).
@@ -131,7 +122,7 @@ impl Pixel {
         if let Some(look) = look
             && look.fired
         {
-            self.event = Some(self.report(&look));
+            self.event = Some(self.report(look));
         }
         if self.event.is_some() || self.exposure >= self.config.l2 {
             self.histogram.clear();
@@ -176,20 +167,12 @@ impl Pixel {
     }
 
     /// The event of a decision that fired (sec. II-B, sec. III-A).
-    fn report(&self, look: &Look) -> Event {
+    fn report(&self, look: Look) -> Event {
+        let Config { first, last, .. } = self.config;
+        let counts = self.histogram.counts();
         Event {
-            cycle: look.cycle,
-            exposure: look.exposure,
-            peak_bin: look.peak_bin,
-            peak_count: look.peak_count,
-            background: look.background,
-            position: centroid(
-                self.histogram.counts(),
-                self.config.first,
-                self.config.last,
-                look.peak_bin,
-                look.background,
-            ),
+            look,
+            position: centroid(counts, first, last, look.peak_bin, look.background),
         }
     }
 }
@@ -276,23 +259,17 @@ mod tests {
             background: 12.0,
             fired: true,
         };
-        let event = Event {
-            cycle: 11,
-            exposure: 12,
-            peak_bin: 5,
-            peak_count: 24.0,
-            background: 12.0,
-            position: 5.5,
-        };
+        let position = 5.5;
         assert_eq!(looks, [look]);
-        assert_eq!(events, [event]);
+        assert_eq!(events, [Event { look, position }]);
         assert_eq!(pixel.histogram().total(), 0.0);
 
         // The next 12 cycles bring the same, and the event is forgotten on the
         // way.
         let (looks, events) = run(&mut pixel, 12, &[0, 2, 5, 5, 6]);
-        assert_eq!(looks, [Look { cycle: 23, ..look }]);
-        assert_eq!(events, [Event { cycle: 23, ..event }]);
+        let look = Look { cycle: 23, ..look };
+        assert_eq!(looks, [look]);
+        assert_eq!(events, [Event { look, position }]);
     }
 
     #[test]
@@ -308,7 +285,7 @@ mod tests {
         let fired: Vec<_> = looks.iter().map(|l| (l.exposure, l.fired)).collect();
         assert_eq!(fired, [(12, false), (16, true)]);
         assert_eq!(events.len(), 1);
-        assert_eq!(events[0].peak_count, 32.0);
+        assert_eq!(events[0].look.peak_count, 32.0);
     }
 
     #[test]
@@ -364,23 +341,22 @@ mod tests {
         };
         let mut pixel = Pixel::new(8, 1023.0, config);
         let (_, events) = run(&mut pixel, 12, &[2, 3, 3, 6, 6, 6, 7, 7, 7, 7]);
-        assert_eq!(
-            events,
-            [Event {
-                cycle: 11,
-                exposure: 12,
-                peak_bin: 6,
-                peak_count: 36.0,
-                background: 12.0,
-                position: 6.5,
-            }]
-        );
+        let look = Look {
+            cycle: 11,
+            exposure: 12,
+            peak_bin: 6,
+            peak_count: 36.0,
+            background: 12.0,
+            fired: true,
+        };
+        let position = 6.5;
+        assert_eq!(events, [Event { look, position }]);
     }
 
     #[test]
     fn a_saturated_peak_is_reported_at_the_limit() {
         // 24 photons in bin 5 by N = 12, the counter stops at 15.
         let (_, events) = run(&mut Pixel::new(8, 15.0, CONFIG), 12, &[5, 5]);
-        assert_eq!(events[0].peak_count, 15.0);
+        assert_eq!(events[0].look.peak_count, 15.0);
     }
 }

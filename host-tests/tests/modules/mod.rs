@@ -20,12 +20,12 @@ pub fn imports(source: &Path) -> Imports {
     let mut files = BTreeMap::new();
     read(source, &mut Vec::new(), &mut files);
     let modules: BTreeSet<&Module> = files.keys().collect();
-    let of = |(module, file): (&Module, &syn::File)| {
+    let of = |(module, items): (&Module, &Vec<syn::Item>)| {
         let mut paths = Paths {
             module: module.clone(),
             found: Vec::new(),
         };
-        paths.visit_file(file);
+        items.iter().for_each(|item| paths.visit_item(item));
         let led = paths.found.iter().filter_map(|path| {
             (1..=path.len())
                 .rev()
@@ -40,7 +40,7 @@ pub fn imports(source: &Path) -> Imports {
     files.iter().map(of).collect()
 }
 
-fn read(folder: &Path, module: &mut Module, files: &mut BTreeMap<Module, syn::File>) {
+fn read(folder: &Path, module: &mut Module, files: &mut BTreeMap<Module, Vec<syn::Item>>) {
     let Ok(entries) = fs::read_dir(folder) else {
         return;
     };
@@ -59,15 +59,7 @@ fn read(folder: &Path, module: &mut Module, files: &mut BTreeMap<Module, syn::Fi
             }
             let file = syn::parse_file(&fs::read_to_string(&path).unwrap()).unwrap();
             // A program and the library beside it begin at the same place.
-            files
-                .entry(module)
-                .or_insert_with(|| syn::File {
-                    shebang: None,
-                    attrs: Vec::new(),
-                    items: Vec::new(),
-                })
-                .items
-                .extend(file.items);
+            files.entry(module).or_default().extend(file.items);
         }
     }
 }

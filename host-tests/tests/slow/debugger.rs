@@ -39,7 +39,9 @@ impl Debugger {
     pub fn set_breakpoint(&mut self, address: u64, on: bool) -> Result<()> {
         let letter = if on { 'Z' } else { 'z' };
         self.send(&format!("{letter}0,{address:x},2"))?;
-        self.done()
+        let reply = self.reply()?;
+        ensure!(reply == "OK", "the debugger says `{reply}`");
+        Ok(())
     }
 
     /// One instruction.
@@ -81,12 +83,6 @@ impl Debugger {
             address += length;
         }
         Ok(memory)
-    }
-
-    fn done(&mut self) -> Result<()> {
-        let reply = self.reply()?;
-        ensure!(reply == "OK", "the debugger says `{reply}`");
-        Ok(())
     }
 
     /// The answer to what was sent. Some versions of QEMU say before it that the

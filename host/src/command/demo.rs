@@ -4,17 +4,17 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use clap::Args;
+use clap::Parser;
 use dtof::cli::arguments::{path, whole};
 use dtof::input::source::Geometry;
 use dtof::simulate::scene::{self, Scene};
 
 use super::simulate::{Simulation, array};
 
-#[derive(Args)]
+#[derive(Parser)]
 pub struct Demo {
     /// The folder of the results
-    #[arg(long, default_value = Demo::OUT, value_parser = path())]
+    #[arg(long, default_value = "out/demo", value_parser = path())]
     out: PathBuf,
     /// Macropixels of the array [default: 64x32; 8x8 with --device]
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = array)]
@@ -27,35 +27,17 @@ pub struct Demo {
     #[arg(long, value_name = "FILE", requires = "device")]
     image: Option<PathBuf>,
     /// Laser cycles of the scene
-    #[arg(long, value_name = "N", default_value_t = Demo::CYCLES, value_parser = whole(1..=u64::MAX))]
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = whole(1..=u64::MAX))]
     cycles: u64,
     /// Seed of the simulated photons.
-    #[arg(long, default_value_t = Demo::SEED, value_parser = whole(0..=u64::MAX))]
+    #[arg(long, default_value_t = 1, value_parser = whole(0..=u64::MAX))]
     seed: u64,
     /// Print nothing but errors.
     #[arg(long)]
     quiet: bool,
 }
 
-impl Default for Demo {
-    fn default() -> Self {
-        Self {
-            out: Self::OUT.into(),
-            array: None,
-            device: None,
-            image: None,
-            cycles: Self::CYCLES,
-            seed: Self::SEED,
-            quiet: false,
-        }
-    }
-}
-
 impl Demo {
-    const OUT: &str = "out/demo";
-    const SEED: u64 = 1;
-    const CYCLES: u64 = 10_000;
-
     pub fn run(&self) -> Result<()> {
         let settings = scene::settings(self.seed);
         let mut scene = Scene::demo()?;

@@ -97,26 +97,13 @@ impl Export {
     fn check(&self) -> Result<()> {
         let evt2 = self.format == Format::Evt2;
         let mcap = self.format == Format::Mcap;
+        let of_changes = self.dynamic_depth.are_given();
+        let points = "points, which evt2 has not";
         for (given, has_use, option, of) in [
             (self.slice_us.is_some(), mcap, "--slice-us", "mcap"),
-            (
-                self.dynamic_depth.are_given(),
-                evt2,
-                "--threshold-mm and --reference",
-                "evt2",
-            ),
-            (
-                self.fov.is_some(),
-                !evt2,
-                "--fov",
-                "points, which evt2 has not",
-            ),
-            (
-                self.calibration.is_some(),
-                !evt2,
-                "--calibration",
-                "points, which evt2 has not",
-            ),
+            (of_changes, evt2, "--threshold-mm and --reference", "evt2"),
+            (self.fov.is_some(), !evt2, "--fov", points),
+            (self.calibration.is_some(), !evt2, "--calibration", points),
         ] {
             ensure!(!given || has_use, "{option}: only for {of}");
         }

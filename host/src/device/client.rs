@@ -120,13 +120,7 @@ impl Client {
     /// # Errors
     /// If the device is gone.
     pub fn sensor(&mut self) -> Result<Option<SensorRecord>> {
-        self.send(message::SENSOR_REQUEST, &[])?;
-        let answer = self.answer()?;
-        ensure!(
-            answer.kind == message::SENSOR,
-            "the device answers with message {:#04x}",
-            answer.kind
-        );
+        let answer = self.ask(message::SENSOR_REQUEST, message::SENSOR)?;
         SensorRecord::from_le_bytes(&answer.body).context("the device says nothing of its sensor")
     }
 
@@ -135,13 +129,7 @@ impl Client {
     /// # Errors
     /// If the device is gone.
     pub fn synchronise(&mut self) -> Result<Vec<Event>> {
-        self.send(message::SYNCHRONISE, &[])?;
-        let answer = self.answer()?;
-        ensure!(
-            answer.kind == message::SYNCHRONISED,
-            "the device answers with message {:#04x}",
-            answer.kind
-        );
+        self.ask(message::SYNCHRONISE, message::SYNCHRONISED)?;
         Ok(self.take_events())
     }
 
@@ -194,6 +182,18 @@ impl Client {
             }
         }
         Ok(())
+    }
+
+    /// Sends a message without a body, and waits for its answer, which is `kind`.
+    fn ask(&mut self, request: u8, kind: u8) -> Result<Message> {
+        self.send(request, &[])?;
+        let answer = self.answer()?;
+        ensure!(
+            answer.kind == kind,
+            "the device answers with message {:#04x}",
+            answer.kind
+        );
+        Ok(answer)
     }
 
     /// Waits for the next message that is not events.

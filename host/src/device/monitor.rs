@@ -252,42 +252,29 @@ impl Figures {
 
 /// The losses and errors since the device had counted `first`, each with a comma before
 /// it. Counts of 0 are left out. `here` is what this end of the link has counted.
-#[must_use]
-pub fn losses(report: &Report, first: &Report, here: &LinkCounters) -> String {
-    let Statistics {
-        saturated,
-        rejected,
-        gated_out,
-        deferred,
-        expired,
-        expired_deferred,
-        ..
-    } = report.statistics;
+fn losses(report: &Report, first: &Report, here: &LinkCounters) -> String {
+    let counted = &report.statistics;
     let there = since(&report.link, &first.link);
     let both = |count: fn(&LinkCounters) -> u32| u64::from(count(&there)) + u64::from(count(here));
     let sensor_errors = report.sensor_errors.wrapping_sub(first.sensor_errors);
+    let overrun = report.overrun.wrapping_sub(first.overrun);
+    let unknown = report.unknown.wrapping_sub(first.unknown);
     let counts = [
-        ("saturated", saturated),
-        ("rejected", rejected),
-        ("gated out", gated_out),
+        ("saturated", counted.saturated),
+        ("rejected", counted.rejected),
+        ("gated out", counted.gated_out),
         ("unaddressed", report.unaddressed),
-        ("deferred", deferred),
-        ("expired", expired),
-        ("expired and deferred", expired_deferred),
-        (
-            "lost bytes",
-            report.overrun.wrapping_sub(first.overrun).into(),
-        ),
+        ("deferred", counted.deferred),
+        ("expired", counted.expired),
+        ("expired and deferred", counted.expired_deferred),
+        ("lost bytes", overrun.into()),
         ("corrupt frames", both(|link| link.corrupt)),
         ("oversized frames", both(|link| link.oversized)),
         ("foreign frames", both(|link| link.foreign)),
         ("out of order", both(|link| link.out_of_order)),
         ("duplicates", both(|link| link.duplicate)),
         ("retransmissions", both(|link| link.retransmitted)),
-        (
-            "unknown messages",
-            report.unknown.wrapping_sub(first.unknown).into(),
-        ),
+        ("unknown messages", unknown.into()),
         ("sensor errors", sensor_errors.into()),
     ];
     let mut line = String::new();
@@ -333,5 +320,44 @@ mod tests {
         let rows = [1, 1, 2, 3, 8, 8, 32, 1, 0];
         assert_eq!(pixels.map(|pixels| array(pixels, None).1), rows);
         assert_eq!(array(64, Some(10)), (10, 7));
+    }
+
+    #[test]
+    fn every_loss_is_shown_and_only_losses() {
+        // A report whose numbers are `number` in one field after the other, little-endian.
+        let report = |number: fn(u64) -> u64| {
+            let wide = (0..10).flat_map(|at| number(at).to_le_bytes());
+            let narrow = (10..20).flat_map(|at| u32::try_from(number(at)).unwrap().to_le_bytes());
+            let bytes: Vec<u8> = wide.chain(narrow).chain([1]).collect();
+            Report::from_le_bytes(&bytes).unwrap()
+        };
+        let none = LinkCounters::default();
+        assert_eq!(losses(&report(|_| 0), &report(|_| 0), &none), "");
+        // The counts of the link and of the sensor began before.
+        assert_eq!(
+            losses(&report(|at| 101 + at), &report(|_| 100), &none),
+            ", saturated 103, rejected 104, gated out 105, unaddressed 110, deferred 107, expired 108, \
+             expired and deferred 109, lost bytes 11, corrupt frames 15, oversized frames 16, \
+             foreign frames 17, out of order 18, duplicates 19, retransmissions 20, \
+             unknown messages 12, sensor errors 13 (last: no answer)"
+        );
+        // Errors of before are not this one's.
+        assert_eq!(losses(&report(|_| 0), &Report::default(), &none), "");
+
+        // Each end sees other frames.
+        let here = LinkCounters {
+            frames: 1,
+            corrupt: 2,
+            oversized: 3,
+            foreign: 4,
+            out_of_order: 5,
+            duplicate: 6,
+            retransmitted: 7,
+        };
+        assert_eq!(
+            losses(&report(|_| 0), &report(|_| 0), &here),
+            ", corrupt frames 2, oversized frames 3, foreign frames 4, out of order 5, duplicates 6, \
+             retransmissions 7"
+        );
     }
 }

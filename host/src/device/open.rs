@@ -51,17 +51,12 @@ fn serial_ports() -> String {
 /// # Errors
 /// If nobody listens.
 fn tcp(address: &str) -> io::Result<TcpStream> {
-    let mut failed = None;
-    let mut connected = None;
+    let mut connected = Err(ErrorKind::AddrNotAvailable.into());
     for address in address.to_socket_addrs()? {
-        match TcpStream::connect_timeout(&address, STUCK) {
-            Ok(stream) => {
-                connected = Some(stream);
-                break;
-            }
-            Err(error) => failed = Some(error),
+        connected = TcpStream::connect_timeout(&address, STUCK);
+        if connected.is_ok() {
+            break;
         }
     }
-    let unknown = || failed.unwrap_or_else(|| ErrorKind::AddrNotAvailable.into());
-    prompt(connected.ok_or_else(unknown)?)
+    prompt(connected?)
 }

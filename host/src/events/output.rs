@@ -133,8 +133,6 @@ impl Output {
                 })
             })
             .collect();
-        let bytes = figures.iter().map(|figure| figure.svg.len()).sum();
-        self.sample.limit(report::room_for_events(bytes));
         let totals = summary.rows();
         let settings = summary.settings.rows();
         let section = |heading, rows| Section { heading, rows };

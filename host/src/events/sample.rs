@@ -106,19 +106,10 @@ impl Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_core::{BinIndex, Count, Flags, LaserCycle, SubBinOffset};
+    use crate::events::fixtures;
 
     fn event(number: u64) -> DepthEvent {
-        DepthEvent {
-            pixel: PixelAddress(u16::try_from(number % 64).unwrap()),
-            cycle: LaserCycle(number),
-            exposure: 100,
-            peak_bin: BinIndex::saturating(3),
-            offset: SubBinOffset::CENTRE,
-            peak_count: Count::saturating(9),
-            background: Count::saturating(1),
-            flags: Flags::NONE,
-        }
+        fixtures::event(u16::try_from(number % 64).unwrap(), number, 3)
     }
 
     fn sampled(limit: usize, events: u64) -> Sample {

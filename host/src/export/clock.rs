@@ -56,11 +56,11 @@ impl LaserClock {
             return Ok(());
         };
         let time = self.nanoseconds(cycle);
+        let name = format!("{format:?}").to_uppercase();
         ensure!(
             time < end_ns,
-            "laser cycle {cycle} lies beyond, {} s after the start: {} holds {} s of time (--laser-hz {})",
+            "laser cycle {cycle} lies beyond, {} s after the start: {name} holds {} s of time (--laser-hz {})",
             time / 1_000_000_000,
-            format.name(),
             end_ns / 1_000_000_000,
             self.hz
         );
@@ -85,16 +85,6 @@ impl Format {
             Self::Pcd | Self::Ply | Self::Mcap => Some(1 << 53),
             // Readers differ in what they take time for that has wrapped.
             Self::Evt2 => Some(1000 << evt2::TIME_BITS),
-        }
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Csv => "CSV",
-            Self::Pcd => "PCD",
-            Self::Ply => "PLY",
-            Self::Mcap => "MCAP",
-            Self::Evt2 => "EVT2",
         }
     }
 }

@@ -18,8 +18,8 @@ pub fn open(path: &Path) -> Result<Reader<BufReader<File>>> {
 /// The contents of a file.
 pub struct Survey {
     pub header: Header,
-    depth: u64,
-    dynamic_depth: u64,
+    /// Depth events and dynamic depth events.
+    counts: [u64; 2],
     /// The laser cycle of the latest event.
     pub latest: u64,
     /// Damage that ends the file too early: the byte, and what is wrong there.
@@ -38,8 +38,7 @@ impl Survey {
         let mut reader = open(path)?;
         let mut survey = Self {
             header: *reader.header(),
-            depth: 0,
-            dynamic_depth: 0,
+            counts: [0; 2],
             latest: 0,
             damage: None,
         };
@@ -69,10 +68,7 @@ impl Survey {
                 beyond = Some((begin, time));
                 continue;
             }
-            *match event.kind() {
-                EventKind::Depth => &mut survey.depth,
-                EventKind::DynamicDepth => &mut survey.dynamic_depth,
-            } += 1;
+            survey.counts[event.kind() as usize] += 1;
             survey.latest = survey.latest.max(event.cycle().0);
             if survey.all().is_multiple_of(4096) {
                 progress.at(reader.offset());
@@ -84,34 +80,31 @@ impl Survey {
 
     /// Events of either kind.
     pub fn all(&self) -> u64 {
-        self.depth + self.dynamic_depth
+        self.counts.iter().sum()
     }
 
     pub fn events(&self, kind: EventKind) -> u64 {
-        match kind {
-            EventKind::Depth => self.depth,
-            EventKind::DynamicDepth => self.dynamic_depth,
-        }
+        self.counts[kind as usize]
     }
 
     /// The one kind there is, unless one is wanted.
     pub fn kind(&self, wanted: Option<EventKind>) -> Result<EventKind> {
         if let Some(wanted) = wanted {
-            let (name, there) = match wanted {
-                EventKind::Depth => ("", self.depth),
-                EventKind::DynamicDepth => ("dynamic ", self.dynamic_depth),
+            let name = match wanted {
+                EventKind::Depth => "depth",
+                EventKind::DynamicDepth => "dynamic depth",
             };
             ensure!(
-                there > 0 || self.all() == 0 || self.damage.is_some(),
-                "{} events, none of them a {name}depth event",
+                self.events(wanted) > 0 || self.all() == 0 || self.damage.is_some(),
+                "{} events, none of them a {name} event",
                 self.all()
             );
             return Ok(wanted);
         }
-        match (self.depth, self.dynamic_depth) {
-            (_, 0) => Ok(EventKind::Depth),
-            (0, _) => Ok(EventKind::DynamicDepth),
-            (depth, dynamic_depth) => bail!(
+        match self.counts {
+            [_, 0] => Ok(EventKind::Depth),
+            [0, _] => Ok(EventKind::DynamicDepth),
+            [depth, dynamic_depth] => bail!(
                 "{depth} depth events and {dynamic_depth} dynamic depth events: --events says \
                  which, depth or dynamic-depth"
             ),

@@ -1,17 +1,17 @@
 //! MCAP: point clouds as Foxglove knows them, one for each slice of time, and
 //! statistics of the slice.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 
 use ::mcap::records::MessageHeader;
 use anyhow::{Context, Result};
 use dtof_core::Flags;
 use foxglove::Encode;
-use foxglove::messages::packed_element_field::NumericType;
 use foxglove::messages::{PackedElementField, PointCloud, Pose, Quaternion, Timestamp, Vector3};
 use serde::Serialize;
 
-use super::points::{BYTES, Number, fields, record};
+use super::points::{BYTES, fields, record};
 use super::projection::Projection;
 use super::reorder::{Reorder, WAITING};
 use super::{Finished, Out, Sink};
@@ -72,20 +72,17 @@ impl Time {
 
 /// The JSON schema of [`Statistics`].
 fn schema() -> String {
+    let kind = |of: &str| serde_json::json!({ "type": of });
     let time = serde_json::json!({
         "type": "object",
         "title": "time",
-        "properties": { "sec": { "type": "integer" }, "nsec": { "type": "integer" } },
+        "properties": { "sec": kind("integer"), "nsec": kind("integer") },
     });
     let whole = "events pixels flagged saturated clipped deferred pile_up events_so_far";
-    let mut properties = serde_json::Map::new();
-    properties.insert("timestamp".into(), time);
-    for name in ["duration_s", "events_per_s"] {
-        properties.insert(name.into(), serde_json::json!({ "type": "number" }));
-    }
-    for name in whole.split(' ') {
-        properties.insert(name.into(), serde_json::json!({ "type": "integer" }));
-    }
+    let whole = whole.split(' ').map(|name| (name, kind("integer")));
+    let reals = ["duration_s", "events_per_s"].map(|name| (name, kind("number")));
+    let all = whole.chain(reals).chain([("timestamp", time)]);
+    let properties: BTreeMap<_, _> = all.collect();
     serde_json::json!({
         "title": "dtof.Statistics",
         "type": "object",
@@ -239,9 +236,9 @@ impl Mcap {
             fields_of_points.push(PackedElementField {
                 name: field.name.to_owned(),
                 offset,
-                r#type: numeric_type(field.number).into(),
+                r#type: field.number.mcap.into(),
             });
-            offset += u32::try_from(field.number.bytes())?;
+            offset += field.number.bytes;
         }
         let cloud = PointCloud {
             timestamp: Timestamp::new_checked(sec, nsec),
@@ -293,14 +290,5 @@ impl Sink for Mcap {
             written: self.written,
             late: self.order.late(),
         })
-    }
-}
-
-fn numeric_type(number: Number) -> NumericType {
-    match number {
-        Number::U8 => NumericType::Uint8,
-        Number::U32 => NumericType::Uint32,
-        Number::F32 => NumericType::Float32,
-        Number::F64 => NumericType::Float64,
     }
 }

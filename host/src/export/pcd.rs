@@ -1,16 +1,14 @@
 //! PCD: the point clouds of PCL, version 0.7, binary.
 
-use super::points::{Number, fields};
+use super::points::fields;
 use crate::events::aer_file::EventKind;
 
 /// The header of a file of so many points.
 pub fn header(kind: EventKind, points: u64) -> String {
     let fields = fields(kind);
     let names = fields.map(|field| field.name).join(" ");
-    let sizes = fields
-        .map(|field| field.number.bytes().to_string())
-        .join(" ");
-    let types = fields.map(|field| letter(field.number)).join(" ");
+    let sizes = fields.map(|field| field.number.bytes.to_string()).join(" ");
+    let types = fields.map(|field| field.number.pcd).join(" ");
     let counts = fields.map(|_| "1").join(" ");
     format!(
         "# .PCD v0.7 - Point Cloud Data file format\n\
@@ -25,11 +23,4 @@ pub fn header(kind: EventKind, points: u64) -> String {
          POINTS {points}\n\
          DATA binary\n"
     )
-}
-
-fn letter(number: Number) -> &'static str {
-    match number {
-        Number::U8 | Number::U32 => "U",
-        Number::F32 | Number::F64 => "F",
-    }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::points::{Number, fields};
+use super::points::fields;
 use crate::events::aer_file::EventKind;
 
 /// The header of a file of so many points.
@@ -15,16 +15,7 @@ pub fn header(kind: EventKind, points: u64) -> String {
     );
     for field in fields(kind) {
         // Writing to a String does not fail.
-        let _ = writeln!(header, "property {} {}", name(field.number), field.name);
+        let _ = writeln!(header, "property {} {}", field.number.ply, field.name);
     }
     header + "end_header\n"
-}
-
-fn name(number: Number) -> &'static str {
-    match number {
-        Number::U8 => "uchar",
-        Number::U32 => "uint",
-        Number::F32 => "float",
-        Number::F64 => "double",
-    }
 }

@@ -3,27 +3,33 @@
 use std::io::Write;
 
 use anyhow::Result;
+use foxglove::messages::packed_element_field::NumericType;
 
 use super::projection::Projection;
 use super::{Finished, Out, Sink};
 use crate::events::aer_file::{Event, EventKind};
 
-/// The type of a field, little-endian.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Number {
-    U8,
-    U32,
-    F32,
-    F64,
+/// The type of a field, little-endian: how many bytes it has, and its names in PCD, PLY
+/// and MCAP.
+#[derive(Clone, Copy, Debug)]
+pub struct Number {
+    pub bytes: u32,
+    pub pcd: &'static str,
+    pub ply: &'static str,
+    pub mcap: NumericType,
 }
 
-impl Number {
-    pub fn bytes(self) -> usize {
-        match self {
-            Self::U8 => 1,
-            Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
-        }
+const U8: Number = number(1, "U", "uchar", NumericType::Uint8);
+const U32: Number = number(4, "U", "uint", NumericType::Uint32);
+const F32: Number = number(4, "F", "float", NumericType::Float32);
+const F64: Number = number(8, "F", "double", NumericType::Float64);
+
+const fn number(bytes: u32, pcd: &'static str, ply: &'static str, mcap: NumericType) -> Number {
+    Number {
+        bytes,
+        pcd,
+        ply,
+        mcap,
     }
 }
 
@@ -46,14 +52,14 @@ pub fn fields(kind: EventKind) -> [Field; 7] {
         EventKind::DynamicDepth => "change",
     };
     [
-        field("x", Number::F32),
-        field("y", Number::F32),
-        field("z", Number::F32),
-        field(value, Number::F32),
+        field("x", F32),
+        field("y", F32),
+        field("z", F32),
+        field(value, F32),
         // More than an address needs: Open3D leaves out 16 bits of a PLY file.
-        field("pixel", Number::U32),
-        field("flags", Number::U8),
-        field("t_ns", Number::F64),
+        field("pixel", U32),
+        field("flags", U8),
+        field("t_ns", F64),
     ]
 }
 

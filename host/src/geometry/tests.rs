@@ -131,42 +131,29 @@ fn the_largest_calibration_is_read_in_linear_time() {
 
 #[test]
 fn calibrations_that_cannot_be_are_refused_with_the_line() {
-    let pixels = |rows: &str| format!("columns = 2\nrows = 1\npixels = [\n{rows}]\n");
-    for (text, parts) in [
-        (String::new(), &["line 1", "missing field"][..]),
-        ("columns = 2\nrows = \n".into(), &["line 2"]),
-        (pixels("[0, 0, 1]\n"), &["line 4", "array of length 4"]),
+    let good = "[0, 0, 1, 0],\n";
+    let pixels =
+        |before: &str, row: &str| format!("columns = 2\nrows = 1\npixels = [\n{before}{row}\n]\n");
+    let other = pixels(good, good).replace("rows = 1", "rows = 3");
+    for (text, part) in [
+        ("", "line 1: missing field"),
+        ("columns = 2\nrows = \n", "line 2: "),
+        (&pixels("", "[0, 0, 1]"), "array of length 4"),
+        (&pixels("", "[0, 0, 1]"), "line 4: "),
         (
-            pixels("[0, 0, 1, 0],\n[0, 0, 0, 0]\n"),
-            &["line 5", "no length"],
+            &pixels(good, "[0, 0, 0, 0]"),
+            "line 5: the direction has no length",
         ),
-        (
-            pixels("[0, 0, 1, 0],\n[nan, 0, 1, 0]\n"),
-            &["line 5", "direction NaN"],
-        ),
-        (
-            pixels("[0, 0, 1, inf],\n[0, 0, 1, 0]\n"),
-            &["line 4", "range bias inf"],
-        ),
-        (
-            pixels("[0, 0, 1, 0],\n"),
-            &["line 4", "1 pixels, should be 2"],
-        ),
-        (
-            pixels(&"[0, 0, 1, 0],\n".repeat(3)),
-            &["line 6", "3 pixels"],
-        ),
-        (
-            pixels(&"[0, 0, 1, 0],\n".repeat(2)).replace("rows = 1", "rows = 3"),
-            &["line 1", "is of 2x3 pixels, the events are of 2x1"],
-        ),
-        (pixels("") + "bias = 1\n", &["line 5", "unknown field"]),
+        (&pixels(good, "[nan, 0, 1, 0]"), "line 5: direction NaN"),
+        (&pixels("[0, 0, 1, inf],\n", good), "line 4: range bias inf"),
+        (&pixels("", good), "line 4: 1 pixels, should be 2"),
+        (&pixels(&good.repeat(2), good), "line 6: 3 pixels"),
+        (&other, "line 1: is of 2x3 pixels, the events are of 2x1"),
+        (&(pixels("", "") + "bias = 1\n"), "line 6: unknown field"),
     ] {
-        let error = calibration::parse(&text, array(2, 1)).unwrap_err();
+        let error = calibration::parse(text, array(2, 1)).unwrap_err();
         let message = format!("{error:#}");
-        for part in parts {
-            assert!(message.contains(part), "{message:?} does not say {part:?}");
-        }
+        assert!(message.contains(part), "{message:?} does not say {part:?}");
     }
 }
 

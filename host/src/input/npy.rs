@@ -98,9 +98,7 @@ fn read_file(path: &Path) -> Result<NpyRecording> {
     Ok(NpyRecording {
         geometry: Geometry::new(u32::try_from(columns)?, u32::try_from(pixels / columns)?),
         bins,
-        capture: Capture {
-            histograms: counts.chunks(bins).map(<[u64]>::to_vec).collect(),
-        },
+        capture: counts.chunks(bins).map(<[u64]>::to_vec).collect(),
     })
 }
 

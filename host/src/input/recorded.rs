@@ -32,12 +32,8 @@ pub enum RecordingLength {
     Cycles(u64),
 }
 
-/// The histograms of pixels that were recorded together.
-#[derive(Clone, Debug)]
-pub struct Capture {
-    /// One histogram a pixel.
-    pub histograms: Vec<Vec<u64>>,
-}
+/// The histograms of pixels that were recorded together, one a pixel.
+pub type Capture = Vec<Vec<u64>>;
 
 /// Captures of one file, one after the other in the address space.
 #[derive(Clone, Debug)]
@@ -69,14 +65,9 @@ impl RecordedHistograms {
         let mut photons_per_cycle = 0.0;
         let (mut shortest, mut longest) = (u64::MAX, 0);
         for capture in captures {
-            let totals = capture
-                .histograms
-                .iter()
-                .map(|counts| {
-                    counts
-                        .iter()
-                        .try_fold(0u64, |sum, &count| sum.checked_add(count))
-                })
+            let add = |sum: u64, &count| sum.checked_add(count);
+            let totals = capture.iter().map(|counts| counts.iter().try_fold(0, add));
+            let totals = totals
                 .collect::<Option<Vec<u64>>>()
                 .filter(|totals| totals.iter().all(|&total| total <= MOST))
                 .context("a histogram holds more than 2^40 photons")?;
@@ -87,7 +78,7 @@ impl RecordedHistograms {
             #[allow(clippy::cast_precision_loss, reason = "at most 2^40")]
             let mean = |total: &u64| *total as f64 / recorded.max(1) as f64;
             photons_per_cycle += totals.iter().map(mean).sum::<f64>();
-            for (counts, total) in capture.histograms.iter().zip(totals) {
+            for (counts, total) in capture.iter().zip(totals) {
                 let address = u16::try_from(pixels.len()).context("more than 65,536 pixels")?;
                 pixels.push(RecordedPixel {
                     left: Remaining::new(counts),
@@ -260,18 +251,15 @@ impl Remaining {
 mod tests {
     use super::*;
 
+    /// A capture of pixels in a row.
+    fn recorded(capture: Capture, cycles: u64, seed: u64) -> Result<RecordedHistograms> {
+        let geometry = Geometry::new(u32::try_from(capture.len())?, 1);
+        let length = RecordingLength::Cycles(cycles);
+        RecordedHistograms::new(geometry, &[capture], length, u64::MAX, seed)
+    }
+
     fn replay(counts: &[u64], cycles: u64) -> Vec<Photon> {
-        let capture = Capture {
-            histograms: vec![counts.to_vec()],
-        };
-        let mut source = RecordedHistograms::new(
-            Geometry::new(1, 1),
-            &[capture],
-            RecordingLength::Cycles(cycles),
-            u64::MAX,
-            7,
-        )
-        .unwrap();
+        let mut source = recorded(vec![counts.to_vec()], cycles, 7).unwrap();
         let slice = source.next_slice(u16::MAX).unwrap();
         assert_eq!(u64::from(slice.pixels[0].cycles), cycles);
         slice.pixels[0].photons.clone()
@@ -292,13 +280,7 @@ mod tests {
     #[test]
     fn equal_pixels_and_other_seeds_receive_other_photons() {
         let photons = |seed| {
-            let capture = Capture {
-                histograms: vec![vec![100; 8]; 2],
-            };
-            let geometry = Geometry::new(2, 1);
-            let length = RecordingLength::Cycles(1000);
-            let mut source =
-                RecordedHistograms::new(geometry, &[capture], length, 1000, seed).unwrap();
+            let mut source = recorded(vec![vec![100; 8]; 2], 1000, seed).unwrap();
             source.next_slice(1000).unwrap().pixels
         };
         let (one, other) = (photons(1), photons(2));
@@ -311,17 +293,11 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_into_memory_is_refused() {
-        let refused = |count: u64, length| {
-            let capture = Capture {
-                histograms: vec![vec![count; 8]],
-            };
-            let geometry = Geometry::new(1, 1);
-            RecordedHistograms::new(geometry, &[capture], length, 1, 1).is_err()
-        };
-        assert!(refused(1 << 38, RecordingLength::Cycles(1 << 40)));
-        assert!(refused(1 << 30, RecordingLength::Cycles(1)));
-        assert!(refused(1, RecordingLength::Cycles((1 << 40) + 1)));
-        assert!(!refused(1 << 30, RecordingLength::Cycles(1 << 20)));
+        let refused = |count: u64, cycles| recorded(vec![vec![count; 8]], cycles, 1).is_err();
+        assert!(refused(1 << 38, 1 << 40));
+        assert!(refused(1 << 30, 1));
+        assert!(refused(1, (1 << 40) + 1));
+        assert!(!refused(1 << 30, 1 << 20));
     }
 
     #[test]

@@ -57,6 +57,13 @@ impl Detector {
         pixel: PixelAddress,
     ) -> Result<Self> {
         effects.check()?;
+        let second_echo = effects.second_echo.as_ref();
+        let cover_glass = effects.cover_glass.as_ref();
+        let tail = effects.tail.as_ref();
+        let dead_time = effects.dead_time.as_ref();
+        let afterpulsing = effects.afterpulsing.as_ref();
+        let jitter = effects.jitter.as_ref();
+        let tdc = effects.tdc.as_ref();
         let rng = |stream: Stream| stream.rng(seed, pixel);
         let end = f64::from(timing.bins);
 
@@ -66,21 +73,10 @@ impl Detector {
             _ => 1.0,
         };
         let hot = Background::new((multiple - 1.0) * rates.background, 0.0, end, hot_rng)?;
-        let timed = effects.dead_time.is_some()
-            || effects.afterpulsing.is_some()
-            || effects.jitter.is_some();
-        let gap_rate = if timed {
-            multiple * rates.background
-        } else {
-            0.0
-        };
+        let timed = dead_time.is_some() || afterpulsing.is_some() || jitter.is_some();
+        let gap_rate = if timed { multiple } else { 0.0 } * rates.background;
         let gap = Background::new(gap_rate, end, timing.period, rng(Stream::Gap))?;
 
-        let second_echo = effects.second_echo.as_ref();
-        let cover_glass = effects.cover_glass.as_ref();
-        let tail = effects.tail.as_ref();
-        let afterpulsing = effects.afterpulsing.as_ref();
-        let jitter = effects.jitter.as_ref();
         let rate = |part: &Option<Background>| part.as_ref().map_or(0.0, |part| part.mean);
         let glass_rate = cover_glass.map_or(0.0, |glass| glass.signal);
         Ok(Self {
@@ -100,17 +96,14 @@ impl Detector {
                 .transpose()?,
             hot,
             gap,
-            recharge: Recharge::new(effects.dead_time.as_ref(), timing),
+            recharge: Recharge::new(dead_time, timing),
             trap: afterpulsing
                 .map(|after| Trap::new(after, timing, rng(Stream::Afterpulsing)))
                 .transpose()?,
             jitter: jitter
                 .map(|jitter| TimingError::new(jitter, timing, rng(Stream::Jitter)))
                 .transpose()?,
-            hits: effects
-                .tdc
-                .as_ref()
-                .map_or(usize::MAX, |tdc| tdc.hits_per_cycle),
+            hits: tdc.map_or(usize::MAX, |tdc| tdc.hits_per_cycle),
             times: Vec::new(),
             avalanches: Vec::new(),
         })
@@ -171,42 +164,34 @@ impl Detector {
         self.times.retain(|time| (0.0..period).contains(time));
         self.times.sort_unstable_by(f64::total_cmp);
         self.avalanches.clear();
-        for arrival in self.times.iter().copied().chain([period]) {
-            while let Some(release) = self
-                .trap
-                .as_mut()
-                .and_then(|trap| trap.release_before(arrival))
-            {
-                avalanche(
-                    release,
-                    &mut self.recharge,
-                    &mut self.trap,
-                    &mut self.avalanches,
-                );
+        let times = std::mem::take(&mut self.times);
+        for arrival in times.iter().copied().chain([period]) {
+            while let Some(release) = self.released_before(arrival) {
+                self.avalanche(release);
             }
             if arrival < period {
-                avalanche(
-                    arrival,
-                    &mut self.recharge,
-                    &mut self.trap,
-                    &mut self.avalanches,
-                );
+                self.avalanche(arrival);
             }
         }
+        self.times = times;
         self.recharge.end_laser_cycle(period);
         if let Some(trap) = &mut self.trap {
             trap.end_laser_cycle(period);
         }
     }
-}
 
-/// A photon or a trapped charge at `time`: an avalanche, unless the SPAD is
-/// blind.
-fn avalanche(time: f64, recharge: &mut Recharge, trap: &mut Option<Trap>, all: &mut Vec<f64>) {
-    if let Some(recharged) = recharge.avalanche(time) {
-        all.push(time);
-        if let Some(trap) = trap {
-            trap.fill(recharged);
+    fn released_before(&mut self, time: f64) -> Option<f64> {
+        self.trap.as_mut()?.release_before(time)
+    }
+
+    /// A photon or a trapped charge at `time`: an avalanche, unless the SPAD is
+    /// blind.
+    fn avalanche(&mut self, time: f64) {
+        if let Some(recharged) = self.recharge.avalanche(time) {
+            self.avalanches.push(time);
+            if let Some(trap) = &mut self.trap {
+                trap.fill(recharged);
+            }
         }
     }
 }

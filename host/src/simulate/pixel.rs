@@ -30,13 +30,9 @@ impl Model {
             0.0
         };
         // No photons at all is a rate the distribution does not take.
-        let photons = if total == 0.0 {
-            None
-        } else {
-            Some(Poisson::new(total)?)
-        };
+        let photons = (total != 0.0).then(|| Poisson::new(total));
         Ok(Self {
-            photons,
+            photons: photons.transpose()?,
             is_signal: Bernoulli::new(signal_share).context("a photon rate is negative")?,
             pulse: Normal::new(rates.position, rates.sigma)
                 .context("the pulse is not a normal one")?,

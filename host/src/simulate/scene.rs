@@ -236,12 +236,16 @@ impl Scene {
         Ok(())
     }
 
+    /// As near as a surface comes in `cycles` laser cycles.
+    fn nearest_mm(&self, surface: &Surface, cycles: u64) -> f64 {
+        let at = |seconds| surface.nearest_mm(seconds, self.layout);
+        at(0.0).min(at(self.seconds(cycles)))
+    }
+
     /// Does every surface stay where a target can be, and is none too bright?
     fn check_motion(&self, cycles: u64) -> Result<()> {
         for surface in &self.surfaces {
-            let ends = [0.0, self.seconds(cycles)];
-            let nearest = ends.map(|seconds| surface.nearest_mm(seconds, self.layout));
-            let nearest = nearest[0].min(nearest[1]);
+            let nearest = self.nearest_mm(surface, cycles);
             ensure!(
                 nearest >= NEAREST_MM,
                 "{}: comes as near as {nearest:.1} mm; must stay {NEAREST_MM} mm away",

@@ -1,10 +1,9 @@
 //! No command replaces a file that it reads, nor one in its folder that it did not write.
 
 use std::fs;
-use std::path::Path;
 
-use crate::common::Scratch;
 use crate::common::aer::{HEADER, events, file};
+use crate::common::{Scratch, names, says};
 use dtof::events::output::Output;
 use dtof::events::summary::Summary;
 use dtof::input::photon_csv::PhotonCsv;
@@ -25,27 +24,19 @@ const RESULTS: [&str; 9] = [
     "summary.json",
 ];
 
-fn names(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> = entries
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    names
-}
-
-/// `dtof ARGUMENTS` must end with one line that says `reason`, and leave `name` as it is.
+/// `dtof LINE` must end with one line that says `reason`, and leave `name` as it is.
 #[track_caller]
-fn kept(scratch: &Scratch, arguments: &[&str], name: &str, reason: &str) {
+fn kept(scratch: &Scratch, line: &str, name: &str, reason: &str) {
     let before = scratch.read(name);
-    let output = scratch.dtof(arguments);
+    let output = scratch.run(line);
     let message = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+    assert_eq!(output.status.code(), Some(1), "{line}");
     assert!(message.contains(&format!("{name}: {reason}")), "{message}");
     assert_eq!(message.lines().count(), 1, "{message}");
     assert_eq!(scratch.read(name), before);
 }
 
+const REPLAY: &str = "replay --input photons.csv --out out";
 const READ: &str = "is the file that is read";
 
 #[test]
@@ -53,22 +44,21 @@ fn a_recording_in_the_output_folder_is_kept() {
     for name in RESULTS {
         let scratch = Scratch::new();
         // Photon lists end in .csv; other names are reached through a link.
-        let arguments = |input| ["replay", "--input", input, "--out", "out"];
-        scratch.file("out/photons.csv", PHOTONS);
-        fs::hard_link(
-            scratch.path("out/photons.csv"),
-            scratch.path("out").join(name),
-        )
-        .unwrap();
         let result = format!("out/{name}");
-        kept(&scratch, &arguments("out/photons.csv"), &result, READ);
+        let photons = scratch.file("out/photons.csv", PHOTONS);
+        fs::hard_link(photons, scratch.path(&result)).unwrap();
+        kept(
+            &scratch,
+            "replay --input out/photons.csv --out out",
+            &result,
+            READ,
+        );
         assert_eq!(names(&scratch.path("out")).len(), 2);
     }
     let scratch = Scratch::new();
     scratch.file("out/events.csv", PHOTONS);
-    let arguments = ["replay", "--input", "out/events.csv", "--out", "out/../out"];
-    let output = scratch.dtof(&arguments);
-    assert!(String::from_utf8(output.stderr).unwrap().contains(READ));
+    let output = scratch.run("replay --input out/events.csv --out out/../out");
+    says(&String::from_utf8(output.stderr).unwrap(), READ);
     assert_eq!(scratch.read("out/events.csv"), PHOTONS);
 }
 
@@ -80,12 +70,11 @@ fn links_hide_no_input() {
     scratch.file("photons.csv", PHOTONS);
     scratch.file("scene.toml", SCENE);
     std::os::unix::fs::symlink("../photons.csv", scratch.path("out/summary.json")).unwrap();
-    let arguments = ["replay", "--input", "photons.csv", "--out", "out"];
-    kept(&scratch, &arguments, "out/summary.json", READ);
+    kept(&scratch, REPLAY, "out/summary.json", READ);
     fs::remove_file(scratch.path("out/summary.json")).unwrap();
     std::os::unix::fs::symlink("../scene.toml", scratch.path("out/report.html")).unwrap();
-    let arguments = ["simulate", "--scene", "scene.toml", "--out", "out"];
-    kept(&scratch, &arguments, "out/report.html", READ);
+    let line = "simulate --scene scene.toml --out out";
+    kept(&scratch, line, "out/report.html", READ);
     assert_eq!(
         scratch.read("photons.csv") + &scratch.read("scene.toml"),
         PHOTONS.to_owned() + SCENE
@@ -96,8 +85,8 @@ fn links_hide_no_input() {
 fn a_scene_in_the_output_folder_is_kept() {
     let scratch = Scratch::new();
     scratch.file("out/summary.json", SCENE);
-    let arguments = ["simulate", "--scene", "out/summary.json", "--out", "out"];
-    kept(&scratch, &arguments, "out/summary.json", READ);
+    let line = "simulate --scene out/summary.json --out out";
+    kept(&scratch, line, "out/summary.json", READ);
 }
 
 #[test]
@@ -109,25 +98,14 @@ fn a_file_of_somebody_else_is_kept() {
             let result = format!("out/{name}");
             scratch.file(&result, text);
             scratch.file("photons.csv", PHOTONS);
-            let arguments = ["replay", "--input", "photons.csv", "--out", "out"];
-            kept(
-                &scratch,
-                &arguments,
-                &result,
-                "was not written by this program",
-            );
+            kept(&scratch, REPLAY, &result, "was not written by this program");
             assert_eq!(names(&scratch.path("out")), [name]);
         }
     }
     let scratch = Scratch::new();
     scratch.file("out/demo/report.html", "mine\n");
-    let arguments = ["demo", "--cycles", "200"];
-    kept(
-        &scratch,
-        &arguments,
-        "out/demo/report.html",
-        "was not written",
-    );
+    let name = "out/demo/report.html";
+    kept(&scratch, "demo --cycles 200", name, "was not written");
 }
 
 /// Also after one that was ended between any two of its files.
@@ -135,23 +113,18 @@ fn a_file_of_somebody_else_is_kept() {
 fn results_of_an_earlier_run_are_replaced() {
     let scratch = Scratch::new();
     let photons = scratch.file("photons.csv", PHOTONS);
-    scratch.replayed(&photons, &[]);
+    scratch.replayed(&photons, "");
     assert_eq!(names(&scratch.path("out")), RESULTS);
     scratch.file("out/notes.txt", "mine\n");
-    scratch.replayed(&photons, &["--alpha", "8"]);
-    for name in [
-        "summary.json",
-        "report.html",
-        "events.aer",
-        "depth-last.svg",
-    ] {
+    scratch.replayed(&photons, "--alpha 8");
+    for name in "summary.json report.html events.aer depth-last.svg".split(' ') {
         fs::remove_file(scratch.path("out").join(name)).unwrap();
-        scratch.replayed(&photons, &[]);
+        scratch.replayed(&photons, "");
     }
     assert_eq!(scratch.read("out/notes.txt"), "mine\n");
     // Another command's, too: they are of this program.
     let scene = scratch.file("scene.toml", SCENE);
-    assert!(scratch.simulate(&scene, &["--quiet"]).status.success());
+    assert!(scratch.simulate(&scene, "--quiet").status.success());
 }
 
 /// What came into the way during a run stays, and so does all of the run before.
@@ -159,7 +132,7 @@ fn results_of_an_earlier_run_are_replaced() {
 fn a_folder_that_cannot_be_completed_is_left_as_it_was() {
     let scratch = Scratch::new();
     let photons = scratch.file("photons.csv", PHOTONS);
-    scratch.replayed(&photons, &[]);
+    scratch.replayed(&photons, "");
     let source = PhotonCsv::open(&photons, 128, None, 1).unwrap();
     let settings = scene::settings(1);
     let out = scratch.path("out");
@@ -176,11 +149,8 @@ fn a_folder_that_cannot_be_completed_is_left_as_it_was() {
     };
     finish(&|| fs::write(out.join("report.html"), "mine\n").unwrap());
     assert_eq!(scratch.read("out/report.html"), "mine\n");
-    fs::write(
-        out.join("report.html"),
-        "<meta name=\"generator\" content=\"dtof\">",
-    )
-    .unwrap();
+    let ours = "<meta name=\"generator\" content=\"dtof\">";
+    fs::write(out.join("report.html"), ours).unwrap();
     finish(&|| fs::create_dir(out.join("report.html")).unwrap());
 }
 
@@ -191,9 +161,8 @@ fn what_an_export_reads_is_kept() {
     scratch.file("calibration.toml", "columns = 64\n");
     fs::hard_link(scratch.path("events.aer"), scratch.path("same.aer")).unwrap();
     let export = |out| {
-        let arguments = ["export", "events.aer", "--format", "ply", "--out", out];
-        let output =
-            scratch.dtof(&[&arguments[..], &["--calibration", "calibration.toml"]].concat());
+        let options = "--format ply --calibration calibration.toml";
+        let output = scratch.run(&format!("export events.aer {options} --out {out}"));
         String::from_utf8(output.stderr).unwrap()
     };
     for out in ["events.aer", "./events.aer", "same.aer", "calibration.toml"] {

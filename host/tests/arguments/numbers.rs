@@ -1,8 +1,8 @@
 //! Numbers, names and devices of the command line: read alike by every command, and refused in
 //! one line.
 
-use std::fs;
-use std::process::{Command, Stdio};
+use std::fs::File;
+use std::path::PathBuf;
 
 use crate::common::aer::{HEADER, events, file};
 use crate::common::{Scratch, table};
@@ -17,9 +17,7 @@ fn numbers_may_have_exponents() {
         "columns = 4\ncycles = 10\n[[surface]]\nrange_mm = 1000\nsignal = 1\n",
     );
     let run = |arguments: &str| {
-        let arguments: Vec<&str> = arguments.split(' ').collect();
-        let output = scratch.simulate(&scene, &arguments);
-        assert!(output.status.success(), "{output:?}");
+        scratch.simulated(&scene, arguments);
         (scratch.read("out/events.csv"), scratch.summary())
     };
     let plain = run(
@@ -84,24 +82,22 @@ fn standard_input_and_output_are_no_files_of_that_name() {
 fn decode_reads_standard_input() {
     let scratch = Scratch::new();
     let aer = scratch.file("events.aer", file(&HEADER, &events()));
-    let decode = |input: fs::File| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_dtof"));
-        command.args(["decode", "-"]).stdin(Stdio::from(input));
-        command.output().unwrap()
+    let decode = |input: PathBuf| {
+        let input = File::open(input).unwrap();
+        scratch.command("decode -").stdin(input).output().unwrap()
     };
-    let output = decode(fs::File::open(&aer).unwrap());
+    let output = decode(aer);
     assert!(output.status.success());
     let of_file = scratch.run("decode events.aer");
     assert_eq!(output.stdout, of_file.stdout);
-    let other = scratch.file("photons.csv", PHOTONS);
-    let output = decode(fs::File::open(other).unwrap());
+    let output = decode(scratch.file("photons.csv", PHOTONS));
     scratch.refused(&output, &["error: standard input: not an AER file"]);
 }
 
 #[test]
 fn the_help_of_monitor_has_no_option_that_it_refuses() {
     let scratch = Scratch::new();
-    let help = |command| String::from_utf8(scratch.dtof(&[command, "--help"]).stdout).unwrap();
+    let help = |command| scratch.printed(&format!("{command} --help"));
     assert!(help("replay").contains("--frame") && help("simulate").contains("--frame"));
     assert!(!help("monitor").contains("--frame"));
 }
@@ -109,11 +105,8 @@ fn the_help_of_monitor_has_no_option_that_it_refuses() {
 #[test]
 fn a_serial_port_that_is_not_there_is_answered_with_those_that_are() {
     let scratch = Scratch::new();
-    for command in [
-        &["monitor"][..],
-        &["demo", "--cycles", "10", "--out", "out"],
-    ] {
-        let output = scratch.dtof(&[command, &["--device", "/dev/ttyNOWHERE"]].concat());
+    for command in ["monitor", "demo --cycles 10 --out out"] {
+        let output = scratch.run(&format!("{command} --device /dev/ttyNOWHERE"));
         scratch.refused(&output, &["/dev/ttyNOWHERE: ", "serial port"]);
     }
 }

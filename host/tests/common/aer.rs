@@ -1,7 +1,5 @@
 //! AER files to export.
 
-use std::path::{Path, PathBuf};
-
 use dtof::events::aer_file::{Event, Header, Writer};
 use dtof::export::{Exported, Format, Options, export};
 use dtof::input::source::Geometry;
@@ -11,7 +9,7 @@ use dtof_core::{
     SubBinOffset,
 };
 
-use super::Scratch;
+use super::{Scratch, names};
 
 /// 64 columns, 32 rows, 128 bins of 250 ps.
 pub const HEADER: Header = Header {
@@ -28,7 +26,12 @@ pub fn byte_of(word: usize) -> usize {
 
 /// An event in a pixel and laser cycle, its peak in a bin.
 pub fn depth(pixel: u16, cycle: u64, bin: u16) -> Event {
-    Event::Depth(DepthEvent {
+    Event::Depth(depth_event(pixel, cycle, bin))
+}
+
+/// The same by itself.
+pub fn depth_event(pixel: u16, cycle: u64, bin: u16) -> DepthEvent {
+    DepthEvent {
         pixel: PixelAddress(pixel),
         cycle: LaserCycle(cycle),
         exposure: 44,
@@ -37,7 +40,7 @@ pub fn depth(pixel: u16, cycle: u64, bin: u16) -> Event {
         peak_count: Count::saturating(37),
         background: Count::saturating(4),
         flags: Flags::from_bits(4).unwrap(),
-    })
+    }
 }
 
 /// A change of depth of so many bins, to a bin.
@@ -63,12 +66,11 @@ pub fn file(header: &Header, events: &[Event]) -> Vec<u8> {
     writer.finish().unwrap()
 }
 
-/// What the folder of an exported file holds.
-pub fn folder(path: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(path).unwrap();
-    let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
-    paths.sort();
-    paths
+/// What comes below a header with this end.
+pub fn below<'a>(bytes: &'a [u8], end: &str) -> &'a [u8] {
+    let mut places = bytes.windows(end.len());
+    let header = places.position(|part| part == end.as_bytes());
+    &bytes[header.unwrap() + end.len()..]
 }
 
 /// Twelve events, one of them in the laser cycle of another time word.
@@ -84,6 +86,6 @@ pub fn exported(bytes: &[u8], format: Format, options: &Options) -> (Exported, V
     let out = scratch.path("out");
     let exported = export(&input, &out, format, options, true).unwrap();
     let written = std::fs::read(out).unwrap();
-    assert_eq!(folder(&scratch.path("")).len(), 2, "files were left");
+    assert_eq!(names(&scratch.path("")).len(), 2, "files were left");
     (exported, written)
 }

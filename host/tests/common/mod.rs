@@ -42,16 +42,18 @@ impl Scratch {
         std::fs::read_to_string(self.path(name)).unwrap()
     }
 
-    /// `dtof ARGUMENTS` in this folder.
-    pub fn dtof(&self, arguments: &[&str]) -> Output {
+    /// `dtof LINE` in this folder, not started.
+    pub fn command(&self, line: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_dtof"));
-        command.current_dir(self.0.path()).args(arguments);
-        command.output().unwrap()
+        command
+            .current_dir(self.0.path())
+            .args(line.split_whitespace());
+        command
     }
 
-    /// `dtof LINE` in this folder.
+    /// What `dtof LINE` in this folder does.
     pub fn run(&self, line: &str) -> Output {
-        self.dtof(&line.split_whitespace().collect::<Vec<_>>())
+        self.command(line).output().unwrap()
     }
 
     /// What `dtof LINE` prints. It must succeed.
@@ -64,22 +66,31 @@ impl Scratch {
     #[track_caller]
     pub fn all_refused(&self, command: &str, rows: &str) {
         for row in table(rows) {
-            let parts: Vec<&str> = row[1..].iter().map(String::as_str).collect();
-            self.refused(&self.run(&format!("{command} {}", row[0])), &parts);
+            self.refused(&self.run(&format!("{command} {}", row[0])), &row[1..]);
         }
     }
 
     /// `dtof replay` of a file into `out`.
-    pub fn replay(&self, input: &Path, more: &[&str]) -> Output {
-        let input = input.to_str().unwrap();
-        self.dtof(&[&["replay", "--input", input, "--out", "out"], more].concat())
+    pub fn replay(&self, input: &Path, options: &str) -> Output {
+        self.run(&format!(
+            "replay --out out --input {} {options}",
+            input.display()
+        ))
     }
 
     /// As [`Self::replay`], which must succeed.
     #[track_caller]
-    pub fn replayed(&self, input: &Path, more: &[&str]) -> serde_json::Value {
-        succeeded(self.replay(input, more));
+    pub fn replayed(&self, input: &Path, options: &str) -> serde_json::Value {
+        succeeded(self.replay(input, options));
         self.summary()
+    }
+
+    /// The events of the last run into `out`: the cells of each row.
+    pub fn events(&self) -> Vec<Vec<String>> {
+        let text = self.read("out/events.csv");
+        let rows = text.lines().skip(1);
+        rows.map(|row| row.split(',').map(str::to_owned).collect())
+            .collect()
     }
 
     /// What the last run into `out` came to.
@@ -88,25 +99,43 @@ impl Scratch {
     }
 
     /// `dtof simulate` of a scene file into `out`.
-    pub fn simulate(&self, scene: &Path, more: &[&str]) -> Output {
-        let scene = scene.to_str().unwrap();
-        self.dtof(&[&["simulate", "--scene", scene, "--out", "out"], more].concat())
+    pub fn simulate(&self, scene: &Path, options: &str) -> Output {
+        self.run(&format!(
+            "simulate --out out --scene {} {options}",
+            scene.display()
+        ))
+    }
+
+    /// What [`Self::simulate`] prints. It must succeed.
+    #[track_caller]
+    pub fn simulated(&self, scene: &Path, options: &str) -> String {
+        succeeded(self.simulate(scene, options))
     }
 
     /// The program must have failed with one line that says all of `parts`, and
     /// left nothing that could be taken for a result.
     #[track_caller]
-    pub fn refused(&self, output: &Output, parts: &[&str]) {
+    pub fn refused(&self, output: &Output, parts: &[impl AsRef<str>]) {
         let message = String::from_utf8(output.stderr.clone()).unwrap();
-        assert!(!output.status.success(), "no failure with {parts:?}");
+        assert!(!output.status.success(), "no failure: {output:?}");
         assert_eq!(message.lines().count(), 1, "not one line: {message}");
         assert!(!message.contains("panicked"), "{message}");
         for part in parts {
-            says(&message, part);
+            says(&message, part.as_ref());
         }
         let left = std::fs::read_dir(self.path("out")).map_or(0, Iterator::count);
         assert_eq!(left, 0, "files were left in the output folder");
     }
+}
+
+/// The names in a folder, sorted.
+pub fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
 }
 
 /// `text` must have `part` in it.

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use crate::common::says;
-use crate::{listen, serve};
+use crate::{client, listen, serve};
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::Engine;
 use dtof::engine::host::host_engine;
@@ -15,7 +15,7 @@ use dtof::engine::settings::Settings;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::scene;
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{Count, DepthEvent, WindowRule};
+use dtof_core::{Count, DepthEvent, PixelAddress, WindowRule};
 use dtof_firmware::sidecar::Sidecar;
 
 const PIXELS: usize = 64;
@@ -41,12 +41,11 @@ fn device(lives: Option<Duration>) -> String {
     let mut lives = lives.unwrap_or(Duration::MAX);
     listen(move |stream| {
         let mut pixels = heapless::Vec::<_, PIXELS>::new();
-        while let Ok(true) = serve(
-            stream,
-            &mut Sidecar::new(&mut pixels, None),
-            lives,
-            |_, _| {},
-        ) {
+        let mut on = |lives| {
+            let mut sidecar = Sidecar::new(&mut pixels, None);
+            serve(stream, &mut sidecar, lives, |_, _| {})
+        };
+        while let Ok(true) = on(lives) {
             lives = Duration::MAX; // switched off and on
         }
         true
@@ -65,8 +64,8 @@ fn events(engine: &mut dyn Engine, cycles: u64) -> anyhow::Result<Vec<DepthEvent
     Ok(events)
 }
 
-fn addresses() -> Vec<dtof_core::PixelAddress> {
-    (0..64).map(dtof_core::PixelAddress).collect()
+fn addresses(pixels: u16) -> Vec<PixelAddress> {
+    (0..pixels).map(PixelAddress).collect()
 }
 
 /// The same events on the device and on the host, and gives them.
@@ -77,11 +76,11 @@ fn same_events(
     reads_every: Duration,
     at_least: u64,
 ) -> Vec<DepthEvent> {
-    let mut client = Client::new(device::open(&device(None), None).unwrap()).unwrap();
+    let mut client = client(&device(None));
     assert_eq!((client.bins(), client.pixels()), (128, 64));
     client.reads_every = reads_every;
-    let mut on_device = DeviceEngine::new(client, settings, &addresses()).unwrap();
-    let mut on_host = host_engine(settings, &addresses()).unwrap();
+    let mut on_device = DeviceEngine::new(client, settings, &addresses(64)).unwrap();
+    let mut on_host = host_engine(settings, &addresses(64)).unwrap();
     let expected = events(on_host.as_mut(), cycles).unwrap();
     let actual = events(&mut on_device, cycles).unwrap();
     assert!(!expected.is_empty() && actual == expected);
@@ -103,23 +102,18 @@ fn a_host_that_seldom_reads_gets_the_same_events() {
 
 #[test]
 fn every_rule_and_estimator_gives_the_same_events_on_a_device() {
-    let with_windows = with_windows();
-    let variants = [
-        Settings {
-            sigma_bins: None,
-            ..with_windows.clone()
-        },
-        Settings {
-            rule: settings().rule,
-            ..with_windows.clone()
-        },
-        with_windows,
-        settings(),
-    ];
-    let events: Vec<_> = variants
-        .iter()
-        .map(|settings| same_events(settings, 1_000, Duration::ZERO, 100_000))
-        .collect();
+    let (plain, with_windows) = (settings(), with_windows());
+    let mut events = Vec::new();
+    for rule in [plain.rule, with_windows.rule] {
+        for sigma_bins in [plain.sigma_bins, with_windows.sigma_bins] {
+            let settings = Settings {
+                rule,
+                sigma_bins,
+                ..settings()
+            };
+            events.push(same_events(&settings, 1_000, Duration::ZERO, 100_000));
+        }
+    }
     // And not because the device decides as it always does.
     for (index, one) in events.iter().enumerate() {
         assert!(!events[index + 1..].contains(one));
@@ -130,37 +124,27 @@ fn every_rule_and_estimator_gives_the_same_events_on_a_device() {
 fn a_configuration_the_device_cannot_take_is_refused_with_its_reason() {
     let name = device(None);
     let refused = |settings: &Settings, pixels: u16| {
-        let client = Client::new(device::open(&name, None).unwrap()).unwrap();
-        let addresses: Vec<_> = (0..pixels).map(dtof_core::PixelAddress).collect();
-        let engine = DeviceEngine::new(client, settings, &addresses);
+        let engine = DeviceEngine::new(client(&name), settings, &addresses(pixels));
         format!("{:#}", engine.err().expect("refused"))
     };
-    let reason = refused(
-        &Settings {
-            l2: 100,
-            ..settings()
-        },
-        64,
-    );
-    assert!(
-        reason.contains("refuses") && reason.contains("L2 must be greater than L1"),
-        "{reason}"
-    );
-    let reason = refused(&settings(), 65);
-    says(&reason, "does not have that many pixels");
+    let mut settings = settings();
+    says(&refused(&settings, 65), "does not have that many pixels");
+    settings.l2 = 100;
+    let reason = refused(&settings, 64);
+    says(&reason, "refuses");
+    says(&reason, "L2 must be greater than L1");
 }
 
 #[test]
 fn a_device_that_restarts_is_noticed() {
     let name = device(Some(Duration::from_millis(200)));
-    let client = Client::new(device::open(&name, None).unwrap()).unwrap();
-    let mut engine = DeviceEngine::new(client, &settings(), &addresses()).unwrap();
+    let mut engine = DeviceEngine::new(client(&name), &settings(), &addresses(64)).unwrap();
     let error = loop {
         if let Err(error) = events(&mut engine, 250) {
             break error;
         }
     };
-    assert!(format!("{error:#}").contains("restarted"), "{error:#}");
+    says(&format!("{error:#}"), "restarted");
 }
 
 #[test]
@@ -172,27 +156,19 @@ fn an_emulated_device_runs_an_image_and_no_other_takes_one() {
     let missing = refused("qemu", "no/such/image");
     assert!(missing.starts_with("no image at no/such/image: "));
     assert!(missing.contains("`cargo xtask image mps2-an386`"));
-    assert_eq!(
-        refused("qemu", "Cargo.toml"),
-        "Cargo.toml: no ELF file, as an image is"
-    );
-    assert_eq!(
-        refused("tcp:127.0.0.1:1", "Cargo.toml"),
-        "--image is for --device qemu"
-    );
+    let other = refused("qemu", "Cargo.toml");
+    assert_eq!(other, "Cargo.toml: no ELF file, as an image is");
+    let other = refused("tcp:127.0.0.1:1", "Cargo.toml");
+    assert_eq!(other, "--image is for --device qemu");
 }
 
 #[test]
 fn nobody_at_the_other_end_is_an_error_not_a_hang() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let name = format!("tcp:{}", listener.local_addr().unwrap());
-    let error = Client::new(device::open(&name, None).unwrap())
-        .err()
-        .expect("nobody answers");
-    assert!(
-        format!("{error:#}").contains("no device answered"),
-        "{error:#}"
-    );
+    let answered = Client::new(device::open(&name, None).unwrap());
+    let error = answered.err().expect("nobody answers");
+    says(&format!("{error:#}"), "no device answered");
     drop(listener);
     assert!(device::open(&name, None).is_err());
     assert!(device::open("/dev/not-a-port", None).is_err());

@@ -12,12 +12,17 @@ use std::net::{TcpListener, TcpStream};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use dtof::device::{self, Client};
 use dtof::engine::settings::Settings;
 use dtof::simulate::scene;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, PaperRule};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
+
+fn client(name: &str) -> Client {
+    Client::new(device::open(name, None).unwrap()).unwrap()
+}
 
 /// What the monitor asks of its devices.
 fn settings() -> Settings {

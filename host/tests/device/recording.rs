@@ -8,15 +8,14 @@ use std::path::Path;
 use std::rc::Rc;
 use std::time::Duration;
 
+use crate::common::aer::{HEADER, depth_event};
+use crate::common::says;
 use crate::{Closing, settings};
 use dtof::device::monitor::map::LiveMap;
 use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::device::{Client, Port};
 use dtof::events::aer_file::{Event, Header, Reader};
-use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{
-    AerEncoder, BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, SubBinOffset,
-};
+use dtof_core::AerEncoder;
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::greeting;
@@ -24,32 +23,8 @@ use dtof_link::{Configuration, Report, Source, message};
 
 const PIXELS: u16 = 4;
 
-fn event(pixel: u16, cycle: u64) -> DepthEvent {
-    DepthEvent {
-        pixel: PixelAddress(pixel),
-        cycle: LaserCycle(cycle),
-        exposure: 44,
-        peak_bin: BinIndex::saturating(20),
-        offset: SubBinOffset::CENTRE,
-        peak_count: Count::saturating(37),
-        background: Count::saturating(4),
-        flags: Flags::NONE,
-    }
-}
-
-/// When the device sends an event.
-#[derive(Clone, Copy, PartialEq)]
-enum Moment {
-    /// It answers the first request for statistics.
-    Begins,
-    /// It answers any later one.
-    Runs,
-    /// It is to stop.
-    Stops,
-}
-
-/// A device whose events come from pixel `pixel`, the last one from pixel 0. After `lives`
-/// events it is gone.
+/// A device that sends an event with each answer to a request for statistics, from pixel
+/// `pixel`, and one from pixel 0 when it is to stop. After `lives` events it is gone.
 struct Device {
     endpoint: Endpoint,
     deframer: Deframer,
@@ -57,42 +32,33 @@ struct Device {
     pixel: u16,
     lives: u64,
     answers: VecDeque<(u8, Vec<u8>)>,
-    reports: u32,
     now_ms: u32,
-    sent: Rc<RefCell<Vec<DepthEvent>>>,
+    sent: Rc<RefCell<Vec<Event>>>,
 }
 
 impl Device {
-    fn event(&mut self, moment: Moment) {
+    fn event(&mut self, pixel: u16) {
         let cycle = self.sent.borrow().len() as u64;
-        let pixel = match moment {
-            Moment::Stops => 0,
-            Moment::Begins | Moment::Runs => self.pixel,
-        };
-        let event = event(pixel, 100 * cycle + moment as u64);
+        let event = depth_event(pixel, 100 * cycle, 20);
         let (time, word) = self.encoder.encode(&event);
         let words = time.into_iter().chain([word]);
         let body: Vec<u8> = words.flat_map(|word| word.to_le_bytes()).collect();
         self.answers.push_back((message::EVENTS, body));
-        self.sent.borrow_mut().push(event);
+        self.sent.borrow_mut().push(Event::Depth(event));
     }
 
     fn answer(&mut self, kind: u8, body: &[u8]) {
         let answer = match kind {
             message::CONFIGURE => {
                 if Configuration::from_le_bytes(body).unwrap().source == Source::Link {
-                    self.event(Moment::Stops);
+                    self.event(0);
                 }
                 (message::CONFIGURED, Vec::new())
             }
             message::STATISTICS_REQUEST => {
-                let moments = [Moment::Begins, Moment::Runs];
-                self.event(moments[usize::from(self.reports > 0)]);
-                self.reports += 1;
-                (
-                    message::STATISTICS,
-                    Report::default().to_le_bytes().to_vec(),
-                )
+                self.event(self.pixel);
+                let report = Report::default().to_le_bytes();
+                (message::STATISTICS, report.to_vec())
             }
             kind => panic!("message {kind:#04x}"),
         };
@@ -156,7 +122,7 @@ impl Write for Screen {
 
 /// What the device sent, what was recorded of it, and why it ended.
 struct Monitored {
-    sent: Vec<DepthEvent>,
+    sent: Vec<Event>,
     recorded: Vec<Event>,
     drawn: String,
     error: Option<String>,
@@ -166,10 +132,8 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("events.aer");
     let header = Header {
-        bins: 128,
         geometry: array(PIXELS, None),
-        bin_width_ps: U16F16::lit("250"),
-        offset_mm: I24F8::ZERO,
+        ..HEADER
     };
     let sent = Rc::default();
     let mut client = Client::new(Box::new(Device {
@@ -179,7 +143,6 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
         pixel,
         lives,
         answers: VecDeque::new(),
-        reports: 0,
         now_ms: 0,
         sent: Rc::clone(&sent),
     }))
@@ -216,9 +179,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
 fn recorded(path: &Path) -> Vec<Event> {
     let file = std::fs::File::open(path).unwrap();
     let mut reader = Reader::new(io::BufReader::new(file)).unwrap();
-    std::iter::from_fn(|| reader.next_event().transpose())
-        .collect::<Result<_, _>>()
-        .unwrap()
+    std::iter::from_fn(|| reader.next_event().unwrap()).collect()
 }
 
 #[test]
@@ -228,8 +189,7 @@ fn what_is_sent_is_recorded_also_when_nobody_reads_and_while_the_device_stops() 
         let run = monitored(3, u64::MAX, 2, room);
         assert_eq!(run.error, None);
         assert!(run.sent.len() >= 3, "at first, after a second, at the end");
-        let sent: Vec<_> = run.sent.into_iter().map(Event::Depth).collect();
-        assert_eq!(run.recorded, sent);
+        assert_eq!(run.recorded, run.sent);
         // The last event, too.
         let (_, last) = run.drawn.rsplit_once("\r").unwrap();
         assert!(last.contains("2 of 4 pixels") && last.contains("events/s "));
@@ -240,19 +200,18 @@ fn what_is_sent_is_recorded_also_when_nobody_reads_and_while_the_device_stops() 
 fn what_was_sent_before_the_device_is_gone_is_recorded() {
     for lives in [1, 2] {
         let run = monitored(3, lives, 30, 100_000);
-        let error = run.error.unwrap();
-        assert!(error.contains("the device cannot be read from"), "{error}");
-        let sent: Vec<_> = run.sent.into_iter().map(Event::Depth).collect();
-        assert_eq!(sent.len() as u64, lives);
-        assert_eq!(run.recorded, sent);
+        says(&run.error.unwrap(), "the device cannot be read from");
+        assert_eq!(run.sent.len() as u64, lives);
+        assert_eq!(run.recorded, run.sent);
     }
 }
 
 #[test]
 fn a_pixel_the_device_was_not_configured_for_ends_it() {
     let run = monitored(PIXELS, u64::MAX, 30, 100_000);
+    let error = run.error.unwrap();
     assert_eq!(
-        run.error.unwrap(),
+        error,
         "the device sends an event of pixel 4, and has 4 pixels"
     );
     assert_eq!(run.recorded, []);

@@ -1,8 +1,10 @@
 //! `dtof export` of files that are damaged, or are no AER files.
 
+use std::ops::Range;
+
 use super::event_camera::{changes, evt2, mcap};
-use crate::common::Scratch;
-use crate::common::aer::{HEADER, byte_of, depth, dynamic, events, exported, file, folder};
+use crate::common::aer::{HEADER, below, byte_of, depth, dynamic, events, exported, file};
+use crate::common::{Scratch, names, says};
 use dtof::events::aer_file::{Event, Header};
 use dtof::export::{Format, Options};
 use dtof::input::source::Geometry;
@@ -15,10 +17,7 @@ fn points(format: Format, bytes: &[u8]) -> u64 {
         line.unwrap().parse::<usize>().unwrap()
     };
     let records = |end: &str, said: usize| {
-        let header = bytes
-            .windows(end.len())
-            .position(|part| part == end.as_bytes());
-        assert_eq!(bytes.len() - header.unwrap() - end.len(), said * 29);
+        assert_eq!(below(bytes, end).len(), said * 29);
         said
     };
     let points = match format {
@@ -69,40 +68,26 @@ fn damage_is_named_with_its_byte_after_the_events_before_it_are_written() {
     let whole = file(&HEADER, &events());
     let changed = |at: usize, to: u8| {
         let mut bytes = whole.clone();
-        bytes[at] = to;
+        bytes[byte_of(5) + at] = to;
         bytes
     };
+    let longer = [&whole[..], &[0]].concat();
     for format in FORMATS {
         for (bytes, written, parts) in [
-            (
-                changed(byte_of(5) + 7, 0xc0),
-                4,
-                ["byte 144: ", "unknown kind"],
-            ),
+            (&changed(7, 0xc0), 4, ["byte 144: ", "unknown kind"]),
             // Pixel 65,280 of 2,048.
-            (
-                changed(byte_of(5) + 1, 0xff),
-                4,
-                ["byte 144: pixel ", " of 2048"],
-            ),
+            (&changed(1, 0xff), 4, ["byte 144: pixel ", " of 2048"]),
             // A photon more, which only the checksum knows.
-            (changed(byte_of(5) + 8, 38), 12, ["byte 288: ", "checksum"]),
-            (
-                [&whole[..], &[0]].concat(),
-                12,
-                ["byte 304: ", "bytes follow"],
-            ),
+            (&changed(8, 38), 12, ["byte 288: ", "checksum"]),
+            (&longer, 12, ["byte 304: ", "bytes follow"]),
             // Bin 152 of 128: the peak bin has bits 52-61.
-            (
-                changed(byte_of(5) + 7, 0x49),
-                4,
-                ["byte 144: bin 152", " of 128"],
-            ),
+            (&changed(7, 0x49), 4, ["byte 144: bin 152", " of 128"]),
         ] {
-            let (exported, out) = exported(&bytes, format, &Options::default());
+            let (exported, out) = exported(bytes, format, &Options::default());
             assert_eq!((exported.written, points(format, &out)), (written, written));
             let damage = exported.damage.unwrap();
-            assert!(parts.iter().all(|part| damage.contains(part)), "{damage}");
+            says(&damage, parts[0]);
+            says(&damage, parts[1]);
         }
     }
 }
@@ -123,23 +108,19 @@ fn the_program_says_what_is_damaged_and_fails() {
 fn what_is_no_aer_file_leaves_the_output_as_it_was() {
     let scratch = Scratch::new();
     scratch.file("x.pcd", "kept");
-    let whole = file(&HEADER, &events());
-    let mut other_version = whole.clone();
-    other_version[8] = 9;
-    let mut no_pixels = whole.clone();
-    no_pixels[16] = 0;
-    let mut many_pixels = whole.clone();
-    many_pixels[16..24].fill(0xff);
-    let mut no_bins = whole.clone();
-    no_bins[24..28].fill(0);
+    let with = |bytes: Range<usize>, value| {
+        let mut file = file(&HEADER, &events());
+        file[bytes].fill(value);
+        file
+    };
     for (bytes, part) in [
         (&b""[..], "not an AER file"),
         (&[0; 200], "not an AER file"),
         (b"cycle,pixel\n", "not an AER file"),
-        (&other_version, "AER version 9"),
-        (&no_pixels, "0x32 pixels"),
-        (&many_pixels, "4294967295x4294967295 pixels"),
-        (&no_bins, "bin width is zero"),
+        (&with(8..9, 9), "AER version 9"),
+        (&with(16..17, 0), "0x32 pixels"),
+        (&with(16..24, 0xff), "4294967295x4294967295 pixels"),
+        (&with(24..28, 0), "bin width is zero"),
     ] {
         scratch.file("events.aer", bytes);
         scratch.refused(
@@ -147,7 +128,7 @@ fn what_is_no_aer_file_leaves_the_output_as_it_was() {
             &["events.aer: ", part],
         );
         assert_eq!(scratch.read("x.pcd"), "kept");
-        assert_eq!(folder(&scratch.path("")).len(), 2);
+        assert_eq!(names(&scratch.path("")).len(), 2);
     }
 }
 
@@ -159,22 +140,18 @@ fn what_comes_before_a_time_that_is_damaged_is_exported_whole() {
     let mut bytes = file(&HEADER, &events);
     // A time word, 1,000 events, a time word: 2^60 laser cycles.
     bytes[byte_of(1001) + 13] = 1;
-    for (format, name) in [
-        (Format::Pcd, "PCD"),
-        (Format::Ply, "PLY"),
-        (Format::Mcap, "MCAP"),
-        (Format::Evt2, "EVT2"),
-    ] {
+    let formats = [Format::Pcd, Format::Ply, Format::Mcap, Format::Evt2];
+    for (format, name) in formats.into_iter().zip(["PCD", "PLY", "MCAP", "EVT2"]) {
         // The rest may be there, or not.
         for bytes in [&bytes[..], &bytes[..byte_of(1003)]] {
             let (exported, _) = exported(bytes, format, &Options::default());
             assert_eq!(exported.written, 1000);
             let damage = exported.damage.unwrap();
-            let parts = [
+            says(
+                &damage,
                 "byte 16080: laser cycle 1152921504607895552 lies beyond",
-                name,
-            ];
-            assert!(parts.iter().all(|part| damage.contains(part)), "{damage}");
+            );
+            says(&damage, name);
         }
     }
     // CSV holds any time: only the checksum knows.
@@ -186,13 +163,11 @@ fn what_comes_before_a_time_that_is_damaged_is_exported_whole() {
 #[test]
 fn a_whole_file_of_times_that_the_format_cannot_hold_is_refused() {
     let scratch = Scratch::new();
-    scratch.file(
-        "late.aer",
-        file(&HEADER, &[depth(0, 5, 5), depth(0, 1 << 60, 5)]),
-    );
-    scratch.refused(
-        &scratch.run("export late.aer --format pcd --out x.pcd"),
-        &["late.aer: laser cycle 1152921504606846976 lies beyond"],
+    let late = file(&HEADER, &[depth(0, 5, 5), depth(0, 1 << 60, 5)]);
+    scratch.file("late.aer", late);
+    scratch.all_refused(
+        "export late.aer --format pcd",
+        "--out x.pcd | late.aer: laser cycle 1152921504606846976 lies beyond",
     );
     assert!(!scratch.path("x.pcd").exists());
 }
@@ -200,10 +175,8 @@ fn a_whole_file_of_times_that_the_format_cannot_hold_is_refused() {
 #[test]
 fn what_export_takes_for_damage_decode_does_too() {
     let beyond = Header { bins: 32, ..HEADER };
-    let narrow = Header {
-        geometry: Geometry::new(8, 2),
-        ..HEADER
-    };
+    let mut narrow = HEADER;
+    narrow.geometry = Geometry::new(8, 2);
     let scratch = Scratch::new();
     for (header, event, part) in [
         (beyond, depth(0, 2, 32), "bin 32 of 32"),
@@ -217,12 +190,10 @@ fn what_export_takes_for_damage_decode_does_too() {
             Event::DynamicDepth(_) => dynamic(15, 1, 32, 1),
         };
         scratch.file("events.aer", file(&header, &[first, event]));
-        for arguments in [
-            &["export", "events.aer", "--format", "csv", "--out", "x.csv"][..],
-            &["decode", "events.aer"],
-        ] {
-            let output = scratch.dtof(arguments);
-            scratch.refused(&output, &[&format!("events.aer: byte 96: {part}")]);
+        let part = format!("events.aer: byte 96: {part}");
+        for line in ["export --format csv --out x.csv", "decode"] {
+            let output = scratch.run(&format!("{line} events.aer"));
+            scratch.refused(&output, &[&part]);
         }
         assert_eq!(scratch.read("x.csv").lines().count(), 2);
     }
@@ -233,13 +204,13 @@ fn an_interrupted_export_leaves_no_output() {
     let scratch = Scratch::new();
     let events: Vec<Event> = (0..1_000_000).map(|cycle| depth(7, cycle, 40)).collect();
     scratch.file("events.aer", file(&HEADER, &events));
-    let mut dtof = std::process::Command::new(env!("CARGO_BIN_EXE_dtof"));
-    dtof.current_dir(scratch.path(""));
-    dtof.args(["export", "events.aer", "--format", "csv", "--out", "x.csv"]);
+    let mut dtof = scratch.command("export events.aer --format csv --out x.csv");
     let mut child = dtof.spawn().unwrap();
-    let is_partial = |path: &std::path::PathBuf| path.extension().is_some_and(|is| is == "partial");
     // Not before it writes.
-    while !folder(&scratch.path("")).iter().any(is_partial) {
+    while !names(&scratch.path(""))
+        .iter()
+        .any(|name| name.ends_with(".partial"))
+    {
         assert!(child.try_wait().unwrap().is_none(), "ended too early");
     }
     child.kill().unwrap();

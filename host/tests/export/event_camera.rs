@@ -2,19 +2,16 @@
 //! is checked with other projects' readers by the test `readers` of `dtof-host-tests`.
 
 use crate::common::Scratch;
-use crate::common::aer::{HEADER, depth, dynamic, exported, file};
-use dtof::events::aer_file::{Event, Header};
-use dtof::export::{Format, LaserClock, Options};
+use crate::common::aer::{HEADER, below, depth, depth_event, dynamic, exported, file};
+use dtof::events::aer_file::Event;
+use dtof::export::{Exported, Format, LaserClock, Options};
 use dtof::input::source::Geometry;
 use dtof_core::fixed::types::U24F8;
-use dtof_core::{DepthEvent, Flags, Reference};
-use dtof_link::DynamicDepth;
+use dtof_core::{Flags, Reference};
 
 /// Time, column, row and whether it is ON, of each event.
 pub fn evt2(bytes: &[u8]) -> Vec<(u64, u32, u32, bool)> {
-    let end = b"% end\n";
-    let header = bytes.windows(end.len()).position(|part| part == end);
-    let words = &bytes[header.unwrap() + end.len()..];
+    let words = below(bytes, "% end\n");
     assert!(words.len().is_multiple_of(4));
     let mut high = None;
     let mut events = Vec::new();
@@ -54,10 +51,8 @@ fn messages(bytes: &[u8], topic: &str) -> Vec<(u64, Vec<u8>)> {
 }
 
 fn times(bytes: &[u8], topic: &str) -> Vec<u64> {
-    messages(bytes, topic)
-        .iter()
-        .map(|message| message.0)
-        .collect()
+    let messages = messages(bytes, topic).into_iter();
+    messages.map(|message| message.0).collect()
 }
 
 /// The messages of statistics.
@@ -72,6 +67,19 @@ pub fn changes() -> Vec<Event> {
     near.chain([dynamic(2047, 1 << 20, 60, -1)]).collect()
 }
 
+/// The export of these events without an option.
+fn plain(events: &[Event], format: Format) -> (Exported, Vec<u8>) {
+    exported(&file(&HEADER, events), format, &Options::default())
+}
+
+/// Slices of so many nanoseconds.
+fn sliced(slice_ns: Option<u64>) -> Options {
+    Options {
+        slice_ns,
+        ..Options::default()
+    }
+}
+
 #[test]
 fn changes_are_found_as_the_paper_has_them_and_taken_where_they_are() {
     // Three at bin 40, then four at bin 28, 450 mm nearer: the mean goes down by 150 mm
@@ -83,13 +91,9 @@ fn changes_are_found_as_the_paper_has_them_and_taken_where_they_are() {
         .collect();
     let bytes = file(&HEADER, &events);
     let found = |threshold: &str, reference| {
-        let options = Options {
-            dynamic_depth: DynamicDepth {
-                threshold_mm: U24F8::lit(threshold),
-                reference,
-            },
-            ..Options::default()
-        };
+        let mut options = Options::default();
+        options.dynamic_depth.threshold_mm = U24F8::lit(threshold);
+        options.dynamic_depth.reference = reference;
         let (exported, out) = exported(&bytes, Format::Evt2, &options);
         let events = evt2(&out);
         assert_eq!(exported.written, events.len() as u64);
@@ -100,16 +104,11 @@ fn changes_are_found_as_the_paper_has_them_and_taken_where_they_are() {
     assert_eq!(found("160", Reference::Previous), []);
     assert_eq!(found("160", Reference::Reported), [off(4)]);
 
-    let (_, out) = exported(
-        &file(&HEADER, &changes()),
-        Format::Evt2,
-        &Options::default(),
-    );
+    let (_, out) = plain(&changes(), Format::Evt2);
     let events = evt2(&out);
-    assert_eq!(
-        (events.len(), events[1], events[9]),
-        (10, (5000, 8, 3, true), (104_857, 63, 31, false))
-    );
+    assert_eq!(events.len(), 10);
+    assert_eq!(events[1], (5000, 8, 3, true));
+    assert_eq!(events[9], (104_857, 63, 31, false));
 }
 
 #[test]
@@ -119,11 +118,9 @@ fn changes_out_of_order_are_put_in_order() {
         .zip(times)
         .map(|(pixel, time)| dynamic(pixel, time * 10, 40, 1))
         .collect();
-    let (exported, out) = exported(&file(&HEADER, &events), Format::Evt2, &Options::default());
-    let order: Vec<(u64, u32)> = evt2(&out)
-        .iter()
-        .map(|&(time, column, ..)| (time, column))
-        .collect();
+    let (exported, out) = plain(&events, Format::Evt2);
+    let events = evt2(&out).into_iter();
+    let order: Vec<_> = events.map(|(time, column, ..)| (time, column)).collect();
     assert_eq!(order, [(1, 3), (3, 1), (5, 0), (7, 5), (9, 2), (9, 4)]);
     assert_eq!(exported.late, 0);
 }
@@ -138,40 +135,27 @@ fn changes_that_are_too_late_are_left_out_and_said() {
     let scratch = Scratch::new();
     scratch.file("events.aer", file(&HEADER, &events));
     for (format, out) in [("evt2", "x.raw"), ("mcap", "x.mcap")] {
-        let output = scratch.dtof(&["export", "events.aer", "--format", format, "--out", out]);
+        let output = scratch.run(&format!("export events.aer --format {format} --out {out}"));
         assert!(output.status.success());
         let message = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(
-            message,
-            format!(
-                "events.aer: 1 events came after more than 65,536 later ones: left out of {out}\n"
-            )
-        );
+        let late = "events.aer: 1 events came after more than 65,536 later ones";
+        assert_eq!(message, format!("{late}: left out of {out}\n"));
     }
     let found = evt2(&std::fs::read(scratch.path("x.raw")).unwrap());
     assert!(found.len() == 65_600 && found.is_sorted_by_key(|event| event.0));
-    assert_eq!(
-        mcap(&std::fs::read(scratch.path("x.mcap")).unwrap()).0,
-        65_600
-    );
+    let found = mcap(&std::fs::read(scratch.path("x.mcap")).unwrap());
+    assert_eq!(found.0, 65_600);
 }
 
 #[test]
 fn what_evt2_cannot_hold_is_refused() {
     let scratch = Scratch::new();
-    let wide = Header {
-        geometry: Geometry::new(2049, 1),
-        ..HEADER
-    };
+    let mut wide = HEADER;
+    wide.geometry = Geometry::new(2049, 1);
     scratch.file("wide.aer", file(&wide, &[]));
-    scratch.file(
-        "last.aer",
-        file(&HEADER, &[dynamic(0, (1 << 34) * 10 - 1, 40, 1)]),
-    );
-    scratch.file(
-        "late.aer",
-        file(&HEADER, &[dynamic(0, (1 << 34) * 10, 40, 1)]),
-    );
+    let one = |cycle| file(&HEADER, &[dynamic(0, cycle, 40, 1)]);
+    scratch.file("last.aer", one((1 << 34) * 10 - 1));
+    scratch.file("late.aer", one((1 << 34) * 10));
     scratch.all_refused(
         "export --format evt2 --out x.raw",
         "
@@ -198,21 +182,14 @@ fn slices_have_a_cloud_and_statistics_each() {
         (Some(1_000_000_000), 1),
         (None, 10),
     ] {
-        let options = Options {
-            slice_ns,
-            ..Options::default()
-        };
-        let (exported, out) = exported(&bytes, Format::Mcap, &options);
+        let (exported, out) = exported(&bytes, Format::Mcap, &sliced(slice_ns));
         assert_eq!(exported.written, 10);
         assert_eq!(mcap(&out), (10, messages, messages), "{slice_ns:?}");
     }
     // A message holds 65,536 points at most.
     let events: Vec<Event> = (0..70_000).map(|index| depth(7, index, 40)).collect();
-    let options = Options {
-        clock: LaserClock::new(1_000_000_000).unwrap(),
-        slice_ns: Some(10_000_000),
-        ..Options::default()
-    };
+    let mut options = sliced(Some(10_000_000));
+    options.clock = LaserClock::new(1_000_000_000).unwrap();
     let (_, out) = exported(&file(&HEADER, &events), Format::Mcap, &options);
     assert_eq!(mcap(&out), (70_000, 2, 1));
     // Each has a time of its own: the beginning of the slice, its first point.
@@ -226,38 +203,31 @@ fn the_last_slice_ends_with_the_last_event() {
     let events: Vec<Event> = (0..7500)
         .map(|index| depth(7, index * 20 + 19, 40))
         .collect();
-    let options = Options {
-        slice_ns: Some(10_000_000),
-        ..Options::default()
-    };
+    let options = sliced(Some(10_000_000));
     let (_, out) = exported(&file(&HEADER, &events), Format::Mcap, &options);
-    for statistics in statistics(&out) {
-        assert_eq!(statistics["events_per_s"], 500_000.0);
-    }
-    let lengths: Vec<_> = statistics(&out)
-        .iter()
-        .map(|said| said["duration_s"].as_f64())
-        .collect();
-    assert_eq!(lengths, [Some(0.01), Some(0.005)]);
-    // A slice is 1/100 of that by default.
-    let (_, out) = exported(&file(&HEADER, &events), Format::Mcap, &Options::default());
+    let [whole, half] = &statistics(&out)[..] else {
+        panic!("not two slices");
+    };
     assert_eq!(
-        times(&out, "/events"),
-        (0..100).map(|slice| slice * 150_000).collect::<Vec<_>>()
+        [&whole["events_per_s"], &half["events_per_s"]],
+        [500_000.0; 2]
     );
+    assert_eq!([&whole["duration_s"], &half["duration_s"]], [0.01, 0.005]);
+    // A slice is 1/100 of that by default.
+    let (_, out) = plain(&events, Format::Mcap);
+    let starts = (0..100).map(|slice| slice * 150_000);
+    assert!(times(&out, "/events").into_iter().eq(starts));
 }
 
 #[test]
 fn flags_are_counted_each() {
-    let events = (0..16u8).map(|bits| match depth(bits.into(), bits.into(), 40) {
-        Event::Depth(event) => Event::Depth(DepthEvent {
-            flags: Flags::from_bits(bits).unwrap(),
-            ..event
-        }),
-        event => event,
+    let events = (0..16u8).map(|bits| {
+        let mut event = depth_event(bits.into(), bits.into(), 40);
+        event.flags = Flags::from_bits(bits).unwrap();
+        Event::Depth(event)
     });
     let events: Vec<Event> = events.collect();
-    let (_, out) = exported(&file(&HEADER, &events), Format::Mcap, &Options::default());
+    let (_, out) = plain(&events, Format::Mcap);
     let said = &statistics(&out)[0];
     for name in ["saturated", "clipped", "deferred", "pile_up"] {
         assert_eq!(said[name], 8, "{name}");
@@ -268,7 +238,7 @@ fn flags_are_counted_each() {
 #[test]
 fn files_without_events_are_whole() {
     for format in [Format::Evt2, Format::Mcap] {
-        let (exported, out) = exported(&file(&HEADER, &[]), format, &Options::default());
+        let (exported, out) = plain(&[], format);
         assert_eq!((exported.written, exported.damage), (0, None));
         match format {
             Format::Evt2 => assert_eq!(evt2(&out), []),

@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::Duration;
 
 use crate::common::Scratch;
@@ -46,10 +46,8 @@ fn peaks(events: u64) -> Vec<u64> {
     let scratch = Scratch::new();
     write(&scratch.path("events.aer"), events);
     let peak = |format: &&str| {
-        let mut dtof = Command::new(env!("CARGO_BIN_EXE_dtof"));
-        dtof.current_dir(scratch.path("")).stdout(Stdio::null());
-        dtof.args(["export", "events.aer", "--format", format, "--out", "out"]);
-        let peak = peak_kb(dtof.spawn().unwrap());
+        let mut dtof = scratch.command(&format!("export events.aer --format {format} --out out"));
+        let peak = peak_kb(dtof.stdout(Stdio::null()).spawn().unwrap());
         println!("{events} events as {format}: at most {peak} kB");
         peak
     };

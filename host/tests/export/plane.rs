@@ -30,43 +30,27 @@ struct Seen {
 /// The events of the scene, and how many were false.
 fn events(scene: &Path, scratch: &Scratch) -> (Vec<Seen>, usize) {
     let truth = Scene::read(scene).unwrap();
-    let settings = ["--alpha", "8", "--l1", "100", "--l2", "2000", "--x", "10"];
-    assert!(scratch.simulate(scene, &settings).status.success());
+    scratch.simulated(scene, "--alpha 8 --l1 100 --l2 2000 --x 10");
     scratch.printed("export out/events.aer --format csv --out wall.csv --fov 60x32");
     let text = scratch.read("wall.csv");
-    let column = |name| {
-        text.lines()
-            .next()
-            .unwrap()
-            .split(',')
-            .position(|is| is == name)
-            .unwrap()
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let seen = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let cell = |name| cells[names.iter().position(|is| *is == name).unwrap()];
+        let number = |name| cell(name).parse::<f64>().unwrap();
+        let address = PixelAddress(cell("pixel").parse().unwrap());
+        let view = truth.truth(address, cell("cycle").parse().unwrap());
+        Seen {
+            point: ["x_m", "y_m", "z_m"].map(|side| number(side) * 1000.0),
+            range_mm: number("range_mm"),
+            truth_mm: view.unwrap().range_mm,
+        }
     };
-    let [x, y, z, range, pixel, cycle] =
-        ["x_m", "y_m", "z_m", "range_mm", "pixel", "cycle"].map(column);
-    let all: Vec<Seen> = text
-        .lines()
-        .skip(1)
-        .map(|line| {
-            let columns: Vec<&str> = line.split(',').collect();
-            let number = |at: usize| columns[at].parse::<f64>().unwrap();
-            let address = PixelAddress(columns[pixel].parse().unwrap());
-            let view = truth.truth(address, columns[cycle].parse().unwrap());
-            Seen {
-                point: [x, y, z].map(|at| number(at) * 1000.0),
-                range_mm: number(range),
-                truth_mm: view.unwrap().range_mm,
-            }
-        })
-        .collect();
     let limit = FALSE_BEYOND_BINS * truth.mm_per_bin();
-    let total = all.len();
-    let right = all
-        .into_iter()
-        .filter(|seen| (seen.range_mm - seen.truth_mm).abs() < limit);
-    let right: Vec<Seen> = right.collect();
-    let wrong = total - right.len();
-    (right, wrong)
+    let is_right = |seen: &Seen| (seen.range_mm - seen.truth_mm).abs() < limit;
+    let (right, wrong): (Vec<Seen>, Vec<Seen>) = lines.map(seen).partition(is_right);
+    (right, wrong.len())
 }
 
 #[test]

@@ -30,25 +30,16 @@ fn csv_has_time_and_point_before_the_columns_of_decode() {
     assert!(text.starts_with("time_us,x_m,y_m,z_m,cycle,pixel,"));
 
     // Pixel 0 of 64×32: 31.5 columns and 15.5 rows from the middle, 60 degrees over 64.
-    let first: Vec<f64> = text
-        .lines()
-        .nth(1)
-        .unwrap()
-        .split(',')
-        .take(4)
-        .map(|n| n.parse().unwrap())
-        .collect();
+    let first = text.lines().nth(1).unwrap().split(',').take(4);
+    let first: Vec<f64> = first.map(|cell| cell.parse().unwrap()).collect();
     let focal = 32.0 / 30f64.to_radians().tan();
     let ray = [-31.5, -15.5, focal]
         .map(|side: f64| side / (31.5f64 * 31.5 + 15.5 * 15.5 + focal * focal).sqrt());
     let metres = ((20.0 + 100.0 / 256.0) * 250.0 * 0.149_896_229 - 12.5) / 1000.0;
     assert_eq!(first[0], 0.0);
     for (is, ray) in first[1..].iter().zip(ray) {
-        assert!(
-            (is - ray * metres).abs() < 1e-5,
-            "{is} and {}",
-            ray * metres
-        );
+        let expected = ray * metres;
+        assert!((is - expected).abs() < 1e-5, "{is} and {expected}");
     }
     let last = text.lines().last().unwrap();
     assert!(last.starts_with("104857.600,"), "{last}");
@@ -114,17 +105,14 @@ fn changes_of_depth_are_points_at_the_mean() {
     let metres = (40.0 * 250.0 * 0.149_896_229 - 12.5) / 1000.0;
     assert!((f64::from(x.hypot(y).hypot(z)) - metres).abs() < 1e-5);
     assert!((change + 0.112_422).abs() < 1e-5 && pixel == 5, "{change}");
-    assert!(
-        csv.starts_with(b"time_us,x_m,y_m,z_m,cycle,pixel,polarity,range_mm,change_mm,flags\n")
-    );
+    let columns = b"time_us,x_m,y_m,z_m,cycle,pixel,polarity,range_mm,change_mm,flags\n";
+    assert!(csv.starts_with(columns));
 }
 
 #[test]
 fn a_file_of_both_kinds_needs_to_be_told_which() {
-    let bytes = file(
-        &HEADER,
-        &[depth(0, 1, 9), dynamic(1, 2, 9, 1), depth(2, 3, 9)],
-    );
+    let events = [depth(0, 1, 9), dynamic(1, 2, 9, 1), depth(2, 3, 9)];
+    let bytes = file(&HEADER, &events);
     for (kind, written) in [(EventKind::Depth, 2), (EventKind::DynamicDepth, 1)] {
         let options = Options {
             kind: Some(kind),
@@ -134,13 +122,12 @@ fn a_file_of_both_kinds_needs_to_be_told_which() {
     }
     let scratch = Scratch::new();
     scratch.file("events.aer", bytes);
-    scratch.refused(
-        &scratch.run("export events.aer --format ply --out out/x.ply"),
-        &["there is no folder out"],
-    );
-    scratch.refused(
-        &scratch.run("export events.aer --format ply --out x.ply"),
-        &["2 depth events and 1 dynamic depth events", "--events"],
+    scratch.all_refused(
+        "export events.aer --format ply",
+        "
+            --out out/x.ply | there is no folder out
+            --out x.ply | 2 depth events and 1 dynamic depth events | --events
+        ",
     );
     assert!(!scratch.path("x.ply").exists());
 }
@@ -185,10 +172,8 @@ fn a_link_stays_and_what_it_leads_to_is_replaced() {
     scratch.printed("export events.aer --format csv --out link.csv");
     assert!(scratch.path("link.csv").is_symlink());
     assert_eq!(scratch.read("folder/points.csv").lines().count(), 13);
-    scratch.refused(
-        &scratch.run("export events.aer --format csv --out lost.csv"),
-        &["lost.csv: is a link to what is not there"],
-    );
+    let lost = scratch.run("export events.aer --format csv --out lost.csv");
+    scratch.refused(&lost, &["lost.csv: is a link to what is not there"]);
     assert!(scratch.path("lost.csv").is_symlink());
 }
 

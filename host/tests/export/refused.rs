@@ -8,9 +8,10 @@ use crate::common::aer::{HEADER, depth, events, file};
 fn a_calibration_without_end_is_refused() {
     let scratch = Scratch::new();
     scratch.file("events.aer", file(&HEADER, &events()));
-    let arguments = ["export", "events.aer", "--format", "csv", "--out", "x"];
-    let output = scratch.dtof(&[&arguments[..], &["--calibration", "/dev/zero"]].concat());
-    scratch.refused(&output, &["/dev/zero: more than 16777216 bytes"]);
+    scratch.all_refused(
+        "export events.aer --format csv --out x",
+        "--calibration /dev/zero | /dev/zero: more than 16777216 bytes",
+    );
 }
 
 #[test]

@@ -15,7 +15,7 @@ fn the_report_of_a_capture_log_calls_them_so() {
         (log, ["zone", "capture"], true),
         (photons, ["column", "row"], false),
     ] {
-        let summary = scratch.replayed(&input, &[]);
+        let summary = scratch.replayed(&input, "");
         assert_eq!(summary["events"].as_u64() > Some(0), has_events);
         let map = scratch.read("out/event-counts.svg");
         let report = scratch.read("out/report.html");

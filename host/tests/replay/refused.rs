@@ -1,15 +1,26 @@
 //! Bad input gives one clear line and a failure, never a panic and never a
 //! half-written result.
 
-use crate::common::{Scratch, table};
+use std::fs::File;
+use std::process::Stdio;
+
+use crate::common::{Scratch, names, says, table};
 
 const CSV_HEADER: &str = "pixel,cycle,bin\n";
+/// One photon.
+const PHOTON: &str = "pixel,cycle,bin\n0,0,0\n";
+
+/// `dtof replay` of a file with these bytes must be refused.
+#[track_caller]
+fn refused(name: &str, bytes: impl AsRef<[u8]>, parts: &[impl AsRef<str>]) {
+    let scratch = Scratch::new();
+    let input = scratch.file(name, bytes);
+    scratch.refused(&scratch.replay(&input, ""), parts);
+}
 
 #[track_caller]
-fn csv_refused(rows: &str, parts: &[&str]) {
-    let scratch = Scratch::new();
-    let input = scratch.file("photons.csv", format!("{CSV_HEADER}{rows}"));
-    scratch.refused(&scratch.replay(&input, &[]), parts);
+fn csv_refused(rows: &str, parts: &[impl AsRef<str>]) {
+    refused("photons.csv", format!("{CSV_HEADER}{rows}"), parts);
 }
 
 #[test]
@@ -31,8 +42,7 @@ fn csv_rows_that_are_not_photons_are_named_by_line() {
         0,5,65664\n | photons.csv:2: | bin 65664
     "#,
     ) {
-        let parts: Vec<&str> = row[1..].iter().map(String::as_str).collect();
-        csv_refused(&row[0], &parts);
+        csv_refused(&row[0], &row[1..]);
     }
     csv_refused(&"0,".repeat(1000), &["photons.csv:2:", "fields, not 3"]);
     csv_refused("", &["photons.csv:2:", "no photons"]);
@@ -41,11 +51,9 @@ fn csv_rows_that_are_not_photons_are_named_by_line() {
 #[test]
 fn a_bad_row_after_the_last_cycle_to_replay_is_still_found() {
     let scratch = Scratch::new();
-    let input = scratch.file(
-        "photons.csv",
-        format!("{CSV_HEADER}0,1,2\n0,5000,3\n0,5001,x\n"),
-    );
-    let output = scratch.replay(&input, &["--cycles", "100"]);
+    let rows = "0,1,2\n0,5000,3\n0,5001,x\n";
+    let input = scratch.file("photons.csv", format!("{CSV_HEADER}{rows}"));
+    let output = scratch.replay(&input, "--cycles 100");
     scratch.refused(&output, &["photons.csv:4:", "bin \"x\""]);
 }
 
@@ -59,9 +67,7 @@ fn csv_files_that_are_not_photon_lists_are_refused() {
         ),
         (b"pixel,cycle,bin\n0,\xff,2\n", "photons.csv:2: not text"),
     ] {
-        let scratch = Scratch::new();
-        let input = scratch.file("photons.csv", bytes);
-        scratch.refused(&scratch.replay(&input, &[]), &[part]);
+        refused("photons.csv", bytes, &[part]);
     }
 }
 
@@ -84,12 +90,8 @@ fn described(descr: &str, fortran: &str, shape: &str) -> String {
 
 #[track_caller]
 fn npy_refused(header: &str, data: &[u8], parts: &[&str]) {
-    let scratch = Scratch::new();
-    let input = scratch.file("recorded.npy", npy(header, data));
-    scratch.refused(
-        &scratch.replay(&input, &[]),
-        &[parts, &["recorded.npy"]].concat(),
-    );
+    let parts = [parts, &["recorded.npy"]].concat();
+    refused("recorded.npy", npy(header, data), &parts);
 }
 
 #[test]
@@ -105,11 +107,8 @@ fn npy_files_that_are_not_integer_histograms_are_refused() {
         ",
     ) {
         let cells: Vec<&str> = row.iter().map(String::as_str).collect();
-        npy_refused(
-            &described(cells[0], cells[1], cells[2]),
-            &zeros,
-            &cells[3..],
-        );
+        let header = described(cells[0], cells[1], cells[2]);
+        npy_refused(&header, &zeros, &cells[3..]);
     }
     for (descr, shape, data, part) in [
         ("<i4", "(4, 8)", &[255; 128][..], "element 0 is negative"),
@@ -137,11 +136,8 @@ fn an_npy_header_that_lies_about_its_shape_is_refused() {
         "(9223372036854775808, 16)",    // more bytes than can be counted
         "(2305843009213693953, 8, 16)", // a product that wraps to 128
     ] {
-        npy_refused(
-            &described("<u4", "False", shape),
-            &zeros,
-            &["the header claims"],
-        );
+        let header = described("<u4", "False", shape);
+        npy_refused(&header, &zeros, &["the header claims"]);
     }
 }
 
@@ -149,9 +145,7 @@ fn an_npy_header_that_lies_about_its_shape_is_refused() {
 fn npy_files_cut_short_are_refused() {
     let whole = npy(&described("<u2", "False", "(2, 32)"), &[1; 128]);
     for length in [0, 5, 9, 30, whole.len() - 1] {
-        let scratch = Scratch::new();
-        let input = scratch.file("recorded.npy", &whole[..length]);
-        scratch.refused(&scratch.replay(&input, &[]), &["recorded.npy"]);
+        refused("recorded.npy", &whole[..length], &["recorded.npy"]);
     }
 }
 
@@ -159,32 +153,27 @@ fn npy_files_cut_short_are_refused() {
 fn json_files_that_are_not_capture_logs_are_refused() {
     let zone = format!("[{}]", ["0"; 128].join(","));
     let eight = [zone.as_str(); 8].join(",");
-    for (text, part) in [
-        (String::new(), "log.json:1:"),
-        ("[]".into(), "no captures"),
-        ("[{}]".into(), "log.json:1:"),
-        ("[\n{\"hists\": [[1,\n".into(), "log.json:3:"),
-        (
-            format!("[{{\"hists\": [{eight}]}}]"),
-            "capture 0 has 8 zones, not 9",
-        ),
-        (
-            format!("[{{\"hists\": [{eight},[1,2]]}}]"),
-            "capture 0, zone 8 has 2 bins, not 128",
-        ),
-        (format!("[{{\"hists\": [{eight},[-1]]}}]"), "log.json:1:"),
-        (format!("[{{\"hists\": [{eight},[1.5]]}}]"), "log.json:1:"),
-    ] {
-        let scratch = Scratch::new();
-        let input = scratch.file("log.json", text);
-        scratch.refused(&scratch.replay(&input, &[]), &["log.json", part]);
+    for row in table(
+        r#"
+         | log.json:1:
+        [] | no captures
+        [{}] | log.json:1:
+        [\n{"hists": [[1,\n | log.json:3:
+        [{"hists": [EIGHT]}] | capture 0 has 8 zones, not 9
+        [{"hists": [EIGHT,[1,2]]}] | capture 0, zone 8 has 2 bins, not 128
+        [{"hists": [EIGHT,[-1]]}] | log.json:1:
+        [{"hists": [EIGHT,[1.5]]}] | log.json:1:
+    "#,
+    ) {
+        let text = row[0].replace("EIGHT", &eight);
+        refused("log.json", text, &["log.json", &row[1]]);
     }
 }
 
 #[test]
 fn settings_that_cannot_be_are_refused() {
     let scratch = Scratch::new();
-    scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
+    scratch.file("photons.csv", PHOTON);
     scratch.all_refused(
         "replay --out out --input photons.csv",
         r#"
@@ -252,11 +241,10 @@ fn files_that_are_not_there_or_not_known_are_refused() {
 #[test]
 fn an_output_folder_that_cannot_be_written_is_refused() {
     let scratch = Scratch::new();
-    let input = scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
-    let input = input.to_str().unwrap();
+    scratch.file("photons.csv", PHOTON);
     scratch.file("taken", "a file, not a folder");
     for folder in ["taken", "taken/below", "/proc/none"] {
-        let output = scratch.dtof(&["replay", "--input", input, "--out", folder]);
+        let output = scratch.run(&format!("replay --input photons.csv --out {folder}"));
         scratch.refused(&output, &[folder]);
     }
     assert_eq!(scratch.read("taken"), "a file, not a folder");
@@ -266,29 +254,24 @@ fn an_output_folder_that_cannot_be_written_is_refused() {
 fn a_folder_in_the_place_of_a_result_is_refused() {
     let scratch = Scratch::new();
     std::fs::create_dir_all(scratch.path("out/report.html")).unwrap();
-    let input = scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
-    let output = scratch.replay(&input, &[]);
+    let input = scratch.file("photons.csv", PHOTON);
+    let output = scratch.replay(&input, "");
+    assert!(!output.status.success());
     let message = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        !output.status.success() && message.contains("report.html: is there, and is no file"),
-        "{message}"
-    );
+    says(&message, "report.html: is there, and is no file");
 }
 
 #[test]
 fn what_a_run_that_was_killed_has_left_is_removed() {
     let scratch = Scratch::new();
-    let input = scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
-    scratch.replayed(&input, &[]);
+    let input = scratch.file("photons.csv", PHOTON);
+    scratch.replayed(&input, "");
     scratch.file("out/.dtof-run-left.partial", "from a run that was killed");
-    let of_others = [
-        "out/.dtof-export-a.partial",
-        "out/.dtof-recording-b.partial",
-    ];
-    for name in of_others {
+    let of_others = ["export-a", "recording-b"].map(|of| format!("out/.dtof-{of}.partial"));
+    for name in &of_others {
         scratch.file(name, "of an export or a recording under way");
     }
-    scratch.replayed(&input, &[]);
+    scratch.replayed(&input, "");
     assert!(!scratch.path("out/.dtof-run-left.partial").exists());
     assert!(of_others.iter().all(|name| scratch.path(name).exists()));
 }
@@ -296,28 +279,16 @@ fn what_a_run_that_was_killed_has_left_is_removed() {
 #[test]
 fn output_that_cannot_be_written_is_an_error_not_a_panic() {
     let scratch = Scratch::new();
-    let input = scratch.file("photons.csv", format!("{CSV_HEADER}0,0,0\n"));
-    let full = || {
-        std::fs::File::options()
-            .write(true)
-            .open("/dev/full")
-            .unwrap()
+    scratch.file("photons.csv", PHOTON);
+    let full = || File::options().write(true).open("/dev/full").unwrap();
+    let run = |line: &str, errors: Stdio| {
+        let mut command = scratch.command(line);
+        command.stdout(full()).stderr(errors).output().unwrap()
     };
-    let run = |arguments: &[&str], out: std::process::Stdio, err: std::process::Stdio| {
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_dtof"));
-        command.current_dir(scratch.path(".")).args(arguments);
-        command.stdout(out).stderr(err).output().unwrap()
-    };
-    let input = input.to_str().unwrap();
-    let arguments = ["replay", "--input", input, "--out", "out"];
-    let output = run(&arguments, full().into(), std::process::Stdio::piped());
+    let output = run("replay --input photons.csv --out out", Stdio::piped());
     assert_eq!(output.status.code(), Some(1));
-    assert!(
-        String::from_utf8(output.stderr)
-            .unwrap()
-            .contains("No space left")
-    );
-    let output = run(&["decode", "none"], full().into(), full().into());
+    says(&String::from_utf8(output.stderr).unwrap(), "No space left");
+    let output = run("decode none", full().into());
     assert_eq!(output.status.code(), Some(1));
 }
 
@@ -325,24 +296,19 @@ fn output_that_cannot_be_written_is_an_error_not_a_panic() {
 fn an_npy_header_made_to_take_long_is_refused_at_once() {
     let nested = format!("{{'descr': {}'<u4'{}, }}", "[".repeat(60), "]".repeat(60));
     npy_refused(&nested, &[0; 32], &["not plain integers"]);
-    let scratch = Scratch::new();
     let long = [&b"\x93NUMPY\x02\x00\xff\xff\xff\xff"[..], &[b' '; 200]].concat();
-    let input = scratch.file("recorded.npy", long);
-    scratch.refused(&scratch.replay(&input, &[]), &["header is longer"]);
+    refused("recorded.npy", long, &["header is longer"]);
 }
 
 #[test]
 fn a_failed_run_leaves_the_results_of_the_one_before() {
     let scratch = Scratch::new();
-    let good = scratch.file("good.csv", format!("{CSV_HEADER}0,0,0\n"));
-    scratch.replayed(&good, &[]);
+    let good = scratch.file("good.csv", PHOTON);
+    scratch.replayed(&good, "");
     let before = scratch.read("out/summary.json");
     let bad = scratch.file("bad.csv", format!("{CSV_HEADER}0,0,0\n0,1,x\n"));
-    assert!(!scratch.replay(&bad, &[]).status.success());
+    assert!(!scratch.replay(&bad, "").status.success());
     assert_eq!(scratch.read("out/summary.json"), before);
-    let names: Vec<_> = std::fs::read_dir(scratch.path("out"))
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
+    let names = names(&scratch.path("out"));
     assert!(names.iter().all(|name| !name.starts_with('.')), "{names:?}");
 }

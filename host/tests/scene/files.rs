@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::{Scratch, succeeded};
+use crate::common::{Scratch, says};
 use dtof::input::source::Geometry;
 use dtof::simulate::scene::Scene;
 use dtof_core::PixelAddress;
@@ -13,8 +13,8 @@ fn repository(path: &str) -> PathBuf {
 }
 
 #[track_caller]
-fn simulated(scratch: &Scratch, scene: &Path, more: &[&str]) -> serde_json::Value {
-    succeeded(scratch.simulate(scene, more));
+fn simulated(scratch: &Scratch, scene: &Path, options: &str) -> serde_json::Value {
+    scratch.simulated(scene, options);
     scratch.summary()
 }
 
@@ -23,8 +23,7 @@ fn the_demos_scene_and_settings_give_the_demos_events() {
     let scratch = Scratch::new();
     scratch.printed("demo --cycles 2000 --seed 7 --quiet");
     let settings = "--alpha 8 --l1 100 --l2 2000 --x 10 --cycles 2000 --seed 7 --quiet";
-    let settings: Vec<&str> = settings.split(' ').collect();
-    let output = scratch.simulate(&repository("scenes/demo.toml"), &settings);
+    let output = scratch.simulate(&repository("scenes/demo.toml"), settings);
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
     for name in ["events.csv", "events.aer", "depth-last.svg"] {
         let read = |folder| fs::read(scratch.path(folder).join(name)).unwrap();
@@ -38,7 +37,7 @@ fn every_scene_of_the_repository_runs_and_says_what_it_holds() {
     let mut scenes = 0;
     for entry in fs::read_dir(repository("scenes")).unwrap() {
         let path = entry.unwrap().path();
-        let summary = simulated(&scratch, &path, &["--cycles", "500", "--quiet"]);
+        let summary = simulated(&scratch, &path, "--cycles 500 --quiet");
         assert_eq!(summary["cycles"], 500);
         assert_eq!(summary["input"], path.to_str().unwrap());
         assert!(summary["events"].as_u64() > Some(0), "{}", path.display());
@@ -56,16 +55,14 @@ fn the_file_says_how_long_and_the_command_line_may_say_otherwise() {
         "columns = 6\nrows = 4\ncycles = 300\nbins = 64\nbin_width_ps = 92.1\n\
          [[surface]]\nrange_mm = 500\nreflectivity = 0.5\n",
     );
-    let summary = simulated(&scratch, &scene, &[]);
+    let summary = simulated(&scratch, &scene, "");
     assert_eq!([&summary["cycles"], &summary["pixels"]], [300, 24]);
     assert_eq!(summary["settings"]["bins"], 64);
     let width = summary["settings"]["bin_width_ps"].as_f64().unwrap();
     assert!((width - 92.1).abs() < 1.0 / 65_536.0, "{width}");
-    let events = scratch.read("out/events.csv");
-    let range = events.lines().nth(1).unwrap().split(',').nth(5).unwrap();
-    let range: f64 = range.parse().unwrap();
+    let range: f64 = scratch.events()[0][5].parse().unwrap();
     assert!((range - 500.0).abs() < 20.0, "{range}");
-    let summary = simulated(&scratch, &scene, &["--cycles", "200", "--array", "3x2"]);
+    let summary = simulated(&scratch, &scene, "--cycles 200 --array 3x2");
     assert_eq!([&summary["cycles"], &summary["pixels"]], [200, 6]);
 }
 
@@ -74,19 +71,19 @@ fn a_surface_beyond_the_last_bin_is_named() {
     let scratch = Scratch::new();
     let file = |range: &str| {
         let surface = "[[surface]]\nname = \"wall\"\nsignal = 1\n";
-        scratch.file(
-            "scene.toml",
-            format!("cycles = 100\ncolumns = 4\n{surface}{range}"),
-        )
+        let text = format!("cycles = 100\ncolumns = 4\n{surface}{range}");
+        scratch.file("scene.toml", text)
     };
-    let printed = |range| succeeded(scratch.simulate(&file(range), &[]));
+    let printed = |range| scratch.simulated(&file(range), "");
     // 128 bins of 250 ps are 4797 mm.
     let far = printed("range_mm = 4790\nrange_right_mm = 4800\n");
-    let expected = "1 of 4 pixels at the start or the end: no photons from 4797 mm on";
-    assert!(far.contains(expected), "{far}");
+    says(
+        &far,
+        "1 of 4 pixels at the start or the end: no photons from 4797 mm on",
+    );
     assert!(!printed("range_mm = 4790\n").contains("beyond the last bin"));
     let moving = printed("range_mm = 4796\nvelocity_m_per_s = 1000\n");
-    assert!(moving.contains("4 of 4 pixels at"), "{moving}");
+    says(&moving, "4 of 4 pixels at");
 }
 
 /// Events of a TDC that takes one hit say when that makes for pile-up.
@@ -96,10 +93,12 @@ fn pile_up_is_flagged_where_the_tdc_takes_one_hit() {
     let flags = |signal: f64, hits: &str| -> Vec<u8> {
         let surface = format!("[[surface]]\nposition_bins = 60.5\nsignal = {signal}\n");
         let scene = scratch.file("scene.toml", format!("cycles = 1000\n{surface}{hits}"));
-        assert!(scratch.simulate(&scene, &["--quiet"]).status.success());
-        let events = scratch.read("out/events.csv");
-        let of = |line: &str| line.rsplit(',').next().unwrap().parse().unwrap();
-        events.lines().skip(1).map(of).collect()
+        scratch.simulated(&scene, "--quiet");
+        let events = scratch.events();
+        events
+            .iter()
+            .map(|event| event[8].parse().unwrap())
+            .collect()
     };
     let one_hit = "[tdc]\nhits_per_cycle = 1\n";
     // A photon in 26 and in 86 % of the laser cycles.
@@ -117,12 +116,8 @@ fn the_document_lists_every_key_and_its_examples_are_scenes() {
     let keys_of = |text: &str| -> Vec<String> {
         let error = Scene::parse(text).unwrap_err().to_string();
         let known = error.split_once("expected").unwrap().1.to_owned();
-        known
-            .split('`')
-            .skip(1)
-            .step_by(2)
-            .map(str::to_owned)
-            .collect()
+        let names = known.split('`').skip(1).step_by(2);
+        names.map(str::to_owned).collect()
     };
     let mut keys = keys_of("nonsense = 1\n");
     assert!(keys.len() > 15, "{keys:?}");
@@ -130,24 +125,18 @@ fn the_document_lists_every_key_and_its_examples_are_scenes() {
         if section == "surface" {
             keys.extend(keys_of("[[surface]]\nnonsense = 1\n"));
             for shape in ["rectangle", "ball", "fan"] {
-                keys.extend(keys_of(&format!(
-                    "[[surface]]\n{shape} = {{ nonsense = 1 }}\n"
-                )));
+                let text = format!("[[surface]]\n{shape} = {{ nonsense = 1 }}\n");
+                keys.extend(keys_of(&text));
             }
         } else if document.contains(&format!("`[{section}]`")) {
             keys.extend(keys_of(&format!("[{section}]\nnonsense = 1\n")));
         }
     }
     for key in keys {
-        let named = [
-            format!("`{key}`"),
-            format!("`[{key}]`"),
-            format!("`[[{key}]]`"),
-        ];
-        assert!(
-            named.iter().any(|name| document.contains(name)),
-            "{key} is not in the document"
-        );
+        let names = [("", ""), ("[", "]"), ("[[", "]]")];
+        let names = names.map(|(open, close)| format!("`{open}{key}{close}`"));
+        let is_there = names.iter().any(|name| document.contains(name));
+        assert!(is_there, "{key} is not in the document");
     }
     let examples: Vec<&str> = document
         .split("```toml\n")
@@ -191,28 +180,21 @@ fn the_documents_defaults_are_those_of_an_empty_file() {
 fn frames_read_all_pixels_at_once() {
     let scratch = Scratch::new();
     let scene = repository("scenes/static.toml");
-    let frames = ["--frame", "2000", "--cycles", "4500", "--quiet"];
-    let summary = simulated(&scratch, &scene, &frames);
+    let frames = "--frame 2000 --cycles 4500 --quiet";
+    let summary = simulated(&scratch, &scene, frames);
     assert_eq!(summary["settings"]["frame"], 2000);
-    let events = scratch.read("out/events.csv");
-    let rows: Vec<Vec<&str>> = events
-        .lines()
-        .skip(1)
-        .map(|row| row.split(',').collect())
-        .collect();
+    let rows = scratch.events();
     for cycle in ["1999", "3999"] {
-        let of_frame = rows
-            .iter()
-            .filter(|row| row[0] == cycle && row[2] == "2000");
-        assert!(of_frame.count() > 32 * 16 * 9 / 10);
+        let is_of_frame = |row: &&Vec<String>| row[0] == cycle && row[2] == "2000";
+        assert!(rows.iter().filter(is_of_frame).count() > 32 * 16 * 9 / 10);
     }
     assert!(rows.len() <= 2 * 32 * 16);
     let report = scratch.read("out/report.html");
     assert!(report.contains("Readings in space and time") && !report.contains(" events are shown"));
     assert!(report.contains("wall</th><td>544 readings of 272 pixels, "));
 
-    for more in [["--l1", "20"], ["--alpha", "4"], ["--device", "qemu"]] {
-        let refused = scratch.simulate(&scene, &[&frames[..], &more].concat());
+    for more in ["--l1 20", "--alpha 4", "--device qemu"] {
+        let refused = scratch.simulate(&scene, &format!("{frames} {more}"));
         assert!(!refused.status.success());
         let lines = refused.stderr.iter().filter(|&&byte| byte == b'\n');
         assert_eq!(lines.count(), 1);
@@ -227,21 +209,16 @@ fn the_options_that_export_needs_are_said() {
     let keys = "columns = 8\nrows = 4\nbins = 128\ncycles = 200\n";
     let slow = "laser_rate_mhz = 1.25\nfield_of_view_degrees = [60, 32]\n";
     let natural = [60.0, 2.0 * (0.5 / 3f64.sqrt()).atan().to_degrees()];
+    let of_slow = Some("--laser-hz 1250000 --fov 60x32");
     for (more, array, hz, degrees, options) in [
         ("", "8x4", 10_000_000, natural, None),
         ("", "16x8", 10_000_000, natural, None),
         // The scene stays as wide as it is.
         ("", "4x4", 10_000_000, natural, Some("--fov 60x32.204228")),
-        (
-            slow,
-            "8x4",
-            1_250_000,
-            [60.0, 32.0],
-            Some("--laser-hz 1250000 --fov 60x32"),
-        ),
+        (slow, "8x4", 1_250_000, [60.0, 32.0], of_slow),
     ] {
         let scene = scratch.file("scene.toml", format!("{keys}{more}{wall}"));
-        let printed = succeeded(scratch.simulate(&scene, &["--array", array]));
+        let printed = scratch.simulated(&scene, &format!("--array {array}"));
         let row = printed.lines().find(|line| line.contains("export with"));
         let summary = scratch.summary();
         assert_eq!(summary["laser_hz"], hz);
@@ -253,9 +230,8 @@ fn the_options_that_export_needs_are_said() {
         assert_eq!(row.is_some(), options.is_some(), "{printed}");
         let Some(options) = options else { continue };
         assert!(row.unwrap().ends_with(options), "{printed}");
-        scratch.printed(&format!(
-            "export out/events.aer --format csv --out x {options}"
-        ));
+        let line = "export out/events.aer --format csv --out x";
+        scratch.printed(&format!("{line} {options}"));
     }
 }
 

@@ -4,19 +4,18 @@ use crate::common::{Scratch, table};
 
 /// A scene file that is not one.
 #[track_caller]
-fn refused(text: &str, parts: &[&str]) {
+fn refused(text: &str, parts: &[impl AsRef<str>]) {
     let scratch = Scratch::new();
-    let scene = scratch.file("scene.toml", text);
-    let parts = [&["scene.toml: "], parts].concat();
-    scratch.refused(&scratch.simulate(&scene, &[]), &parts);
+    let output = scratch.simulate(&scratch.file("scene.toml", text), "");
+    scratch.refused(&output, &["scene.toml: "]);
+    scratch.refused(&output, parts);
 }
 
 /// Each row: a scene file, and parts of what is said of it.
 #[track_caller]
 fn all_refused(rows: &str) {
     for row in table(rows) {
-        let parts: Vec<&str> = row[1..].iter().map(String::as_str).collect();
-        refused(&row[0], &parts);
+        refused(&row[0], &row[1..]);
     }
 }
 
@@ -121,22 +120,20 @@ fn surfaces_that_cannot_be_are_named() {
 #[test]
 fn scenes_that_are_not_there_and_options_that_cannot_be_are_refused() {
     let scratch = Scratch::new();
-    scratch.refused(
-        &scratch.simulate(&scratch.path("none.toml"), &[]),
-        &["none.toml", "No such file"],
+    scratch.file("binary.toml", [0xff, 0xfe, 0]);
+    scratch.file("scene.toml", "columns = 2\n");
+    scratch.all_refused(
+        "simulate --out out",
+        "
+             | --scene
+            --scene none.toml | none.toml | No such file
+            --scene binary.toml | binary.toml | UTF-8
+            --scene scene.toml --cycles 0 | --cycles
+            --scene scene.toml --array 0x5 | --array
+            --scene scene.toml --array 65535x2 | 131070 pixels: more than 65,536
+            --scene scene.toml --x 50 | X must not be greater than L1
+            --scene scene.toml --gate 0..128 | past the last bin
+            --scene scene.toml --scen x | --scen
+        ",
     );
-    let binary = scratch.file("binary.toml", [0xff, 0xfe, 0]);
-    scratch.refused(&scratch.simulate(&binary, &[]), &["binary.toml", "UTF-8"]);
-    scratch.refused(&scratch.run("simulate --out out"), &["--scene"]);
-    let scene = scratch.file("scene.toml", "columns = 2\n");
-    for (arguments, part) in [
-        (&["--cycles", "0"][..], "--cycles"),
-        (&["--array", "0x5"], "--array"),
-        (&["--array", "65535x2"], "131070 pixels: more than 65,536"),
-        (&["--x", "50"], "X must not be greater than L1"),
-        (&["--gate", "0..128"], "past the last bin"),
-        (&["--scen", "x"], "--scen"),
-    ] {
-        scratch.refused(&scratch.simulate(&scene, arguments), &[part]);
-    }
 }

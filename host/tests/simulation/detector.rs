@@ -1,8 +1,8 @@
 //! SPAD and TDC: dead time, pile-up, afterpulsing, jitter.
 
 use super::{
-    DEVIATIONS, float, histogram, mean, near, near_count, near_counts, near_in_blocks, near_share,
-    pixel, variance,
+    DEVIATIONS, float, histogram, mean, near, near_count, near_counts, near_in_blocks, near_mean,
+    near_share, pixel, variance,
 };
 
 const CYCLES: u64 = 100_000;
@@ -24,10 +24,8 @@ fn dead_time_counts_a_steady_rate_as_theory_says() {
     let rate = 0.05;
     for dead_bins in [4.0, 40.0, 300.0] {
         let dead_ps = dead_bins * 250.0;
-        let photons = pixel(
-            &format!("{NO_GAP}background = {rate}\n[dead_time]\nduration_ps = {dead_ps}\n"),
-            CYCLES,
-        );
+        let dead = format!("[dead_time]\nduration_ps = {dead_ps}\n");
+        let photons = pixel(&format!("{NO_GAP}background = {rate}\n{dead}"), CYCLES);
         // Between avalanches lies a dead time and an exponential time: a renewal
         // process.
         let interval = dead_bins + 1.0 / rate;
@@ -39,13 +37,8 @@ fn dead_time_counts_a_steady_rate_as_theory_says() {
             (length / rate.powi(2) / interval.powi(3)).sqrt(),
         );
         let times = times(&photons);
-        let least = times
-            .windows(2)
-            .map(|pair| pair[1] - pair[0])
-            .min()
-            .unwrap();
-        #[allow(clippy::cast_precision_loss)]
-        let least = least as f64;
+        let least = times.windows(2).map(|pair| pair[1] - pair[0]).min();
+        let least = f64::from(u32::try_from(least.unwrap()).unwrap());
         assert!(
             (dead_bins..dead_bins + 2.0).contains(&(least + 1.0)),
             "{least}"
@@ -74,16 +67,11 @@ fn dead_time_goes_on_between_histograms() {
 fn pile_up_hides_what_comes_late() {
     let scene = "[[surface]]\nsignal = 2\nposition_bins = 60.5\n";
     let plain = pixel(scene, CYCLES);
-    let piled = pixel(
-        &format!("{scene}[dead_time]\nduration_ps = 20_000\n"),
-        CYCLES,
-    );
+    let dead = format!("{scene}[dead_time]\nduration_ps = 20_000\n");
+    let piled = pixel(&dead, CYCLES);
     near_share("pulses", piled.len(), 100_000, 1.0 - (-2.0_f64).exp());
-    near_counts(
-        "bins",
-        &histogram(&piled)[56..65],
-        &first_photons(0.0, 2.0)[56..65],
-    );
+    let expected = first_photons(0.0, 2.0);
+    near_counts("bins", &histogram(&piled)[56..65], &expected[56..65]);
     assert!(mean(&piled) < mean(&plain) - 0.3);
 }
 
@@ -230,27 +218,19 @@ fn the_variance_of_jitter_adds() {
         CYCLES,
     );
     near_count("photons", photons.len(), 1e5);
-    let count = float(photons.len());
     let expected = 2.0_f64.powi(2) + 3.0_f64.powi(2) + 1.0 / 12.0;
-    near(
-        "variance",
-        variance(&photons),
-        expected,
-        expected * (2.0 / count).sqrt(),
-    );
-    near("mean", mean(&photons), 60.3, (expected / count).sqrt());
+    let deviation = expected * (2.0 / float(photons.len())).sqrt();
+    near("variance", variance(&photons), expected, deviation);
+    near_mean("mean", &photons, 60.3, expected);
 }
 
 /// As many are measured into the histogram as out of it.
 #[test]
 fn jitter_leaves_the_background_even() {
     for laser_rate_mhz in [10.0, 31.25] {
-        let photons = pixel(
-            &format!(
-                "laser_rate_mhz = {laser_rate_mhz}\nbackground = 0.02\n[jitter]\nsigma_ps = 1000\n"
-            ),
-            CYCLES,
-        );
+        let jitter = "background = 0.02\n[jitter]\nsigma_ps = 1000\n";
+        let text = format!("laser_rate_mhz = {laser_rate_mhz}\n{jitter}");
+        let photons = pixel(&text, CYCLES);
         near_counts("bins", &histogram(&photons), &[2000.0; 128]);
     }
 }

@@ -1,6 +1,6 @@
 //! Light: tail, second echo, cover glass, hot pixels.
 
-use super::{array, float, histogram, mean, near, near_count, near_share, pixel};
+use super::{array, float, histogram, near_count, near_mean, near_share, pixel};
 
 const CYCLES: u64 = 100_000;
 /// One bin of 250 ps, in millimetres.
@@ -18,8 +18,7 @@ fn a_tail_holds_its_share_and_moves_the_mean() {
     // 0.3 of them are later by 5 bins on average; the spread of an exponential
     // delay is its mean, that of a bin 1/12.
     let spread = sigma.powi(2) + 1.0 / 12.0 + decay.powi(2) * (2.0 * share - share.powi(2));
-    let deviation = (spread / float(photons.len())).sqrt();
-    near("mean", mean(&photons), 20.5 + share * decay, deviation);
+    near_mean("mean", &photons, 20.5 + share * decay, spread);
     // Ten standard deviations behind the pulse there is nothing but tail: a
     // normal pulse with an exponential tail, far from its middle.
     let late = photons.iter().filter(|(_, code)| *code >= 31).count();
@@ -30,23 +29,16 @@ fn a_tail_holds_its_share_and_moves_the_mean() {
 #[test]
 fn a_second_echo_has_its_share_and_place() {
     let behind_mm = 30.0 * MM_PER_BIN;
-    let photons = pixel(
-        &format!(
-            "[[surface]]\nsignal = 1\nposition_bins = 40.5\n\
-             [second_echo]\nshare = 0.25\nbehind_mm = {behind_mm}\n"
-        ),
-        CYCLES,
+    let text = format!(
+        "[[surface]]\nsignal = 1\nposition_bins = 40.5\n\
+         [second_echo]\nshare = 0.25\nbehind_mm = {behind_mm}\n"
     );
+    let photons = pixel(&text, CYCLES);
     let (first, second): (Vec<_>, Vec<_>) = photons.iter().partition(|(_, code)| *code < 55);
     near_share("second echo", second.len(), photons.len(), 0.25);
     let spread = 1.0 + 1.0 / 12.0;
     for (what, echo, position) in [("first", first, 40.5), ("second", second, 70.5)] {
-        near(
-            what,
-            mean(&echo),
-            position,
-            (spread / float(echo.len())).sqrt(),
-        );
+        near_mean(what, &echo, position, spread);
     }
 }
 
@@ -70,12 +62,7 @@ fn the_tail_is_the_lasers_and_the_cover_glass_has_it_too() {
         CYCLES,
     );
     let spread = 1.0 + 1.0 / 12.0 + 64.0 * 0.75;
-    near(
-        "mean",
-        mean(&photons),
-        24.5,
-        (spread / float(photons.len())).sqrt(),
-    );
+    near_mean("mean", &photons, 24.5, spread);
 }
 
 #[test]

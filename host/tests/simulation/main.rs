@@ -112,6 +112,13 @@ fn near_in_blocks(
     near(what, mean, expected, deviation);
 }
 
+/// The mean position of photons, each of which has this variance.
+#[track_caller]
+fn near_mean(what: &str, photons: &[(u64, u16)], expected: f64, variance: f64) {
+    let deviation = (variance / float(photons.len())).sqrt();
+    near(what, mean(photons), expected, deviation);
+}
+
 /// Mean position of photons, in bins from the start of bin 0.
 fn mean(photons: &[(u64, u16)]) -> f64 {
     let sum: f64 = photons.iter().map(|(_, code)| f64::from(*code) + 0.5).sum();

@@ -4,7 +4,7 @@ use dtof::input::source::Geometry;
 use dtof::simulate::scene::{Scene, View};
 use dtof_core::PixelAddress;
 
-use super::{array, float, mean, near, near_count, pixel};
+use super::{array, float, near_count, near_mean, pixel};
 
 /// One bin of 250 ps, in millimetres.
 const MM_PER_BIN: f64 = 37.474_057_25;
@@ -23,15 +23,10 @@ fn a_surface_that_goes_away_takes_its_photons_along() {
     for (block, first) in (0..cycles).step_by(10_000).enumerate() {
         let seconds = 1e-3 * (float(block) + 0.5);
         let middle = view(&scene, 0, first + 5000).range_mm;
-        assert!(
-            (middle - (1000.0 + 100_000.0 * seconds)).abs() < 1e-6,
-            "{middle}"
-        );
-        let photons: Vec<_> = photons
-            .iter()
-            .copied()
-            .filter(|(cycle, _)| (first..first + 10_000).contains(cycle))
-            .collect();
+        let truth = 1000.0 + 100_000.0 * seconds;
+        assert!((middle - truth).abs() < 1e-6, "{middle}");
+        let in_block = |(cycle, _): &(u64, u16)| (first..first + 10_000).contains(cycle);
+        let photons: Vec<_> = photons.iter().copied().filter(in_block).collect();
         // Photons by the inverse square: over a block their mean is that of the
         // product of its ends.
         let ends = (middle - 50.0) * (middle + 50.0) / 1e6;
@@ -40,12 +35,7 @@ fn a_surface_that_goes_away_takes_its_photons_along() {
         let (near_mm, far_mm): (f64, f64) = (middle - 50.0, middle + 50.0);
         let expected = (far_mm / near_mm).ln() / (near_mm.recip() - far_mm.recip());
         let spread = 1.0 + 1.0 / 12.0 + (100.0 / MM_PER_BIN).powi(2) / 12.0;
-        near(
-            "position",
-            mean(&photons),
-            expected / MM_PER_BIN,
-            (spread / float(photons.len())).sqrt(),
-        );
+        near_mean("position", &photons, expected / MM_PER_BIN, spread);
     }
 }
 
@@ -62,19 +52,11 @@ fn an_edge_moves_through_the_pixels() {
         // The edge is at column 0.9995 + cycle / 1000.
         let covered_from = (u64::from(index) * 1000).saturating_sub(999);
         for cycle in 0..5000 {
-            let surface = view(&scene, index, cycle).surface;
-            assert_eq!(
-                surface == 1,
-                cycle >= covered_from,
-                "pixel {index}, cycle {cycle}"
-            );
+            let is_covered = view(&scene, index, cycle).surface == 1;
+            assert_eq!(is_covered, cycle >= covered_from, "{index}, {cycle}");
         }
         for (cycle, code) in photons {
-            assert_eq!(
-                *code < 60,
-                *cycle >= covered_from,
-                "pixel {index}, cycle {cycle}"
-            );
+            assert_eq!(*code < 60, *cycle >= covered_from, "{index}, {cycle}");
         }
     }
 }
@@ -89,9 +71,8 @@ fn a_fan_covers_its_share_of_a_revolution() {
     let scene = Scene::parse(text).unwrap();
     let photons = array(text, 5000);
     for pixel in [1, 3, 5, 7] {
-        let covered: Vec<bool> = (0..5000)
-            .map(|cycle| view(&scene, pixel, cycle).surface == 1)
-            .collect();
+        let is_covered = |cycle| view(&scene, pixel, cycle).surface == 1;
+        let covered: Vec<bool> = (0..5000).map(is_covered).collect();
         let share = covered.iter().filter(|covered| **covered).count();
         // Three blades, and each end of one falls between two laser cycles.
         assert!(share.abs_diff(2000) <= 3, "{share}");
@@ -104,17 +85,13 @@ fn a_fan_covers_its_share_of_a_revolution() {
         }
     }
     // The corners are beyond the blades.
-    assert!((0..5000).all(|cycle| {
-        [0, 2, 6, 8]
-            .iter()
-            .all(|pixel| view(&scene, *pixel, cycle).surface == 0)
-    }));
+    for corner in [0, 2, 6, 8] {
+        assert!((0..5000).all(|cycle| view(&scene, corner, cycle).surface == 0));
+    }
     // Clockwise: what is on the right now is at the bottom a quarter later.
     for cycle in 0..3000 {
-        assert_eq!(
-            view(&scene, 5, cycle).surface,
-            view(&scene, 7, cycle + 1250).surface
-        );
+        let [right, bottom] = [view(&scene, 5, cycle), view(&scene, 7, cycle + 1250)];
+        assert_eq!(right.surface, bottom.surface);
     }
 }
 

@@ -13,6 +13,7 @@
 //! every half bin, is what is compared with a threshold. No rule that has to
 //! estimate `A`, `B` or the shape knows more.
 
+use crate::counts::bisect;
 use crate::rates::bin_share;
 
 /// Positions a bin: its start and its middle.
@@ -117,20 +118,11 @@ pub fn information(background: f64, signal: f64, position: f64, sigma: f64) -> f
 #[must_use]
 pub fn signal_for_information(background: f64, position: f64, sigma: f64, wanted: f64) -> f64 {
     let is_less = |signal| information(background, signal, position, sigma) < wanted;
-    let (mut low, mut high) = (0.0, 1.0);
+    let mut high = 1.0;
     while is_less(high) {
         high *= 2.0;
     }
-    // Every halving is a bit.
-    for _ in 0..60 {
-        let middle = (low + high) / 2.0;
-        if is_less(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
+    bisect(0.0, high, is_less)
 }
 
 #[cfg(test)]

@@ -3,6 +3,8 @@
 
 use libm::lgamma;
 
+use crate::counts::bisect;
+
 /// The probability of at most `count` of `times`.
 #[must_use]
 pub fn at_most(count: u64, times: u64, probability: f64) -> f64 {
@@ -56,21 +58,9 @@ pub fn interval(seen: u64, times: u64, tail: f64) -> (f64, f64) {
         return (0.0, 1.0);
     }
     let share = real(seen) / real(times);
-    // Halved 60 times: to a part in 1e18.
-    let bisect = |mut inside: f64, mut outside: f64, is_inside: &dyn Fn(f64) -> bool| {
-        for _ in 0..60 {
-            let middle = f64::midpoint(inside, outside);
-            if is_inside(middle) {
-                inside = middle;
-            } else {
-                outside = middle;
-            }
-        }
-        outside
-    };
     (
-        bisect(share, 0.0, &|low| at_least(seen, times, low) > tail),
-        bisect(share, 1.0, &|high| at_most(seen, times, high) > tail),
+        bisect(share, 0.0, |low| at_least(seen, times, low) > tail),
+        bisect(share, 1.0, |high| at_most(seen, times, high) > tail),
     )
 }
 

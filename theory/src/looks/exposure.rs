@@ -231,20 +231,16 @@ mod tests {
 
     #[test]
     fn looks_are_those_of_a_pixel() {
-        for (x, l1, l2) in [
+        let all = [
             (1, 1, 3),
             (4, 40, 2000),
             (10, 100, 203),
             (7, 10, 22),
             (3, 5, 7),
-        ] {
-            let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
-            let config = PixelConfig::<8>::with_rule(rule)
-                .x(x)
-                .l1(l1)
-                .l2(l2)
-                .build()
-                .unwrap();
+        ];
+        for (x, l1, l2) in all {
+            let config = PixelConfig::<8>::paper().x(x).l1(l1).l2(l2);
+            let config = config.build().unwrap();
             let looks = Looks::new(x, l1, l2);
             let mut pixel = AsyncPixel::<8>::new(PixelAddress(0));
             let (mut seen, mut statistics) = (Vec::new(), Statistics::new());
@@ -258,10 +254,8 @@ mod tests {
                     _ => {}
                 }
             }
-            let expected: Vec<u32> = (looks.first..=looks.last)
-                .map(|look| look * looks.x)
-                .collect();
-            assert_eq!(seen, expected, "{x} {l1} {l2}");
+            let expected = (looks.first..=looks.last).map(|look| look * looks.x);
+            assert!(seen.into_iter().eq(expected), "{x} {l1} {l2}");
         }
     }
 
@@ -269,6 +263,7 @@ mod tests {
     fn the_highest_alpha_fires_and_the_next_does_not() {
         let mut rng = trial_rng(5, 0);
         let minimum_count = Count::saturating(5);
+        let (gate, estimator) = (RangeGate::full(), DepthEstimator::default());
         let mut seen = [0; 3];
         for mean in [0.002, 0.5, 3.0, 60.0] {
             let rates = Rates {
@@ -283,28 +278,15 @@ mod tests {
                 photons.add_to(&mut histogram, &mut rng);
                 let fires = |alpha: u16| {
                     let rule = PaperRule::new(U8F8::from_bits(alpha), minimum_count);
-                    detect(
-                        &histogram,
-                        &RangeGate::full(),
-                        &rule,
-                        &DepthEstimator::default(),
-                    )
-                    .is_some()
+                    detect(&histogram, &gate, &rule, &estimator).is_some()
                 };
-                match highest_alpha(&histogram, minimum_count) {
-                    None => {
-                        assert!(!fires(0));
-                        seen[0] += 1;
-                    }
-                    Some(u16::MAX) => {
-                        assert!(fires(u16::MAX));
-                        seen[1] += 1;
-                    }
-                    Some(alpha) => {
-                        assert!(fires(alpha) && !fires(alpha + 1));
-                        seen[2] += 1;
-                    }
-                }
+                let (kind, is_right) = match highest_alpha(&histogram, minimum_count) {
+                    None => (0, !fires(0)),
+                    Some(u16::MAX) => (1, fires(u16::MAX)),
+                    Some(alpha) => (2, fires(alpha) && !fires(alpha + 1)),
+                };
+                assert!(is_right);
+                seen[kind] += 1;
             }
         }
         assert!(seen.iter().all(|&seen| seen > 50), "{seen:?}");

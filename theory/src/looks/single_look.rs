@@ -154,6 +154,7 @@ mod tests {
         let mean = 0.2;
         let law = Poisson::new(mean);
         let rule = PaperRule::new(U8F8::lit("0.5"), Count::saturating(1));
+        let (gate, estimator) = (RangeGate::full(), DepthEstimator::default());
         let (mut expected, mut left_out) = (0.0, 1.0);
         for index in 0..6u32.pow(8) {
             let mut digits = index;
@@ -164,16 +165,9 @@ mod tests {
             });
             let probability: f64 = counts.iter().map(|&count| law.mass(count)).product();
             let mut histogram = Histogram::<8>::new();
-            histogram.add_frame(&counts, &RangeGate::full());
+            histogram.add_frame(&counts, &gate);
             left_out -= probability;
-            if detect(
-                &histogram,
-                &RangeGate::full(),
-                &rule,
-                &DepthEstimator::default(),
-            )
-            .is_some()
-            {
+            if detect(&histogram, &gate, &rule, &estimator).is_some() {
                 expected += probability;
             }
         }

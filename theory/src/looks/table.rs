@@ -225,8 +225,8 @@ impl Table {
             upper: vec![Default::default(); FIRST_MEANS.len()],
         };
         for line in text.lines().filter(|line| !line.starts_with('#')).skip(1) {
-            let row = read_row(line).with_context(|| format!("row {line:?}"))?;
-            table.add(row).with_context(|| format!("row {line:?}"))?;
+            let added = read_row(line).and_then(|row| table.add(row));
+            added.with_context(|| format!("row {line:?}"))?;
         }
         Ok(table)
     }

@@ -163,7 +163,9 @@ impl Comparison<'_> {
         // The gate begins where the pulse of the glass has ended, but before that of a surface.
         let sigma = self.scene.pulse_sigma_bins;
         let ends = middle as f64 + (GLASS_ENDS_SIGMA * sigma).ceil().max(FALSE_BEYOND_BINS);
-        let nearest = self.nearest_mm() / self.scene.mm_per_bin();
+        let surfaces = self.scene.surfaces.iter();
+        let ranges = surfaces.map(|surface| self.scene.nearest_mm(surface, self.cycles));
+        let nearest = ranges.fold(f64::INFINITY, f64::min) / self.scene.mm_per_bin();
         let gate = (ends + 1.0).min((nearest - FALSE_BEYOND_BINS).floor());
         let has_room = gate > last as f64 && gate + LEAST_GATE as f64 <= self.last_bin as f64 + 1.0;
         (is_glass && has_room).then_some(CoverGlass {
@@ -171,18 +173,6 @@ impl Comparison<'_> {
             false_alarms: here,
             gate: (gate as u16, self.last_bin as u16),
         })
-    }
-
-    /// As near as any surface comes.
-    fn nearest_mm(&self) -> f64 {
-        let ends = [0.0, self.scene.seconds(self.cycles)];
-        let nearest = |seconds| {
-            let surfaces = self.scene.surfaces.iter();
-            let ranges =
-                surfaces.map(move |surface| surface.nearest_mm(seconds, self.scene.layout));
-            ranges.fold(f64::INFINITY, f64::min)
-        };
-        nearest(ends[0]).min(nearest(ends[1]))
     }
 }
 

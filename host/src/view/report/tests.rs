@@ -1,33 +1,17 @@
 use super::*;
-use dtof_core::{
-    BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, RangeScale, SubBinOffset,
-};
+use dtof_core::PixelAddress;
 
 use crate::events::events_csv::range_mm;
-use crate::events::sample::Sample;
+use crate::events::fixtures::{event, scale};
 use crate::input::source::Geometry;
 
 /// `count` events, one a laser cycle, of four pixels in turn.
 fn sample(limit: usize, count: u32) -> Sample {
-    let scale = RangeScale::new(
-        dtof_core::fixed::types::U16F16::lit("250"),
-        dtof_core::fixed::types::I24F8::ZERO,
-    )
-    .unwrap();
     let mut sample = Sample::new(limit);
     for cycle in 0..count {
         let pixel = u16::try_from(cycle % 4).unwrap();
-        let event = DepthEvent {
-            pixel: PixelAddress(pixel),
-            cycle: LaserCycle(cycle.into()),
-            exposure: 40,
-            peak_bin: BinIndex::saturating(10 + pixel),
-            offset: SubBinOffset::CENTRE,
-            peak_count: Count::saturating(9),
-            background: Count::saturating(1),
-            flags: Flags::NONE,
-        };
-        sample.add(&event, range_mm(&event, &scale));
+        let event = event(pixel, cycle.into(), 10 + pixel);
+        sample.add(&event, range_mm(&event, &scale()));
     }
     sample
 }

@@ -1,10 +1,8 @@
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
-use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, SubBinOffset};
-
 use super::*;
+use crate::events::fixtures::{event, scale};
 
 /// `text` without colours.
 fn characters(text: &str) -> String {
@@ -80,22 +78,8 @@ fn it_is_drawn_in_place_and_gives_the_cursor_back() {
     assert!(characters(&first).contains("no event yet of 4 pixels"));
     assert_eq!(first.matches('\n').count(), 3);
 
-    let event = DepthEvent {
-        pixel: PixelAddress(3),
-        cycle: LaserCycle(9),
-        exposure: 10,
-        peak_bin: BinIndex::saturating(40),
-        offset: SubBinOffset::CENTRE,
-        peak_count: Count::saturating(9),
-        background: Count::saturating(1),
-        flags: Flags::NONE,
-    };
-    let foreign = DepthEvent {
-        pixel: PixelAddress(4),
-        ..event
-    };
-    let scale = RangeScale::new(U16F16::lit("250"), I24F8::ZERO).unwrap();
-    map.add(&[event, foreign].map(Event::Depth), &scale);
+    let [known, foreign] = [3, 4].map(|pixel| Event::Depth(event(pixel, 9, 40)));
+    map.add(&[known, foreign], &scale());
     map.tell("events/s 12, and so much more than fits here".to_owned());
     map.draw_when_due().unwrap();
     assert_eq!(screen.taken(), "", "not so soon");
