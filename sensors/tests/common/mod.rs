@@ -85,11 +85,7 @@ impl Line {
         self.broken.set(broken);
     }
     fn check(&self) -> Result<(), Broken> {
-        if self.broken.get() {
-            Err(Broken)
-        } else {
-            Ok(())
-        }
+        (!self.broken.get()).then_some(()).ok_or(Broken)
     }
     fn drive(&self, high: bool) -> Result<(), Broken> {
         self.check()?;
@@ -109,8 +105,7 @@ impl InputPin for Line {
         Ok(self.level.get())
     }
     fn is_low(&mut self) -> Result<bool, Broken> {
-        self.check()?;
-        Ok(!self.level.get())
+        self.is_high().map(|is_high| !is_high)
     }
 }
 
