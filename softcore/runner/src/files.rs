@@ -43,7 +43,7 @@ pub enum Column {
     Told,
 }
 
-use Column::{Name, Percent, Told};
+use Column::{Percent, Told};
 
 /// All figures.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -163,6 +163,7 @@ fn is_near(a: &str, b: &str, columns: &[Column]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::Column::Name;
     use super::*;
     use crate::image::Sizes;
 
