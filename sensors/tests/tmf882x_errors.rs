@@ -97,13 +97,13 @@ fn another_error_of_the_bus_is_inside() {
 #[test]
 fn an_error_of_a_pin_is_inside() {
     let mut bench = measuring();
-    bench.interrupt.set_broken(true);
+    bench.interrupt.broken.set(true);
     let polled = bench.poll(&[]);
     assert_eq!(polled, Err(Error::Pin(Broken)));
-    bench.interrupt.set_broken(false);
-    bench.enable.set_broken(true);
+    bench.interrupt.broken.set(false);
+    bench.enable.broken.set(true);
     assert_eq!(bench.poll(&[]), Err(Error::Pin(Broken)));
-    bench.enable.set_broken(false);
+    bench.enable.broken.set(false);
     starts_over(&mut bench);
 }
 

@@ -55,7 +55,7 @@ impl PhotonSink for Notes {
 #[derive(Clone, Debug)]
 pub struct Line {
     level: Rc<Cell<bool>>,
-    broken: Rc<Cell<bool>>,
+    pub broken: Rc<Cell<bool>>,
     /// Every level set by the driver.
     pub driven: Rc<RefCell<Vec<bool>>>,
 }
@@ -80,9 +80,6 @@ impl Line {
     }
     pub fn set(&self, high: bool) {
         self.level.set(high);
-    }
-    pub fn set_broken(&self, broken: bool) {
-        self.broken.set(broken);
     }
     fn check(&self) -> Result<(), Broken> {
         (!self.broken.get()).then_some(()).ok_or(Broken)

@@ -166,6 +166,7 @@ mod tests {
     use super::Column::Name;
     use super::*;
     use crate::image::Sizes;
+    use crate::root;
 
     #[test]
     fn figures_may_differ_by_little() {
@@ -226,7 +227,7 @@ mod tests {
 
     #[test]
     fn the_files_are_read_as_they_are_written() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let root = root();
         let files = Files::read(&root).unwrap();
         for (file, text) in files.texts() {
             assert_eq!(fs::read_to_string(root.join(file)).unwrap(), text, "{file}");

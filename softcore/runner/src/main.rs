@@ -29,7 +29,7 @@ use image::Images;
 use memory::{Memory, Stacks};
 use program::Ran;
 use rtl::{CORES, Core, Simulator};
-use trials::{Cycles, Found, Trials};
+use trials::{Cycles, Trials};
 
 const HELP: &str = "\
 cargo softcore [--qemu-only] [--core NAME]... [--check]
@@ -138,8 +138,7 @@ impl Options {
 
 /// Builds and runs.
 fn run(options: &Options) -> Result<()> {
-    let root = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let root = &root.canonicalize()?;
+    let root = &root().canonicalize()?;
     let expected = fs::read_to_string(root.join(EXPECTED)).context(EXPECTED)?;
     for isa in ISAS {
         in_qemu(root, isa, &expected).with_context(|| format!("QEMU, {isa}"))?;
@@ -171,6 +170,11 @@ fn run(options: &Options) -> Result<()> {
         measured.write(root)?;
     }
     Ok(())
+}
+
+/// The folder of the workspace.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
 /// Where cargo builds.
@@ -239,22 +243,18 @@ fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<(Files, Stacks)> {
         core: &name(core),
         cycles: Cycles::of(&rows).context("no rows of a count and a look")?,
     };
-    let Found {
-        sustained: photons,
-        stack,
-        slow: (events, deferred),
-    } = trials.run()?;
+    let found = trials.run()?;
+    let (events, deferred) = found.slow;
     println!(
         "{}: the host decides the same from the same photons and looks, each event word over REQ and ACK; \
          with a slow link {events} events, {deferred} decisions put off",
         core.name
     );
-    let stacks = stack
-        .into_iter()
-        .map(|(pixels, stack)| (core.isa, pixels, stack));
+    let stacks = found.stack.into_iter();
+    let stacks = stacks.map(|(pixels, stack)| (isa, pixels, stack));
     let files = Files {
         rows,
-        photons,
+        photons: found.sustained,
         memory: Vec::new(),
     };
     Ok((files, stacks.collect()))
