@@ -178,13 +178,10 @@ fn configuration() -> impl Strategy<Value = Configuration> {
     let centred = (256u16..=1024).prop_map(|half| {
         DepthEstimator::CentredWindow(CentredWindow::new(U8F8::from_bits(half)).unwrap())
     });
-    let changes = (any::<u32>(), any::<bool>()).prop_map(|(threshold, reported)| DynamicDepth {
+    let reference = prop_oneof![Just(Reference::Previous), Just(Reference::Reported)];
+    let changes = (any::<u32>(), reference).prop_map(|(threshold, reference)| DynamicDepth {
         threshold_mm: U24F8::from_bits(threshold),
-        reference: if reported {
-            Reference::Reported
-        } else {
-            Reference::Previous
-        },
+        reference,
     });
     let source = prop_oneof![Just(Source::Link), Just(Source::Sensor)];
     (

@@ -31,22 +31,14 @@ fn check_any_bytes(bytes: [u8; 16]) {
         }
         (0, 1) => {
             let valid = number << 76 == 0 && number >> 108 == 0;
-            let expected = if valid {
-                Ok(AerRecord::Time(LaserCycle(((number >> 64) << 20) as u64)))
-            } else {
-                Err(AerError::ReservedBits)
-            };
-            assert_eq!(decoded, expected);
+            let time = AerRecord::Time(LaserCycle(((number >> 64) << 20) as u64));
+            assert_eq!(decoded, valid.then_some(time).ok_or(AerError::ReservedBits));
         }
         (0, 2) => {
             let valid = number >> 32 & 0xf_ffff == 0;
-            let expected = if valid {
-                let (events, checksum) = ((number >> 64) as u64, number as u32);
-                Ok(AerRecord::End { events, checksum })
-            } else {
-                Err(AerError::ReservedBits)
-            };
-            assert_eq!(decoded, expected);
+            let (events, checksum) = ((number >> 64) as u64, number as u32);
+            let end = AerRecord::End { events, checksum };
+            assert_eq!(decoded, valid.then_some(end).ok_or(AerError::ReservedBits));
         }
         (0, _) => assert_eq!(decoded, Err(AerError::UnknownControl)),
         (2, _) => {
