@@ -47,6 +47,10 @@ struct Field {
     bits: u32,
 }
 
+const fn field(shift: u32, bits: u32) -> Field {
+    Field { shift, bits }
+}
+
 impl Field {
     const fn mask(self) -> u64 {
         (1 << self.bits) - 1
@@ -62,49 +66,28 @@ impl Field {
 }
 
 // The low half of every word.
-const KIND: Field = Field { shift: 62, bits: 2 };
+const KIND: Field = field(62, 2);
 // The low half of an event.
-const PIXEL: Field = Field { shift: 0, bits: 16 };
-const EXPOSURE: Field = Field {
-    shift: 16,
-    bits: 16,
-};
-const CYCLE_LOW: Field = Field {
-    shift: 32,
-    bits: 20,
-};
-const PEAK_BIN: Field = Field {
-    shift: 52,
-    bits: 10,
-};
+const PIXEL: Field = field(0, 16);
+const EXPOSURE: Field = field(16, 16);
+const CYCLE_LOW: Field = field(32, 20);
+const PEAK_BIN: Field = field(52, 10);
 // The high half of an event.
-const PEAK_COUNT: Field = Field { shift: 0, bits: 24 };
-const BACKGROUND: Field = Field {
-    shift: 24,
-    bits: 24,
-};
-const OFFSET: Field = Field {
-    shift: 48,
-    bits: 10,
-};
-const FLAGS: Field = Field { shift: 58, bits: 6 };
+const PEAK_COUNT: Field = field(0, 24);
+const BACKGROUND: Field = field(24, 24);
+const OFFSET: Field = field(48, 10);
+const FLAGS: Field = field(58, 6);
 // The low half of a dynamic depth event; its pixel and cycle are where those of a depth
 // event are.
-const CHANGE_FLAGS: Field = Field { shift: 52, bits: 6 };
+const CHANGE_FLAGS: Field = field(52, 6);
 // The high half of a dynamic depth event.
-const POSITION: Field = Field { shift: 0, bits: 32 };
-const CHANGE: Field = Field {
-    shift: 32,
-    bits: 32,
-};
+const POSITION: Field = field(0, 32);
+const CHANGE: Field = field(32, 32);
 // The low half of a control word.
-const CONTROL: Field = Field {
-    shift: 52,
-    bits: 10,
-};
-const CHECKSUM: Field = Field { shift: 0, bits: 32 };
+const CONTROL: Field = field(52, 10);
+const CHECKSUM: Field = field(0, 32);
 // The high half of a time word.
-const CYCLE_HIGH: Field = Field { shift: 0, bits: 44 };
+const CYCLE_HIGH: Field = field(0, 44);
 
 const KIND_CONTROL: u64 = 0;
 const KIND_DEPTH_EVENT: u64 = 1;

@@ -31,3 +31,18 @@ macro_rules! checked {
         }
     };
 }
+
+/// Makes an error of a type with a constant text, which [`checked`] says too.
+macro_rules! written_as_its_text {
+    ($error:ident) => {
+        impl core::fmt::Display for $error {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.write_str(self.text())
+            }
+        }
+
+        impl core::error::Error for $error {}
+    };
+}
+
+pub(crate) use written_as_its_text;

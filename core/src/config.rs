@@ -28,10 +28,9 @@
 //! Source: X, L1 and L2 are those of the flow chart in the paper's section II-B; X of 4
 //! and L1 of 40 those of its FPGA (section IV).
 
-use core::fmt;
-
 use fixed::types::U8F8;
 
+use crate::check::written_as_its_text;
 use crate::counter::CounterWidth;
 use crate::depth::DepthEstimator;
 use crate::detect::{Detection, DetectionRule, PaperRule, detect};
@@ -88,13 +87,7 @@ impl ConfigError {
     }
 }
 
-impl fmt::Display for ConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.text())
-    }
-}
-
-impl core::error::Error for ConfigError {}
+written_as_its_text!(ConfigError);
 
 impl<const BINS: usize> PixelConfig<BINS> {
     /// The paper's rule and depth, with α = 4 and at least 5 photons in the peak.

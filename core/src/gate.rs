@@ -17,8 +17,9 @@
 //! # Ok::<(), dtof_core::GateError>(())
 //! ```
 
-use core::fmt;
 use core::ops::Range;
+
+use crate::check::written_as_its_text;
 
 /// First and last bin that may hold the peak, both inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,13 +51,7 @@ impl GateError {
     }
 }
 
-impl fmt::Display for GateError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.text())
-    }
-}
-
-impl core::error::Error for GateError {}
+written_as_its_text!(GateError);
 
 impl<const BINS: usize> RangeGate<BINS> {
     /// The fewest bins a gate may leave, as many as the smallest histogram has.

@@ -5,12 +5,10 @@ mod common;
 
 use std::collections::VecDeque;
 
-use common::host::{CONFIGURATION, Host, deliver};
-use dtof_core::fixed::types::U8F8;
-use dtof_core::{
-    AsyncPixel, Count, DepthEvent, LaserCycle, PaperRule, PixelAddress, PixelConfig, Statistics,
-};
-use dtof_firmware::sidecar::{Pixel, Sidecar};
+use common::host::{CONFIGURATION, Call, Host, deliver, device};
+use common::script;
+use dtof_core::DepthEvent;
+use dtof_firmware::sidecar::Sidecar;
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
@@ -18,9 +16,7 @@ use dtof_link::{Configuration, Report, Source, Token};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-const PIXELS: u16 = 8;
-type Pixels = heapless::Vec<Pixel, { PIXELS as usize }>;
-
+const PIXELS: usize = 8;
 /// One direction of the wire.
 struct Wire {
     bytes: VecDeque<u8>,
@@ -72,36 +68,25 @@ struct Script {
     photons: u64,
 }
 
-fn script(cycles: u64, rng: &mut Pcg32) -> Script {
-    let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
-    let config = PixelConfig::<128>::with_rule(rule).x(4).l1(20).l2(200);
-    let config = config.build().unwrap();
-    let mut pixels: Vec<_> = (0..PIXELS)
-        .map(|address| AsyncPixel::<128>::new(PixelAddress(address)))
-        .collect();
+fn script(cycles: usize, rng: &mut Pcg32) -> Script {
+    let calls = script::script(cycles, rng);
     let mut messages = vec![Vec::new()];
-    let mut events = Vec::new();
-    let mut photons = 0;
-    let mut statistics = Statistics::default();
-    for cycle in 0..cycles {
-        // One laser cycle a piece, some of them a message.
-        let mut piece = Vec::new();
-        for (address, pixel) in (0..).zip(&mut pixels) {
-            for _ in 0..rng.next_u32() % 3 {
-                // Half of them in one bin; a few past the last.
-                let random = (rng.next_u32() % 130) as u16;
-                let is_signal = rng.next_u32() & 1 == 0;
-                let code = if is_signal { 20 + 10 * address } else { random };
-                pixel.count(&config, code);
-                photons += 1;
-                piece.extend(Token::Photon { code }.to_bytes());
-            }
-            piece.extend(Token::Advance { pixels: 1 }.to_bytes());
-        }
-        piece.extend(Token::EndOfCycles { cycles: 1 }.to_bytes());
-        for pixel in &mut pixels {
-            pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle));
-            events.extend(pixel.acknowledge());
+    for cycle in &calls {
+        // One piece, some of them a message.
+        let (mut piece, mut at) = (Vec::new(), 0);
+        for call in cycle {
+            let token = match *call {
+                Call::Photon(pixel, code) => {
+                    for _ in at..pixel {
+                        piece.extend(Token::Advance { pixels: 1 }.to_bytes());
+                    }
+                    at = pixel;
+                    Token::Photon { code }
+                }
+                Call::End(cycles) => Token::EndOfCycles { cycles },
+                Call::Histogram(..) => unreachable!(),
+            };
+            piece.extend(token.to_bytes());
         }
         if messages.last().unwrap().len() + piece.len() > BODY_BYTES {
             messages.push(Vec::new());
@@ -110,8 +95,8 @@ fn script(cycles: u64, rng: &mut Pcg32) -> Script {
     }
     Script {
         messages,
-        events,
-        photons,
+        events: script::reference(&calls, &script::config(&CONFIGURATION)),
+        photons: script::photons(&calls),
     }
 }
 
@@ -225,23 +210,19 @@ fn check(script: &Script, outcome: &Outcome) {
     let (got, wanted) = (outcome.events.len(), script.events.len());
     assert!(outcome.events == script.events, "{got} of {wanted} events");
     let statistics = report.statistics;
-    assert_eq!(
-        statistics.counted + statistics.saturated + statistics.rejected + statistics.gated_out,
-        script.photons
-    );
+    assert_eq!(statistics.photons(), script.photons);
     assert!(statistics.rejected > 0 && !outcome.is_lost);
     assert_eq!(statistics.events, script.events.len() as u64);
     assert_eq!(statistics.deferred, 0);
 }
 
 /// A device that was just switched on, and a script of so many laser cycles.
-fn run(seed: u64, cycles: u64, change: impl FnOnce(&mut Line<'_>)) -> Outcome {
+fn run(seed: u64, cycles: usize, change: impl FnOnce(&mut Line<'_>)) -> Outcome {
     let mut rng = Pcg32::seed_from_u64(seed);
     let script = script(cycles, &mut rng);
-    let mut pixels = Pixels::new();
     let mut line = good(&mut rng);
     change(&mut line);
-    let outcome = session(&mut Sidecar::new(&mut pixels, None), 7, &script, &mut line);
+    let outcome = session(&mut device::<PIXELS>(None), 7, &script, &mut line);
     check(&script, &outcome);
     outcome
 }
@@ -299,38 +280,30 @@ fn interrupted(device: &mut Sidecar<'_>, number: u16, script: &Script, rng: &mut
 fn a_host_that_restarts_begins_anew_and_gets_every_event() {
     let mut rng = Pcg32::seed_from_u64(4);
     let script = script(2_000, &mut rng);
-    let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, None);
+    let mut device = device::<PIXELS>(None);
     for number in 1..20 {
         interrupted(&mut device, number, &script, &mut rng);
     }
-    check(
-        &script,
-        &session(&mut device, 20, &script, &mut good(&mut rng)),
-    );
+    let outcome = session(&mut device, 20, &script, &mut good(&mut rng));
+    check(&script, &outcome);
 }
 
 #[test]
 fn the_same_session_number_drawn_again_begins_anew() {
     let mut rng = Pcg32::seed_from_u64(6);
     let script = script(2_000, &mut rng);
-    let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, None);
+    let mut device = device::<PIXELS>(None);
     interrupted(&mut device, 7, &script, &mut rng);
-    check(
-        &script,
-        &session(&mut device, 7, &script, &mut good(&mut rng)),
-    );
+    let outcome = session(&mut device, 7, &script, &mut good(&mut rng));
+    check(&script, &outcome);
 }
 
 #[test]
 fn a_device_that_restarts_is_noticed_and_serves_the_next_session() {
     let mut rng = Pcg32::seed_from_u64(5);
     let script = script(2_000, &mut rng);
-    let (mut pixels, mut earlier_pixels) = (Pixels::new(), Pixels::new());
-    let mut device = Sidecar::new(&mut pixels, None);
     // A session of the device's earlier life, which another stands for.
-    let mut earlier = Sidecar::new(&mut earlier_pixels, None);
+    let [mut device, mut earlier] = [(); 2].map(|()| device::<PIXELS>(None));
     let mut host = Host::new(1, 0);
     host.exchange(&mut earlier, 0);
     assert!(host.endpoint.is_open() && !host.endpoint.is_lost());
@@ -338,10 +311,8 @@ fn a_device_that_restarts_is_noticed_and_serves_the_next_session() {
     host.exchange(&mut device, 0);
     assert!(host.endpoint.is_lost());
     assert_eq!(device.endpoint().counters().foreign, 1);
-    check(
-        &script,
-        &session(&mut device, 2, &script, &mut good(&mut rng)),
-    );
+    let outcome = session(&mut device, 2, &script, &mut good(&mut rng));
+    check(&script, &outcome);
 }
 
 /// Milliseconds until a hundred messages have crossed a line of so many bytes a

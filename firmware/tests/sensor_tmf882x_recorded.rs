@@ -12,7 +12,6 @@ use common::host::{CONFIGURATION, configured};
 use common::mocks::tmf882x::{Bench, Counts, packet, packets, settings};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, Count24, DepthEstimator, Histogram, PaperRule, RangeGate, detect};
-use dtof_firmware::sidecar::Pixel;
 use dtof_link::Configuration;
 use dtof_sensors::Sensor;
 use serde_json::Value;
@@ -83,12 +82,11 @@ fn the_sidecar_decides_recorded_histograms_as_the_core_does() {
     };
     // The reference is pixel 99, which is none of the sidecar's; the zones are 10
     // to 18, the centre one 14.
-    let mut pixels = heapless::Vec::<Pixel, 19>::new();
     let wanted = Configuration {
         pixels: 19,
         ..CONFIGURATION
     };
-    let (mut device, mut host) = configured(&mut pixels, &wanted);
+    let (mut device, mut host) = configured::<19>(&wanted);
     let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
     let gate = RangeGate::full();
 

@@ -2,14 +2,11 @@
 
 mod common;
 
-use common::host::{CONFIGURATION, Call, Host, Scripted, configured};
+use common::host::{CONFIGURATION, Call, Host, Scripted, configured, device};
 use dtof_core::Flags;
 use dtof_core::fixed::types::U16F16;
-use dtof_firmware::sidecar::{Pixel, Sidecar};
 use dtof_link::{Configuration, Refusal, SensorRecord, Source, message};
 use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
-
-type Pixels = heapless::Vec<Pixel, 8>;
 
 /// A sensor that notes what it is told.
 #[derive(Default)]
@@ -48,9 +45,8 @@ impl Sensor for Told {
 
 #[test]
 fn a_sensor_is_started_for_each_configuration_and_stopped_once() {
-    let mut pixels = Pixels::new();
     let mut sensor = Told::default();
-    let mut device = Sidecar::new(&mut pixels, Some(sensor.about()));
+    let mut device = device::<8>(Some(sensor.about()));
     let mut host = Host::new(1, 0);
     device.poll_sensor(&mut sensor, 0);
     let wanted = |bin_width: u32, source| Configuration {
@@ -81,8 +77,7 @@ fn a_sensor_is_started_for_each_configuration_and_stopped_once() {
 
 #[test]
 fn bins_that_are_not_the_sensors_are_refused() {
-    let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, Some(Told::default().about()));
+    let mut device = device::<8>(Some(Told::default().about()));
     let mut host = Host::new(1, 0);
     // A sixteenth of 160 ps to either side.
     for (bin_width, taken) in [(149, false), (150, true), (170, true), (171, false)] {
@@ -111,46 +106,17 @@ fn the_host_is_told_what_the_sensor_is() {
         bin_width: told.bin_width,
         offset: told.offset,
     };
-    let mut pixels = Pixels::new();
     let mut host = Host::new(1, 0);
-    let mut device = Sidecar::new(&mut pixels, Some(told));
-    let body = host.answer(&mut device, 0, message::SENSOR_REQUEST, &[]);
+    let mut with_one = device::<8>(Some(told));
+    let body = host.answer(&mut with_one, 0, message::SENSOR_REQUEST, &[]);
     assert_eq!(body, [3, 0, 0, 0, 160, 0, 0, 0, 0, 0]);
     assert_eq!(SensorRecord::from_le_bytes(&body), Some(Some(told_record)));
 
-    let mut pixels = Pixels::new();
     let mut host = Host::new(1, 0);
-    let mut device = Sidecar::new(&mut pixels, None);
-    let body = host.answer(&mut device, 0, message::SENSOR_REQUEST, &[]);
+    let mut bare = device::<8>(None);
+    let body = host.answer(&mut bare, 0, message::SENSOR_REQUEST, &[]);
     assert_eq!(SensorRecord::from_le_bytes(&body), Some(None));
     assert_eq!(SensorRecord::from_le_bytes(&body[1..]), None);
-}
-
-/// A sensor that does or does not give the first photon of a laser cycle only.
-struct Hits<'a, S>(&'a mut S, bool);
-
-impl<S: Sensor> Sensor for Hits<'_, S> {
-    type Error = S::Error;
-
-    fn about(&self) -> About {
-        self.0.about()
-    }
-
-    fn is_one_hit(&self) -> bool {
-        self.1
-    }
-
-    fn start(&mut self, bin_width: U16F16) {
-        self.0.start(bin_width);
-    }
-
-    fn stop(&mut self) {
-        self.0.stop();
-    }
-
-    fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, S::Error> {
-        self.0.poll(now_ms, sink)
-    }
 }
 
 #[test]
@@ -163,10 +129,9 @@ fn events_of_a_sensor_that_gives_one_photon_a_laser_cycle_say_so_at_high_rates()
             calls.drain(..usize::from(is_dark));
             calls
         };
-        let mut script = Scripted((0..48).map(call).map(Some));
-        let mut pixels = Pixels::new();
-        let (mut device, mut host) = configured(&mut pixels, &CONFIGURATION);
-        let mut sensor = Hits(&mut script, is_one_hit);
+        let calls = (0..48).map(call).map(Some);
+        let mut sensor = Scripted { calls, is_one_hit };
+        let (mut device, mut host) = configured::<8>(&CONFIGURATION);
         host.run(&mut device, &mut sensor, 0..100, 4);
         let flags: Vec<Flags> = host.events.iter().map(|event| event.flags).collect();
         let first = [Flags::NONE, Flags::PILE_UP][usize::from(is_one_hit)];

@@ -4,132 +4,59 @@
 
 mod common;
 
-use common::host::{CONFIGURATION, Call, Host, Scripted, configured};
-use common::scene;
+use common::host::{CONFIGURATION, Call, Host, Scripted, configured, device, scripted};
+use common::{scene, script};
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
-    AnyRule, AsyncPixel, CentredWindow, Count, Count24, DepthEstimator, DepthEvent,
-    DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Flags, Histogram, LaserCycle,
-    PaperRule, PixelAddress, PixelConfig, RangeGate, RangeScale, Reference, Statistics, WindowRule,
-    detect,
+    AnyRule, CentredWindow, Count, Count24, DepthEstimator, DepthEvent, DynamicDepthConfig,
+    DynamicDepthEvent, DynamicDepthPixel, Flags, Histogram, LaserCycle, PixelAddress, PixelConfig,
+    RangeGate, RangeScale, Reference, WindowRule, detect,
 };
-use dtof_firmware::sidecar::{Pixel, Sidecar};
 use dtof_link::frame::WIRE_BYTES;
 use dtof_link::{Configuration, DynamicDepth, FaultRecord, Report, Source, message};
 use dtof_sensors::About;
-use rand_core::{Rng, SeedableRng};
+use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
-
-type Pixels = heapless::Vec<Pixel, 8>;
 
 /// A configuration with each rule and estimator, and the same as the core takes it.
 fn configurations() -> [(Configuration, PixelConfig<128, AnyRule>); 2] {
-    let minimum_count = Count::saturating(5);
-    let config = |rule| PixelConfig::with_rule(rule).x(4).l1(20).l2(200);
-    let paper = PaperRule::new(U8F8::lit("4"), minimum_count);
-    let window = WindowRule::new(3, U4F12::lit("4.5"), minimum_count).unwrap();
+    let window = WindowRule::new(3, U4F12::lit("4.5"), Count::saturating(5)).unwrap();
     let centred = CentredWindow::new(U8F8::lit("2.5")).unwrap();
     let with_windows = Configuration {
         rule: window.into(),
         estimator: DepthEstimator::CentredWindow(centred),
         ..CONFIGURATION
     };
-    let estimator = DepthEstimator::CentredWindow(centred);
-    let (paper, window) = (config(paper.into()), config(window.into()));
-    [
-        (CONFIGURATION, paper.build().unwrap()),
-        (with_windows, window.estimator(estimator).build().unwrap()),
-    ]
-}
-
-/// Photons of one laser cycle and, now and then, of a few empty ones after it.
-fn calls(rng: &mut Pcg32) -> Vec<Call> {
-    let mut calls = Vec::new();
-    for pixel in 0..8 {
-        for _ in 0..rng.next_u32() % 3 {
-            let random = (rng.next_u32() % 130) as u16;
-            let signal = rng.next_u32() & 1 == 0;
-            let code = if signal { 20 + 10 * pixel } else { random };
-            calls.push(Call::Photon(pixel, code));
-        }
-    }
-    let is_tenth = rng.next_u32().is_multiple_of(10);
-    calls.push(Call::End(if is_tenth { 7 } else { 1 }));
-    calls
-}
-
-fn script(length: usize) -> Vec<Vec<Call>> {
-    let mut rng = Pcg32::seed_from_u64(1);
-    (0..length).map(|_| calls(&mut rng)).collect()
+    [CONFIGURATION, with_windows].map(|wanted| (wanted, script::config(&wanted)))
 }
 
 fn sensor(script: &[Vec<Call>]) -> Scripted<impl Iterator<Item = Option<Vec<Call>>>> {
-    Scripted(script.iter().cloned().map(Some))
-}
-
-/// What pixels with a link that takes every event at once report.
-fn reference(script: &[Vec<Call>], config: &PixelConfig<128, AnyRule>) -> Vec<DepthEvent> {
-    let mut pixels: Vec<_> = (0..8)
-        .map(|address| AsyncPixel::<128>::new(PixelAddress(address)))
-        .collect();
-    let mut events = Vec::new();
-    let mut statistics = Statistics::default();
-    let mut cycle = 0;
-    for call in script.iter().flatten() {
-        match *call {
-            Call::Photon(pixel, code) => pixels[usize::from(pixel)].count(config, code),
-            Call::End(cycles) => {
-                for _ in 0..cycles {
-                    for pixel in &mut pixels {
-                        pixel.end_laser_cycle(config, &mut statistics, LaserCycle(cycle));
-                        events.extend(pixel.acknowledge());
-                    }
-                    cycle += 1;
-                }
-            }
-            Call::Histogram(..) => unreachable!(),
-        }
-    }
-    events
-}
-
-fn photons(script: &[Vec<Call>]) -> u64 {
-    let calls = script.iter().flatten();
-    calls
-        .map(|call| u64::from(matches!(call, Call::Photon(..))))
-        .sum()
-}
-
-fn offered(report: &Report) -> u64 {
-    let statistics = report.statistics;
-    statistics.counted + statistics.saturated + statistics.rejected + statistics.gated_out
+    scripted(script.iter().cloned().map(Some))
 }
 
 #[test]
 fn a_host_that_reads_gets_the_events_of_the_pixels() {
-    let script = script(5_000);
+    let script = script::script(5_000, &mut Pcg32::seed_from_u64(1));
     for (wanted, config) in configurations() {
-        let mut pixels = Pixels::new();
-        let (mut device, mut host) = configured(&mut pixels, &wanted);
+        let (mut device, mut host) = configured::<8>(&wanted);
         host.run(&mut device, &mut sensor(&script), 0..5_000, 4);
         let report = host.report(&mut device, 5_000);
-        let expected = reference(&script, &config);
+        let expected = script::reference(&script, &config);
         assert!(expected.len() > 500 && host.events == expected);
         assert_eq!(report.statistics.events, expected.len() as u64);
         assert_eq!(report.statistics.deferred, 0);
-        assert_eq!(offered(&report), photons(&script));
+        assert_eq!(report.statistics.photons(), script::photons(&script));
     }
 }
 
 #[test]
 fn dynamic_depth_sends_what_the_core_makes_of_the_events() {
-    let script = script(5_000);
+    let script = script::script(5_000, &mut Pcg32::seed_from_u64(1));
     let (wanted, config) = configurations()[0];
     let scale = RangeScale::new(U16F16::from_num(250), I24F8::ZERO).unwrap();
     // A twentieth of a bin, so that there are many.
     let threshold_mm = U24F8::lit("2");
     for reference in [Reference::Previous, Reference::Reported] {
-        let mut pixels = Pixels::new();
         let wanted = Configuration {
             dynamic_depth: Some(DynamicDepth {
                 threshold_mm,
@@ -137,12 +64,12 @@ fn dynamic_depth_sends_what_the_core_makes_of_the_events() {
             }),
             ..wanted
         };
-        let (mut device, mut host) = configured(&mut pixels, &wanted);
+        let (mut device, mut host) = configured::<8>(&wanted);
         host.run(&mut device, &mut sensor(&script), 0..5_000, 4);
         let report = host.report(&mut device, 5_000);
         let dynamic_depth = DynamicDepthConfig::new(threshold_mm, &scale, reference).unwrap();
         let mut observers = [const { DynamicDepthPixel::<3>::new() }; 8];
-        let events = self::reference(&script, &config);
+        let events = script::reference(&script, &config);
         let observe = |event: &DepthEvent| {
             observers[usize::from(event.pixel.0)].observe(&dynamic_depth, event)
         };
@@ -156,13 +83,12 @@ fn dynamic_depth_sends_what_the_core_makes_of_the_events() {
 
 #[test]
 fn a_host_that_does_not_read_for_ten_seconds_lengthens_exposures_and_loses_no_event() {
-    let script = script(20_000);
+    let script = script::script(20_000, &mut Pcg32::seed_from_u64(1));
     let wanted = Configuration {
         l2: 60_000,
         ..CONFIGURATION
     };
-    let mut pixels = Pixels::new();
-    let (mut device, mut host) = configured(&mut pixels, &wanted);
+    let (mut device, mut host) = configured::<8>(&wanted);
     let mut sensor = sensor(&script);
     for (milliseconds, messages) in [(0..2_000, 4), (2_000..12_000, 0), (12_000..20_000, 4)] {
         host.run(&mut device, &mut sensor, milliseconds, messages);
@@ -171,7 +97,7 @@ fn a_host_that_does_not_read_for_ten_seconds_lengthens_exposures_and_loses_no_ev
     // Questions do not empty slots; what is still in them comes after.
     assert_eq!(report.statistics.events, host.events.len() as u64);
     assert!(report.statistics.deferred > 100, "{report:?}");
-    assert_eq!(offered(&report), photons(&script));
+    assert_eq!(report.statistics.photons(), script::photons(&script));
     assert_eq!(report.statistics.expired, 0);
     // Each laser cycle was part of one exposure: no event of any pixel is missing.
     for pixel in 0..8 {
@@ -189,9 +115,8 @@ fn a_host_that_does_not_read_for_ten_seconds_lengthens_exposures_and_loses_no_ev
 
 #[test]
 fn questions_are_answered_though_the_sensor_fills_the_link() {
-    let script = script(20_000);
-    let mut pixels = Pixels::new();
-    let (mut device, mut host) = configured(&mut pixels, &CONFIGURATION);
+    let script = script::script(20_000, &mut Pcg32::seed_from_u64(1));
+    let (mut device, mut host) = configured::<8>(&CONFIGURATION);
     let mut sensor = sensor(&script);
     let mut asked = 0;
     for now_ms in 0..20_000 {
@@ -228,9 +153,8 @@ fn questions_are_answered_though_the_sensor_fills_the_link() {
 
 #[test]
 fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
-    let script = script(10_000);
-    let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
+    let script = script::script(10_000, &mut Pcg32::seed_from_u64(1));
+    let mut device = device::<8>(Some(About::new(256)));
     let mut unused = sensor(&script);
     let mut wire = [0; WIRE_BYTES];
     for now_ms in 0..10_000 {
@@ -239,7 +163,7 @@ fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
         assert_eq!(device.transmit(now_ms, &mut wire), 0);
     }
     // It was not even asked.
-    assert!(unused.0.next().is_some());
+    assert!(unused.calls.next().is_some());
 
     // A configuration that takes photons from the link keeps the sensor's out.
     let mut host = Host::new(1, 10_000);
@@ -250,7 +174,7 @@ fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
     host.configure(&mut device, 10_000, &wanted);
     device.poll_sensor(&mut unused, 10_000);
     let report = host.report(&mut device, 10_000);
-    assert_eq!((report.cycles, offered(&report)), (0, 0));
+    assert_eq!((report.cycles, report.statistics.photons()), (0, 0));
 
     // A host that goes away keeps the device from nothing, and finds the events
     // when it comes back.
@@ -263,16 +187,15 @@ fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
     }
     // What was lost on the way is sent again by now.
     let report = host.report(&mut device, 112_000);
-    assert_eq!(offered(&report), photons(&script));
+    assert_eq!(report.statistics.photons(), script::photons(&script));
     assert_eq!(report.statistics.events, host.events.len() as u64);
     assert!(report.statistics.deferred > 0 && !host.events.is_empty());
 }
 
 #[test]
 fn a_configuration_waits_for_the_events_of_the_one_before() {
-    let script = script(3_000);
-    let mut pixels = Pixels::new();
-    let (mut device, mut host) = configured(&mut pixels, &CONFIGURATION);
+    let script = script::script(3_000, &mut Pcg32::seed_from_u64(1));
+    let (mut device, mut host) = configured::<8>(&CONFIGURATION);
     let mut sensor = sensor(&script);
     host.run(&mut device, &mut sensor, 0..2_000, 0);
     let report = host.report(&mut device, 2_000);
@@ -305,8 +228,7 @@ fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<1
         gate: (10, 99),
         ..wanted
     };
-    let mut pixels = Pixels::new();
-    let (mut device, mut host) = configured(&mut pixels, &wanted);
+    let (mut device, mut host) = configured::<8>(&wanted);
     let mut outside = histogram(40);
     outside[120] = 100_000;
     let calls = vec![
@@ -315,7 +237,7 @@ fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<1
         Call::Histogram(8, Box::new([1; 128])),
         Call::Histogram(3, histogram(41)),
     ];
-    let mut sensor = Scripted([None, Some(calls), None].into_iter());
+    let mut sensor = scripted([None, Some(calls), None].into_iter());
     for now_ms in 0..3 {
         device.poll_sensor(&mut sensor, now_ms);
     }
@@ -345,9 +267,8 @@ fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<1
 
 #[test]
 fn histograms_without_room_for_an_event_are_counted_as_deferred() {
-    let mut pixels = Pixels::new();
-    let (mut device, mut host) = configured(&mut pixels, &CONFIGURATION);
-    let mut sensor = Scripted((0..1_000).map(|_| Some(vec![Call::Histogram(0, histogram(40))])));
+    let (mut device, mut host) = configured::<8>(&CONFIGURATION);
+    let mut sensor = scripted((0..1_000).map(|_| Some(vec![Call::Histogram(0, histogram(40))])));
     host.run(&mut device, &mut sensor, 0..1_000, 0);
     let report = host.report(&mut device, 1_000);
     let statistics = report.statistics;
@@ -355,7 +276,7 @@ fn histograms_without_room_for_an_event_are_counted_as_deferred() {
     assert!(statistics.events > 60 && statistics.deferred > 500);
     assert_eq!(statistics.events + statistics.deferred, 1_000);
     // Those that were not looked at are counted all the same.
-    assert_eq!(offered(&report), 1_000 * (125 * 100 + 84_000));
+    assert_eq!(report.statistics.photons(), 1_000 * (125 * 100 + 84_000));
 }
 
 /// 100 bytes a millisecond on the wire.

@@ -4,20 +4,18 @@
 
 mod common;
 
-use common::host::{CONFIGURATION, Host, configured};
+use common::host::{CONFIGURATION, Host, configured, device};
 use common::mocks::plug::{Answers, Bus, Tdc, Tmf};
 use common::mocks::{Broken, Line};
 use common::scene;
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{DepthEvent, PixelAddress, Statistics};
-use dtof_firmware::sidecar::{Pixel, Sidecar};
+use dtof_firmware::sidecar::Sidecar;
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::message;
 use dtof_link::{Configuration, FaultRecord, Refusal, Report, Source, Token};
 use dtof_sensors::tmf882x::{BootCommand, Command, Tmf882x, Waiting};
 use dtof_sensors::{Sensor, SensorFault, tdc7200, tmf882x};
-
-type Pixels = heapless::Vec<Pixel, 9>;
 
 /// One that takes photons from the link.
 const GOOD: Configuration = Configuration {
@@ -56,12 +54,11 @@ fn unplug<Chip: Default>(
     most_a_second: u32,
     said: FaultRecord,
 ) {
-    let mut pixels = Pixels::new();
     let wanted = Configuration {
         pixels: 9,
         ..CONFIGURATION
     };
-    let (mut device, mut host) = configured(&mut pixels, &wanted);
+    let (mut device, mut host) = configured::<9>(&wanted);
     let mut now_ms = 0;
     let mut second = || {
         let report = second(&mut sensor, bus, &mut device, &mut host, &mut now_ms);
@@ -114,9 +111,8 @@ fn an_unplugged_tdc7200_is_reported_and_found_again() {
             ..tdc7200::Settings::new(PixelAddress(0), 8_000, U16F16::lit("250"))
         };
         let config = tdc7200::Config::new(settings).unwrap();
-        let enable = Line::new(false);
-        let sensor =
-            tdc7200::Tdc7200::<_, _, _>::new(bus.clone(), bus.interrupt.clone(), enable, config);
+        let (interrupt, enable) = (bus.interrupt.clone(), Line::new(false));
+        let sensor = tdc7200::Tdc7200::<_, _, _>::new(bus.clone(), interrupt, enable, config);
         unplug(sensor, &bus, how, 200, said);
     }
 }
@@ -125,14 +121,8 @@ fn an_unplugged_tdc7200_is_reported_and_found_again() {
 fn an_unplugged_tmf882x_is_reported_and_found_again() {
     let bus = Bus::<Tmf>::new();
     let config = tmf882x::Config::new(tmf882x::Settings::new(PixelAddress(0))).unwrap();
-    let enable = Line::new(false);
-    let sensor = Tmf882x::<_, _, _>::new(
-        bus.clone(),
-        bus.interrupt.clone(),
-        enable,
-        &[1, 2, 3],
-        config,
-    );
+    let (interrupt, enable) = (bus.interrupt.clone(), Line::new(false));
+    let sensor = Tmf882x::<_, _, _>::new(bus.clone(), interrupt, enable, &[1, 2, 3], config);
     unplug(sensor, &bus, Answers::Error, 60, FaultRecord::NoAnswer);
 }
 
@@ -253,8 +243,7 @@ fn is_refused(host: &mut Host, device: &mut Sidecar, wanted: &[u8], refusal: Ref
 
 /// Events and counts of photons between which these configurations are asked for.
 fn photons_between(refused: &[(Vec<u8>, Refusal)]) -> (Vec<DepthEvent>, Statistics, u64) {
-    let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, None);
+    let mut device = device::<9>(None);
     let mut host = Host::new(1, 0);
     host.configure(&mut device, 0, &GOOD);
     for turn in 0..100 {
@@ -286,8 +275,7 @@ fn every_refused_configuration_names_its_reason_and_changes_nothing() {
 
 #[test]
 fn a_device_that_has_refused_its_first_configuration_waits_for_a_better_one() {
-    let mut pixels = Pixels::new();
-    let mut device = Sidecar::new(&mut pixels, None);
+    let mut device = device::<9>(None);
     let mut host = Host::new(1, 0);
     for (wanted, refusal) in refused() {
         is_refused(&mut host, &mut device, &wanted, refusal);

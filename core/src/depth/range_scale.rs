@@ -13,10 +13,9 @@
 //!
 //! Cost: one multiplication of 32 bits by 32 a range.
 
-use core::fmt;
-
 use fixed::types::{I24F8, I56F8, U16F16, U24F8};
 
+use crate::check::written_as_its_text;
 use crate::units::BinPosition;
 
 /// From bins to millimetres: bin width and range offset.
@@ -50,13 +49,7 @@ impl RangeScaleError {
     }
 }
 
-impl fmt::Display for RangeScaleError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.text())
-    }
-}
-
-impl core::error::Error for RangeScaleError {}
+written_as_its_text!(RangeScaleError);
 
 impl RangeScale {
     /// Half the speed of light in m/s: 0.149896229 mm a picosecond, exactly.

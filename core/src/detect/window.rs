@@ -40,11 +40,10 @@
 //! # Ok::<(), dtof_core::WindowWidthError>(())
 //! ```
 
-use core::fmt;
-
 use fixed::types::{U4F12, U8F8, U24F8};
 
 use super::rule::DetectionRule;
+use crate::check::written_as_its_text;
 use crate::counter::CounterWidth;
 use crate::gate::RangeGate;
 use crate::histogram::{Histogram, Peak, mean};
@@ -72,13 +71,7 @@ impl WindowWidthError {
     }
 }
 
-impl fmt::Display for WindowWidthError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.text())
-    }
-}
-
-impl core::error::Error for WindowWidthError {}
+written_as_its_text!(WindowWidthError);
 
 impl WindowRule {
     /// The widest window: a gate always leaves a bin outside it.

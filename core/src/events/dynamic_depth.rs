@@ -36,11 +36,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use core::fmt;
-
 use fixed::types::U24F8;
 
 use super::running_mean::RunningMean;
+use crate::check::written_as_its_text;
 use crate::depth::RangeScale;
 use crate::event::DepthEvent;
 use crate::flags::Flags;
@@ -81,13 +80,7 @@ impl ZeroThresholdError {
     }
 }
 
-impl fmt::Display for ZeroThresholdError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.text())
-    }
-}
-
-impl core::error::Error for ZeroThresholdError {}
+written_as_its_text!(ZeroThresholdError);
 
 impl DynamicDepthConfig {
     /// A mean depth more than `threshold` millimetres from `reference` is reported.

@@ -30,12 +30,17 @@ pub const CONFIGURATION: Configuration = Configuration {
     dynamic_depth: None,
 };
 
-/// A device of some pixels with a sensor, and a host that has configured it.
-pub fn configured<'a, const N: usize>(
-    pixels: &'a mut heapless::Vec<Pixel, N>,
-    wanted: &Configuration,
-) -> (Sidecar<'a>, Host) {
-    let mut device = Sidecar::new(pixels, Some(About::new(256)));
+/// A device with room for so many pixels, which stays until the tests have ended.
+pub fn device<const PIXELS: usize>(sensor: Option<About>) -> Sidecar<'static> {
+    Sidecar::new(
+        Box::leak(Box::new(heapless::Vec::<Pixel, PIXELS>::new())),
+        sensor,
+    )
+}
+
+/// A device with a sensor, and a host that has configured it.
+pub fn configured<const PIXELS: usize>(wanted: &Configuration) -> (Sidecar<'static>, Host) {
+    let mut device = device::<PIXELS>(Some(About::new(256)));
     let mut host = Host::new(1, 0);
     host.configure(&mut device, 0, wanted);
     (device, host)
@@ -183,8 +188,19 @@ pub enum Call {
     Histogram(u16, Box<[u32; 128]>),
 }
 
-/// Gives the next item each time it is asked; `None` is an error.
-pub struct Scripted<I>(pub I);
+/// Gives the next item each time it is asked; `None` is an error. It may give the first
+/// photon of a laser cycle only.
+pub struct Scripted<I> {
+    pub calls: I,
+    pub is_one_hit: bool,
+}
+
+pub fn scripted<I>(calls: I) -> Scripted<I> {
+    Scripted {
+        calls,
+        is_one_hit: false,
+    }
+}
 
 impl<I: Iterator<Item = Option<Vec<Call>>>> Sensor for Scripted<I> {
     type Error = SensorFault;
@@ -193,12 +209,16 @@ impl<I: Iterator<Item = Option<Vec<Call>>>> Sensor for Scripted<I> {
         About::new(256)
     }
 
+    fn is_one_hit(&self) -> bool {
+        self.is_one_hit
+    }
+
     fn start(&mut self, _: U16F16) {}
 
     fn stop(&mut self) {}
 
     fn poll(&mut self, _: u32, sink: &mut impl PhotonSink) -> Result<Polled, SensorFault> {
-        let calls = self.0.next().unwrap_or(Some(Vec::new()));
+        let calls = self.calls.next().unwrap_or(Some(Vec::new()));
         for call in calls.ok_or(SensorFault::Data)? {
             match call {
                 Call::Photon(pixel, code) => sink.photon(PixelAddress(pixel), code),

@@ -7,3 +7,4 @@ pub mod host;
 #[path = "../../../sensors/tests/common/mod.rs"]
 pub mod mocks;
 pub mod scene;
+pub mod script;

@@ -1,13 +1,12 @@
 //! The main loop of an image: the simulated scene over a serial port.
 
 use dtof_firmware::serial::Buffers;
-use dtof_firmware::sidecar::{Pixel, Sidecar};
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::frame::WIRE_BYTES;
 use dtof_link::{Configuration, message};
 use dtof_sensors::{About, simulated};
 
-use super::host::{CONFIGURATION, Host};
+use super::host::{CONFIGURATION, Host, device};
 
 /// A host that comes at `start_ms` and stays for so many milliseconds, the device being
 /// on from 0 and sending so many bytes a millisecond. What the host has then, and what
@@ -15,8 +14,7 @@ use super::host::{CONFIGURATION, Host};
 pub fn over_serial(start_ms: u32, milliseconds: u32, bytes: usize) -> (Host, LinkCounters) {
     let mut buffers = Buffers::<512, 1024>::new();
     let (mut interrupt, mut serial) = buffers.split(|| {});
-    let mut pixels = heapless::Vec::<Pixel, 16>::new();
-    let mut device = Sidecar::new(&mut pixels, Some(About::new(256)));
+    let mut device = device::<16>(Some(About::new(256)));
     let mut sensor = simulated::scene();
     for now_ms in 0..start_ms {
         let lost = serial.lost();

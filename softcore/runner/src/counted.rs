@@ -44,30 +44,14 @@ impl Counted {
             anyhow::bail!("laser cycles are lost");
         };
         let lowest = fifo();
-        let named = |prefix: &str| {
-            let mut lines = ran.output.lines();
-            let line = lines.find_map(|line| line.strip_prefix(prefix));
-            let words = line.with_context(|| format!("no `{prefix}`"))?.split(' ');
-            let numbers = words.filter_map(|word| word.parse().ok());
-            anyhow::Ok(numbers.collect::<Vec<u64>>())
+        let count = |name: &str| {
+            let mut words = ran.output.split_whitespace();
+            words.find(|&word| word == name);
+            let count = words.next().and_then(|count| count.parse::<u64>().ok());
+            count.with_context(|| format!("the program does not say how many {name}"))
         };
-        let counts = named("cycles ")?;
-        let [
-            cycles,
-            looks,
-            losses,
-            strays,
-            photons,
-            events,
-            expired,
-            deferred,
-        ] = counts[..]
-        else {
-            anyhow::bail!("what does the program say?");
-        };
-        let [stack] = named("stack ")?[..] else {
-            anyhow::bail!("no stack");
-        };
+        let (cycles, losses) = (count("cycles")?, count("losses")?);
+        let (strays, photons) = (count("strays")?, count("photons")?);
         ensure!(cycles == ended, "{ended} laser cycles, {cycles} told");
         ensure!(
             photons + strays + lost == sent,
@@ -77,10 +61,8 @@ impl Counted {
             (losses > 0) == (lost > 0),
             "{lost} photons lost, {losses} losses seen"
         );
-        let words = ran
-            .output
-            .lines()
-            .filter_map(|line| line.strip_prefix("event "));
+        let words = ran.output.lines();
+        let words = words.filter_map(|line| line.strip_prefix("event "));
         let words = words.map(|word| u128::from_str_radix(word, 16));
         let marks = ran.errors.lines().filter_map(|line| {
             let number = line.strip_prefix("mark ")?.split(' ').next();
@@ -88,13 +70,13 @@ impl Counted {
         });
         Ok(Self {
             cycles,
-            looks,
+            looks: count("looks")?,
             strays,
             photons,
-            events,
-            expired,
-            deferred,
-            stack,
+            events: count("events")?,
+            expired: count("expired")?,
+            deferred: count("deferred")?,
+            stack: count("stack")?,
             lost,
             fill,
             lowest,
@@ -143,22 +125,15 @@ fifo: lowest fill of each tenth 0 0 0 0 0 0 0 0 1 0
 
     #[test]
     fn every_loss_is_noticed() {
-        let counted = Counted::read(&Ran::success(OUTPUT, ERRORS)).unwrap();
+        let read = |output: &str, errors: &str| Counted::read(&Ran::success(output, errors));
+        let counted = read(OUTPUT, ERRORS).unwrap();
         assert!(counted.is_sustained() && counted.words == [15]);
         assert!(counted.check(4, &[]).is_err());
         let grows = ERRORS.replace(" 1 0\n", " 1 2\n");
-        assert!(
-            !Counted::read(&Ran::success(OUTPUT, &grows))
-                .unwrap()
-                .is_sustained()
-        );
+        assert!(!read(OUTPUT, &grows).unwrap().is_sustained());
         let lost = ERRORS.replace("10 photons, 0 lost", "11 photons, 1 lost");
         let seen = OUTPUT.replace("losses 0", "losses 1");
-        assert!(
-            !Counted::read(&Ran::success(&seen, &lost))
-                .unwrap()
-                .is_sustained()
-        );
+        assert!(!read(&seen, &lost).unwrap().is_sustained());
 
         for (output, errors) in [
             (OUTPUT, &*lost),
@@ -171,10 +146,7 @@ fifo: lowest fill of each tenth 0 0 0 0 0 0 0 0 1 0
             ("", ERRORS),
             (OUTPUT, ""),
         ] {
-            assert!(
-                Counted::read(&Ran::success(output, errors)).is_err(),
-                "{output}{errors}"
-            );
+            assert!(read(output, errors).is_err(), "{output}{errors}");
         }
         let mut failed = Ran::success(OUTPUT, ERRORS);
         failed.code = Some(2);

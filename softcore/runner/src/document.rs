@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use crate::image::Sizes;
 use crate::memory::Memory;
 use crate::sustained::Sustained;
 use crate::table::{COLD, Row};
@@ -11,7 +10,7 @@ use crate::table::{COLD, Row};
 const PAGE: &str = include_str!("../page.md");
 
 /// Clock cycles in 2.4 µs at 100 MHz.
-const CYCLES: u64 = 240;
+const CYCLES: f64 = 240.0;
 /// Operations from a look to what comes of it.
 const AGAINST: [&str; 5] = [
     "decision: kept peak; no event",
@@ -76,11 +75,12 @@ fn cycles(rows: &[Row]) -> String {
         let _ = write!(text, "| {operation} |");
         for &core in &cores {
             let (warm, cold) = find(rows, core, operation);
-            let cell = |row: &Row| format!("{} ({})", row.cycles(), row.instructions());
+            let lines = |row: &Row| format!("{:.0} + {:.0}", row.code_lines, row.data_lines);
+            let cell = |row: &Row| format!("{:.1} ({:.1})", row.cycles, row.instructions);
             let _ = write!(text, " {} |", warm.map(cell).unwrap_or_default());
             if let Some(cold) = cold {
-                let warm = warm.map(Row::lines).unwrap_or_default();
-                let _ = write!(text, " {warm} | {} | {} |", cold.cycles(), cold.lines());
+                let warm = warm.map(lines).unwrap_or_default();
+                let _ = write!(text, " {warm} | {:.1} | {} |", cold.cycles, lines(cold));
             }
         }
         text.push('\n');
@@ -100,9 +100,9 @@ fn against(rows: &[Row]) -> String {
         for operation in AGAINST {
             let (warm, cold) = find(rows, core, operation);
             for row in [warm, cold.or(warm)] {
-                let cell = row.map(|row| match row.cycles() {
-                    cycles if row.cycles <= CYCLES * 100 => format!("**{cycles}**"),
-                    cycles => cycles,
+                let cell = row.map(|row| match row.cycles {
+                    cycles if cycles <= CYCLES => format!("**{cycles:.1}**"),
+                    cycles => format!("{cycles:.1}"),
                 });
                 let _ = write!(text, " {} |", cell.unwrap_or_default());
             }
@@ -118,12 +118,12 @@ fn rates(photons: &[Sustained]) -> String {
     for sustained in photons {
         let _ = writeln!(
             text,
-            "| {} | {:.5} | {:.1} thousand | {} | {} | {} | {} | {:.0} | {} |",
+            "| {} | {:.5} | {:.1} thousand | {:.1} | {} | {} | {} | {:.0} | {} |",
             sustained.core.replace(',', ", "),
             sustained.rate(),
             // Ten million laser cycles a second.
             sustained.rate() * 1e4,
-            sustained.between_looks(),
+            sustained.between_looks,
             sustained.photons,
             sustained.events,
             sustained.expired,
@@ -136,18 +136,8 @@ fn rates(photons: &[Sustained]) -> String {
 
 fn bytes(memory: &[Memory]) -> String {
     let mut text = String::new();
-    for Memory {
-        isa,
-        macropixels,
-        sizes: Sizes { code, data },
-        stack,
-    } in memory
-    {
-        let stack = stack.map(|stack| stack.to_string()).unwrap_or_default();
-        let _ = writeln!(
-            text,
-            "| {isa} | {macropixels} | {code} | {data} | {stack} |"
-        );
+    for memory in memory {
+        let _ = writeln!(text, "| {} |", memory.cells().join(" | "));
     }
     text
 }
@@ -155,27 +145,29 @@ fn bytes(memory: &[Memory]) -> String {
 #[cfg(test)]
 mod tests {
     use std::fs;
-    use std::path::Path;
 
     use super::*;
     use crate::files::{DOCUMENT, Files};
+    use crate::root;
+
+    fn committed() -> Files {
+        Files::read(&root()).unwrap()
+    }
 
     #[test]
     fn the_document_says_what_the_files_say() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let files = Files::read(&root).unwrap();
-        let written = fs::read_to_string(root.join(DOCUMENT)).unwrap();
+        let files = committed();
+        let written = fs::read_to_string(root().join(DOCUMENT)).unwrap();
         assert_eq!(text(&files.rows, &files.photons, &files.memory), written);
     }
 
     #[test]
     fn what_the_page_says_of_240_cycles_holds() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let rows = Files::read(&root).unwrap().rows;
+        let rows = committed().rows;
         let is_within = |core: &str, operation| {
             let (warm, cold) = find(&rows, core, operation);
             let warm = warm.unwrap();
-            [warm, cold.unwrap_or(warm)].map(|row| row.cycles <= CYCLES * 100)
+            [warm, cold.unwrap_or(warm)].map(|row| row.cycles <= CYCLES)
         };
         for core in cores(&rows) {
             let [decision, look, others @ ..] = AGAINST.map(|operation| is_within(core, operation));
@@ -190,19 +182,18 @@ mod tests {
         let (warm, cold) = find(&rows, cores(&rows)[0], AGAINST[0]);
         let (warm, cold) = (warm.unwrap(), cold.unwrap());
         let more = cold.code_lines + cold.data_lines - warm.code_lines - warm.data_lines;
-        assert!((10 * more..14 * more).contains(&(cold.cycles - warm.cycles)));
-        assert!(cold.code_lines > 2 * cold.data_lines);
+        assert!((10.0 * more..14.0 * more).contains(&(cold.cycles - warm.cycles)));
+        assert!(cold.code_lines > 2.0 * cold.data_lines);
     }
 
     #[test]
     fn the_rates_are_a_highest_one_and_parts_of_it() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let photons = Files::read(&root).unwrap().photons;
+        let photons = committed().photons;
         for of_core in photons.chunks(3) {
             assert!(of_core.iter().all(|one| one.core == of_core[0].core));
             assert_eq!(of_core[1].rate, of_core[0].rate / 2);
             // X = 4 is held at no rate.
-            assert!(of_core.iter().all(|one| one.between_looks > 10 * 4));
+            assert!(of_core.iter().all(|one| one.between_looks > 4.0));
         }
         assert_eq!(photons.len(), 3 * 5);
     }
@@ -213,14 +204,14 @@ mod tests {
             core: core.to_owned(),
             operation: operation.to_owned(),
             cycles,
-            instructions: 100,
+            instructions: 1.0,
             code_lines: lines,
-            data_lines: 100,
+            data_lines: 1.0,
         };
         let rows = [
-            row("a,x", "decision: look; no event; cold", 30_000, 200),
-            row("a,x", "decision: look; no event", 24_000, 0),
-            row("b,y", "decision: look; no event", 24_001, 0),
+            row("a,x", "decision: look; no event; cold", 300.0, 2.0),
+            row("a,x", "decision: look; no event", 240.0, 0.0),
+            row("b,y", "decision: look; no event", 240.01, 0.0),
         ];
         let table = cycles(&rows);
         assert!(table.contains(

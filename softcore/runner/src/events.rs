@@ -1,5 +1,8 @@
 //! The events of a soft-core against those of the host from the same photons.
 
+use std::iter::Peekable;
+use std::vec::IntoIter;
+
 use anyhow::{Context, Result, ensure};
 use dtof_core::{
     AerDecoder, AerRecord, AerWord, AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig,
@@ -38,15 +41,13 @@ pub fn decided(
     photons: &[Photon],
 ) -> Result<(Vec<DepthEvent>, Statistics)> {
     let config = stream::config()?;
-    let pixel = |number: u8| Pixel {
-        pixel: AsyncPixel::new(PixelAddress(number.into())),
-        photons: photons
-            .iter()
-            .filter(|photon| photon.pixel == number)
-            .copied()
-            .collect(),
-        counted: 0,
-        looked: 0,
+    let pixel = |number: u8| {
+        let photons = photons.iter().filter(|photon| photon.pixel == number);
+        Pixel {
+            pixel: AsyncPixel::new(PixelAddress(number.into())),
+            photons: photons.copied().collect::<Vec<_>>().into_iter().peekable(),
+            looked: 0,
+        }
     };
     let mut pixels: Vec<Pixel> = (0..pixels).map(pixel).collect();
     let (mut events, mut all) = (Vec::new(), Statistics::default());
@@ -80,9 +81,8 @@ pub fn decided(
 
 struct Pixel {
     pixel: AsyncPixel<BINS>,
-    photons: Vec<Photon>,
-    /// Photons that have been counted.
-    counted: usize,
+    /// Those that have not been counted.
+    photons: Peekable<IntoIter<Photon>>,
     /// Laser cycles that had ended at the last look.
     looked: u64,
 }
@@ -90,11 +90,9 @@ struct Pixel {
 impl Pixel {
     /// Counts the photons of the laser cycles before `end`.
     fn count(&mut self, config: &PixelConfig<BINS>, end: u64) {
-        while let Some(photon) = self.photons.get(self.counted)
-            && u64::from(photon.cycle) < end
-        {
+        let is_before = |photon: &Photon| u64::from(photon.cycle) < end;
+        while let Some(photon) = self.photons.next_if(is_before) {
             self.pixel.count(config, photon.code);
-            self.counted += 1;
         }
     }
 }
@@ -110,11 +108,10 @@ pub fn compare(of_core: &[DepthEvent], of_host: &[DepthEvent]) -> Result<()> {
             "over the link {of_core:?}, on the host {of_host:?}"
         );
     }
+    let [of_core, of_host] = [of_core.len(), of_host.len()];
     ensure!(
-        of_core.len() == of_host.len(),
-        "{} events over the link, {} on the host",
-        of_core.len(),
-        of_host.len()
+        of_core == of_host,
+        "{of_core} events over the link, {of_host} on the host"
     );
     Ok(())
 }

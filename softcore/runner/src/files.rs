@@ -9,16 +9,33 @@ use anyhow::{Context, Result, ensure};
 use crate::document;
 use crate::memory::Memory;
 use crate::sustained::Sustained;
-use crate::table::{self, Row};
+use crate::table::Row;
 
-const ROWS: &str = "docs/results/bench/softcore.csv";
-const PHOTONS: &str = "docs/results/bench/softcore-photons.csv";
-const MEMORY: &str = "docs/results/bench/softcore-bytes.csv";
 pub const DOCUMENT: &str = "docs/results/bench/softcore.md";
+
+/// A line of a file.
+pub trait Line: Sized {
+    const FILE: &str;
+    const HEADER: &str;
+    /// A simulation gives the same cycle for cycle. But a change anywhere moves code, and in
+    /// a cache with one way other lines are then filled; what a processor does when it is as
+    /// busy as can be is then not the same at all.
+    const COLUMNS: &[Column];
+
+    /// As it is written.
+    fn csv(&self) -> String;
+
+    /// Reads the cells of a line.
+    fn of(words: &[&str]) -> Option<Self>;
+
+    fn parse(line: &str) -> Option<Self> {
+        Self::of(&line.split(',').collect::<Vec<_>>())
+    }
+}
 
 /// How a column is compared.
 #[derive(Clone, Copy)]
-enum Column {
+pub enum Column {
     Name,
     /// It may differ by so many percent, more or less.
     Percent(f64),
@@ -26,22 +43,10 @@ enum Column {
     Told,
 }
 
-use Column::{Name, Percent, Told};
-
-/// A simulation gives the same cycle for cycle. But a change anywhere moves code, and in a
-/// cache with one way other lines are then filled; what a processor does when it is as
-/// busy as can be is then not the same at all.
-const COLUMNS: [&[Column]; 3] = [
-    // Cycles, instructions, lines.
-    &[Name, Name, Name, Percent(10.0), Percent(2.0), Told, Told],
-    // The rate, and what came of it.
-    &[Name, Name, Percent(10.0), Told, Told, Told, Told, Told],
-    // Code, data, stack.
-    &[Name, Name, Percent(2.0), Percent(2.0), Percent(10.0)],
-];
+use Column::{Percent, Told};
 
 /// All figures.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Files {
     pub rows: Vec<Row>,
     pub photons: Vec<Sustained>,
@@ -52,44 +57,25 @@ impl Files {
     /// The figures in the files.
     pub fn read(root: &Path) -> Result<Self> {
         Ok(Self {
-            rows: lines(root, ROWS, table::HEADER, Row::parse)?,
-            photons: lines(root, PHOTONS, Sustained::HEADER, Sustained::parse)?,
-            memory: lines(root, MEMORY, Memory::HEADER, Memory::parse)?,
+            rows: lines(root)?,
+            photons: lines(root)?,
+            memory: lines(root)?,
         })
     }
 
     /// Writes the files and the document.
     pub fn write(&self, root: &Path) -> Result<()> {
         let document = document::text(&self.rows, &self.photons, &self.memory);
-        let [rows, photons, memory] = self.texts();
-        for (file, text) in [
-            (ROWS, rows),
-            (PHOTONS, photons),
-            (MEMORY, memory),
-            (DOCUMENT, document),
-        ] {
+        for (file, text) in self.texts().into_iter().chain([(DOCUMENT, document)]) {
             fs::write(root.join(file), text).context(file)?;
             println!("{file}: written");
         }
         Ok(())
     }
 
-    fn texts(&self) -> [String; 3] {
-        let text = |header: &str, lines: Vec<String>| {
-            let lines = iter::once(header.to_owned()).chain(lines);
-            lines.map(|line| line + "\n").collect::<String>()
-        };
-        [
-            text(table::HEADER, self.rows.iter().map(Row::csv).collect()),
-            text(
-                Sustained::HEADER,
-                self.photons.iter().map(Sustained::csv).collect(),
-            ),
-            text(
-                Memory::HEADER,
-                self.memory.iter().map(Memory::csv).collect(),
-            ),
-        ]
+    /// The files with their text.
+    fn texts(&self) -> [(&'static str, String); 3] {
+        [text(&self.rows), text(&self.photons), text(&self.memory)]
     }
 
     /// The figures of the processors that `wants` selects.
@@ -107,7 +93,8 @@ impl Files {
         }
         let mut differences = Vec::new();
         let texts = expected.texts().into_iter().zip(measured.texts());
-        for ((expected, measured), columns) in texts.zip(COLUMNS) {
+        let columns = [Row::COLUMNS, Sustained::COLUMNS, Memory::COLUMNS];
+        for (((_, expected), (_, measured)), columns) in texts.zip(columns) {
             let (mut expected, mut measured) = (expected.lines(), measured.lines());
             loop {
                 match (expected.next(), measured.next()) {
@@ -130,24 +117,32 @@ impl Files {
         for difference in &differences {
             println!("{difference}");
         }
+        let [rows, photons, memory] = [Row::FILE, Sustained::FILE, Memory::FILE];
         ensure!(
             differences.is_empty(),
-            "not what {ROWS}, {PHOTONS} and {MEMORY} say, see above; `cargo softcore` writes them"
+            "not what {rows}, {photons} and {memory} say, see above; `cargo softcore` writes them"
         );
         println!(
-            "{ROWS}, {PHOTONS}, {MEMORY}: {} lines as measured",
+            "{rows}, {photons}, {memory}: {} lines as measured",
             measured.rows.len() + measured.photons.len() + measured.memory.len()
         );
         Ok(())
     }
 }
 
+/// A file and its text.
+fn text<L: Line>(lines: &[L]) -> (&'static str, String) {
+    let lines = iter::once(L::HEADER.to_owned()).chain(lines.iter().map(L::csv));
+    (L::FILE, lines.map(|line| line + "\n").collect())
+}
+
 /// The lines of a file but for its header.
-fn lines<T>(root: &Path, file: &str, header: &str, parse: fn(&str) -> Option<T>) -> Result<Vec<T>> {
-    let text = fs::read_to_string(root.join(file)).context(file.to_owned())?;
+fn lines<L: Line>(root: &Path) -> Result<Vec<L>> {
+    let (file, header) = (L::FILE, L::HEADER);
+    let text = fs::read_to_string(root.join(file)).context(file)?;
     let mut lines = text.lines();
     ensure!(lines.next() == Some(header), "{file}: not headed {header}");
-    let parse = |line| parse(line).with_context(|| format!("{file}: what is `{line}`?"));
+    let parse = |line| L::parse(line).with_context(|| format!("{file}: what is `{line}`?"));
     lines.map(parse).collect()
 }
 
@@ -168,8 +163,10 @@ fn is_near(a: &str, b: &str, columns: &[Column]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::Column::Name;
     use super::*;
     use crate::image::Sizes;
+    use crate::root;
 
     #[test]
     fn figures_may_differ_by_little() {
@@ -196,9 +193,9 @@ mod tests {
             core: core.to_owned(),
             operation: "o".to_owned(),
             cycles,
-            instructions: 1,
-            code_lines: 0,
-            data_lines: 0,
+            instructions: 1.0,
+            code_lines: 0.0,
+            data_lines: 0.0,
         };
         let memory = |stack| Memory {
             isa: "rv32i".to_owned(),
@@ -207,21 +204,21 @@ mod tests {
             stack,
         };
         let files = Files {
-            rows: vec![row("a,x", 1000), row("b,x", 2000)],
+            rows: vec![row("a,x", 10.0), row("b,x", 20.0)],
             photons: Vec::new(),
             memory: vec![memory(Some(4))],
         };
         let of_a = files.clone().only(|core| core == "a,x");
         let mut measured = Files {
-            rows: vec![row("a,x", 1010)],
+            rows: vec![row("a,x", 10.1)],
             photons: Vec::new(),
             memory: vec![memory(None)],
         };
         assert!(of_a.check(&measured).is_ok());
         assert_eq!(files.differences(&measured).len(), 1);
-        measured.rows[0].cycles = 1101;
+        measured.rows[0].cycles = 11.01;
         assert!(of_a.check(&measured).is_err());
-        measured.rows[0].cycles = 1000;
+        measured.rows[0].cycles = 10.0;
         measured.memory[0].stack = Some(5);
         assert_eq!(of_a.differences(&measured).len(), 1);
         measured.memory.clear();
@@ -230,10 +227,9 @@ mod tests {
 
     #[test]
     fn the_files_are_read_as_they_are_written() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let root = root();
         let files = Files::read(&root).unwrap();
-        let [rows, photons, memory] = files.texts();
-        for (file, text) in [(ROWS, rows), (PHOTONS, photons), (MEMORY, memory)] {
+        for (file, text) in files.texts() {
             assert_eq!(fs::read_to_string(root.join(file)).unwrap(), text, "{file}");
         }
     }

@@ -5,6 +5,8 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::ISAS;
+use crate::files::Column::{self, Name, Percent};
+use crate::files::Line;
 use crate::image::{Images, Sizes};
 
 /// Macropixels of the programs.
@@ -24,8 +26,6 @@ pub struct Memory {
 pub type Stacks = Vec<(&'static str, u8, u64)>;
 
 impl Memory {
-    pub const HEADER: &str = "isa,macropixels,code and constants,data,stack";
-
     /// Builds and measures all programs.
     pub fn of_all(root: &Path, stacks: &Stacks) -> Result<Vec<Self>> {
         let mut all = Vec::new();
@@ -46,22 +46,31 @@ impl Memory {
         Ok(all)
     }
 
-    /// Its line of the file.
-    pub fn csv(&self) -> String {
-        let Self {
-            isa,
-            macropixels,
-            sizes: Sizes { code, data },
-            stack,
-        } = self;
-        let stack = stack.map(|stack| stack.to_string()).unwrap_or_default();
-        format!("{isa},{macropixels},{code},{data},{stack}")
+    /// Its cells.
+    pub fn cells(&self) -> [String; 5] {
+        [
+            self.isa.clone(),
+            self.macropixels.to_string(),
+            self.sizes.code.to_string(),
+            self.sizes.data.to_string(),
+            self.stack
+                .map(|stack| stack.to_string())
+                .unwrap_or_default(),
+        ]
+    }
+}
+
+impl Line for Memory {
+    const FILE: &str = "docs/results/bench/softcore-bytes.csv";
+    const HEADER: &str = "isa,macropixels,code and constants,data,stack";
+    const COLUMNS: &[Column] = &[Name, Name, Percent(2.0), Percent(2.0), Percent(10.0)];
+
+    fn csv(&self) -> String {
+        self.cells().join(",")
     }
 
-    /// Reads a line of the file.
-    pub fn parse(line: &str) -> Option<Self> {
-        let words: Vec<&str> = line.split(',').collect();
-        let [isa, macropixels, code, data, stack] = words[..] else {
+    fn of(words: &[&str]) -> Option<Self> {
+        let &[isa, macropixels, code, data, stack] = words else {
             return None;
         };
         Some(Self {
@@ -71,10 +80,10 @@ impl Memory {
                 code: code.parse().ok()?,
                 data: data.parse().ok()?,
             },
-            stack: match stack {
-                "" => None,
-                stack => Some(stack.parse().ok()?),
-            },
+            stack: (!stack.is_empty())
+                .then(|| stack.parse())
+                .transpose()
+                .ok()?,
         })
     }
 }

@@ -30,6 +30,10 @@ impl Ran {
         }
     }
 
+    pub fn has_failed(&self) -> bool {
+        self.code.is_some_and(|code| code != 0)
+    }
+
     /// All that it said, and how it ended.
     pub fn said(&self) -> String {
         let end = match self.code {
@@ -41,17 +45,13 @@ impl Ran {
     }
 }
 
-/// How long a program may take.
-#[derive(Clone, Copy, Debug)]
-pub enum Limit {
-    /// So long.
-    Whole(Duration),
-    /// So long until it has written a line, and so long after that.
-    After(Duration, &'static str, Duration),
-}
-
-/// Runs a program and what it starts, for so long.
-pub fn run(command: &mut Command, limit: Limit) -> Result<Ran> {
+/// Runs a program and what it starts for so long; or until it has written a line, and so long
+/// after that.
+pub fn run(
+    command: &mut Command,
+    most: Duration,
+    mut awaited: Option<(&str, Duration)>,
+) -> Result<Ran> {
     let name = command.get_program().to_string_lossy().into_owned();
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(command, 0);
@@ -63,13 +63,7 @@ pub fn run(command: &mut Command, limit: Limit) -> Result<Ran> {
         .with_context(|| format!("{name} does not start: `cargo xtask setup` installs it"))?;
     let output = Text::read(child.stdout.take().context("no output")?);
     let errors = Text::read(child.stderr.take().context("no error output")?);
-    let mut end = match limit {
-        Limit::Whole(most) | Limit::After(most, ..) => Instant::now() + most,
-    };
-    let mut awaited = match limit {
-        Limit::Whole(_) => None,
-        Limit::After(_, line, rest) => Some((line, rest)),
-    };
+    let mut end = Instant::now() + most;
     let (code, timed_out) = loop {
         if let Some(status) = child.try_wait()? {
             break (status.code(), false);
@@ -144,18 +138,15 @@ fn text(bytes: &Mutex<Vec<u8>>) -> String {
 mod tests {
     use super::*;
 
-    const LONG: Limit = Limit::Whole(Duration::from_secs(60));
+    const LONG: Duration = Duration::from_secs(60);
 
     #[test]
     fn ends_what_does_not_end_and_what_it_has_started() {
         let mut endless = Command::new("sh");
         endless.args(["-c", "echo begun; sleep 600 & sleep 600"]);
         let rest = Duration::from_millis(50);
-        for limit in [
-            Limit::Whole(rest),
-            Limit::After(Duration::from_secs(60), "begun", rest),
-        ] {
-            let ran = run(&mut endless, limit).unwrap();
+        for (most, awaited) in [(rest, None), (LONG, Some(("begun", rest)))] {
+            let ran = run(&mut endless, most, awaited).unwrap();
             assert!(ran.timed_out && ran.code.is_none());
             assert!(ran.said().ends_with("(took too long)"));
         }
@@ -165,8 +156,7 @@ mod tests {
     fn the_line_that_is_awaited_is_a_whole_one() {
         let mut shell = Command::new("sh");
         shell.args(["-c", "echo a line more; exit 1"]);
-        let limit = Limit::After(Duration::from_secs(60), "a line", Duration::ZERO);
-        let ran = run(&mut shell, limit).unwrap();
+        let ran = run(&mut shell, LONG, Some(("a line", Duration::ZERO))).unwrap();
         assert_eq!((ran.code, ran.timed_out), (Some(1), false));
     }
 
@@ -174,7 +164,7 @@ mod tests {
     fn tells_both_outputs_and_the_code() {
         let mut shell = Command::new("sh");
         shell.args(["-c", "echo out; echo error >&2; exit 3"]);
-        let ran = run(&mut shell, LONG).unwrap();
+        let ran = run(&mut shell, LONG, None).unwrap();
         assert_eq!(
             (ran.code, &*ran.output, &*ran.errors),
             (Some(3), "out\n", "error\n")

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::program::{self, Limit, Ran};
+use crate::program::{self, Ran};
 use crate::target_folder;
 
 /// A processor as it is configured in `softcore/rtl`.
@@ -17,48 +17,33 @@ pub struct Core {
     /// Its name, and that of the list of its files in `softcore/sim`.
     pub name: &'static str,
     pub isa: &'static str,
-    /// The Python package with its Verilog.
-    package: &'static str,
     /// Whether it has a cache.
     pub caches: bool,
 }
 
 /// All of them.
 pub const CORES: [Core; 5] = [
-    Core {
-        name: "vexriscv",
-        isa: "rv32im",
-        package: "pythondata_cpu_vexriscv",
-        caches: true,
-    },
-    Core {
-        name: "ibex",
-        isa: "rv32imc",
-        package: "pythondata_cpu_ibex",
-        caches: false,
-    },
-    Core {
-        name: "picorv32",
-        isa: "rv32im",
-        package: "pythondata_cpu_picorv32",
-        caches: false,
-    },
-    Core {
-        name: "picorv32-rv32i",
-        isa: "rv32i",
-        package: "pythondata_cpu_picorv32",
-        caches: false,
-    },
-    Core {
-        name: "serv",
-        isa: "rv32i",
-        package: "pythondata_cpu_serv",
-        caches: false,
-    },
+    core("vexriscv", "rv32im", true),
+    core("ibex", "rv32imc", false),
+    core("picorv32", "rv32im", false),
+    core("picorv32-rv32i", "rv32i", false),
+    core("serv", "rv32i", false),
 ];
 
+const fn core(name: &'static str, isa: &'static str, caches: bool) -> Core {
+    Core { name, isa, caches }
+}
+
+impl Core {
+    /// The Python package with its Verilog.
+    fn package(self) -> String {
+        let (processor, _) = self.name.split_once('-').unwrap_or((self.name, ""));
+        format!("pythondata_cpu_{processor}")
+    }
+}
+
 /// Far more than any run takes; the cycles are limited as well.
-const PATIENCE: Limit = Limit::Whole(Duration::from_secs(600));
+const PATIENCE: Duration = Duration::from_secs(600);
 
 /// A core's testbench as a program.
 pub struct Simulator(PathBuf);
@@ -67,30 +52,27 @@ impl Simulator {
     /// Builds it, from the package index first if need be.
     pub fn build(root: &Path, core: Core) -> Result<Self> {
         let python = python(root)?;
-        let ask = format!("import {0}; print({0}.data_location)", core.package);
+        let package = core.package();
+        let ask = format!("import {package}; print({package}.data_location)");
         let mut ask_python = Command::new(python);
-        let ran = program::run(ask_python.args(["-c", &ask]), PATIENCE)?;
-        ensure!(ran.code == Some(0), "{}: {}", core.package, ran.said());
+        let ran = program::run(ask_python.args(["-c", &ask]), PATIENCE, None)?;
+        ensure!(ran.code == Some(0), "{package}: {}", ran.said());
 
         verilate(root, core.name, ran.output.trim()).map(Self)
     }
 
     /// Runs an image for so many cycles at most.
     pub fn run(&self, image: &Path, cycles: u64) -> Result<Ran> {
-        program::run(&mut self.command(image, cycles), PATIENCE)
+        program::run(&mut self.command(image, cycles), PATIENCE, None)
     }
 
     /// The same with photons.
     pub fn stream(&self, image: &Path, cycles: u64, laser: &Laser) -> Result<Ran> {
         let mut command = self.command(image, cycles);
         command.arg("--stream").arg(laser.photons);
-        for (option, number) in [
-            ("--clocks-per-laser-cycle", laser.clocks),
-            ("--acknowledge-after", laser.wait),
-        ] {
-            command.args([option, &number.to_string()]);
-        }
-        program::run(&mut command, PATIENCE)
+        command.args(["--clocks-per-laser-cycle", &laser.clocks.to_string()]);
+        command.args(["--acknowledge-after", &laser.wait.to_string()]);
+        program::run(&mut command, PATIENCE, None)
     }
 
     fn command(&self, image: &Path, cycles: u64) -> Command {
@@ -115,7 +97,7 @@ pub struct Laser<'a> {
 /// its 512 words of 32.
 pub fn check_fifo(root: &Path) -> Result<()> {
     let test = verilate(root, "photon_fifo", "")?;
-    let ran = program::run(&mut Command::new(test), PATIENCE)?;
+    let ran = program::run(&mut Command::new(test), PATIENCE, None)?;
     ensure!(ran.code == Some(0), ran.said());
     print!("{}", ran.output);
 
@@ -125,7 +107,7 @@ pub fn check_fifo(root: &Path) -> Result<()> {
         "read_verilog photon_fifo.v; synth_ice40 -top photon_fifo; \
          select -assert-count 4 t:SB_RAM40_4K; tee -o /dev/stdout stat",
     );
-    let ran = program::run(&mut yosys, PATIENCE)?;
+    let ran = program::run(&mut yosys, PATIENCE, None)?;
     ensure!(
         ran.code == Some(0),
         "photon FIFO: not four block RAMs of an iCE40\n{}",
@@ -147,13 +129,9 @@ pub fn check_fifo(root: &Path) -> Result<()> {
 /// A Python that has the processors' packages.
 fn python(root: &Path) -> Result<PathBuf> {
     let mut xtask = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    let xtask = xtask
-        .current_dir(root)
-        .args(["--locked", "xtask", "python"]);
-    let output = xtask
-        .arg("softcore/requirements.txt")
-        .stderr(Stdio::inherit());
-    let output = output.output().context("cargo does not start")?;
+    xtask.args(["--locked", "xtask", "python", "softcore/requirements.txt"]);
+    let output = xtask.current_dir(root).stderr(Stdio::inherit()).output();
+    let output = output.context("cargo does not start")?;
     ensure!(
         output.status.success(),
         "the packages of the processors are missing, see above"
@@ -178,7 +156,7 @@ fn verilate(root: &Path, name: &str, data: &str) -> Result<PathBuf> {
         .arg(softcore.join("sim").join(format!("{name}.f")))
         .arg("--Mdir")
         .arg(&folder);
-    let ran = program::run(&mut verilator, PATIENCE)?;
+    let ran = program::run(&mut verilator, PATIENCE, None)?;
     ensure!(
         ran.code == Some(0),
         "{name}: verilator fails\n{}",

@@ -1,16 +1,18 @@
 //! A rate that a processor sustains, as the file has it.
 
+use crate::files::Column::{self, Name, Percent, Told};
+use crate::files::Line;
 use crate::photons::UNIT;
 
 /// The results of a run at one rate.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Sustained {
     /// Core and instruction set, with a comma between.
     pub core: String,
     /// Photons of all macropixels a laser cycle, in [`UNIT`].
     pub rate: u32,
-    /// Laser cycles between two looks at a macropixel, in the mean, in tenths.
-    pub between_looks: u64,
+    /// Laser cycles between two looks at a macropixel, in the mean, rounded up to tenths.
+    pub between_looks: f64,
     pub photons: u64,
     pub events: u64,
     /// Exposures that reached L2 without one.
@@ -19,57 +21,45 @@ pub struct Sustained {
     pub fill: u64,
 }
 
-impl Sustained {
-    pub const HEADER: &str = "core,isa,photons a laser cycle,laser cycles between looks,photons,events,expired,highest fill";
+impl Line for Sustained {
+    const FILE: &str = "docs/results/bench/softcore-photons.csv";
+    const HEADER: &str = "core,isa,photons a laser cycle,laser cycles between looks,photons,events,expired,highest fill";
+    // The rate, and what came of it.
+    const COLUMNS: &[Column] = &[Name, Name, Percent(10.0), Told, Told, Told, Told, Told];
 
-    /// Its line of the file.
-    pub fn csv(&self) -> String {
-        let Self {
-            core,
-            photons,
-            events,
-            expired,
-            fill,
-            ..
-        } = self;
-        let (rate, between) = (self.rate(), self.between_looks());
-        format!("{core},{rate:.5},{between},{photons},{events},{expired},{fill}")
+    fn csv(&self) -> String {
+        let (core, rate, between) = (&self.core, self.rate(), self.between_looks);
+        let counts = [self.photons, self.events, self.expired, self.fill];
+        let counts = counts.map(|count| count.to_string()).join(",");
+        format!("{core},{rate:.5},{between:.1},{counts}")
     }
 
-    /// Reads a line of the file.
-    pub fn parse(line: &str) -> Option<Self> {
-        let words: Vec<&str> = line.split(',').collect();
-        let [core, isa, rate, between, photons, events, expired, fill] = words[..] else {
+    fn of(words: &[&str]) -> Option<Self> {
+        let &[core, isa, rate, between, photons, events, expired, fill] = words else {
             return None;
         };
-        let (whole, tenths) = between.split_once('.')?;
         let rate = rate.replacen('.', "", 1);
         Some(Self {
             core: format!("{core},{isa}"),
             rate: (rate.len() == 6).then(|| rate.parse().ok())??,
-            between_looks: whole.parse::<u64>().ok()? * 10
-                + (tenths.len() == 1).then(|| tenths.parse::<u64>().ok())??,
+            between_looks: between.parse().ok()?,
             photons: photons.parse().ok()?,
             events: events.parse().ok()?,
             expired: expired.parse().ok()?,
             fill: fill.parse().ok()?,
         })
     }
+}
 
+impl Sustained {
     /// Photons of all macropixels a laser cycle.
     pub fn rate(&self) -> f64 {
         f64::from(self.rate) * UNIT
     }
 
     /// Events of all macropixels a second, of ten million laser cycles.
-    #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
     pub fn events_a_second(&self) -> f64 {
         self.events as f64 / self.photons.max(1) as f64 * self.rate() * 1e7
-    }
-
-    /// Laser cycles between two looks at a macropixel, to be looked at.
-    pub fn between_looks(&self) -> String {
-        format!("{}.{}", self.between_looks / 10, self.between_looks % 10)
     }
 }
 
@@ -82,7 +72,7 @@ mod tests {
         let sustained = Sustained {
             core: "serv,rv32i".to_owned(),
             rate: 12_345,
-            between_looks: 987,
+            between_looks: 98.7,
             photons: 3,
             events: 2,
             expired: 1,

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
 
+use crate::files::Column::{self, Name, Percent, Told};
+use crate::files::Line;
 use crate::program::Ran;
 
 /// The first operation of the bench: a call that does nothing, taken off the others.
@@ -14,24 +16,20 @@ pub const COLD: &str = "; cold";
 /// The end of an operation's name when it was done just before.
 const WARM: &str = "; warm";
 
-/// One figure of one processor.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// The figures of an operation on one processor, rounded to hundredths.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// Core and instruction set, with a comma between.
     pub core: String,
     /// Warm, if the name does not end with [`COLD`].
     pub operation: String,
-    /// In hundredths.
-    pub cycles: u64,
-    /// In hundredths.
-    pub instructions: u64,
-    /// Lines that the instruction cache filled, in hundredths.
-    pub code_lines: u64,
-    /// Lines that the data cache filled, in hundredths.
-    pub data_lines: u64,
+    pub cycles: f64,
+    pub instructions: f64,
+    /// Lines that the instruction cache filled.
+    pub code_lines: f64,
+    /// Lines that the data cache filled.
+    pub data_lines: f64,
 }
-
-pub const HEADER: &str = "core,isa,operation,cycles,instructions,code lines,data lines";
 
 /// The counts of the testbench: cycles, instructions, lines of code and of data.
 const COUNTS: [&str; 4] = ["cycle", "instructions", "code", "data"];
@@ -75,7 +73,7 @@ pub fn rows(core: &str, caches: bool, ran: &Ran) -> Result<Vec<Row>> {
                 let rest = (total[of] * parts).checked_sub(call.0[of] * measured);
                 let rest = rest.with_context(|| format!("{name}: less than a call of nothing"))?;
                 let times = times.max(1) * parts;
-                anyhow::Ok((rest * 100 + times / 2) / times)
+                anyhow::Ok(((rest * 100 + times / 2) / times) as f64 / 100.0)
             };
             both.push(Row {
                 core: core.to_owned(),
@@ -146,20 +144,26 @@ fn mark(rest: &str) -> Option<(u64, Counts)> {
     words.next().is_none().then_some((number, counts))
 }
 
-impl Row {
-    /// Its line of the file.
-    pub fn csv(&self) -> String {
-        let counted = [self.cycles, self.instructions].map(decimal).join(",");
-        let lines = [self.code_lines, self.data_lines].map(decimal).join(",");
-        format!("{},{},{counted},{lines}", self.core, self.operation)
+impl Line for Row {
+    const FILE: &str = "docs/results/bench/softcore.csv";
+    const HEADER: &str = "core,isa,operation,cycles,instructions,code lines,data lines";
+    const COLUMNS: &[Column] = &[Name, Name, Name, Percent(10.0), Percent(2.0), Told, Told];
+
+    fn csv(&self) -> String {
+        let counts = [
+            self.cycles,
+            self.instructions,
+            self.code_lines,
+            self.data_lines,
+        ];
+        let counts = counts.map(|count| format!("{count:.2}")).join(",");
+        format!("{},{},{counts}", self.core, self.operation)
     }
 
-    /// Reads a line of the file.
-    pub fn parse(line: &str) -> Option<Self> {
-        let words: Vec<&str> = line.split(',').collect();
-        let (&[core, isa, operation], figures) = words.split_first_chunk()?;
-        let figures: Option<Vec<u64>> = figures.iter().map(|text| of_decimal(text)).collect();
-        let [cycles, instructions, code_lines, data_lines] = figures?[..] else {
+    fn of(words: &[&str]) -> Option<Self> {
+        let (&[core, isa, operation], counts) = words.split_first_chunk()?;
+        let counts: Result<Vec<f64>, _> = counts.iter().map(|text| text.parse()).collect();
+        let [cycles, instructions, code_lines, data_lines] = counts.ok()?[..] else {
             return None;
         };
         Some(Self {
@@ -171,37 +175,6 @@ impl Row {
             data_lines,
         })
     }
-
-    /// Cycles to be looked at.
-    pub fn cycles(&self) -> String {
-        format!("{:.1}", hundredths(self.cycles))
-    }
-
-    /// Instructions to be looked at.
-    pub fn instructions(&self) -> String {
-        format!("{:.1}", hundredths(self.instructions))
-    }
-
-    /// Lines of code and of data filled, to be looked at.
-    pub fn lines(&self) -> String {
-        let lines = [self.code_lines, self.data_lines].map(hundredths);
-        format!("{:.0} + {:.0}", lines[0], lines[1])
-    }
-}
-
-fn decimal(hundredths: u64) -> String {
-    format!("{}.{:02}", hundredths / 100, hundredths % 100)
-}
-
-fn of_decimal(text: &str) -> Option<u64> {
-    let (whole, part) = text.split_once('.')?;
-    let part = (part.len() == 2).then(|| part.parse::<u64>().ok())??;
-    Some(whole.parse::<u64>().ok()? * 100 + part)
-}
-
-#[allow(clippy::cast_precision_loss, reason = "to be looked at")]
-fn hundredths(value: u64) -> f64 {
-    value as f64 / 100.0
 }
 
 #[cfg(test)]
@@ -238,13 +211,7 @@ exit 0x0 cycle 250 instructions 60
         for (row, line) in rows.iter().zip(&lines) {
             assert_eq!(Row::parse(line).as_ref(), Some(row));
         }
-        assert_eq!((&*rows[0].cycles(), &*rows[0].lines()), ("12.5", "0 + 1"));
-        for wrong in [
-            "",
-            "a,b,c,1,2,3",
-            "a,b,c,1.0,2.00,3.00",
-            "a,b,1.00,2.00,3.00",
-        ] {
+        for wrong in ["", "a,b,c,1,2,3", "a,b,c,1.00,2.00,3.00,x", "a,b,1,2,3"] {
             assert_eq!(Row::parse(wrong), None, "{wrong}");
         }
     }

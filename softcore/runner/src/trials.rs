@@ -49,7 +49,12 @@ impl Cycles {
     pub fn of(rows: &[Row]) -> Option<Self> {
         let of = |operation| {
             let row = rows.iter().find(|row| row.operation == operation);
-            row.map(|row| row.cycles / 100)
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "few, and not negative"
+            )]
+            row.map(|row| row.cycles as u64)
         };
         Some(Self {
             count: of("photon: AsyncPixel::count")?,
@@ -125,11 +130,11 @@ impl Trials<'_> {
             let run = at(held / part, cycles(held));
             let counted = self.checked(&run)?;
             ensure!(counted.is_sustained(), "a lower rate is not sustained");
+            let tenths = counted.cycles * u64::from(PIXELS) * 10;
             sustained.push(Sustained {
                 core: self.core.to_owned(),
                 rate: run.rate,
-                between_looks: (counted.cycles * u64::from(PIXELS) * 10)
-                    .div_ceil(counted.looks.max(1)),
+                between_looks: tenths.div_ceil(counted.looks.max(1)) as f64 / 10.0,
                 photons: counted.photons,
                 events: counted.events,
                 expired: counted.expired,
@@ -161,19 +166,14 @@ impl Trials<'_> {
             signal: 1.0,
             length: CERTAIN,
             clocks,
-            wait: if is_slow {
-                clocks * u64::from(CERTAIN) / 4
-            } else {
-                0
-            },
+            wait: u64::from(is_slow) * clocks * u64::from(CERTAIN) / 4,
             strays: is_slow,
         };
         let counted = self.checked(&run)?;
+        let Counted { lost, events, .. } = counted;
         ensure!(
-            counted.lost == 0 && counted.events >= u64::from(pixels),
-            "{run:?}: {} photons lost, {} events",
-            counted.lost,
-            counted.events
+            lost == 0 && events >= u64::from(pixels),
+            "{run:?}: {lost} photons lost, {events} events"
         );
         Ok(counted)
     }
@@ -210,11 +210,8 @@ impl Trials<'_> {
         let image = (self.image)(run.pixels);
         let ran = self.simulator.stream(&image, limit, &laser)?;
         let counted = Counted::read(&ran).with_context(|| format!("{run:?}\n{}", ran.said()))?;
-        ensure!(
-            counted.strays == strays,
-            "{run:?}: {} strays of {strays}",
-            counted.strays
-        );
+        let found = counted.strays;
+        ensure!(found == strays, "{run:?}: {found} strays of {strays}");
         Ok((counted, photons))
     }
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use anyhow::Result;
 
-use crate::program::{self, Limit, Ran};
+use crate::program::{self, Ran};
 
 /// Whatever ends, ends in a fraction of this.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -15,7 +15,7 @@ const A_MOMENT: Duration = Duration::from_secs(1);
 
 /// Runs an image until it ends, or a moment longer than it takes to print a line, after which
 /// no end is expected. What the instruction set has not is an illegal instruction.
-pub fn run(image: &Path, isa: &str, last_line: Option<&'static str>) -> Result<Ran> {
+pub fn run(image: &Path, isa: &str, last_line: Option<&str>) -> Result<Ran> {
     let letters = isa.trim_start_matches("rv32");
     let mut processor =
         "rv32,a=false,f=false,d=false,zba=false,zbb=false,zbc=false,zbs=false".to_owned();
@@ -28,9 +28,5 @@ pub fn run(image: &Path, isa: &str, last_line: Option<&'static str>) -> Result<R
     qemu.args(["-machine", "virt", "-cpu", &processor, "-bios", "none"]);
     qemu.args(["-display", "none", "-monitor", "none", "-serial", "stdio"]);
     qemu.arg("-kernel").arg(image);
-    let limit = match last_line {
-        None => Limit::Whole(PATIENCE),
-        Some(line) => Limit::After(PATIENCE, line, A_MOMENT),
-    };
-    program::run(&mut qemu, limit)
+    program::run(&mut qemu, PATIENCE, last_line.map(|line| (line, A_MOMENT)))
 }
