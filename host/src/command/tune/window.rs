@@ -8,7 +8,6 @@ use super::{Line, Tune, number};
 
 impl Tune {
     /// z, L1 and what to expect of them; the options for it.
-    #[allow(clippy::cast_precision_loss)]
     pub(super) fn window(&self, request: &Request) -> Result<(Vec<Line>, String)> {
         let widest = CentredWindow::WIDEST_PULSE;
         ensure!(

@@ -1,8 +1,7 @@
 //! A fan at 120 rpm: how many exposures an edge passes, and what they report
 //! (sections III-D and IV-C, transverse motion).
 
-use super::mixed;
-use super::mixed::{add_pair, excess, is_sharp, neither};
+use super::mixed::{self, add_pair, excess, is_sharp, neither};
 use super::one_pixel::{CODES, SENSORS, in_parts, phases, prototype, watch, watch_step};
 use crate::sweep::mean::{Measured, add};
 use crate::sweep::results::{Claim, Figure, Results, Verdict};

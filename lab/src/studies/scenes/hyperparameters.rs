@@ -22,8 +22,7 @@ use dtof_core::{
     AsyncPixel, Count, LaserCycle, Look, PaperRule, PixelAddress, PixelConfig, Statistics,
 };
 use dtof_draw::chart::{Axis, Chart, Panel, Point as Dot, Series, Style};
-use dtof_draw::palette;
-use dtof_draw::palette::STEPS;
+use dtof_draw::palette::{self, STEPS};
 use dtof_theory::rates::bin_share;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
