@@ -55,11 +55,3 @@ fn every_bin_is_asked_for_once() {
     let inside: Vec<u16> = (0..=u16::MAX).filter(|&bin| gate.contains(bin)).collect();
     assert_eq!(inside, (20..120).collect::<Vec<_>>());
 }
-
-#[test]
-fn the_quadrants_of_the_whole_histogram_are_the_paper_s() {
-    let starts = RangeGate::<128>::full().quadrant_starts();
-    assert_eq!(starts, [0, 32, 64, 96, 128]);
-    let starts = RangeGate::<8>::full().quadrant_starts();
-    assert_eq!(starts, [0, 2, 4, 6, 8]);
-}

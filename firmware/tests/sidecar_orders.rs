@@ -119,33 +119,6 @@ fn the_host_is_told_what_the_sensor_is() {
     assert_eq!(SensorRecord::from_le_bytes(&body[1..]), None);
 }
 
-/// A sensor that does or does not give the first photon of a laser cycle only.
-struct Hits<'a, S>(&'a mut S, bool);
-
-impl<S: Sensor> Sensor for Hits<'_, S> {
-    type Error = S::Error;
-
-    fn about(&self) -> About {
-        self.0.about()
-    }
-
-    fn is_one_hit(&self) -> bool {
-        self.1
-    }
-
-    fn start(&mut self, bin_width: U16F16) {
-        self.0.start(bin_width);
-    }
-
-    fn stop(&mut self) {
-        self.0.stop();
-    }
-
-    fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, S::Error> {
-        self.0.poll(now_ms, sink)
-    }
-}
-
 #[test]
 fn events_of_a_sensor_that_gives_one_photon_a_laser_cycle_say_so_at_high_rates() {
     for is_one_hit in [false, true] {
@@ -156,9 +129,9 @@ fn events_of_a_sensor_that_gives_one_photon_a_laser_cycle_say_so_at_high_rates()
             calls.drain(..usize::from(is_dark));
             calls
         };
-        let mut script = Scripted((0..48).map(call).map(Some));
+        let calls = (0..48).map(call).map(Some);
+        let mut sensor = Scripted { calls, is_one_hit };
         let (mut device, mut host) = configured::<8>(&CONFIGURATION);
-        let mut sensor = Hits(&mut script, is_one_hit);
         host.run(&mut device, &mut sensor, 0..100, 4);
         let flags: Vec<Flags> = host.events.iter().map(|event| event.flags).collect();
         let first = [Flags::NONE, Flags::PILE_UP][usize::from(is_one_hit)];

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::host::{CONFIGURATION, Call, Host, Scripted, configured, device};
+use common::host::{CONFIGURATION, Call, Host, Scripted, configured, device, scripted};
 use common::{scene, script};
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
@@ -31,7 +31,7 @@ fn configurations() -> [(Configuration, PixelConfig<128, AnyRule>); 2] {
 }
 
 fn sensor(script: &[Vec<Call>]) -> Scripted<impl Iterator<Item = Option<Vec<Call>>>> {
-    Scripted(script.iter().cloned().map(Some))
+    scripted(script.iter().cloned().map(Some))
 }
 
 #[test]
@@ -163,7 +163,7 @@ fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
         assert_eq!(device.transmit(now_ms, &mut wire), 0);
     }
     // It was not even asked.
-    assert!(unused.0.next().is_some());
+    assert!(unused.calls.next().is_some());
 
     // A configuration that takes photons from the link keeps the sensor's out.
     let mut host = Host::new(1, 10_000);
@@ -237,7 +237,7 @@ fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<1
         Call::Histogram(8, Box::new([1; 128])),
         Call::Histogram(3, histogram(41)),
     ];
-    let mut sensor = Scripted([None, Some(calls), None].into_iter());
+    let mut sensor = scripted([None, Some(calls), None].into_iter());
     for now_ms in 0..3 {
         device.poll_sensor(&mut sensor, now_ms);
     }
@@ -268,7 +268,7 @@ fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<1
 #[test]
 fn histograms_without_room_for_an_event_are_counted_as_deferred() {
     let (mut device, mut host) = configured::<8>(&CONFIGURATION);
-    let mut sensor = Scripted((0..1_000).map(|_| Some(vec![Call::Histogram(0, histogram(40))])));
+    let mut sensor = scripted((0..1_000).map(|_| Some(vec![Call::Histogram(0, histogram(40))])));
     host.run(&mut device, &mut sensor, 0..1_000, 0);
     let report = host.report(&mut device, 1_000);
     let statistics = report.statistics;

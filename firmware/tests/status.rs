@@ -111,9 +111,8 @@ fn an_unplugged_tdc7200_is_reported_and_found_again() {
             ..tdc7200::Settings::new(PixelAddress(0), 8_000, U16F16::lit("250"))
         };
         let config = tdc7200::Config::new(settings).unwrap();
-        let enable = Line::new(false);
-        let sensor =
-            tdc7200::Tdc7200::<_, _, _>::new(bus.clone(), bus.interrupt.clone(), enable, config);
+        let (interrupt, enable) = (bus.interrupt.clone(), Line::new(false));
+        let sensor = tdc7200::Tdc7200::<_, _, _>::new(bus.clone(), interrupt, enable, config);
         unplug(sensor, &bus, how, 200, said);
     }
 }
@@ -122,14 +121,8 @@ fn an_unplugged_tdc7200_is_reported_and_found_again() {
 fn an_unplugged_tmf882x_is_reported_and_found_again() {
     let bus = Bus::<Tmf>::new();
     let config = tmf882x::Config::new(tmf882x::Settings::new(PixelAddress(0))).unwrap();
-    let enable = Line::new(false);
-    let sensor = Tmf882x::<_, _, _>::new(
-        bus.clone(),
-        bus.interrupt.clone(),
-        enable,
-        &[1, 2, 3],
-        config,
-    );
+    let (interrupt, enable) = (bus.interrupt.clone(), Line::new(false));
+    let sensor = Tmf882x::<_, _, _>::new(bus.clone(), interrupt, enable, &[1, 2, 3], config);
     unplug(sensor, &bus, Answers::Error, 60, FaultRecord::NoAnswer);
 }
 

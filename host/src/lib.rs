@@ -15,8 +15,6 @@ pub mod engine;
 pub mod events;
 pub mod export;
 pub mod files;
-#[cfg(test)]
-mod fixtures;
 pub mod geometry;
 pub mod input;
 pub mod progress;

@@ -18,9 +18,7 @@ use crate::{studies, sweep};
 use anyhow::{Context, Result, ensure};
 use std::collections::BTreeMap;
 use std::fs;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 const FIGURES: &str = include_str!("pages/figures.md");
 const CLAIMS: &str = include_str!("pages/paper-claims.md");
@@ -60,7 +58,7 @@ pub fn documents(
         let mut taken = |which, seeds, is_anew| {
             let kept = format!("results/data/{name}.{which}.json");
             let part = if is_anew {
-                work_out(study, seeds)?
+                sweep::work_out(study, seeds)?
             } else {
                 Part::load(&docs.join(&kept))?
             };
@@ -142,13 +140,6 @@ pub fn documents(
     }
     documents.push(("figures/demo.svg".into(), movie::demo()?));
     Ok(documents)
-}
-
-fn work_out(study: &Study, seeds: Range<u64>) -> Result<Part> {
-    let folder = tempfile::tempdir()?;
-    let path = folder.path().join("part");
-    let hour = Duration::from_secs(3600);
-    sweep::run(study, seeds, &path, hour, |_| ())
 }
 
 /// Writes documents below `docs` and gives those that changed.

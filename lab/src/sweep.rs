@@ -27,7 +27,7 @@ use rand_pcg::Pcg64;
 use self::results::Results;
 
 pub use self::part::{Part, PointTally, merge};
-pub use self::run::run;
+pub use self::run::{run, work_out};
 
 /// The parameters of a point, by name.
 pub type Point = BTreeMap<String, f64>;

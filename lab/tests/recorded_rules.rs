@@ -12,10 +12,10 @@ use capture_log::{ground_truth, log, tell};
 use dtof::input::recorded::{RecordedHistograms, RecordingLength};
 use dtof::input::source::{PhotonSource, Slice};
 use dtof::input::tmf8820::{self, BINS};
-use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AsyncPixel, Count, DepthEstimator, DetectionRule, LaserCycle, PaperRule, PixelAddress,
-    PixelConfig, RangeScale, Statistics, WindowRule,
+    AnyRule, AsyncPixel, DepthEstimator, LaserCycle, PixelAddress, PixelConfig, RangeScale,
+    Statistics,
 };
 use dtof_lab::studies::methods::passage::{Ladder, Method, Passage, count_false};
 use dtof_theory::looks::exposure::{Exposures, Looks};
@@ -67,17 +67,14 @@ struct Outcome {
 
 impl Recording<'_> {
     /// What the centre zone reports; the added photons are the same for every rule.
-    fn replay<R: DetectionRule>(&self, config: &PixelConfig<BINS, R>) -> Outcome {
-        let Self {
-            slice,
-            truth,
-            added,
-        } = *self;
+    fn replay(&self, config: &PixelConfig<BINS, AnyRule>) -> Outcome {
         let scale = RangeScale::new(tmf8820::BIN_WIDTH_PS, tmf8820::OFFSET_MM).unwrap();
+        let added = self.added;
         let number = (added > 0.0).then(|| Poisson::new(added * 128.0).unwrap());
         let bins = Uniform::new(0, 128).unwrap();
         let (mut errors, mut photons, mut distances) = (Vec::new(), 0, 0);
-        for (capture, (truth, pixels)) in (0..).zip(truth.iter().zip(slice.pixels.chunks(ZONES))) {
+        let captures = self.truth.iter().zip(self.slice.pixels.chunks(ZONES));
+        for (capture, (truth, pixels)) in (0..).zip(captures) {
             if *truth < 29.9 {
                 continue;
             }
@@ -132,10 +129,8 @@ fn calibrated(methods: &[Method], background: f64) -> Vec<(f64, f64)> {
         position: 64.0,
         sigma: 1.0,
     };
-    let ladders: Vec<Ladder> = methods
-        .iter()
-        .map(|&method| Ladder::new(method, 0, 56, 8))
-        .collect();
+    let ladder = |&method: &Method| Ladder::new(method, 0, 56, 8);
+    let ladders: Vec<Ladder> = methods.iter().map(ladder).collect();
     let exposures = Exposures::new(&rates, 128, Looks::new(X, L1, L2)).unwrap();
     let mut passage = Passage::new(&ladders, exposures, None).unwrap();
     let tally = count_false(&mut passage, EXPOSURES, &mut trial_rng(9, 0));
@@ -175,20 +170,7 @@ struct Setting {
 
 impl Setting {
     fn replay(self, recording: &Recording) -> Outcome {
-        let minimum = Count::saturating(self.minimum);
-        match self.method {
-            Method::Window(width) => {
-                let z = U4F12::from_num(self.threshold);
-                self.with(recording, WindowRule::new(width, z, minimum).unwrap())
-            }
-            _ => {
-                let alpha = U8F8::from_num(self.threshold);
-                self.with(recording, PaperRule::new(alpha, minimum))
-            }
-        }
-    }
-
-    fn with<R: DetectionRule>(self, recording: &Recording, rule: R) -> Outcome {
+        let rule = self.method.rule(self.threshold, self.minimum).unwrap();
         let estimator = if self.is_centred {
             DepthEstimator::for_pulse(U8F8::lit("1"))
         } else {
@@ -256,30 +238,26 @@ fn window_rules_need_fewer_photons_than_the_papers() {
             // The first is the paper's rule with its centre of mass.
             let papers = *papers_own.get_or_insert(outcome);
             assert_eq!(outcome.distances, DISTANCES, "a distance without an event");
-            let Setting {
-                method,
-                threshold,
-                minimum,
-                is_centred,
-            } = setting;
+            let is_as_good = outcome.is_as_good_as(&papers);
+            let estimator = if setting.is_centred {
+                "centred window"
+            } else {
+                "centre of mass"
+            };
             writeln!(
                 csv,
-                "{added},{},{threshold},{minimum},{share:.4},{},{},{:.1},{:.2},{:.2},{},{}",
-                method.label(),
-                if is_centred {
-                    "centred window"
-                } else {
-                    "centre of mass"
-                },
+                "{added},{},{},{},{share:.4},{estimator},{},{:.1},{:.2},{:.2},{},{is_as_good}",
+                setting.method.label(),
+                setting.threshold,
+                setting.minimum,
                 outcome.events,
                 outcome.photons,
                 outcome.median,
                 outcome.within_95,
-                outcome.beyond_50,
-                outcome.is_as_good_as(&papers)
+                outcome.beyond_50
             )
             .unwrap();
-            (outcome, outcome.is_as_good_as(&papers))
+            (outcome, is_as_good)
         };
         let thresholds = calibrated(&methods, added + RECORDED);
         for is_centred in [false, true] {

@@ -3,7 +3,7 @@
 
 mod common;
 
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
 
@@ -12,21 +12,24 @@ use common::Scratch;
 const STUDY: &str = "hit-rate";
 
 impl Scratch {
-    fn sweep(&self, seeds: &str, out: &str) -> std::process::Output {
+    fn sweep(&self, seeds: &str, out: &str) -> Output {
         self.lab(&["sweep", STUDY, "--seeds", seeds, "--out", out])
     }
 
     #[track_caller]
     fn swept(&self, seeds: &str, out: &str) -> String {
-        let output = self.sweep(seeds, out);
-        let error = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{error}");
-        self.read(out)
+        self.written(&self.sweep(seeds, out), out)
     }
 
     #[track_caller]
     fn merged(&self, parts: &[&str], out: &str) -> String {
         let output = self.lab(&[&["merge", "--out", out], parts].concat());
+        self.written(&output, out)
+    }
+
+    /// The part of a run that must have succeeded.
+    #[track_caller]
+    fn written(&self, output: &Output, out: &str) -> String {
         let error = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{error}");
         self.read(out)

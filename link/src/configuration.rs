@@ -82,14 +82,8 @@ impl Configuration {
             AnyRule::Paper(rule) => with_alpha(PAPER_RULE, rule.threshold()),
             AnyRule::Average(rule) => with_alpha(AVERAGE_RULE, rule.threshold()),
             AnyRule::Window(rule) => {
-                let minimum_count = rule.minimum_count();
-                (
-                    WINDOW_RULE,
-                    U8F8::ZERO,
-                    minimum_count,
-                    rule.width(),
-                    rule.z(),
-                )
+                let (minimum_count, width) = (rule.minimum_count(), rule.width());
+                (WINDOW_RULE, U8F8::ZERO, minimum_count, width, rule.z())
             }
         };
         let (estimator, half_width) = match self.estimator {
@@ -167,6 +161,10 @@ impl Configuration {
         let threshold_mm = U24F8::from_le_bytes(fields.next()?);
         let [hits] = fields.next()?;
 
+        let changes = |reference| DynamicDepth {
+            threshold_mm,
+            reference,
+        };
         if !Self::MINIMUM_COUNTS.contains(&minimum_count) {
             return Err(Refusal::MinimumCount);
         }
@@ -204,14 +202,8 @@ impl Configuration {
             },
             dynamic_depth: match (output, reference) {
                 (DEPTH_EVENTS, _) => None,
-                (DYNAMIC_DEPTH_EVENTS, PREVIOUS) => Some(DynamicDepth {
-                    threshold_mm,
-                    reference: Reference::Previous,
-                }),
-                (DYNAMIC_DEPTH_EVENTS, REPORTED) => Some(DynamicDepth {
-                    threshold_mm,
-                    reference: Reference::Reported,
-                }),
+                (DYNAMIC_DEPTH_EVENTS, PREVIOUS) => Some(changes(Reference::Previous)),
+                (DYNAMIC_DEPTH_EVENTS, REPORTED) => Some(changes(Reference::Reported)),
                 _ => return Err(Refusal::Unknown),
             },
         })

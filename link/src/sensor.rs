@@ -21,16 +21,6 @@ impl SensorRecord {
     /// Bytes of the record.
     pub const BYTES: usize = 10;
 
-    /// Bins of any width, from the laser pulse on.
-    #[must_use]
-    pub const fn new(pixels: u16) -> Self {
-        Self {
-            pixels,
-            bin_width: None,
-            offset: I24F8::ZERO,
-        }
-    }
-
     /// The record as bytes. A device without a sensor sends one without pixels.
     #[must_use]
     pub fn to_le_bytes(sensor: Option<&Self>) -> [u8; Self::BYTES] {

@@ -26,14 +26,8 @@ fn settings(seed: u64) -> Settings {
 }
 
 fn pixel(address: u16, position: u16, signal: f64, background: f64) -> SimulatedPixel {
-    let rate = U8F24::from_num::<f64>;
-    SimulatedPixel::new(
-        PixelAddress(address),
-        position,
-        rate(signal),
-        rate(background),
-    )
-    .unwrap()
+    let [signal, background] = [signal, background].map(U8F24::from_num);
+    SimulatedPixel::new(PixelAddress(address), position, signal, background).unwrap()
 }
 
 /// Polls until `cycles` laser cycles have ended; what was given.
@@ -49,13 +43,11 @@ fn run(sensor: &mut Simulated, cycles: u32) -> Vec<Given> {
 }
 
 fn ended(given: &[Given]) -> u32 {
-    given
-        .iter()
-        .map(|given| match given {
-            Given::End(cycles) => u32::from(*cycles),
-            _ => 0,
-        })
-        .sum()
+    let cycles = given.iter().map(|given| match given {
+        Given::End(cycles) => u32::from(*cycles),
+        _ => 0,
+    });
+    cycles.sum()
 }
 
 /// Pixel and code of each photon, with its laser cycle.
@@ -113,10 +105,8 @@ fn counts_have_the_mean_and_the_variance_of_their_rate() {
         let mean_limit = 5.0 * (lambda / draws).sqrt();
         let variance_limit = 5.0 * ((lambda + 2.0 * lambda * lambda) / draws).sqrt();
         assert!((mean - lambda).abs() <= mean_limit, "{rate}: mean {mean}");
-        assert!(
-            (variance - lambda).abs() <= variance_limit,
-            "{rate}: variance {variance}"
-        );
+        let error = (variance - lambda).abs();
+        assert!(error <= variance_limit, "{rate}: variance {variance}");
     }
 }
 
@@ -207,11 +197,7 @@ fn the_time_says_how_many_laser_cycles_are_due() {
     let mut poll = |after: u32| {
         let polled = sensor.poll(start.wrapping_add(after), &mut sink).unwrap();
         let given = sink.take();
-        let expected = if given.is_empty() {
-            Polled::Idle
-        } else {
-            Polled::Data
-        };
+        let expected = [Polled::Data, Polled::Idle][usize::from(given.is_empty())];
         assert_eq!(polled, expected);
         // Empty laser cycles come in one call.
         assert!(given.len() <= 1);

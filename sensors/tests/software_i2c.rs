@@ -49,21 +49,17 @@ fn expected(parts: &[Part]) -> Vec<Seen> {
 }
 
 fn run(bus: &mut Bus, parts: &[Part]) -> Result<Vec<u8>, Error> {
-    let mut buffers: Vec<Vec<u8>> = parts
-        .iter()
-        .map(|part| match part {
-            Part::Write(bytes) => bytes.clone(),
-            Part::Read(count) => vec![0xAA; *count],
-        })
-        .collect();
-    let mut operations: Vec<Operation<'_>> = parts
-        .iter()
-        .zip(&mut buffers)
-        .map(|(part, buffer)| match part {
-            Part::Write(_) => Operation::Write(buffer),
-            Part::Read(_) => Operation::Read(buffer),
-        })
-        .collect();
+    let buffers = parts.iter().map(|part| match part {
+        Part::Write(bytes) => bytes.clone(),
+        Part::Read(count) => vec![0xAA; *count],
+    });
+    let mut buffers: Vec<Vec<u8>> = buffers.collect();
+    let operations = parts.iter().zip(&mut buffers);
+    let operations = operations.map(|(part, buffer)| match part {
+        Part::Write(_) => Operation::Write(buffer),
+        Part::Read(_) => Operation::Read(buffer),
+    });
+    let mut operations: Vec<Operation<'_>> = operations.collect();
     bus.transaction(ADDRESS, &mut operations)?;
     let read = parts.iter().zip(buffers);
     let read = read.filter(|(part, _)| matches!(part, Part::Read(_)));
@@ -234,19 +230,12 @@ fn a_bus_that_nothing_pulls_up_costs_no_more_than_its_limit() {
 fn a_device_stuck_in_a_byte_is_clocked_free() {
     for bits in 1..=8 {
         let (mut bus, wires) = bus();
-        {
-            let mut wires = wires.borrow_mut();
-            wires.hold(SDA, true);
-            wires.phase = Phase::Send(0, bits);
-        }
+        wires.borrow_mut().hold(SDA, true);
+        wires.borrow_mut().phase = Phase::Send(0, bits);
         let mut byte = [0xAA];
         assert_eq!(bus.write_read(ADDRESS, &[7], &mut byte), Ok(()));
         assert_eq!(byte, [0]);
-        assert!(
-            wires
-                .borrow()
-                .seen
-                .ends_with(&expected(&[Part::Write(vec![7]), Part::Read(1)]))
-        );
+        let expected = expected(&[Part::Write(vec![7]), Part::Read(1)]);
+        assert!(wires.borrow().seen.ends_with(&expected));
     }
 }

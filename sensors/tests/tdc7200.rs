@@ -46,8 +46,7 @@ fn each_start_brings_it_up_with_bins_of_its_width() {
         bench.sensor.start(U16F16::from_num(bin_width));
         assert!(!bench.sensor.is_armed());
         bench.bring_up(MODE_1, ARM_1);
-        bench.interrupt.set(false);
-        assert_eq!(bench.poll(&example()), Ok(Polled::Data));
+        assert_eq!(bench.serve(&example()), Ok(Polled::Data));
         assert_eq!(bench.sink.take(), [Given::Photon(7, code), Given::End(1)]);
         bench.interrupt.set(true);
     }
@@ -163,11 +162,10 @@ fn a_bin_past_the_histogram_is_passed_on_and_one_before_it_is_rejected() {
     let mut values = MODE_1;
     values[0] = 0x42;
     bench.bring_up(values, ARM_1);
-    bench.interrupt.set(false);
     // 236.7 ns, 473.4 ns and 0.496 ms.
     let results = over(0x19, &[4000, 0, 8_000, 0, 0x7f_ffff], CALIBRATIONS);
     let accesses = [results, write(0x00, ARM_1)].concat();
-    assert_eq!(bench.poll(&accesses), Ok(Polled::Data));
+    assert_eq!(bench.serve(&accesses), Ok(Polled::Data));
     let [a, b, c] = [u16::MAX, 933, u16::MAX].map(|code| Given::Photon(7, code));
     assert_eq!(bench.sink.take(), [a, b, c, Given::End(1)]);
 }
@@ -175,9 +173,8 @@ fn a_bin_past_the_histogram_is_passed_on_and_one_before_it_is_rejected() {
 #[test]
 fn a_laser_cycle_without_a_stop_is_empty_and_needs_no_calibration() {
     let mut bench = armed();
-    bench.interrupt.set(false);
     let accesses = [over(0x0a, &[0], [0; 2]), write(0x00, ARM_1)].concat();
-    assert_eq!(bench.poll(&accesses), Ok(Polled::Data));
+    assert_eq!(bench.serve(&accesses), Ok(Polled::Data));
     assert_eq!(bench.sink.take(), [Given::End(1)]);
     let counts = Counts {
         cycles: 1,
@@ -198,11 +195,10 @@ fn parity_is_not_part_of_the_value_and_is_checked() {
     });
     let arm = ARM_1 | 0b100_0000;
     bench.bring_up(MODE_1, arm);
-    bench.interrupt.set(false);
     let even = |value: u32| value | (value.count_ones() & 1) << 23;
     let right = over(0x19, &[even(4175)], CALIBRATIONS.map(even));
     let accesses = [right, write(0x00, arm)].concat();
-    assert_eq!(bench.poll(&accesses), Ok(Polled::Data));
+    assert_eq!(bench.serve(&accesses), Ok(Polled::Data));
     assert_eq!(bench.sink.take(), [Given::Photon(7, 28), Given::End(1)]);
 
     let calibrations = [even(2110), even(21121) ^ 0x80_0000];
@@ -288,8 +284,7 @@ fn a_stuck_interrupt_is_an_error_at_the_limit() {
 #[test]
 fn a_bus_that_reads_as_ones_is_no_answer() {
     let mut bench = armed();
-    bench.interrupt.set(false);
-    assert_eq!(bench.poll(&read(0x02, &[0xff])), Err(Error::NoAnswer));
+    assert_eq!(bench.serve(&read(0x02, &[0xff])), Err(Error::NoAnswer));
     bench.recover();
 }
 
@@ -319,12 +314,12 @@ fn an_error_of_the_bus_is_inside() {
 #[test]
 fn an_error_of_a_pin_is_inside() {
     let mut bench = armed();
-    bench.interrupt.set_broken(true);
+    bench.interrupt.broken.set(true);
     assert_eq!(bench.poll(&[]), Err(Error::Pin(Broken)));
-    bench.interrupt.set_broken(false);
-    bench.enable.set_broken(true);
+    bench.interrupt.broken.set(false);
+    bench.enable.broken.set(true);
     assert_eq!(bench.poll(&[]), Err(Error::Pin(Broken)));
-    bench.enable.set_broken(false);
+    bench.enable.broken.set(false);
     bench.recover();
 }
 

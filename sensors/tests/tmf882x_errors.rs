@@ -40,8 +40,7 @@ fn starts_over(bench: &mut Bench<128>) {
 #[test]
 fn not_acknowledged_while_measuring() {
     let mut bench = measuring();
-    bench.interrupt.set(false);
-    let polled = bench.poll(&[read(0x41, 0xE1, &[0]).with_error(NACK)]);
+    let polled = bench.serve(&[read(0x41, 0xE1, &[0]).with_error(NACK)]);
     assert_eq!(polled, Err(Error::Nack(NACK)));
     stops_measuring(&mut bench, polled);
 
@@ -53,8 +52,7 @@ fn not_acknowledged_while_measuring() {
     let mut accesses = packet(0x41, &packets[15], 128);
     let last = accesses.pop().unwrap();
     accesses.push(last.with_error(NACK));
-    bench.interrupt.set(false);
-    let polled = bench.poll(&accesses);
+    let polled = bench.serve(&accesses);
     assert_eq!(polled, Err(Error::Nack(NACK)));
     stops_measuring(&mut bench, polled);
 }
@@ -69,8 +67,7 @@ fn only_an_address_not_acknowledged_is_no_answer() {
     ] {
         let kind = ErrorKind::NoAcknowledge(source);
         let mut bench = measuring();
-        bench.interrupt.set(false);
-        let polled = bench.poll(&[read(0x41, 0xE1, &[0]).with_error(kind)]);
+        let polled = bench.serve(&[read(0x41, 0xE1, &[0]).with_error(kind)]);
         assert_eq!(polled.map_err(SensorFault::from), Err(fault));
         stops_measuring(&mut bench, polled);
     }
@@ -92,8 +89,7 @@ fn an_unplugged_sensor_says_so_again_and_again_and_is_found_when_it_is_back() {
 #[test]
 fn another_error_of_the_bus_is_inside() {
     let mut bench = measuring();
-    bench.interrupt.set(false);
-    let polled = bench.poll(&[read(0x41, 0xE1, &[0]).with_error(ErrorKind::ArbitrationLoss)]);
+    let polled = bench.serve(&[read(0x41, 0xE1, &[0]).with_error(ErrorKind::ArbitrationLoss)]);
     assert_eq!(polled, Err(Error::Bus(ErrorKind::ArbitrationLoss)));
     stops_measuring(&mut bench, polled);
 }
@@ -101,13 +97,13 @@ fn another_error_of_the_bus_is_inside() {
 #[test]
 fn an_error_of_a_pin_is_inside() {
     let mut bench = measuring();
-    bench.interrupt.set_broken(true);
+    bench.interrupt.broken.set(true);
     let polled = bench.poll(&[]);
     assert_eq!(polled, Err(Error::Pin(Broken)));
-    bench.interrupt.set_broken(false);
-    bench.enable.set_broken(true);
+    bench.interrupt.broken.set(false);
+    bench.enable.broken.set(true);
     assert_eq!(bench.poll(&[]), Err(Error::Pin(Broken)));
-    bench.enable.set_broken(false);
+    bench.enable.broken.set(false);
     starts_over(&mut bench);
 }
 
@@ -258,8 +254,7 @@ fn a_result_is_cleared_and_results_alone_are_an_error() {
     stops_measuring(&mut bench, polled);
 
     bench.wait(1001);
-    bench.interrupt.set(false);
-    let polled = bench.poll(&result[..1]);
+    let polled = bench.serve(&result[..1]);
     assert_eq!(polled, Err(Error::Timeout(Waiting::Histogram)));
     stops_measuring(&mut bench, polled);
 }

@@ -88,16 +88,9 @@ fn differences(committed: &[Row], rows: &[Row]) -> Vec<String> {
         match rows.iter().find(|row| row.name == *name) {
             None => lines.push(format!("{name}: missing")),
             Some(row) if row.hundredths.abs_diff(*hundredths) > hundredths / TOLERANCE => {
-                let better = if row.hundredths < *hundredths {
-                    ", better"
-                } else {
-                    ""
-                };
-                lines.push(format!(
-                    "{name}: {}, was {}{better}",
-                    decimal(row.hundredths),
-                    decimal(*hundredths)
-                ));
+                let better = ["", ", better"][usize::from(row.hundredths < *hundredths)];
+                let [is, was] = [row.hundredths, *hundredths].map(decimal);
+                lines.push(format!("{name}: {is}, was {was}{better}"));
             }
             Some(_) => {}
         }
@@ -123,11 +116,8 @@ fn parse(text: &str) -> Result<Vec<Row>> {
     ensure!(lines.next() == Some(HEADER), "the header is not {HEADER}");
     let row = |line: &str| {
         let (name, number) = line.rsplit_once(',')?;
-        let (whole, hundredths) = number.split_once('.')?;
-        let hundredths = hundredths
-            .parse::<u64>()
-            .ok()
-            .filter(|_| hundredths.len() == 2)?;
+        let (whole, part) = number.split_once('.')?;
+        let hundredths = part.parse::<u64>().ok().filter(|_| part.len() == 2)?;
         Some(Row {
             name: name.into(),
             hundredths: whole.parse::<u64>().ok()? * 100 + hundredths,

@@ -96,12 +96,14 @@ pub enum Build {
 }
 
 impl Build {
-    pub fn named(name: &str) -> Result<Self> {
+    /// The sidecar with simulated photons, unless another is named.
+    pub fn named(name: Option<&str>) -> Result<Self> {
         Ok(match name {
-            "self-test" => Self::SelfTest,
-            "tdc7200" => Self::With(Sensor::Tdc7200),
-            "tmf882x" | "tmf8820" | "tmf8821" | "tmf8828" => Self::With(Sensor::Tmf882x),
-            _ => bail!("what is `{name}`? tdc7200, tmf882x or self-test"),
+            None => Self::Sidecar,
+            Some("self-test") => Self::SelfTest,
+            Some("tdc7200") => Self::With(Sensor::Tdc7200),
+            Some("tmf882x" | "tmf8820" | "tmf8821" | "tmf8828") => Self::With(Sensor::Tmf882x),
+            Some(name) => bail!("what is `{name}`? tdc7200, tmf882x or self-test"),
         })
     }
 }
@@ -202,7 +204,7 @@ fn link(
 /// Builds an image and prints its path.
 pub fn image(root: &Path, board: &str, what: Option<&str>, emulator: bool) -> Result<()> {
     let board = Board::named(board)?;
-    let what = what.map_or(Ok(Build::Sidecar), Build::named)?;
+    let what = Build::named(what)?;
     let path = if emulator {
         board.build_for_emulator(root, what)?
     } else {

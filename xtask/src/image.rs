@@ -207,10 +207,8 @@ mod tests {
                 "{problems:?}"
             );
         }
-        assert_eq!(
-            Image::default().problems().len(),
-            PARTS.split(' ').count() + 2
-        );
+        let nothing = Image::default().problems();
+        assert_eq!(nothing.len(), PARTS.split(' ').count() + 2);
     }
 
     #[test]

@@ -104,15 +104,15 @@ fn run() -> Result<()> {
             toolchain::set_up(root)?;
             tools::set_up();
         }
-        ("image", &[board]) => firmware::image(root, board, None, options.emulator)?,
-        ("image", &[board, what]) => firmware::image(root, board, Some(what), options.emulator)?,
-        ("flash", []) => flash::flash(root, options.chip.as_deref(), Build::Sidecar)?,
-        ("flash", &[what]) => {
-            flash::flash(root, options.chip.as_deref(), Build::named(what)?)?;
+        ("image", [board, what @ ..]) if what.len() < 2 => {
+            firmware::image(root, board, what.first().copied(), options.emulator)?;
         }
-        ("emulate", []) => emulate::emulate(root, options.port, None)?,
-        ("emulate", &[end @ ("exit" | "panic" | "fault")]) => {
-            emulate::emulate(root, options.port, Some(end))?;
+        ("flash", what @ ([] | [_])) => {
+            let what = Build::named(what.first().copied())?;
+            flash::flash(root, options.chip.as_deref(), what)?;
+        }
+        ("emulate", end @ ([] | ["exit" | "panic" | "fault"])) => {
+            emulate::emulate(root, options.port, end.first().copied())?;
         }
         ("sizes", []) => sizes::print(root)?,
         ("check-image", []) => image::check(root)?,

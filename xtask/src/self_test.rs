@@ -29,10 +29,8 @@ pub fn check(root: &Path) -> Result<()> {
             differences.is_empty(),
             "{name}: differs from {EXPECTED}, see above"
         );
-        println!(
-            "{name}: {} lines as in {EXPECTED}",
-            expected.lines().count()
-        );
+        let lines = expected.lines().count();
+        println!("{name}: {lines} lines as in {EXPECTED}");
     }
     Ok(())
 }
@@ -49,11 +47,8 @@ pub fn bless(root: &Path) -> Result<()> {
 fn lines(board: Board, root: &Path) -> Result<String> {
     let image = board.build_bare(root, Build::SelfTest)?;
     let (status, output) = qemu::run(board, &image, &[])?;
-    ensure!(
-        status.success(),
-        "{}: QEMU: {status}: {output}",
-        board.name()
-    );
+    let name = board.name();
+    ensure!(status.success(), "{name}: QEMU: {status}: {output}");
     Ok(output)
 }
 

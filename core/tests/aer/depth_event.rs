@@ -22,10 +22,8 @@ fn check_event(tables: &[Vec<Field>; 2], event: &DepthEvent) {
 
     let mut decoder = AerDecoder::new();
     let start = LaserCycle(event.cycle.0 / (1 << 20) * (1 << 20));
-    assert_eq!(
-        decoder.decode(AerWord::from_le_bytes(time)),
-        Ok(AerRecord::Time(start))
-    );
+    let decoded = decoder.decode(AerWord::from_le_bytes(time));
+    assert_eq!(decoded, Ok(AerRecord::Time(start)));
     let decoded = decoder.decode(AerWord::from_le_bytes(bytes));
     assert_eq!(decoded, Ok(AerRecord::Event(*event)));
 }
@@ -171,12 +169,8 @@ fn a_late_receiver_is_right_from_the_first_time_word_on() {
         if let Some(time) = time.filter(|_| cycle != 70) {
             late.decode(time).unwrap();
         }
-        let wanted = if expected {
-            Ok(AerRecord::Event(event))
-        } else {
-            Err(AerError::MissingTime)
-        };
-        assert_eq!(late.decode(word), wanted);
+        let wanted = expected.then_some(AerRecord::Event(event));
+        assert_eq!(late.decode(word), wanted.ok_or(AerError::MissingTime));
     }
 }
 

@@ -103,11 +103,9 @@ pub fn pack_time(table: &[Field], cycle: LaserCycle) -> [u8; 16] {
 /// `a=1 b=2` in backquotes.
 pub fn named_values(text: &'static str) -> BTreeMap<&'static str, i128> {
     let pairs = text.trim_matches('`').split(' ');
+    let pairs = pairs.map(|pair| pair.split_once('=').unwrap());
     pairs
-        .map(|pair| {
-            let (name, value) = pair.split_once('=').unwrap();
-            (name, value.parse().unwrap())
-        })
+        .map(|(name, value)| (name, value.parse().unwrap()))
         .collect()
 }
 
@@ -165,27 +163,19 @@ pub fn crc32(bytes: &[u8]) -> u32 {
     !crc
 }
 
-/// An event of any numbers.
+/// An event of any numbers, in the order of its fields.
 pub fn event(numbers: [u64; 8]) -> DepthEvent {
-    let [
-        pixel,
-        cycle,
-        exposure,
-        peak_bin,
-        offset,
-        peak_count,
-        background,
-        flags,
-    ] = numbers;
+    let mut numbers = numbers.into_iter();
+    let mut next = || numbers.next().unwrap();
     DepthEvent {
-        pixel: PixelAddress(pixel as u16),
-        cycle: LaserCycle(cycle),
-        exposure: exposure as u16,
-        peak_bin: BinIndex::new(peak_bin as u16 % 1024).unwrap(),
-        offset: SubBinOffset::new((offset % 1024) as i16 - 512).unwrap(),
-        peak_count: Count::new(peak_count as u32 % (1 << 24)).unwrap(),
-        background: Count::new(background as u32 % (1 << 24)).unwrap(),
-        flags: Flags::from_bits(flags as u8 % 64).unwrap(),
+        pixel: PixelAddress(next() as u16),
+        cycle: LaserCycle(next()),
+        exposure: next() as u16,
+        peak_bin: BinIndex::new(next() as u16 % 1024).unwrap(),
+        offset: SubBinOffset::new((next() % 1024) as i16 - 512).unwrap(),
+        peak_count: Count::new(next() as u32 % (1 << 24)).unwrap(),
+        background: Count::new(next() as u32 % (1 << 24)).unwrap(),
+        flags: Flags::from_bits(next() as u8 % 64).unwrap(),
     }
 }
 

@@ -113,9 +113,7 @@ fn the_flags_are_those_of_the_document() {
         assert_eq!(flag.bits(), 1 << row[0].parse::<u32>().unwrap());
     }
     for bits in 0..=u8::MAX {
-        assert_eq!(
-            Flags::from_bits(bits).map(Flags::bits),
-            (bits < 64).then_some(bits)
-        );
+        let flags = Flags::from_bits(bits).map(Flags::bits);
+        assert_eq!(flags, (bits < 64).then_some(bits));
     }
 }

@@ -137,10 +137,8 @@ fn an_even_pulse_stays_where_it_is() {
 fn nothing_at_all_lies_in_the_middle() {
     for background in [U24F8::ZERO, U24F8::ONE, U24F8::MAX] {
         let depth = depth::<Count10>(&[0; BINS], 16, 640, background);
-        assert_eq!(
-            (depth.offset, depth.flags),
-            (SubBinOffset::CENTRE, Flags::NONE)
-        );
+        let Depth { offset, flags } = depth;
+        assert_eq!((offset, flags), (SubBinOffset::CENTRE, Flags::NONE));
     }
 }
 
@@ -183,11 +181,8 @@ fn a_window_past_the_gate_is_clipped() {
                 assert_eq!(depth.offset, SubBinOffset::CENTRE);
                 let (from, to) = (bin * 256 + 128, bin * 256 + 128 + half_width);
                 let clipped = from < first * 256 + half_width || to > (last + 1) * 256;
-                assert_eq!(
-                    depth.flags.contains(Flags::CLIPPED),
-                    clipped,
-                    "{bin} {half_width}"
-                );
+                let found = depth.flags.contains(Flags::CLIPPED);
+                assert_eq!(found, clipped, "{bin} {half_width}");
             }
         }
     }

@@ -29,7 +29,6 @@ fn density(x: f64) -> f64 {
 
 /// The share of the pulse in bin `bin`, and its derivative by the position.
 fn share(bin: usize, position: f64, sigma: f64) -> (f64, f64) {
-    #[allow(clippy::cast_precision_loss, reason = "at most 128")]
     let left = (bin as f64 - position) / sigma;
     let right = left + 1.0 / sigma;
     let derivative = (density(left) - density(right)) / sigma;

@@ -37,7 +37,6 @@ fn false_events<const BINS: usize>(
     let config = PixelConfig::with_rule(rule).x(x).l1(l1).l2(l2);
     let config = config.gate(gate).build().unwrap();
     let mut rng = Pcg64Mcg::seed_from_u64(u64::from(width));
-    #[allow(clippy::cast_precision_loss, reason = "at most 1024")]
     let photons_a_cycle = background * BINS as f64;
     let (mut events, mut statistics) = (0.0, Statistics::default());
     for _ in 0..exposures {

@@ -7,6 +7,18 @@ use rand_pcg::Pcg32;
 
 use crate::model::{Lone, Model, Settings, compare, cycle, random_cycles, settings};
 
+/// Section III-B.
+const PAPER: Settings = Settings {
+    x: 10,
+    l1: 100,
+    l2: 2000,
+    first: 0,
+    last: 127,
+    alpha: 8 * 256,
+    minimum: 5,
+    is_one_hit: false,
+};
+
 #[test]
 fn random_pixels_follow_the_flow_chart() {
     let mut rng = Pcg32::seed_from_u64(1);
@@ -42,16 +54,7 @@ fn the_paper_s_settings_on_128_bins() {
     let mut seen = Statistics::default();
     // Section III-B, and section IV with X = 4 and L1 = 40.
     for (x, l1) in [(10, 100), (4, 40)] {
-        let settings = Settings {
-            x,
-            l1,
-            l2: 2000,
-            first: 0,
-            last: 127,
-            alpha: 8 * 256,
-            minimum: 5,
-            is_one_hit: false,
-        };
+        let settings = Settings { x, l1, ..PAPER };
         for _ in 0..10 {
             let cycles = random_cycles(128, 10_000, 60, &mut rng);
             seen += compare::<128>(settings, &cycles);
@@ -133,14 +136,11 @@ fn frames_of_five_laser_cycles_are_their_photons_one_cycle_at_a_time() {
     let mut events = 0;
     for _ in 0..200 {
         let settings = Settings {
-            x: 10,
-            l1: 100,
             l2: 600,
             first: 1,
             last: 14,
             alpha: (rng.next_u32() % 1500) as u16,
-            minimum: 5,
-            is_one_hit: false,
+            ..PAPER
         };
         let config = settings.config::<16>();
         let mut single = Lone::<16>::new(5);

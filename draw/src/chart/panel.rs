@@ -83,12 +83,10 @@ pub(super) fn dot(svg: &mut Svg, mark: Mark, (x, y): (f64, f64), radius: f64, is
         format!("<path class=\"{class}\" d=\"M{}z\"/>", places.join("L"))
     };
     let element = match mark {
-        Mark::Circle => format!(
-            "<circle class=\"{class}\" cx=\"{}\" cy=\"{}\" r=\"{}\"/>",
-            At(x),
-            At(y),
-            At(radius)
-        ),
+        Mark::Circle => {
+            let [x, y, radius] = [x, y, radius].map(At);
+            format!("<circle class=\"{class}\" cx=\"{x}\" cy=\"{y}\" r=\"{radius}\"/>")
+        }
         Mark::Square => path(&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]),
         Mark::Diamond => path(&[(0.0, -1.3), (1.3, 0.0), (0.0, 1.3), (-1.3, 0.0)]),
         Mark::Up => path(&[(0.0, -1.2), (1.2, 0.9), (-1.2, 0.9)]),

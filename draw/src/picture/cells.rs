@@ -22,11 +22,9 @@ pub(super) fn draw(
             x += width;
         }
     }
-    let ((x, y), (width, height)) = (corner, cell);
+    let (x, y, (width, height)) = (At(corner.0), At(corner.1), cell);
     svg.raw(&format!(
-        "<g transform=\"translate({} {})scale({width} {height})\" shape-rendering=\"crispEdges\">",
-        At(x),
-        At(y)
+        "<g transform=\"translate({x} {y})scale({width} {height})\" shape-rendering=\"crispEdges\">"
     ));
     let colours = std::iter::once(NO_EVENT).chain((0..=u8::MAX).map(level));
     for (shape, colour) in paths.iter().zip(colours) {

@@ -2,15 +2,22 @@ use super::scale::Scale;
 use super::*;
 use crate::palette;
 
+const ONE_PIXEL: Map = Map {
+    title: "Range",
+    unit: "mm",
+    sides: ["column", "row"],
+    missing: "event",
+    columns: 1,
+    rows: 1,
+    values: &[Some(1.0)],
+};
+
 fn picture(columns: usize, rows: usize, values: &[Option<f64>]) -> String {
     let map = Map {
-        title: "Range",
-        unit: "mm",
-        sides: ["column", "row"],
-        missing: "event",
         columns,
         rows,
         values,
+        ..ONE_PIXEL
     };
     let svg = heat_map(&map).unwrap();
     assert_well_formed(&svg);
@@ -71,11 +78,7 @@ fn texts_are_escaped() {
     let map = Map {
         title: "a <b> & \"c\" 'd' ]]>\u{1}\u{fffe}",
         unit: "<&\0>",
-        sides: ["column", "row"],
-        missing: "event",
-        columns: 1,
-        rows: 1,
-        values: &[Some(1.0)],
+        ..ONE_PIXEL
     };
     let svg = heat_map(&map).unwrap();
     assert_well_formed(&svg);
@@ -126,19 +129,10 @@ fn outliers_do_not_flatten_the_colours() {
     assert!((118..138).contains(&scale.level(0.5)));
 
     let marks = scale.marks(256.0);
-    assert_eq!(
-        (marks[0].position, marks[0].label.as_str()),
-        (0.0, "≤ 0.02")
-    );
-    assert_eq!(
-        (marks[1].position, marks[1].label.as_str()),
-        (1.0, "≥ 0.98")
-    );
-    assert!(
-        marks[2..]
-            .iter()
-            .all(|mark| !mark.label.contains(['≤', '≥']))
-    );
+    let ends = [&marks[0], &marks[1]].map(|mark| (mark.position, mark.label.as_str()));
+    assert_eq!(ends, [(0.0, "≤ 0.02"), (1.0, "≥ 0.98")]);
+    let mut others = marks[2..].iter();
+    assert!(others.all(|mark| !mark.label.contains(['≤', '≥'])));
     assert!(picture(40, 25, &values).contains("colours: 2nd to 98th percentile"));
 }
 
@@ -214,13 +208,10 @@ fn a_long_line_is_wrapped() {
 fn impossible_maps_are_refused() {
     let refused = |columns, rows, values: &[Option<f64>]| {
         let map = Map {
-            title: "",
-            unit: "",
-            sides: ["column", "row"],
-            missing: "event",
             columns,
             rows,
             values,
+            ..ONE_PIXEL
         };
         heat_map(&map).is_err()
     };

@@ -188,8 +188,19 @@ pub enum Call {
     Histogram(u16, Box<[u32; 128]>),
 }
 
-/// Gives the next item each time it is asked; `None` is an error.
-pub struct Scripted<I>(pub I);
+/// Gives the next item each time it is asked; `None` is an error. It may give the first
+/// photon of a laser cycle only.
+pub struct Scripted<I> {
+    pub calls: I,
+    pub is_one_hit: bool,
+}
+
+pub fn scripted<I>(calls: I) -> Scripted<I> {
+    Scripted {
+        calls,
+        is_one_hit: false,
+    }
+}
 
 impl<I: Iterator<Item = Option<Vec<Call>>>> Sensor for Scripted<I> {
     type Error = SensorFault;
@@ -198,12 +209,16 @@ impl<I: Iterator<Item = Option<Vec<Call>>>> Sensor for Scripted<I> {
         About::new(256)
     }
 
+    fn is_one_hit(&self) -> bool {
+        self.is_one_hit
+    }
+
     fn start(&mut self, _: U16F16) {}
 
     fn stop(&mut self) {}
 
     fn poll(&mut self, _: u32, sink: &mut impl PhotonSink) -> Result<Polled, SensorFault> {
-        let calls = self.0.next().unwrap_or(Some(Vec::new()));
+        let calls = self.calls.next().unwrap_or(Some(Vec::new()));
         for call in calls.ok_or(SensorFault::Data)? {
             match call {
                 Call::Photon(pixel, code) => sink.photon(PixelAddress(pixel), code),

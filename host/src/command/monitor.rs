@@ -91,7 +91,11 @@ impl Monitor {
         })?;
         // A device without a sensor says so when it is configured.
         let sensor = client.sensor().with_context(name)?;
-        let sensor = sensor.unwrap_or(SensorRecord::new(client.pixels()));
+        let sensor = sensor.unwrap_or(SensorRecord {
+            pixels: client.pixels(),
+            bin_width: None,
+            offset: I24F8::ZERO,
+        });
         let pixels = self.pixels.unwrap_or(sensor.pixels.min(client.pixels()));
         let any = const { U16F16::lit("250") };
         let settings = self.operation.settings(

@@ -52,12 +52,8 @@ impl DeviceEngine {
             client.bins(),
             settings.bins
         );
-        client.configure(&configuration(
-            settings,
-            u16::try_from(addresses.len())?,
-            Source::Link,
-            None,
-        )?)?;
+        let pixels = u16::try_from(addresses.len())?;
+        client.configure(&configuration(settings, pixels, Source::Link, None)?)?;
         Ok(Self {
             client,
             report: Report::default(),
@@ -115,11 +111,8 @@ impl Engine for DeviceEngine {
             client: &mut self.client,
             body: Vec::new(),
         };
-        let mut photons: Vec<_> = slice
-            .pixels
-            .iter()
-            .map(|pixel| pixel.photons.iter().peekable())
-            .collect();
+        let photons = slice.pixels.iter().map(|pixel| &pixel.photons);
+        let mut photons: Vec<_> = photons.map(|of| of.iter().peekable()).collect();
         for cycle in 0..cycles {
             let mut at = 0;
             for (pixel, photons) in photons.iter_mut().enumerate() {
@@ -138,11 +131,8 @@ impl Engine for DeviceEngine {
         let events = events.collect::<Result<_>>()?;
         self.report = self.client.report()?;
         self.cycles += u64::from(cycles);
-        self.sent += slice
-            .pixels
-            .iter()
-            .map(|pixel| pixel.photons.len() as u64)
-            .sum::<u64>();
+        let photons = slice.pixels.iter().map(|pixel| pixel.photons.len());
+        self.sent += photons.sum::<usize>() as u64;
         let accounted = self.report.statistics.photons();
         ensure!(
             accounted == self.sent && self.report.cycles == self.cycles,

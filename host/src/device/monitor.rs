@@ -233,7 +233,6 @@ struct Figures {
 
 impl Figures {
     /// Rates since the last line.
-    #[allow(clippy::cast_precision_loss, reason = "rates to look at")]
     fn line(&mut self, client: &Client, report: &Report) -> String {
         let seconds = self.since.elapsed().as_secs_f64();
         let rate = |now: u64, before: u64| now.saturating_sub(before) as f64 / seconds;

@@ -39,7 +39,6 @@ impl PixelHistory {
     /// The mean range of the last [`MEAN_OF`] events, or of as many as there
     /// are.
     #[must_use]
-    #[allow(clippy::cast_precision_loss, reason = "at most ten")]
     pub fn mean_mm(&self) -> Option<f64> {
         let count = self.recent.len();
         (count > 0).then(|| self.recent.iter().sum::<f64>() / count as f64)
@@ -47,7 +46,6 @@ impl PixelHistory {
 
     /// Relative reflectivity as the paper has it, events × range², at the mean range.
     #[must_use]
-    #[allow(clippy::cast_precision_loss, reason = "to look at")]
     pub fn reflectivity_of_events(&self) -> Option<f64> {
         let range = I24F8::saturating_from_num(self.mean_mm()?);
         Some(self.reflectivity.of_events(range) as f64)

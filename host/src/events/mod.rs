@@ -2,6 +2,8 @@
 
 pub mod aer_file;
 pub mod events_csv;
+#[cfg(test)]
+pub(crate) mod fixtures;
 pub mod maps;
 pub mod output;
 pub mod sample;

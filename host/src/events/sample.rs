@@ -106,7 +106,7 @@ impl Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures;
+    use crate::events::fixtures;
 
     fn event(number: u64) -> DepthEvent {
         fixtures::event(u16::try_from(number % 64).unwrap(), number, 3)

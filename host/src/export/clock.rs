@@ -70,7 +70,6 @@ impl LaserClock {
 
 /// "10 MHz".
 impl fmt::Display for LaserClock {
-    #[allow(clippy::cast_precision_loss, reason = "for people")]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} MHz", self.hz as f64 / 1e6)
     }

@@ -203,7 +203,6 @@ impl Mcap {
     }
 
     /// Writes what was gathered.
-    #[allow(clippy::cast_precision_loss, reason = "for people")]
     fn end_slice(&mut self) -> Result<()> {
         let Some(slice) = self.slice else {
             return Ok(());

@@ -69,7 +69,6 @@ pub const BYTES: usize = 5 * 4 + 1 + 8;
 /// The record of an event.
 #[allow(
     clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
     reason = "a peak count has 24 bits, a time is less than 2^53 ns; a change is rounded"
 )]
 pub fn record(event: &Event, projection: &Projection) -> Result<[u8; BYTES]> {

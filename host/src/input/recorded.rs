@@ -75,7 +75,6 @@ impl RecordedHistograms {
             let recorded = recorded_cycles(length, brightest, cycles)?;
             shortest = shortest.min(recorded);
             longest = longest.max(recorded);
-            #[allow(clippy::cast_precision_loss, reason = "at most 2^40")]
             let mean = |total: &u64| *total as f64 / recorded.max(1) as f64;
             photons_per_cycle += totals.iter().map(mean).sum::<f64>();
             for (counts, total) in capture.iter().zip(totals) {
@@ -111,11 +110,7 @@ impl RecordedHistograms {
 }
 
 /// Laser cycles of a capture whose brightest pixel holds `brightest` photons.
-#[allow(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss
-)]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn recorded_cycles(length: RecordingLength, brightest: u64, wanted: u64) -> Result<u64> {
     match length {
         RecordingLength::Cycles(cycles) => {
@@ -187,7 +182,6 @@ struct RecordedPixel {
 }
 
 impl RecordedPixel {
-    #[allow(clippy::cast_precision_loss, reason = "at most 2^40")]
     fn next_cycles(&mut self, cycles: u16) -> Result<PixelPhotons> {
         let mut received = PixelPhotons::default();
         while received.cycles < cycles && self.cycles_left > 0 {

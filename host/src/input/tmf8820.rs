@@ -49,13 +49,11 @@ struct LogEntry {
 pub fn read(path: &Path) -> Result<Tmf8820Log> {
     let name = path.display();
     let file = File::open(path).with_context(|| name.to_string())?;
-    let entries: Vec<LogEntry> =
-        serde_json::from_reader(BufReader::new(file)).map_err(|error| {
-            anyhow!(
-                "{name}:{}: not a TMF8820 capture log: {error}",
-                error.line()
-            )
-        })?;
+    let entries = serde_json::from_reader(BufReader::new(file));
+    let entries: Vec<LogEntry> = entries.map_err(|error| {
+        let line = error.line();
+        anyhow!("{name}:{line}: not a TMF8820 capture log: {error}")
+    })?;
     ensure!(!entries.is_empty(), "{name}: no captures");
     for (index, entry) in entries.iter().enumerate() {
         let zones = entry.hists.len();

@@ -208,7 +208,6 @@ impl Scene {
         [f64::from(pixel % columns), f64::from(pixel / columns)]
     }
 
-    #[allow(clippy::cast_precision_loss, reason = "2^53 laser cycles are years")]
     fn seconds(&self, cycle: u64) -> f64 {
         cycle as f64 / (self.laser_rate_mhz * 1e6)
     }

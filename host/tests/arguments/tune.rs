@@ -1,6 +1,6 @@
 //! `dtof tune` as a user runs it.
 
-use crate::common::Scratch;
+use crate::common::{Scratch, says};
 use serde_json::Value;
 
 /// What `dtof tune` prints with the options in `line`.
@@ -25,18 +25,23 @@ fn refused(rows: &str) {
     Scratch::new().all_refused("tune", &rows);
 }
 
+#[track_caller]
+fn every_line_has_a_source(results: &str) {
+    for line in results.lines() {
+        let sources = ["formula: ", "simulation: "];
+        assert!(sources.iter().any(|source| line.contains(source)), "{line}");
+    }
+}
+
 const PIXEL: &str = "--background 0.05 --signal 0.4 --sigma-bins 0.8";
 
 #[test]
 fn every_line_says_where_it_comes_from() {
     let text = text(&format!("{PIXEL} --laser-hz 1e7"));
     let (results, options) = text.split_once("\n\n").unwrap();
-    for line in results.lines() {
-        let sources = ["formula: ", "simulation: "];
-        assert!(sources.iter().any(|source| line.contains(source)), "{line}");
-    }
+    every_line_has_a_source(results);
     for part in "seed 1|exposures a point|Eq. 11|mm rms|laser cycles| s ".split('|') {
-        assert!(results.contains(part), "{part}: {results}");
+        says(results, part);
     }
     // What `dtof replay` takes.
     assert!(options.starts_with("--alpha "), "{options}");
@@ -53,11 +58,10 @@ fn the_options_it_prints_are_options_of_replay() {
     let photons = scratch.file("photons.csv", "pixel,cycle,bin\n0,1,2\n");
     let summary = scratch.replayed(&photons, options);
     let result = json(PIXEL);
-    assert_eq!(summary["settings"]["alpha"], result["alpha"]["value"]);
-    assert_eq!(
-        value(&result, "l1"),
-        summary["settings"]["l1"].as_f64().unwrap()
-    );
+    for name in ["alpha", "l1"] {
+        let setting = summary["settings"][name].as_f64();
+        assert_eq!(setting, Some(value(&result, name)), "{name}");
+    }
 }
 
 /// Another histogram than that of `replay` by itself is named.
@@ -84,10 +88,13 @@ fn fewer_false_alarms_take_a_higher_alpha_and_longer() {
         assert_eq!((value(result, "alpha") * 256.0).fract(), 0.0);
     }
     // Too seldom for the table: the bound, which says so.
-    let source = seldom["false_alarms"]["source"].as_str().unwrap();
-    assert!(source.starts_with("formula: upper bound"), "{source}");
-    let source = often["false_alarms"]["source"].as_str().unwrap();
-    assert!(source.starts_with("simulation: table"), "{source}");
+    for (result, start) in [
+        (seldom, "formula: upper bound"),
+        (often, "simulation: table"),
+    ] {
+        let source = result["false_alarms"]["source"].as_str().unwrap();
+        assert!(source.starts_with(start), "{source}");
+    }
 }
 
 #[test]
@@ -105,9 +112,8 @@ fn snr_and_picoseconds_say_the_same() {
 #[test]
 fn false_alarms_a_second_depend_on_the_laser() {
     // 0.01 an exposure of 2000 laser cycles at 1 MHz are 5 a second.
-    let result = json(&format!(
-        "{PIXEL} --l1 40 --false-alarms-per-second 5 --laser-hz 1e6"
-    ));
+    let rate = "--false-alarms-per-second 5 --laser-hz 1e6";
+    let result = json(&format!("{PIXEL} --l1 40 {rate}"));
     let wanted = json(&format!("{PIXEL} --l1 40 --false-alarm 0.01"));
     // A little higher, as exposures with an event are shorter.
     let [higher, alpha] = [result.clone(), wanted].map(|result| value(&result, "alpha"));
@@ -166,9 +172,8 @@ fn options_that_are_missing_or_no_numbers_are_named() {
         ",
     );
     for bad in ["0", "-1", "nan", "inf", "x"] {
-        refused(&format!(
-            "--background={bad} --signal 1 --sigma-bins 1 | --background | a number above 0"
-        ));
+        let options = format!("--background={bad} --signal 1 --sigma-bins 1");
+        refused(&format!("{options} | --background | a number above 0"));
     }
 }
 
@@ -178,17 +183,14 @@ const WINDOW: &str = "--background 0.05 --signal 0.4 --sigma-bins 0.8 --rule win
 fn the_window_rule_has_a_z_a_window_and_an_estimator() {
     let text = text(WINDOW);
     let (results, options) = text.split_once("\n\n").unwrap();
-    for line in results.lines() {
-        let sources = ["formula: ", "simulation: "];
-        assert!(sources.iter().any(|source| line.contains(source)), "{line}");
-    }
+    every_line_has_a_source(results);
     assert!(!results.contains('α'), "{results}");
     let scratch = Scratch::new();
     let photons = scratch.file("photons.csv", "pixel,cycle,bin\n0,1,2\n");
     let settings = &scratch.replayed(&photons, options)["settings"];
     let result = json(WINDOW);
-    for (name, of_result) in [("z", "z"), ("window", "window"), ("l1", "l1")] {
-        let value = value(&result, of_result);
+    for name in ["z", "window", "l1"] {
+        let value = value(&result, name);
         assert_eq!(settings[name].as_f64(), Some(value), "{name}");
     }
     assert_eq!(settings["rule"], "window");
@@ -221,14 +223,11 @@ fn the_average_rule_has_an_alpha_by_simulation() {
 fn z_is_that_of_the_core_and_keeps_false_alarms_down() {
     let gate = dtof_core::RangeGate::<128>::full();
     for one_in in [10, 100, 1000] {
-        let result = json(&format!(
-            "{WINDOW} --l1 40 --false-alarm {}",
-            1.0 / f64::from(one_in)
-        ));
+        let wanted = 1.0 / f64::from(one_in);
+        let result = json(&format!("{WINDOW} --l1 40 --false-alarm {wanted}"));
         let z = dtof_core::z_for(one_in, &gate, 4, 40, 2000).to_num::<f64>();
         assert_eq!(value(&result, "z"), z);
         // `z_for`: 0.4 to 1.2 times as many; 4 standard deviations of 4000 exposures.
-        let wanted = 1.0 / f64::from(one_in);
         let deviation = (wanted / 4000.0).sqrt();
         let found = value(&result, "false_alarms");
         let source = result["false_alarms"]["source"].as_str().unwrap();

@@ -23,19 +23,8 @@ use dtof_link::{Configuration, Report, Source, message};
 
 const PIXELS: u16 = 4;
 
-/// When the device sends an event.
-#[derive(Clone, Copy, PartialEq)]
-enum Moment {
-    /// It answers the first request for statistics.
-    Begins,
-    /// It answers any later one.
-    Runs,
-    /// It is to stop.
-    Stops,
-}
-
-/// A device whose events come from pixel `pixel`, the last one from pixel 0. After `lives`
-/// events it is gone.
+/// A device that sends an event with each answer to a request for statistics, from pixel
+/// `pixel`, and one from pixel 0 when it is to stop. After `lives` events it is gone.
 struct Device {
     endpoint: Endpoint,
     deframer: Deframer,
@@ -43,19 +32,14 @@ struct Device {
     pixel: u16,
     lives: u64,
     answers: VecDeque<(u8, Vec<u8>)>,
-    reports: u32,
     now_ms: u32,
     sent: Rc<RefCell<Vec<Event>>>,
 }
 
 impl Device {
-    fn event(&mut self, moment: Moment) {
+    fn event(&mut self, pixel: u16) {
         let cycle = self.sent.borrow().len() as u64;
-        let pixel = match moment {
-            Moment::Stops => 0,
-            Moment::Begins | Moment::Runs => self.pixel,
-        };
-        let event = depth_event(pixel, 100 * cycle + moment as u64, 20);
+        let event = depth_event(pixel, 100 * cycle, 20);
         let (time, word) = self.encoder.encode(&event);
         let words = time.into_iter().chain([word]);
         let body: Vec<u8> = words.flat_map(|word| word.to_le_bytes()).collect();
@@ -67,14 +51,12 @@ impl Device {
         let answer = match kind {
             message::CONFIGURE => {
                 if Configuration::from_le_bytes(body).unwrap().source == Source::Link {
-                    self.event(Moment::Stops);
+                    self.event(0);
                 }
                 (message::CONFIGURED, Vec::new())
             }
             message::STATISTICS_REQUEST => {
-                let moments = [Moment::Begins, Moment::Runs];
-                self.event(moments[usize::from(self.reports > 0)]);
-                self.reports += 1;
+                self.event(self.pixel);
                 let report = Report::default().to_le_bytes();
                 (message::STATISTICS, report.to_vec())
             }
@@ -161,7 +143,6 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
         pixel,
         lives,
         answers: VecDeque::new(),
-        reports: 0,
         now_ms: 0,
         sent: Rc::clone(&sent),
     }))

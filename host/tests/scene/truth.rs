@@ -68,7 +68,6 @@ fn every_event_is_compared_with_the_truth() {
     let summary = scratch.summary();
     let truth = &summary["against_truth"];
     let of = |name: &str| truth[name].as_f64().unwrap();
-    #[allow(clippy::cast_precision_loss)]
     let mean = |sum: f64| sum / right.len() as f64;
     let square = |error: &f64| error * error;
     assert_eq!(truth["events"], events);

@@ -131,7 +131,6 @@ fn variance(photons: &[(u64, u16)]) -> f64 {
     photons.iter().map(square).sum::<f64>() / float(photons.len() - 1)
 }
 
-#[allow(clippy::cast_precision_loss)]
 fn float(count: usize) -> f64 {
     count as f64
 }

@@ -3,10 +3,8 @@
 use anyhow::{Result, bail};
 use clap::Args;
 use dtof::cli::arguments::path;
-use dtof_lab::pages;
-use dtof_lab::pages::Anew;
-use std::io;
-use std::io::Write;
+use dtof_lab::pages::{self, Anew};
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 #[derive(Args)]

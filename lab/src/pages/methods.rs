@@ -16,8 +16,7 @@ use crate::sweep::values::Values;
 use crate::sweep::{Part, PointTally};
 use anyhow::{Context, Result, ensure};
 use dtof_draw::chart::{Axis, Chart, Panel, Point as Dot, Series, Style, chart};
-use dtof_draw::palette;
-use dtof_draw::palette::Pen;
+use dtof_draw::palette::{self, Pen};
 use std::path::PathBuf;
 
 pub use self::recorded::RECORDED;

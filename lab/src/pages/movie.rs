@@ -79,12 +79,13 @@ pub fn demo() -> Result<String> {
             .collect();
         firsts.sort_unstable();
         let median = firsts.get(firsts.len() / 2).copied().unwrap_or(u64::MAX);
-        let first = if median > u64::from(CYCLES) {
-            format!("after more than {}", grouped(CYCLES.into()))
+        let more = if median > u64::from(CYCLES) {
+            "more than "
         } else {
-            format!("after {}", grouped(median))
+            ""
         };
-        notes.push(format!("{} {first}", surface.name));
+        let first = grouped(median.min(CYCLES.into()));
+        notes.push(format!("{} after {more}{first}", surface.name));
     }
     let title = "Each flash is an event: bright pixels report often, dim ones later";
     let notes = notes.join(", ");
@@ -98,10 +99,9 @@ fn draw(geometry: Geometry, flashes: &[Flash], title: &str, note: &str) -> Strin
     let lines = wrapped(title, TITLE.0, INNER);
     let mut y = svg.lines("ink title", (EDGE, EDGE), TITLE, Anchor::Start, &lines) + 8.0;
     let side = INNER / f64::from(geometry.columns);
+    let (left, top) = (At(EDGE), At(y));
     svg.raw(&format!(
-        "<g transform=\"translate({} {})scale({side})\">",
-        At(EDGE),
-        At(y)
+        "<g transform=\"translate({left} {top})scale({side})\">"
     ));
     let ranges: Vec<Option<f64>> = flashes.iter().map(|flash| Some(flash.range_mm)).collect();
     let steps: Vec<u8> = levels(&ranges)
@@ -133,12 +133,9 @@ fn draw(geometry: Geometry, flashes: &[Flash], title: &str, note: &str) -> Strin
     }
     svg.raw("</g>");
     let height = side * f64::from(geometry.rows);
+    let [left, top, width, high] = [EDGE, y, INNER, height].map(At);
     svg.raw(&format!(
-        "<rect class=\"edge\" fill=\"none\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>",
-        At(EDGE),
-        At(y),
-        At(INNER),
-        At(height)
+        "<rect class=\"edge\" fill=\"none\" x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{high}\"/>"
     ));
     y = time(&mut svg, y + height + 14.0);
     y = colours(&mut svg, span(&ranges).unwrap_or_default(), y + 10.0);
@@ -190,11 +187,9 @@ fn sheet() -> String {
 
 /// The laser cycles as a bar that grows. Gives where it ends.
 fn time(svg: &mut Svg, y: f64) -> f64 {
+    let [left, top, width] = [EDGE, y, INNER].map(At);
     svg.raw(&format!(
-        "<g class=\"soft\"><rect class=\"fill t\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"5\"/></g>",
-        At(EDGE),
-        At(y),
-        At(INNER)
+        "<g class=\"soft\"><rect class=\"fill t\" x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"5\"/></g>"
     ));
     for quarter in 0..=4u16 {
         let cycles = CYCLES / 4 * quarter;
@@ -219,11 +214,9 @@ fn colours(svg: &mut Svg, (low, high): (f64, f64), y: f64) -> f64 {
     svg.text("soft", place, TEXT, Anchor::Start, &format!("{low:.0}"));
     x += 44.0;
     for step in (0..=u8::MAX).step_by(STEP.into()) {
+        let (left, top, fill) = (At(x), At(y + 4.0), palette::hex(palette::level(step)));
         svg.raw(&format!(
-            "<rect fill=\"{}\" x=\"{}\" y=\"{}\" width=\"10\" height=\"11\" shape-rendering=\"crispEdges\"/>",
-            palette::hex(palette::level(step)),
-            At(x),
-            At(y + 4.0)
+            "<rect fill=\"{fill}\" x=\"{left}\" y=\"{top}\" width=\"10\" height=\"11\" shape-rendering=\"crispEdges\"/>"
         ));
         x += 10.0;
     }

@@ -17,8 +17,7 @@ use dtof_core::{
     PaperRule, PixelAddress, PixelConfig, Statistics, WindowRule, z_for,
 };
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
-use dtof_draw::palette;
-use dtof_draw::palette::Pen;
+use dtof_draw::palette::{self, Pen};
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 

@@ -4,8 +4,7 @@ use super::mean::Measured;
 use super::values::Values;
 use super::{Part, PointTally};
 use anyhow::{Context, Result};
-use dtof_draw::chart;
-use dtof_draw::chart::Chart;
+use dtof_draw::chart::{self, Chart};
 use dtof_theory::counts::poisson::Poisson;
 use std::fmt;
 

@@ -9,6 +9,16 @@ use rayon::prelude::*;
 
 use super::{Part, Study, Tally};
 
+/// The part of these seeds.
+///
+/// # Errors
+/// If a trial fails, or there is no place for it in the folder of temporary files.
+pub fn work_out(study: &Study, seeds: Range<u64>) -> Result<Part> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("part");
+    run(study, seeds, &path, Duration::MAX, |_| ())
+}
+
 /// Works out `seeds` into the file at `path`. If there is a part of them already,
 /// as a run that was ended early leaves it, the rest is added. It is saved every
 /// `save_every` and at the end; `progress` is told how many seeds are done.

@@ -207,19 +207,11 @@ impl Config {
         self.0.calibration.bits() << 6 | (self.0.stops as u8 - 1)
     }
 
-    /// `COARSE_CNTR_OVF`.
-    pub(super) const fn coarse_overflow(&self) -> u16 {
+    /// `COARSE_CNTR_OVF` and `CLOCK_CNTR_OVF`.
+    pub(super) const fn overflows(&self) -> [u16; 2] {
         match self.0.mode {
-            Mode::One => self.0.overflow,
-            Mode::Two => u16::MAX,
-        }
-    }
-
-    /// `CLOCK_CNTR_OVF`.
-    pub(super) const fn clock_overflow(&self) -> u16 {
-        match self.0.mode {
-            Mode::One => u16::MAX,
-            Mode::Two => self.0.overflow,
+            Mode::One => [self.0.overflow, u16::MAX],
+            Mode::Two => [u16::MAX, self.0.overflow],
         }
     }
 

@@ -201,8 +201,8 @@ where
 
     /// Writes all that is configured and reads it back.
     fn configure(&mut self) -> Result<(), SPI, INT> {
-        let [coarse_h, coarse_l] = self.config.coarse_overflow().to_be_bytes();
-        let [clock_h, clock_l] = self.config.clock_overflow().to_be_bytes();
+        let [[coarse_h, coarse_l], [clock_h, clock_l]] =
+            self.config.overflows().map(u16::to_be_bytes);
         let [mask_h, mask_l] = self.config.settings().stop_mask.to_be_bytes();
         let registers = [
             (CONFIG2, self.config.config2()),

@@ -55,7 +55,7 @@ impl PhotonSink for Notes {
 #[derive(Clone, Debug)]
 pub struct Line {
     level: Rc<Cell<bool>>,
-    broken: Rc<Cell<bool>>,
+    pub broken: Rc<Cell<bool>>,
     /// Every level set by the driver.
     pub driven: Rc<RefCell<Vec<bool>>>,
 }
@@ -81,15 +81,8 @@ impl Line {
     pub fn set(&self, high: bool) {
         self.level.set(high);
     }
-    pub fn set_broken(&self, broken: bool) {
-        self.broken.set(broken);
-    }
     fn check(&self) -> Result<(), Broken> {
-        if self.broken.get() {
-            Err(Broken)
-        } else {
-            Ok(())
-        }
+        (!self.broken.get()).then_some(()).ok_or(Broken)
     }
     fn drive(&self, high: bool) -> Result<(), Broken> {
         self.check()?;
@@ -109,8 +102,7 @@ impl InputPin for Line {
         Ok(self.level.get())
     }
     fn is_low(&mut self) -> Result<bool, Broken> {
-        self.check()?;
-        Ok(!self.level.get())
+        self.is_high().map(|is_high| !is_high)
     }
 }
 

@@ -140,6 +140,12 @@ impl<const CHUNK: usize> Bench<CHUNK> {
         polled
     }
 
+    /// The same with the interrupt active.
+    pub fn serve(&mut self, accesses: &[Access]) -> Result<Polled, Error<ErrorKind, Broken>> {
+        self.interrupt.set(false);
+        self.poll(accesses)
+    }
+
     /// Polls after so many milliseconds, without an access.
     pub fn wait(&mut self, ms: u32) -> Result<Polled, Error<ErrorKind, Broken>> {
         self.now_ms = self.now_ms.wrapping_add(ms);
@@ -164,8 +170,7 @@ impl<const CHUNK: usize> Bench<CHUNK> {
 
     /// One measurement of mode 1 with one stop, as the data sheet's example.
     pub fn measure(&mut self) {
-        self.interrupt.set(false);
-        assert_eq!(self.poll(&example()), Ok(Polled::Data));
+        assert_eq!(self.serve(&example()), Ok(Polled::Data));
         // 247.061 ns are 7.061 ns into the histogram: bin 28.
         assert_eq!(self.sink.take(), [Given::Photon(7, 28), Given::End(1)]);
         self.interrupt.set(true);

@@ -134,6 +134,12 @@ impl<const CHUNK: usize> Bench<CHUNK> {
         polled
     }
 
+    /// The same with the interrupt active.
+    pub fn serve(&mut self, accesses: &[Access]) -> Result {
+        self.interrupt.set(false);
+        self.poll(accesses)
+    }
+
     pub fn wait(&mut self, ms: u32) {
         self.now_ms = self.now_ms.wrapping_add(ms);
     }
@@ -209,8 +215,7 @@ impl<const CHUNK: usize> Bench<CHUNK> {
     }
 
     pub fn packet(&mut self, bytes: &[u8]) -> Result {
-        self.interrupt.set(false);
-        let polled = self.poll(&packet(0x41, bytes, CHUNK));
+        let polled = self.serve(&packet(0x41, bytes, CHUNK));
         self.interrupt.set(true);
         polled
     }

@@ -25,9 +25,10 @@ pub enum Seen {
     Stop,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub enum Phase {
     /// Not addressed.
+    #[default]
     Idle,
     /// Takes bits, the most significant first: the byte so far, its bits, and whether it
     /// is an address.
@@ -41,6 +42,7 @@ pub enum Phase {
 }
 
 /// Two wires and a device on them.
+#[derive(Default)]
 pub struct Wires {
     pub now_ns: u64,
     /// What the controller and the device each let go of.
@@ -84,24 +86,13 @@ impl Wires {
             now_ns: 1_000_000,
             controller: [true; 2],
             device: [true; 2],
-            rise_ns: 0,
             free_since: [Some(0); 2],
-            phase: Phase::Idle,
-            seen: Vec::new(),
-            next: 0,
             takes: usize::MAX,
-            stretch_ns: 0,
-            stretched_until: 0,
-            falls: 0,
-            stuck: None,
-            rose_ns: 0,
-            fell_ns: 0,
             shortest_high: u64::MAX,
             shortest_low: u64::MAX,
             shortest_period: u64::MAX,
-            longest_period: 0,
-            is_plain_period: false,
             shortest_hold: u64::MAX,
+            ..Self::default()
         }
     }
 

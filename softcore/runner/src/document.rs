@@ -145,23 +145,25 @@ fn bytes(memory: &[Memory]) -> String {
 #[cfg(test)]
 mod tests {
     use std::fs;
-    use std::path::Path;
 
     use super::*;
     use crate::files::{DOCUMENT, Files};
+    use crate::root;
+
+    fn committed() -> Files {
+        Files::read(&root()).unwrap()
+    }
 
     #[test]
     fn the_document_says_what_the_files_say() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let files = Files::read(&root).unwrap();
-        let written = fs::read_to_string(root.join(DOCUMENT)).unwrap();
+        let files = committed();
+        let written = fs::read_to_string(root().join(DOCUMENT)).unwrap();
         assert_eq!(text(&files.rows, &files.photons, &files.memory), written);
     }
 
     #[test]
     fn what_the_page_says_of_240_cycles_holds() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let rows = Files::read(&root).unwrap().rows;
+        let rows = committed().rows;
         let is_within = |core: &str, operation| {
             let (warm, cold) = find(&rows, core, operation);
             let warm = warm.unwrap();
@@ -186,8 +188,7 @@ mod tests {
 
     #[test]
     fn the_rates_are_a_highest_one_and_parts_of_it() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let photons = Files::read(&root).unwrap().photons;
+        let photons = committed().photons;
         for of_core in photons.chunks(3) {
             assert!(of_core.iter().all(|one| one.core == of_core[0].core));
             assert_eq!(of_core[1].rate, of_core[0].rate / 2);

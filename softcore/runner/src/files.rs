@@ -43,7 +43,7 @@ pub enum Column {
     Told,
 }
 
-use Column::{Name, Percent, Told};
+use Column::{Percent, Told};
 
 /// All figures.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -163,8 +163,10 @@ fn is_near(a: &str, b: &str, columns: &[Column]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::Column::Name;
     use super::*;
     use crate::image::Sizes;
+    use crate::root;
 
     #[test]
     fn figures_may_differ_by_little() {
@@ -225,7 +227,7 @@ mod tests {
 
     #[test]
     fn the_files_are_read_as_they_are_written() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let root = root();
         let files = Files::read(&root).unwrap();
         for (file, text) in files.texts() {
             assert_eq!(fs::read_to_string(root.join(file)).unwrap(), text, "{file}");

@@ -29,7 +29,7 @@ use image::Images;
 use memory::{Memory, Stacks};
 use program::Ran;
 use rtl::{CORES, Core, Simulator};
-use trials::{Cycles, Found, Trials};
+use trials::{Cycles, Trials};
 
 const HELP: &str = "\
 cargo softcore [--qemu-only] [--core NAME]... [--check]
@@ -61,9 +61,9 @@ const MUST_FAIL: [(&str, &str); 3] = [
     ("endless-loop", "an endless loop follows"),
 ];
 
-/// The last line of a program that must fail in simulation.
-fn last_words(core: Core, program: &str) -> &'static str {
-    match (core.name, program) {
+/// The last line of a program that must fail on a processor.
+fn last_words(core: &str, program: &str) -> &'static str {
+    match (core, program) {
         ("picorv32" | "picorv32-rv32i", "illegal-instruction") => "the processor stops cycle",
         // The bit-serial processor carries it out as some other, which the program tells.
         ("serv", "illegal-instruction") => "the illegal instruction was carried out",
@@ -138,8 +138,7 @@ impl Options {
 
 /// Builds and runs.
 fn run(options: &Options) -> Result<()> {
-    let root = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let root = &root.canonicalize()?;
+    let root = &root().canonicalize()?;
     let expected = fs::read_to_string(root.join(EXPECTED)).context(EXPECTED)?;
     for isa in ISAS {
         in_qemu(root, isa, &expected).with_context(|| format!("QEMU, {isa}"))?;
@@ -173,6 +172,11 @@ fn run(options: &Options) -> Result<()> {
     Ok(())
 }
 
+/// The folder of the workspace.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
 /// Where cargo builds.
 fn target_folder(root: &Path) -> PathBuf {
     let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
@@ -192,26 +196,19 @@ fn in_qemu(root: &Path, isa: &str, expected: &str) -> Result<()> {
     let bench = run("bench", None)?;
     ensure!(bench.code == Some(0), "bench: {}", bench.said());
     for (program, message) in MUST_FAIL {
+        // QEMU has no limit of its own.
         let is_endless = program == "endless-loop";
-        let last = match program {
-            // QEMU has no limit of its own.
-            "endless-loop" => message,
-            "illegal-instruction" => ILLEGAL,
-            _ => "golden WRONG",
-        };
         let ran = run(program, is_endless.then_some(message))?;
-        let failed = ran.code.is_some_and(|code| code != 0) && !is_endless;
-        must_fail(
-            program,
-            &ran,
-            failed || ran.timed_out && is_endless,
-            [message, last],
-        )?;
+        let (failed, last) = if is_endless {
+            (ran.timed_out, message)
+        } else {
+            (ran.has_failed(), last_words("QEMU", program))
+        };
+        must_fail(program, &ran, failed, [message, last])?;
     }
+    let lines = expected.lines().count();
     println!(
-        "QEMU, {isa}: {} lines as in {}, {stack} bytes of stack; what must fail fails",
-        expected.lines().count(),
-        EXPECTED
+        "QEMU, {isa}: {lines} lines as in {EXPECTED}, {stack} bytes of stack; what must fail fails"
     );
     Ok(())
 }
@@ -222,24 +219,19 @@ fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<(Files, Stacks)> {
     let simulator = Simulator::build(root, core)?;
     let run = |program, cycles| simulator.run(&images.flat(program), cycles);
     let stack = golden(&run("self-test", MOST_CYCLES)?, expected)?;
-    println!(
-        "{}, {}: {} lines as in {}, {stack} bytes of stack",
-        core.name,
-        core.isa,
-        expected.lines().count(),
-        EXPECTED
-    );
+    let lines = expected.lines().count();
+    let Core { name: of, isa, .. } = core;
+    println!("{of}, {isa}: {lines} lines as in {EXPECTED}, {stack} bytes of stack");
     for (program, message) in MUST_FAIL {
         let limit = match program {
             "wrong-vector" => MOST_CYCLES,
             _ => ENDLESS_CYCLES,
         };
         let ran = run(program, limit)?;
-        let last = last_words(core, program);
-        let failed = ran.code.is_some_and(|code| code != 0);
-        must_fail(program, &ran, failed, [message, last])?;
+        let last = last_words(of, program);
+        must_fail(program, &ran, ran.has_failed(), [message, last])?;
         let end = ran.errors.lines().last().unwrap_or_default();
-        println!("{}: {program} fails: {last} ({end})", core.name);
+        println!("{of}: {program} fails: {last} ({end})");
     }
     let bench = run("bench", MOST_CYCLES)?;
     ensure!(bench.code == Some(0), "bench: {}", bench.said());
@@ -251,22 +243,18 @@ fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<(Files, Stacks)> {
         core: &name(core),
         cycles: Cycles::of(&rows).context("no rows of a count and a look")?,
     };
-    let Found {
-        sustained: photons,
-        stack,
-        slow: (events, deferred),
-    } = trials.run()?;
+    let found = trials.run()?;
+    let (events, deferred) = found.slow;
     println!(
         "{}: the host decides the same from the same photons and looks, each event word over REQ and ACK; \
          with a slow link {events} events, {deferred} decisions put off",
         core.name
     );
-    let stacks = stack
-        .into_iter()
-        .map(|(pixels, stack)| (core.isa, pixels, stack));
+    let stacks = found.stack.into_iter();
+    let stacks = stacks.map(|(pixels, stack)| (isa, pixels, stack));
     let files = Files {
         rows,
-        photons,
+        photons: found.sustained,
         memory: Vec::new(),
     };
     Ok((files, stacks.collect()))

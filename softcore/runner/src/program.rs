@@ -30,6 +30,10 @@ impl Ran {
         }
     }
 
+    pub fn has_failed(&self) -> bool {
+        self.code.is_some_and(|code| code != 0)
+    }
+
     /// All that it said, and how it ended.
     pub fn said(&self) -> String {
         let end = match self.code {

@@ -166,19 +166,14 @@ impl Trials<'_> {
             signal: 1.0,
             length: CERTAIN,
             clocks,
-            wait: if is_slow {
-                clocks * u64::from(CERTAIN) / 4
-            } else {
-                0
-            },
+            wait: u64::from(is_slow) * clocks * u64::from(CERTAIN) / 4,
             strays: is_slow,
         };
         let counted = self.checked(&run)?;
+        let Counted { lost, events, .. } = counted;
         ensure!(
-            counted.lost == 0 && counted.events >= u64::from(pixels),
-            "{run:?}: {} photons lost, {} events",
-            counted.lost,
-            counted.events
+            lost == 0 && events >= u64::from(pixels),
+            "{run:?}: {lost} photons lost, {events} events"
         );
         Ok(counted)
     }
@@ -215,11 +210,8 @@ impl Trials<'_> {
         let image = (self.image)(run.pixels);
         let ran = self.simulator.stream(&image, limit, &laser)?;
         let counted = Counted::read(&ran).with_context(|| format!("{run:?}\n{}", ran.said()))?;
-        ensure!(
-            counted.strays == strays,
-            "{run:?}: {} strays of {strays}",
-            counted.strays
-        );
+        let found = counted.strays;
+        ensure!(found == strays, "{run:?}: {found} strays of {strays}");
         Ok((counted, photons))
     }
 }

@@ -45,7 +45,6 @@ fn outward(count: u64, times: u64, probability: f64) -> f64 {
     sum.min(1.0)
 }
 
-#[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
 fn real(count: u64) -> f64 {
     count as f64
 }

@@ -85,21 +85,18 @@ impl Detections {
     /// Mean laser cycles to an event near the target, expired exposures and
     /// those with a false alarm included.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)]
     pub fn cycles_to_event(&self) -> f64 {
         self.cycles as f64 / self.near as f64
     }
 
     /// Root mean square depth error of the events near the target, in bins.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)]
     pub fn depth_error_bins(&self) -> f64 {
         (self.squared_errors as f64 / self.near as f64).sqrt() / 256.0
     }
 
     /// Exposures with an event near the target, of all.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)]
     pub fn detected(&self) -> f64 {
         self.near as f64 / self.exposures as f64
     }

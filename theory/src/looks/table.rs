@@ -231,7 +231,6 @@ impl Table {
         Ok(table)
     }
 
-    #[allow(clippy::cast_precision_loss, reason = "some ten thousand exposures")]
     fn add(&mut self, row: Row) -> Result<()> {
         let mean = FIRST_MEANS.iter().position(|&mean| mean == row.first_mean);
         let first = FIRSTS.iter().position(|&first| first == row.first);

@@ -38,10 +38,7 @@ pub fn of_image(path: &Path) -> Result<u64> {
     let table = file.section_by_name(".vector_table");
     let table = table.context("no vector table in the image")?;
     let (vectors, _) = table.data()?.as_chunks();
-    let vectors: Vec<u32> = vectors
-        .iter()
-        .map(|word| u32::from_le_bytes(*word))
-        .collect();
+    let vectors = vectors.iter().map(|word| u32::from_le_bytes(*word));
     let mut needs = Needs {
         functions: functions(&file)?,
         known: BTreeMap::new(),
@@ -50,7 +47,7 @@ pub fn of_image(path: &Path) -> Result<u64> {
     needs.resolve_defmt_rtt();
     let mut bound = 0;
     let mut handlers = 0;
-    for (index, &vector) in vectors.iter().enumerate().skip(1) {
+    for (index, vector) in vectors.enumerate().skip(1) {
         // Reserved entries are 0.
         if vector == 0 {
             continue;
@@ -168,10 +165,8 @@ fn functions(file: &object::File) -> Result<BTreeMap<u32, Function>> {
         }
         let start = u32::try_from(section.address())?;
         let (halfwords, _) = section.data()?.as_chunks();
-        let halfwords: Vec<u16> = halfwords
-            .iter()
-            .map(|pair| u16::from_le_bytes(*pair))
-            .collect();
+        let halfwords = halfwords.iter().map(|pair| u16::from_le_bytes(*pair));
+        let halfwords: Vec<u16> = halfwords.collect();
         let end = start + 2 * u32::try_from(halfwords.len())?;
         for (&address, &(name, size)) in names.range(start..end) {
             let next = names.range(address + 1..end).next();

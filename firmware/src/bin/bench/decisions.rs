@@ -2,14 +2,14 @@
 //! whole from elsewhere.
 
 use crate::counter::{Counter, Operation};
-use crate::report::Report;
+use crate::report;
 use crate::scene::{CYCLES, EXPOSURES, State};
 use crate::ways::{kept, look, whole};
 
 const WITH_GATE: &str = "kept peak; no event; gate";
 
 /// Measures all.
-pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
+pub fn run(counter: &Counter, state: &mut State) {
     let rows: [(&str, Operation, bool); 6] = [
         ("kept peak; no event", kept, false),
         (WITH_GATE, kept, false),
@@ -33,15 +33,11 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
                 runs += 1;
             }
         }
-        report.line("decision", variant, total, runs);
+        report::line("decision", variant, total, runs);
     }
     state.late_background();
-    report.line(
-        "decision",
-        "kept peak; slowest no event",
-        counter.measure(kept, state, 0),
-        1,
-    );
+    let slowest = counter.measure(kept, state, 0);
+    report::line("decision", "kept peak; slowest no event", slowest, 1);
 }
 
 fn fires(state: &State) -> bool {

@@ -27,7 +27,6 @@ use semihosting::println;
 use semihosting::process::ExitCode;
 
 use counter::Counter;
-use report::Report;
 use scene::State;
 
 #[entry]
@@ -40,12 +39,11 @@ fn main() -> ! {
         println!("the counter does not count instructions: see `cargo xtask bench`");
         ExitCode::FAILURE.exit_process()
     };
-    let mut report = Report;
-    operations::run(&mut report, &counter, &mut state);
-    decisions::run(&mut report, &counter, &mut state);
-    windows::run(&mut report, &counter, &mut state);
-    products::run(&mut report, &counter, &mut state);
-    roots::run(&mut report, &counter, &mut state);
+    operations::run(&counter, &mut state);
+    decisions::run(&counter, &mut state);
+    windows::run(&counter, &mut state);
+    products::run(&counter, &mut state);
+    roots::run(&counter, &mut state);
     ExitCode::SUCCESS.exit_process()
 }
 

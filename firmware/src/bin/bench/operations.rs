@@ -4,12 +4,12 @@ use dtof_core::fixed::types::U24F8;
 use dtof_core::{LaserCycle, Look, centroid};
 
 use crate::counter::{Counter, Operation};
-use crate::report::Report;
+use crate::report;
 use crate::scene::{CYCLES, EXPOSURES, PHOTONS, PHOTONS_A_CYCLE, State};
 use crate::ways::{add_batch, clear, count_batch, exposure, look, pack};
 
 /// Measures all.
-pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
+pub fn run(counter: &Counter, state: &mut State) {
     let photons = EXPOSURES * PHOTONS;
     let mut total = 0;
     for number in 0..EXPOSURES {
@@ -18,7 +18,7 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
             total += counter.measure(count, state, index);
         }
     }
-    report.line("photon", "AsyncPixel::count", total, photons);
+    report::line("photon", "AsyncPixel::count", total, photons);
     let of_photons: [(&str, Operation, Prepare); 3] = [
         ("AsyncPixel::count_batch", count_batch, empty),
         ("AsyncPixel::count_batch; gate", count_batch, gated),
@@ -26,7 +26,7 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
     ];
     for (variant, way, prepare) in of_photons {
         let total = exposures(counter, state, way, prepare);
-        report.line("photon", variant, total, photons);
+        report::line("photon", variant, total, photons);
     }
     let rows: [(&str, &str, Operation, Prepare); 7] = [
         ("frame", "Histogram::add_frame", add_frame, frame),
@@ -39,12 +39,12 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
     ];
     for (operation, variant, way, prepare) in rows {
         let total = exposures(counter, state, way, prepare);
-        report.line(operation, variant, total, EXPOSURES);
+        report::line(operation, variant, total, EXPOSURES);
     }
 }
 
 /// All exposures together.
-fn exposures(counter: &Counter, state: &mut State, way: Operation, prepare: Prepare) -> u32 {
+pub fn exposures(counter: &Counter, state: &mut State, way: Operation, prepare: Prepare) -> u32 {
     let mut total = 0;
     for number in 0..EXPOSURES {
         prepare(state, number);
@@ -54,7 +54,7 @@ fn exposures(counter: &Counter, state: &mut State, way: Operation, prepare: Prep
 }
 
 /// Brings the state to where the operation begins.
-type Prepare = fn(&mut State, u32);
+pub type Prepare = fn(&mut State, u32);
 
 fn empty(state: &mut State, number: u32) {
     state.empty(number, true);
@@ -65,7 +65,7 @@ fn gated(state: &mut State, number: u32) {
     state.config = state.gated;
 }
 
-fn with_target(state: &mut State, number: u32) {
+pub fn with_target(state: &mut State, number: u32) {
     state.counted(number, true);
 }
 
@@ -74,7 +74,7 @@ fn frame(state: &mut State, number: u32) {
     state.histogram.clear();
 }
 
-fn with_event(state: &mut State, number: u32) {
+pub fn with_event(state: &mut State, number: u32) {
     state.target(number);
 }
 
@@ -92,9 +92,8 @@ extern "C" fn count(state: &mut State, index: u32) -> u32 {
 }
 
 extern "C" fn add_frame(state: &mut State, _: u32) -> u32 {
-    state
-        .histogram
-        .add_frame(&state.foreign, state.config.gate());
+    let gate = state.config.gate();
+    state.histogram.add_frame(&state.foreign, gate);
     0
 }
 

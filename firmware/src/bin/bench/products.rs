@@ -5,11 +5,12 @@ use core::hint::black_box;
 use dtof_core::fixed::types::I24F8;
 
 use crate::counter::{Counter, Operation};
-use crate::report::Report;
+use crate::operations::{exposures, with_event};
+use crate::report;
 use crate::scene::{EXPOSURES, State};
 
 /// Measures all, an event of each exposure with a target.
-pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
+pub fn run(counter: &Counter, state: &mut State) {
     let rows: [(&str, Operation); 6] = [
         ("running mean of 3", mean_of_3),
         ("running mean of 10", mean_of_10),
@@ -22,13 +23,9 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
     for (variant, way) in rows {
         let of_change = variant.ends_with("word");
         state.dynamic_depth = if of_change { moving } else { still };
-        let mut total = 0;
-        for number in 0..EXPOSURES {
-            // The exposures have their targets at different ranges.
-            state.target(number);
-            total += counter.measure(way, state, number);
-        }
-        report.line("product", variant, total, EXPOSURES);
+        // The exposures have their targets at different ranges.
+        let total = exposures(counter, state, way, with_event);
+        report::line("product", variant, total, EXPOSURES);
     }
 }
 

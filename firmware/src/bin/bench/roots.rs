@@ -6,13 +6,13 @@ use dtof_core::isqrt;
 
 use crate::State;
 use crate::counter::{Counter, Operation};
-use crate::report::Report;
+use crate::report;
 
 /// Every number of 10 bits.
 const VALUES: u32 = 1024;
 
 /// Measures all.
-pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
+pub fn run(counter: &Counter, state: &mut State) {
     let ways: [(&str, Operation); 4] = [
         ("isqrt::<5> out of line", trial_square),
         ("core u32::isqrt out of line", of_core),
@@ -21,12 +21,12 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
     ];
     for (name, way) in ways {
         let total = (0..VALUES).map(|value| counter.measure(way, state, value));
-        report.line("root", name, total.sum(), VALUES);
+        report::line("root", name, total.sum(), VALUES);
     }
     // The same loop without the root takes the rest.
     let with_root = counter.measure(inlined, state, VALUES);
     let without = counter.measure(no_root, state, VALUES);
-    report.line("root", "isqrt::<5> inlined", with_root - without, VALUES);
+    report::line("root", "isqrt::<5> inlined", with_root - without, VALUES);
 }
 
 extern "C" fn trial_square(_: &mut State, value: u32) -> u32 {

@@ -95,12 +95,8 @@ impl State {
         gate: RangeGate<BINS>,
     ) -> Result<PixelConfig<BINS>, ConfigError> {
         let rule = PaperRule::new(const { U8F8::lit("4") }, Count::saturating(minimum));
-        PixelConfig::with_rule(rule)
-            .x(4)
-            .l1(l1)
-            .l2(l2)
-            .gate(gate)
-            .build()
+        let config = PixelConfig::with_rule(rule).x(4).l1(l1).l2(l2);
+        config.gate(gate).build()
     }
 
     /// The photons of exposure `number`, about six a laser cycle, and empty pixels

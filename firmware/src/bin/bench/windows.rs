@@ -7,7 +7,8 @@ use dtof_core::{
 };
 
 use crate::counter::{Counter, Operation};
-use crate::report::Report;
+use crate::operations::{exposures, with_target};
+use crate::report;
 use crate::scene::{EXPOSURES, State};
 use crate::ways::offset;
 
@@ -27,9 +28,8 @@ const PULSES: [(U8F8, &str); 4] = [
 ];
 
 /// Measures all.
-pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
+pub fn run(counter: &Counter, state: &mut State) {
     undecided(
-        report,
         counter,
         state,
         "average; no event",
@@ -39,7 +39,7 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
     for (width, variant) in RULES {
         if let Some(rule) = window(width) {
             state.window = rule;
-            undecided(report, counter, state, variant, decide, fires);
+            undecided(counter, state, variant, decide, fires);
         }
     }
     let Some(window) = window(3) else {
@@ -51,16 +51,12 @@ pub fn run(report: &mut Report, counter: &Counter, state: &mut State) {
         (AnyRule::from(window), "any rule: window of 3; no event"),
     ] {
         state.any_rule = rule;
-        undecided(report, counter, state, variant, decide_by_any, any_fires);
+        undecided(counter, state, variant, decide_by_any, any_fires);
     }
     for (sigma, variant) in PULSES {
         state.estimator = DepthEstimator::for_pulse(sigma);
-        let mut total = 0;
-        for number in 0..EXPOSURES {
-            state.counted(number, true);
-            total += counter.measure(estimate, state, 0);
-        }
-        report.line("depth", variant, total, EXPOSURES);
+        let total = exposures(counter, state, estimate, with_target);
+        report::line("depth", variant, total, EXPOSURES);
     }
 }
 
@@ -71,7 +67,6 @@ fn window(width: u8) -> Option<WindowRule> {
 
 /// Measures decisions without an event.
 fn undecided(
-    report: &mut Report,
     counter: &Counter,
     state: &mut State,
     variant: &str,
@@ -86,7 +81,7 @@ fn undecided(
             runs += 1;
         }
     }
-    report.line("decision", variant, total, runs);
+    report::line("decision", variant, total, runs);
 }
 
 #[inline(always)]

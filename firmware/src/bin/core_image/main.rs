@@ -25,19 +25,17 @@ use core::fmt::Write;
 use core::panic::PanicInfo;
 use core::ptr;
 
-use dtof_core::fixed::types::U16F16;
 use dtof_core::{
     AerDecoder, AerEncoder, AerWord, AnyRule, AsyncPixel, BinIndex, BinPosition, ComparatorTree,
     Count, Count10, Count16, Count24, CounterWidth, DetectionRule, DynamicDepthConfig,
-    DynamicDepthPixel, Flags, Histogram, Peak, RangeGate, RangeScale, Reference, Reflectivity,
-    RunningMean, Statistics, SubBinOffset, Threshold, centroid, detect, isqrt, quadrant_background,
-    z_for,
+    DynamicDepthPixel, Flags, Histogram, Peak, RangeGate, Reference, Reflectivity, RunningMean,
+    Statistics, SubBinOffset, Threshold, centroid, detect, isqrt, quadrant_background, z_for,
 };
 
 use values::{
     Link, address, alpha, average_rule, background_level, bin, byte, change, count, cycle,
-    distance, double, estimator, event, flags, gate, half, keep, millimetres, more, position, rule,
-    settings, some, values, window_rule, word,
+    distance, double, estimator, event, flags, gate, half, keep, millimetres, more, or_text,
+    position, rule, scale, settings, some, values, window_rule, word,
 };
 
 #[allow(unsafe_code, reason = "the linker knows the entry by this name")]
@@ -90,15 +88,10 @@ fn roots() {
 
 #[inline(never)]
 fn ranges() {
-    match RangeScale::new(U16F16::from_bits(word()), millimetres()) {
-        Ok(scale) => {
-            keep((scale.range(position()), scale.range(event().position())));
-            keep((
-                scale.distance(word().cast_signed()),
-                scale.bins_of(distance()),
-            ));
-        }
-        Err(error) => keep(error),
+    if let Some(scale) = scale() {
+        keep((scale.range(position()), scale.range(event().position())));
+        keep(scale.distance(word().cast_signed()));
+        keep(scale.bins_of(distance()));
     }
 }
 
@@ -141,12 +134,9 @@ fn products_of<const N: usize>() {
     } else {
         Reference::Reported
     };
-    let Ok(scale) = RangeScale::new(U16F16::from_bits(word()), millimetres()) else {
+    let config = scale().map(|scale| DynamicDepthConfig::new(distance(), &scale, reference));
+    let Some(config) = config.and_then(or_text) else {
         return;
-    };
-    let config = match DynamicDepthConfig::new(distance(), &scale, reference) {
-        Ok(config) => config,
-        Err(error) => return keep(error),
     };
     keep((config.threshold(), config.reference()));
     let mut pixel = DynamicDepthPixel::<N>::new();
@@ -167,29 +157,18 @@ fn texts() {
     keep(write!(Link, "{}", bin()));
     keep(write!(Link, "{}", count()));
     keep(write!(Link, "{}", flags()));
-    if let Err(error) = RangeGate::<8>::new(half(), half()) {
-        keep(write!(Link, "{error}"));
-    }
-    if let Err(error) = settings::<8, _>(rule()).build() {
-        keep(write!(Link, "{error}"));
-    }
-    if let Err(error) = RangeScale::new(U16F16::from_bits(word()), millimetres()) {
-        keep(write!(Link, "{error}"));
-    }
-    if let Err(error) = AerDecoder::new().decode(AerWord::from_le_bytes(values(byte))) {
-        keep(write!(Link, "{error}"));
-    }
+    keep(or_text(RangeGate::<8>::new(half(), half())));
+    keep(or_text(settings::<8, _>(rule()).build()));
+    keep(or_text(
+        AerDecoder::new().decode(AerWord::from_le_bytes(values(byte))),
+    ));
 }
 
 #[inline(never)]
 fn gates<const BINS: usize>() {
-    match RangeGate::<BINS>::new(half(), half()) {
-        Ok(gate) => keep((
-            (gate.first(), gate.last(), gate.contains(half())),
-            gate.quadrant_starts(),
-        )),
-        Err(error) => keep(error),
-    }
+    let gate = gate::<BINS>();
+    keep((gate.first(), gate.last(), gate.contains(half())));
+    keep(gate.quadrant_starts());
 }
 
 #[inline(never)]
@@ -229,10 +208,8 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
         }
 
         // Another detection rule may ask about a peak of its own.
-        let peak = Peak {
-            bin: bin(),
-            count: count(),
-        };
+        let (bin, count) = (bin(), count());
+        let peak = Peak { bin, count };
         keep(quadrant_background(histogram.counts(), &gate, peak.bin));
         keep(centroid(&histogram, &gate, peak, background_level()));
         keep(estimator().estimate(&histogram, &gate, peak, background_level()));
@@ -260,11 +237,12 @@ fn pixels<const BINS: usize, W: CounterWidth>() {
 }
 
 fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(rule: R) {
-    let config = match settings::<BINS, R>(rule).build() {
-        Ok(config) if more() => config.with_one_hit_tdc(),
-        Ok(config) => config,
-        Err(error) => return keep(error),
+    let Some(mut config) = or_text(settings::<BINS, R>(rule).build()) else {
+        return;
     };
+    if more() {
+        config = config.with_one_hit_tdc();
+    }
     keep((config.x(), config.l1(), config.l2()));
     keep((*config.gate(), *config.rule(), *config.estimator()));
     keep(config.is_one_hit());

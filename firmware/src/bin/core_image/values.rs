@@ -5,11 +5,11 @@ use core::fmt::{self, Write};
 use core::hint::black_box;
 use core::sync::atomic::AtomicU32;
 
-use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U24F8};
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
     AverageRule, BinIndex, BinPosition, CentredWindow, Count, DepthEstimator, DepthEvent,
     DetectionRule, DynamicDepthEvent, Flags, LaserCycle, PaperRule, PixelAddress, PixelConfig,
-    PixelConfigBuilder, RangeGate, SubBinOffset, WindowRule, whole_background,
+    PixelConfigBuilder, RangeGate, RangeScale, SubBinOffset, WindowRule, whole_background,
 };
 
 /// Valid or not.
@@ -27,6 +27,10 @@ pub fn gate<const BINS: usize>() -> RangeGate<BINS> {
     RangeGate::new(half(), half()).unwrap_or(RangeGate::full())
 }
 
+pub fn scale() -> Option<RangeScale> {
+    or_text(RangeScale::new(U16F16::from_bits(word()), millimetres()))
+}
+
 pub fn rule() -> PaperRule {
     PaperRule::new(alpha(), count())
 }
@@ -36,16 +40,10 @@ pub fn average_rule() -> AverageRule {
 }
 
 pub fn window_rule() -> Option<WindowRule> {
-    match WindowRule::new(byte(), U4F12::from_bits(half()), count()) {
-        Ok(rule) => {
-            keep((rule.width(), rule.z(), rule.minimum_count()));
-            Some(rule)
-        }
-        Err(error) => {
-            keep(write!(Link, "{error}"));
-            None
-        }
-    }
+    let rule = WindowRule::new(byte(), U4F12::from_bits(half()), count());
+    let rule = or_text(rule)?;
+    keep((rule.width(), rule.z(), rule.minimum_count()));
+    Some(rule)
 }
 
 pub fn estimator() -> DepthEstimator {
@@ -172,6 +170,11 @@ pub fn word() -> u32 {
 /// Where values go: all of `value` has to be there, as something may look.
 pub fn keep<T>(value: T) {
     black_box(value);
+}
+
+/// Without an error, which is written out.
+pub fn or_text<T>(result: Result<T, impl fmt::Display>) -> Option<T> {
+    result.map_err(|error| keep(write!(Link, "{error}"))).ok()
 }
 
 /// Takes text, or not.

@@ -25,7 +25,6 @@ pub struct Picture {
 
 /// The maps of a run on an array with these `sides`, whose pixels report what is called
 /// `one` and `several`.
-#[allow(clippy::cast_precision_loss, reason = "a picture")]
 pub fn pictures(maps: &Maps, sides: [&str; 2], [one, several]: [&str; 2]) -> Result<[Picture; 5]> {
     let draw = |name, title: &str, unit, caption, values: Vec<Option<f64>>| {
         let Geometry { columns, rows } = maps.geometry;

@@ -206,10 +206,6 @@ impl Tally {
         }
     }
 
-    #[allow(
-        clippy::cast_precision_loss,
-        reason = "2^53 events are more than any run has"
-    )]
     fn errors(&self, step_mm: f64) -> Errors {
         let right: u64 = self.sizes.iter().sum();
         let false_alarms = self.events - right;

@@ -2,7 +2,7 @@ use super::*;
 use dtof_core::PixelAddress;
 
 use crate::events::events_csv::range_mm;
-use crate::fixtures::{event, scale};
+use crate::events::fixtures::{event, scale};
 use crate::input::source::Geometry;
 
 /// `count` events, one a laser cycle, of four pixels in turn.

@@ -126,19 +126,12 @@ fn claims(part: &Part) -> Vec<Claim> {
     let enough = || fine_backgrounds().filter(|&background| background >= ENOUGH);
     let pass_off = enough()
         .flat_map(|background| ALPHAS.map(|alpha| (background, alpha)))
-        .map(|(background, alpha)| {
-            let of = |rate: fn(Rate, f64, u32) -> f64| rate(Rate::Pass, background, alpha);
-            (of(Rate::gaussian) - of(Rate::exact)).abs()
-        })
+        .map(|(at, alpha)| (Rate::Pass.gaussian(at, alpha) - Rate::Pass.exact(at, alpha)).abs())
         .fold(0.0, f64::max);
-    let times = |background, alpha| {
-        Rate::FalsePositive.exact(background, alpha)
-            / Rate::FalsePositive.gaussian(background, alpha)
-    };
     let false_off = |alpha| {
-        enough()
-            .map(|background| times(background, alpha))
-            .fold(0.0, f64::max)
+        let rate = Rate::FalsePositive;
+        let times = enough().map(|at| rate.exact(at, alpha) / rate.gaussian(at, alpha));
+        times.fold(0.0, f64::max)
     };
     let is_pass_near = pass_off < 0.05;
     let is_false_near = ALPHAS.iter().all(|&alpha| false_off(alpha) < 2.0);
@@ -211,10 +204,7 @@ fn rates(part: &Part, rate: Rate) -> Chart {
         ]);
     }
     let exact = exact_against_simulation(part);
-    let off = |background, alpha| {
-        let of = |of: fn(Rate, f64, u32) -> f64| of(rate, background, alpha);
-        (of(Rate::exact), of(Rate::gaussian))
-    };
+    let off = |at, alpha| (rate.exact(at, alpha), rate.gaussian(at, alpha));
     let (finding, holds, y, printed) = match rate {
         Rate::FalsePositive => {
             let more = |alpha| {
@@ -257,10 +247,8 @@ fn rates(part: &Part, rate: Rate) -> Chart {
 }
 
 fn ratio() -> Chart {
-    let of = |background, alpha| {
-        let of = |rate: fn(Rate, f64, u32) -> f64| rate(Rate::FalsePositive, background, alpha);
-        of(Rate::gaussian) / of(Rate::exact)
-    };
+    let rate = Rate::FalsePositive;
+    let of = |background, alpha| rate.gaussian(background, alpha) / rate.exact(background, alpha);
     let series = ALPHAS.into_iter().map(|alpha| {
         let points = Dot::curve(fine_backgrounds(), |background| of(background, alpha));
         Series::named(format!("α = {alpha}"), pen(alpha), Style::Line, points)

@@ -39,12 +39,10 @@ fn points() -> Vec<Point> {
     ])
 }
 
-fn means_at(point: &Point) -> [f64; super::paper_setting::BINS] {
-    means(point["background"], point["snr"], point["neighbours"] > 0.0)
-}
-
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    let histograms = Histograms::new(means_at(point))?;
+    let with_neighbours = point["neighbours"] > 0.0;
+    let means = means(point["background"], point["snr"], with_neighbours);
+    let histograms = Histograms::new(means)?;
     let (target, _) = target();
     let (mut hits, mut either) = (0, 0);
     for _ in 0..HISTOGRAMS {
@@ -68,6 +66,16 @@ fn exact(means: &[f64]) -> (f64, f64) {
     (hit(target), hit(target) + hit(target + 1))
 }
 
+/// What Eq. 7 says.
+fn printed(background: f64, snr: f64) -> f64 {
+    gaussian(background, snr).hit_probability()
+}
+
+/// The exact form of it.
+fn exact_hit(background: f64, snr: f64) -> f64 {
+    exact(&means(background, snr, false)).0
+}
+
 /// The SNR from which on `hit_rate`, which grows with it, is 99 %.
 fn snr_of_99_percent(hit_rate: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, 2000.0);
@@ -86,8 +94,8 @@ fn snr_of_99_percent(hit_rate: impl Fn(f64) -> f64) -> f64 {
 /// signal of all bins.
 fn snrs_of_99_percent(background: f64) -> [f64; 3] {
     [
-        snr_of_99_percent(|snr| exact(&means(background, snr, false)).0),
-        snr_of_99_percent(|snr| gaussian(background, snr).hit_probability()),
+        snr_of_99_percent(|snr| exact_hit(background, snr)),
+        snr_of_99_percent(|snr| printed(background, snr)),
         snr_of_99_percent(|snr| exact(&means(background, snr, true)).1),
     ]
 }
@@ -119,7 +127,6 @@ fn results(part: &Part) -> Result<Results> {
 }
 
 fn claims(part: &Part) -> Result<Vec<Claim>> {
-    let printed = |background, snr| gaussian(background, snr).hit_probability();
     let found: Vec<Comparison> = BACKGROUNDS
         .iter()
         .map(|&background| comparison(part, &[background], printed))
@@ -129,17 +136,14 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
         texts.join(", ")
     };
     let misses = by_background(&|index| {
-        let Comparison {
-            points,
-            outside,
-            largest,
-        } = found[index];
-        let background = BACKGROUNDS[index];
-        format!("{background}: {outside} of {points} outside, off by up to {largest:.3}")
+        let (background, of) = (BACKGROUNDS[index], found[index]);
+        let (outside, largest) = (of.outside, of.largest);
+        format!(
+            "{background}: {outside} of {} outside, off by up to {largest:.3}",
+            of.points
+        )
     });
-    let exact = comparison(part, &BACKGROUNDS, |background, snr| {
-        exact(&means(background, snr, false)).0
-    });
+    let exact = comparison(part, &BACKGROUNDS, exact_hit);
     let levels = BACKGROUNDS.map(snrs_of_99_percent);
     let of_level = |which: usize| by_background(&|index| format!("{:.1}", levels[index][which]));
     // "Around 18": within 1 of it by Eq. 7, which the paper takes it from.
@@ -201,11 +205,10 @@ fn chart(part: &Part, neighbours: f64) -> Result<Chart> {
                 series(Style::Dashed, line(&|snr| exact(snr).0)),
             ]
         } else {
-            let printed = |snr| gaussian(background, snr).hit_probability();
             vec![
                 series(Style::Dots, dots("hits")),
                 series(Style::Line, line(&|snr| exact(snr).0)),
-                series(Style::Dashed, line(&printed)),
+                series(Style::Dashed, line(&|snr| printed(background, snr))),
             ]
         };
         Panel {
@@ -221,7 +224,6 @@ fn chart(part: &Part, neighbours: f64) -> Result<Chart> {
         let text = "On the edge of two bins either is the highest, each about half of the time";
         (text, near_half)
     } else {
-        let printed = |background, snr| gaussian(background, snr).hit_probability();
         let points = part.at([("neighbours", 0.0), ("background", SHOWN[0])]);
         let is_below = |point: &&PointTally| {
             let share = point.share("hits", "histograms");
@@ -230,9 +232,7 @@ fn chart(part: &Part, neighbours: f64) -> Result<Chart> {
         let below = points.clone().filter(is_below).count();
         let mostly = 2 * below > points.count();
         let many = comparison(part, &SHOWN[2..], printed).largest;
-        let exact = comparison(part, &BACKGROUNDS, |background, snr| {
-            exact(&means(background, snr, false)).0
-        });
+        let exact = comparison(part, &BACKGROUNDS, exact_hit);
         let text = "With few photons the pulse's bin is the highest less often than Eq. 7 says";
         (text, exact.is_chance() && mostly && many < 0.02)
     };

@@ -35,7 +35,7 @@ pub const STUDY: Study = Study {
 };
 
 /// α from 0 to 5 in quarters.
-fn alphas() -> impl Iterator<Item = f64> + Clone {
+fn alphas() -> impl DoubleEndedIterator<Item = f64> {
     (0..=20).map(|step| f64::from(step) / 4.0)
 }
 
@@ -192,12 +192,6 @@ fn is_chance(rises: u32, steps: u32) -> bool {
     binomial::at_least(rises.into(), steps.into(), 0.01) > 1e-3
 }
 
-/// Points from the largest α to the least.
-fn from_the_left(mut points: Vec<Dot>) -> Vec<Dot> {
-    points.reverse();
-    points
-}
-
 fn chart(part: &Part) -> Chart {
     let mut series = Vec::new();
     for (snr, pen) in SNRS.into_iter().zip(STEPS) {
@@ -208,19 +202,15 @@ fn chart(part: &Part) -> Chart {
             let rate = gaussian(BACKGROUND, snr).true_positive_rate(alpha);
             (false_positive_rate(alpha, BACKGROUND_BINS), rate)
         };
+        // From the left: the largest α.
         let line = |of: &dyn Fn(f64) -> (f64, f64)| {
-            let points = alphas().map(of);
-            let points = points.map(|(x, y)| Dot::exact(x, y));
-            from_the_left(points.collect())
+            let points = alphas().rev().map(of);
+            points.map(|(x, y)| Dot::exact(x, y)).collect()
         };
+        let exact = line(&|alpha| exact(snr, alpha));
         series.extend([
             Series::unnamed(pen, Style::Dots, dots.collect()),
-            Series::named(
-                format!("SNR {snr}"),
-                pen,
-                Style::Line,
-                line(&|alpha| exact(snr, alpha)),
-            ),
+            Series::named(format!("SNR {snr}"), pen, Style::Line, exact),
             Series::unnamed(pen, Style::Dashed, line(&printed)),
         ]);
     }

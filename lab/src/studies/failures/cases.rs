@@ -45,16 +45,6 @@ struct Pulse {
     is_surface: bool,
 }
 
-/// What changes in an exposure.
-#[derive(Clone, Copy, Debug)]
-enum Change {
-    Nothing,
-    /// The background, by a factor, after [`CHANGE`] laser cycles.
-    Background(f64),
-    /// The position, by so many bins a laser cycle.
-    Position(f64),
-}
-
 /// A scene.
 #[derive(Clone, Debug)]
 pub struct Case {
@@ -71,7 +61,10 @@ pub struct Case {
     background: f64,
     pulses: Vec<Pulse>,
     effects: Effects,
-    change: Change,
+    /// By what the background is multiplied after [`CHANGE`] laser cycles.
+    change: f64,
+    /// Bins that the surfaces go in a laser cycle.
+    drift: f64,
 }
 
 impl Case {
@@ -85,7 +78,8 @@ impl Case {
             background: BACKGROUND,
             pulses: Vec::new(),
             effects: Effects::default(),
-            change: Change::Nothing,
+            change: 1.0,
+            drift: 0.0,
         }
         .and(SIGNAL, PLACE)
     }
@@ -135,8 +129,13 @@ impl Case {
         self
     }
 
-    fn changing(mut self, change: Change) -> Self {
+    fn changing(mut self, change: f64) -> Self {
         self.change = change;
+        self
+    }
+
+    fn drifting(mut self, drift: f64) -> Self {
+        self.drift = drift;
         self
     }
 
@@ -150,10 +149,7 @@ impl Case {
     /// exposure, in bins from the start of bin 0.
     pub fn surfaces(&self, cycle: u32) -> impl Iterator<Item = f64> {
         let surfaces = self.pulses.iter().filter(|pulse| pulse.is_surface);
-        let moved = match self.change {
-            Change::Position(bins) => bins * f64::from(cycle),
-            _ => 0.0,
-        };
+        let moved = self.drift * f64::from(cycle);
         surfaces.map(move |pulse| pulse.position + moved)
     }
 
@@ -185,6 +181,7 @@ impl Case {
         Ok(CasePixel {
             parts,
             change: self.change,
+            drift: self.drift,
         })
     }
 }
@@ -193,7 +190,8 @@ impl Case {
 /// background.
 pub struct CasePixel {
     parts: Vec<(SimulatedPixel, Rates)>,
-    change: Change,
+    change: f64,
+    drift: f64,
 }
 
 impl CasePixel {
@@ -203,18 +201,12 @@ impl CasePixel {
     /// If the change leaves a rate negative.
     pub fn next_cycle(&mut self, cycle: u32, mut photon: impl FnMut(u16)) -> Result<()> {
         for (part, rates) in &mut self.parts {
-            match self.change {
-                Change::Nothing => {}
-                Change::Background(factor) if cycle == CHANGE + 1 => part.set_rates(&Rates {
-                    background: rates.background * factor,
-                    ..*rates
-                })?,
-                Change::Background(_) => {}
-                Change::Position(bins) => part.set_rates(&Rates {
-                    position: rates.position + bins * f64::from(cycle),
-                    ..*rates
-                })?,
-            }
+            let factor = if cycle > CHANGE { self.change } else { 1.0 };
+            part.set_rates(&Rates {
+                background: rates.background * factor,
+                position: rates.position + self.drift * f64::from(cycle),
+                ..*rates
+            })?;
             part.next_cycle(&mut photon);
         }
         Ok(())
@@ -307,17 +299,17 @@ pub fn cases() -> Result<Vec<Case>> {
         Case::new("weak signal").only(WEAK, PLACE),
         Case::new("weak signal, background × 4 at 200")
             .only(WEAK, PLACE)
-            .changing(Change::Background(4.0)),
+            .changing(4.0),
         Case::new("weak signal, background / 4 at 200")
             .only(WEAK, PLACE)
-            .changing(Change::Background(0.25)),
+            .changing(0.25),
         Case::new("drift of 5 bins in 1000 laser cycles")
-            .changing(Change::Position(0.005))
+            .drifting(0.005)
             .advised("a rule that fires sooner")
             .silent_as(moved),
         Case::new("weak signal, the same drift")
             .only(WEAK, PLACE)
-            .changing(Change::Position(0.005))
+            .drifting(0.005)
             .advised("more light or a shorter L2, so that exposures are shorter")
             .silent_as(smeared),
     ]);

@@ -124,6 +124,7 @@ pub fn outcomes(part: &Part) -> Result<Vec<(Case, Vec<Outcome>)>> {
     };
     Ok(cases()?.into_iter().zip(part.points()).map(of).collect())
 }
+
 fn outcome(case: &Case, point: &PointTally, plain: &PointTally, method: Method) -> Outcome {
     let name = method.name();
     let count = |what: &str| point.count(&format!("{name} {what}"));

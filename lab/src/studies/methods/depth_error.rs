@@ -11,8 +11,7 @@ use dtof_core::{
     SubBinOffset, WindowRule, quadrant_background, whole_background,
 };
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
-use dtof_draw::palette;
-use dtof_draw::palette::Pen;
+use dtof_draw::palette::{self, Pen};
 use dtof_theory::bounds::cramer_rao::Pulse;
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::rates::Rates;

@@ -109,8 +109,7 @@ impl Method {
         match self {
             Self::Paper => "the paper's rule".to_owned(),
             Self::Average => "average of all bins".to_owned(),
-            Self::Window(1) => "window of 1 bin".to_owned(),
-            Self::Window(width) => format!("window of {width} bins"),
+            Self::Window(_) => format!("window of {}", self.short()),
             Self::Oracle => "likelihood ratio".to_owned(),
         }
     }

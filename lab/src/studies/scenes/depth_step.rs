@@ -1,8 +1,7 @@
 //! How soon a pixel reports a surface that is suddenly there, and what it reports
 //! of an exposure that saw two (section III-D).
 
-use super::mixed;
-use super::mixed::{MARGIN, add_pair, excess, is_sharp, neither};
+use super::mixed::{self, MARGIN, add_pair, excess, is_sharp, neither};
 use super::one_pixel::{CODES, PER_BIN, Reading, SENSORS, in_parts, pen, phases, watch_step};
 use crate::sweep::mean::{Measured, add, add_value};
 use crate::sweep::results::{Claim, Figure, Results, Verdict};
@@ -157,14 +156,10 @@ fn results(part: &Part) -> Result<Results> {
             Figure::new("step-reaction", &reaction)?,
             Figure::new("step-blur", &blur)?,
         ],
-        claims: claims(part)?,
+        claims: vec![latency_claim(part)?, blur_claim(part)?],
         values: [("steps", grouped(STEPS * part.seed_count()))].into(),
         ..Results::default()
     })
-}
-
-fn claims(part: &Part) -> Result<Vec<Claim>> {
-    Ok(vec![latency_claim(part)?, blur_claim(part)?])
 }
 
 /// What there are of `what` at every signal of a step, from dim to bright.

@@ -1,8 +1,7 @@
 //! A fan at 120 rpm: how many exposures an edge passes, and what they report
 //! (sections III-D and IV-C, transverse motion).
 
-use super::mixed;
-use super::mixed::{add_pair, excess, is_sharp, neither};
+use super::mixed::{self, add_pair, excess, is_sharp, neither};
 use super::one_pixel::{CODES, SENSORS, in_parts, phases, prototype, watch, watch_step};
 use crate::sweep::mean::{Measured, add};
 use crate::sweep::results::{Claim, Figure, Results, Verdict};
@@ -161,11 +160,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             pixel.next_cycle(photon);
             Ok(())
         })?;
-        let range = |cycle| {
-            scene
-                .truth(address, start + cycle)
-                .map(|view| view.range_mm)
-        };
+        let range = |cycle| Some(scene.truth(address, start + cycle)?.range_mm);
         for (sensor, readings) in SENSORS.into_iter().zip(&readings) {
             for reading in readings {
                 let mixed = range(reading.first) != range(reading.last);
@@ -186,6 +181,7 @@ struct Blur {
     /// Exposures that an edge passes.
     mixed: Measured,
 }
+
 fn blur(point: &PointTally, sensor: &str) -> Blur {
     let count = |what: &str| point.count(&format!("{sensor} {what}"));
     let (mixed, clean) = (count("mixed"), count("clean"));
@@ -232,16 +228,12 @@ fn results(part: &Part) -> Result<Results> {
         columns: 1,
         panels: vec![Panel::only(series)],
     };
-    let events = blur(part.one([("laser_rate_mhz", RATES_MHZ[0])])?, SENSORS[0]);
-    let frames = blur(part.one([("laser_rate_mhz", RATES_MHZ[0])])?, SENSORS[4]);
+    let prototype = part.one([("laser_rate_mhz", RATES_MHZ[0])])?;
+    let readings = |sensor: usize| grouped(blur(prototype, SENSORS[sensor]).readings);
     Ok(Results {
         figures: vec![Figure::new("fan-mixed", &chart)?],
         claims: vec![claim(part)?],
-        values: [
-            ("events", grouped(events.readings)),
-            ("frames", grouped(frames.readings)),
-        ]
-        .into(),
+        values: [("events", readings(0)), ("frames", readings(4))].into(),
         ..Results::default()
     })
 }

@@ -28,8 +28,7 @@ use dtof_core::{
     PixelConfig, Statistics,
 };
 use dtof_draw::chart::{Axis, Chart, Panel, Point as Dot, Series, Style};
-use dtof_draw::palette;
-use dtof_draw::palette::STEPS;
+use dtof_draw::palette::{self, STEPS};
 use dtof_theory::rates::bin_share;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
@@ -255,15 +254,18 @@ fn figures(part: &Part) -> Result<Vec<Figure>> {
     let all_fall = errors.iter().all(falls);
     // α = 8 at the shortest exposure, α = 4 at the longest.
     let by_alpha = y(&by_l1[3], 0) < y(&by_l1[1], L1S.len() - 1);
-    let chart = |text: &str, holds: bool, x: &str, y, series: Vec<Series>| Chart {
-        finding: text.to_owned(),
-        holds,
-        note: "Bars hold 99 %. Dots with fewer than 50 events are left out.".to_owned(),
-        x: Axis::logarithmic(x),
-        y,
-        key: Vec::new(),
-        columns: 1,
-        panels: vec![Panel::only(series)],
+    let figure = |name, text: &str, holds: bool, x: &str, y, series: Vec<Series>| {
+        let chart = Chart {
+            finding: text.to_owned(),
+            holds,
+            note: "Bars hold 99 %. Dots with fewer than 50 events are left out.".to_owned(),
+            x: Axis::logarithmic(x),
+            y,
+            key: Vec::new(),
+            columns: 1,
+            panels: vec![Panel::only(series)],
+        };
+        Figure::new(name, &chart)
     };
     let metres = |at: &str| {
         Axis::linear(format!(
@@ -273,35 +275,29 @@ fn figures(part: &Part) -> Result<Vec<Figure>> {
     let snr = "signal over background, A/B";
     Ok(vec![
         Figure::new("hyperparameters-background", &background)?,
-        Figure::new(
+        figure(
             "hyperparameters-false",
-            &chart(
-                "A larger α suppresses false alarms at every signal",
-                suppressed,
-                snr,
-                Axis::linear("events that are false alarms, % (L1 = 20)").percent(),
-                false_alarms.into(),
-            ),
+            "A larger α suppresses false alarms at every signal",
+            suppressed,
+            snr,
+            Axis::linear("events that are false alarms, % (L1 = 20)").percent(),
+            false_alarms.into(),
         )?,
-        Figure::new(
+        figure(
             "hyperparameters-error",
-            &chart(
-                "A stronger signal lowers the depth error at every L1",
-                all_fall,
-                snr,
-                metres("α = 4"),
-                errors.into(),
-            ),
+            "A stronger signal lowers the depth error at every L1",
+            all_fall,
+            snr,
+            metres("α = 4"),
+            errors.into(),
         )?,
-        Figure::new(
+        figure(
             "hyperparameters-alpha",
-            &chart(
-                "A larger α lowers the depth error more than a larger L1",
-                by_alpha,
-                "L1, laser cycles",
-                metres("A/B = 5"),
-                by_l1.into(),
-            ),
+            "A larger α lowers the depth error more than a larger L1",
+            by_alpha,
+            "L1, laser cycles",
+            metres("A/B = 5"),
+            by_l1.into(),
         )?,
     ])
 }

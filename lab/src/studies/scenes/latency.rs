@@ -111,6 +111,7 @@ fn share_by(point: &PointTally, what: &str, by: u64) -> Measured {
     let all = point.count("latency values") + point.count("events cut off");
     Measured::share(point.count(&format!("{what} by {by}")), all)
 }
+
 fn results(part: &Part) -> Result<Results> {
     let points = || part.at([("l1", 40.0), ("background", 0.02)]);
     let series = points().zip(STEPS).map(|(point, pen)| {

@@ -9,8 +9,7 @@ use dtof_core::{
     AnyRule, AsyncPixel, BinPosition, DepthEstimator, DepthEvent, LaserCycle, PixelAddress,
     PixelConfig, RangeGate, Statistics,
 };
-use dtof_draw::palette;
-use dtof_draw::palette::Pen;
+use dtof_draw::palette::{self, Pen};
 use dtof_theory::rates::Rates;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;

@@ -58,6 +58,7 @@ fn points() -> Vec<Point> {
 fn bins_per_cycle(point: &Point) -> f64 {
     point["metres_per_second"] / point["laser_rate_mhz"] / 1000.0 / MM_PER_BIN
 }
+
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let config = prototype(40)?;
     let speed = bins_per_cycle(point);
@@ -109,6 +110,7 @@ struct Lag {
     /// What the surface goes in a mean exposure, in millimetres.
     path_mm: f64,
 }
+
 fn lag(point: &PointTally, sensor: &str) -> Lag {
     let count = |what: &str| point.count(&format!("{sensor} {what}")) as f64;
     let mean = Measured::mean(point, sensor);

@@ -150,6 +150,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     add_scene(&mut tally, &scene, &addresses, &pixels);
     Ok(tally)
 }
+
 fn mean_of_last(positions: &[i64], most: usize) -> f64 {
     let last = &positions[positions.len().saturating_sub(most)..];
     last.iter().sum::<i64>() as f64 / last.len() as f64
@@ -221,17 +222,11 @@ fn add_scene(tally: &mut Tally, scene: &Scene, addresses: &[PixelAddress], pixel
     let signals = addresses
         .iter()
         .map(|&address| scene.rates(address, 0).signal);
-    let signals: Vec<f64> = signals.collect();
-    let events: Vec<f64> = pixels
-        .iter()
-        .map(|pixel| pixel.positions.len() as f64)
-        .collect();
+    let events = pixels.iter().map(|pixel| pixel.positions.len() as f64);
+    let (signals, events): (Vec<f64>, Vec<f64>) = (signals.collect(), events.collect());
     let correlation = rank_correlation(&signals, &events).unwrap_or_default();
-    add_value(
-        tally,
-        "rank correlation",
-        (correlation * MILLION).round() as i64,
-    );
+    let millionths = |value: f64| (value * MILLION).round() as i64;
+    add_value(tally, "rank correlation", millionths(correlation));
     let estimates: [fn(&Pixel) -> f64; 2] = [
         |pixel| pixel.reflectivity.events().into(),
         |pixel| pixel.reflectivity.signal().to_num(),
@@ -255,15 +250,12 @@ fn add_scene(tally: &mut Tally, scene: &Scene, addresses: &[PixelAddress], pixel
             })
             .collect();
         let (scale, error) = common_scale(ratios.iter().map(|(_, ratio)| *ratio));
-        add_value(tally, name, (error * MILLION).round() as i64);
+        add_value(tally, name, millionths(error));
         // Black pixels have no say in the scale.
         let seen = ratios.iter().map(|(_, ratio)| *ratio);
         let (_, error) = common_scale(seen.filter(|&ratio| ratio > 0.0));
-        add_value(
-            tally,
-            &format!("{name}, with an event"),
-            (error * MILLION).round() as i64,
-        );
+        let with_event = format!("{name}, with an event");
+        add_value(tally, &with_event, millionths(error));
         for (surface, ratio) in ratios {
             let name = format!("{}, {name}", scene.surfaces[surface].name);
             add_value(tally, &name, (ratio * scale * 1000.0).round() as i64);

@@ -2,7 +2,7 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use super::*;
-use crate::fixtures::{event, scale};
+use crate::events::fixtures::{event, scale};
 
 /// `text` without colours.
 fn characters(text: &str) -> String {

@@ -64,6 +64,7 @@ impl Outcome {
             (high < 0.0).then_some(1)
         }
     }
+
     fn new(scene: (f64, f64), pixel: &Pixel, without: &[&PointTally], with: &PointTally) -> Self {
         let (sigma, background) = scene;
         let name = pixel.name();

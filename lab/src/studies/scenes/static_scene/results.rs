@@ -167,6 +167,7 @@ pub fn results(part: &Part) -> Result<Results> {
         ..Results::default()
     })
 }
+
 /// For each scene what `text` makes of it.
 fn of_each(part: &Part, text: impl FnMut(&PointTally) -> Result<String>) -> Result<String> {
     let texts: Result<Vec<String>> = part.points().iter().map(text).collect();
