@@ -26,7 +26,8 @@
 //! ```
 //!
 //! Source: X, L1 and L2 are those of the flow chart in the paper's section II-B; X of 4
-//! and L1 of 40 those of its FPGA (section IV).
+//! and L1 of 40 those of its FPGA (section IV-A, Table I). α = 4, five photons and L2 = 2000
+//! are our defaults.
 
 use fixed::types::U8F8;
 

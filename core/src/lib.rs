@@ -91,7 +91,7 @@
 //! - **Centroid**: the centre of the photons of some bins.
 //! - **Dead time**, **pile-up**: the TDC takes one photon and misses those behind it.
 //! - **Dynamic depth**: events of changes of depth only, with a polarity.
-//! - **AER**: address-event representation; REQ and ACK are its handshake.
+//! - **AER**: address-event representation; REQ and ACK are its handshake, REQ the paper's.
 
 #![no_std]
 #![forbid(unsafe_code)]

@@ -31,8 +31,8 @@
 //! Cost: 64 bytes beside the counters (a compile-time check). On a Cortex-M4 and 128
 //! bins 10 instructions a photon in a batch, 130 a look, 110 to clear and re-arm.
 //!
-//! Source: the flow chart of the paper's section II-B; the slot is its handshake of REQ
-//! and ACK.
+//! Source: the flow chart of the paper's section II-B. The slot is its REQ (section IV-A);
+//! ACK is ours, as is what happens while the link is busy.
 
 use crate::config::PixelConfig;
 use crate::counter::{Count10, CounterWidth, PhotonCount};

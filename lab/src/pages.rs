@@ -116,6 +116,7 @@ pub fn documents(
         } in &results.claims
         {
             values.set(format!("{}.{name}", study.name), verdict);
+            values.set(format!("{}.{name}.answer", study.name), verdict.answer());
             values.set(format!("{}.{name}.here", study.name), here);
             ensure!(
                 CLAIMS.contains(&format!("{{{}.{name}.here}}", study.name)),

@@ -24,7 +24,8 @@
 //! Cost on a Cortex-M4: 68 instructions. It suits pulses of up to 0.5 bins (σ); wider
 //! ones are drawn to the middle of the peak bin.
 //!
-//! Source: the paper's section III-A (CMM).
+//! Source: the paper's section III-A names the centre of mass around the peak (CMM). That
+//! it is of three bins, and less the background, is our choice.
 
 use fixed::types::U24F8;
 

@@ -19,7 +19,8 @@
 //!
 //! Cost: one pass over half of the gated bins.
 //!
-//! Source: the paper's section IV-B.
+//! Source: the paper's section IV-B, which has it in place of the average of all bins:
+//! [`AverageRule`](crate::AverageRule).
 
 use crate::counter::PhotonCount;
 use crate::gate::RangeGate;

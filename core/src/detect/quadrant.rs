@@ -1,4 +1,4 @@
-//! The paper's rule: the peak bin against the smaller of two quadrant maxima.
+//! The rule of the paper's FPGA: the peak bin against the smaller of two quadrant maxima.
 //!
 //! The peak is a detection if it exceeds `background + α·√background`, the
 //! [`Threshold`] of the [`quadrant_background`]. It is a CFAR test whose reference is a
@@ -23,7 +23,8 @@
 //! [`Threshold::lowest_background`] says which background would hold the peak back, and
 //! the search ends at the first count that reaches it.
 //!
-//! Source: the paper's section IV-B and Eq. 5.
+//! Source: the paper's section IV-B and Eq. 5. Its section III, with 8 bins, most likely
+//! took the average of all bins: [`AverageRule`](crate::AverageRule).
 
 use fixed::types::{U8F8, U24F8};
 

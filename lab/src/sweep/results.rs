@@ -98,6 +98,17 @@ impl Verdict {
             _ => Self::Refuted,
         }
     }
+
+    /// The same as an answer to a question.
+    #[must_use]
+    pub const fn answer(self) -> &'static str {
+        match self {
+            Self::Agrees => "yes",
+            Self::Differs => "in part",
+            Self::Refuted => "no",
+            Self::NotDecided => "not decided",
+        }
+    }
 }
 
 impl fmt::Display for Verdict {

@@ -13,6 +13,8 @@ use rand_pcg::Pcg64;
 
 /// Mean background counts a bin (N·B): the paper's B = 0.05 at N = 2 to 2000.
 const BACKGROUNDS: [f64; 5] = [0.1, 1.0, 10.0, 30.0, 100.0];
+/// Counts a bin from which on the paper takes them as Gaussian.
+const ENOUGH: f64 = 30.0;
 /// Histograms of a trial.
 const HISTOGRAMS: u64 = 1000;
 
@@ -148,15 +150,18 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
     let of_level = |which: usize| by_background(&|index| format!("{:.1}", levels[index][which]));
     // "Around 18": within 1 of it by Eq. 7, which the paper takes it from.
     let near_18 = levels.map(|[_, printed, _]| (printed - 18.0).abs() <= 1.0);
-    // The last of the backgrounds is the largest, where a Gaussian does best.
-    let best = found.last().context("no backgrounds")?;
+    // Where the paper's own condition for Gaussian counts holds.
+    let enough = BACKGROUNDS.iter().zip(&found);
+    let enough = enough.filter(|&(&background, _)| background >= ENOUGH);
+    let most = enough.map(|(_, of)| of.largest).fold(0.0, f64::max);
     Ok(vec![
         Claim::new(
             "eq7",
-            format!("99 % intervals by background counts a bin: {misses}"),
-            // Within the interval everywhere; or at least to what can be told apart
-            // on a plot, a fiftieth, at the largest background.
-            Verdict::graded(found.iter().all(Comparison::is_chance), best.largest < 0.02),
+            format!(
+                "off by up to {most:.3} from 30 background counts a bin on; 99 % intervals by background: {misses}"
+            ),
+            // To what can be told apart on a plot: a fiftieth.
+            Verdict::graded(most < 0.02, found.iter().any(|of| of.largest < 0.02)),
         ),
         Claim::new(
             "poisson",
