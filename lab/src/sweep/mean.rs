@@ -4,10 +4,12 @@
 //! worked out in 128 bits, so that nothing cancels: a mean and a variance are
 //! rounded once, to a part in 2^52.
 
-use super::results::Z_99;
 use super::{PointTally, Tally};
 use dtof_draw::chart;
 use dtof_theory::counts::binomial;
+
+/// Standard deviations of an interval that holds 99 %.
+pub const Z_99: f64 = 2.575_829_303_548_9;
 
 /// Adds `amount` to a count.
 pub fn add(tally: &mut Tally, name: &str, what: &str, amount: u64) {

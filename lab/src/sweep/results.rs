@@ -130,9 +130,6 @@ pub fn ends(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     values.fold(ends, |(low, high), value| (value.min(low), value.max(high)))
 }
 
-/// Standard deviations of an interval that holds 99 %.
-pub const Z_99: f64 = 2.575_829_303_548_9;
-
 /// Shares beside what was predicted for them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Comparison {

@@ -7,43 +7,13 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 
 use crate::document;
+use crate::line::Column::{self, Percent, Told};
+use crate::line::Line;
 use crate::memory::Memory;
 use crate::sustained::Sustained;
 use crate::table::Row;
 
 pub const DOCUMENT: &str = "docs/results/bench/softcore.md";
-
-/// A line of a file.
-pub trait Line: Sized {
-    const FILE: &str;
-    const HEADER: &str;
-    /// A simulation gives the same cycle for cycle. But a change anywhere moves code, and in
-    /// a cache with one way other lines are then filled; what a processor does when it is as
-    /// busy as can be is then not the same at all.
-    const COLUMNS: &[Column];
-
-    /// As it is written.
-    fn csv(&self) -> String;
-
-    /// Reads the cells of a line.
-    fn of(words: &[&str]) -> Option<Self>;
-
-    fn parse(line: &str) -> Option<Self> {
-        Self::of(&line.split(',').collect::<Vec<_>>())
-    }
-}
-
-/// How a column is compared.
-#[derive(Clone, Copy)]
-pub enum Column {
-    Name,
-    /// It may differ by so many percent, more or less.
-    Percent(f64),
-    /// It is not.
-    Told,
-}
-
-use Column::{Percent, Told};
 
 /// All figures.
 #[derive(Clone, Debug, Default, PartialEq)]

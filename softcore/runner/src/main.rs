@@ -6,6 +6,7 @@ mod document;
 mod events;
 mod files;
 mod image;
+mod line;
 mod memory;
 mod photons;
 mod program;

@@ -5,9 +5,9 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::ISAS;
-use crate::files::Column::{self, Name, Percent};
-use crate::files::Line;
 use crate::image::{Images, Sizes};
+use crate::line::Column::{self, Name, Percent};
+use crate::line::Line;
 
 /// Macropixels of the programs.
 pub const MACROPIXELS: [u8; 3] = [1, 4, 64];

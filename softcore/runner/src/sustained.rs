@@ -1,7 +1,7 @@
 //! A rate that a processor sustains, as the file has it.
 
-use crate::files::Column::{self, Name, Percent, Told};
-use crate::files::Line;
+use crate::line::Column::{self, Name, Percent, Told};
+use crate::line::Line;
 use crate::photons::UNIT;
 
 /// The results of a run at one rate.

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::files::Column::{self, Name, Percent, Told};
-use crate::files::Line;
+use crate::line::Column::{self, Name, Percent, Told};
+use crate::line::Line;
 use crate::program::Ran;
 
 /// The first operation of the bench: a call that does nothing, taken off the others.

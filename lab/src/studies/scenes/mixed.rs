@@ -7,8 +7,8 @@
 //! left out.
 
 use super::one_pixel::{PER_BIN, Reading};
-use crate::sweep::mean::{Measured, add};
-use crate::sweep::results::{Verdict, Z_99};
+use crate::sweep::mean::{Measured, Z_99, add};
+use crate::sweep::results::Verdict;
 use crate::sweep::{PointTally, Tally};
 
 /// The paper's bound of a false detection: half a bin from the surface.

@@ -3,8 +3,7 @@
 use super::FALSE_SHARE;
 use crate::studies::methods::passage::{LOOKS, Ladder};
 use crate::sweep::PointTally;
-use crate::sweep::mean::Measured;
-use crate::sweep::results::Z_99;
+use crate::sweep::mean::{Measured, Z_99};
 
 /// Mean laser cycles to an event with a threshold, and the variance of that mean.
 fn mean_and_variance(ladder: &Ladder, threshold: f64, point: &PointTally) -> (f64, f64) {
