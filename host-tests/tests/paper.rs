@@ -11,19 +11,19 @@ fn read(path: &str) -> String {
     fs::read_to_string(root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// The cells of each row: in the paper, here, test, study, verdict.
-fn rows(page: &str) -> Vec<[&str; 5]> {
+/// The cells of each row: in the paper, here, test, study, verdict, criterion.
+fn rows(page: &str) -> Vec<[&str; 6]> {
     let rows = page.lines().filter(|line| line.starts_with('|'));
     let rows = rows.map(|line| line.trim_matches('|').split('|').map(str::trim).collect());
     let rows: Vec<Vec<&str>> = rows.collect();
-    // That of the verdicts has two cells.
+    // Those of the verdicts, backgrounds and choices have two or three.
     assert!(
-        rows.iter().all(|row| matches!(row.len(), 2 | 5)),
+        rows.iter().all(|row| matches!(row.len(), 2 | 3 | 6)),
         "a | in a cell"
     );
     let rows = rows
         .iter()
-        .filter_map(|row| <[&str; 5]>::try_from(row.as_slice()).ok());
+        .filter_map(|row| <[&str; 6]>::try_from(row.as_slice()).ok());
     rows.filter(|row| row[0] != "in the paper" && !row[0].starts_with("---"))
         .collect()
 }
@@ -56,7 +56,7 @@ fn names_of_the_page_are_there() {
         .filter(|cell| !cell.is_empty());
     let gone: Vec<&str> = cells.filter(|cell| !is_there(cell)).collect();
     assert_eq!(gone, [""; 0]);
-    assert!(rows.len() >= 40, "{} rows", rows.len());
+    assert!(rows.len() >= 70, "{} rows", rows.len());
     assert!(!is_there("`core/src/pixel.rs: Pixel`") && !is_there("`core/src/nothing.rs`"));
 }
 
@@ -65,7 +65,7 @@ fn verdicts_of_the_page_are_those_of_the_studies() {
     let page = read("docs/paper.md");
     let claims = read("docs/results/paper-claims.md");
     let studies = read("docs/results/figures.md");
-    for [paper, _, test, study, verdict] in rows(&page) {
+    for [paper, _, test, study, verdict, _] in rows(&page) {
         let judged = ["agrees", "differs", "refuted"].contains(&verdict);
         let built = verdict == "built";
         assert!(

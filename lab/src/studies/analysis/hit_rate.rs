@@ -3,7 +3,7 @@
 use super::paper_setting::{Histograms, gaussian, means, target};
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, tally};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use dtof::rows::grouped;
 use dtof_core::ComparatorTree;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};

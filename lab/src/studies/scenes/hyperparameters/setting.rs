@@ -96,11 +96,10 @@ impl<'a> Setting<'a> {
         (!common.is_empty()).then(|| (by_l1.map(mean), common.len()))
     }
 
-    /// Whether from L1 = 40 to 80 the error falls by less than from 20 to 40 and by
-    /// less than a tenth.
-    pub fn little_gain_beyond_40(self) -> Option<bool> {
+    /// Whether a laser cycle more of L1 lowers the error less from 40 to 80 than from 20 to 40.
+    pub fn gain_diminishes(self) -> Option<bool> {
         let ([at_20, at_40, at_80], _) = self.mean_errors([20, 40, 80])?;
-        Some(at_40 - at_80 < (at_20 - at_40).max(0.1 * at_40) && at_80 > 0.9 * at_40)
+        Some((at_40 - at_80) / 40.0 < (at_20 - at_40) / 20.0)
     }
 
     /// What `of` gives for every point of an α and L1, each after its SNR.
