@@ -34,7 +34,7 @@ pub(super) fn recorded(counts: &Instructions, csv: &str) -> Result<Vec<Entry>> {
         let found = Rule::RULES.into_iter().find(|found| found.label() == rule);
         let rule = found.with_context(|| format!("{RECORDED}: {line}"))?;
         // Window rules with the common minimum take fewer photons, and err more.
-        if rule != Rule::Paper && minimum == "5" {
+        if matches!(rule, Rule::Window(_)) && minimum == "5" {
             continue;
         }
         let (depth, estimator) = match estimator {
