@@ -156,8 +156,16 @@ fn against_cost(
             interval: Some(entry.range),
         };
         // The note says what is left out.
-        let name = entry.label.replace("window of ", "");
-        let name = name.replace("centred window for ", "");
+        let mut name = entry.label.clone();
+        for (long, short) in [
+            ("centred window for ", ""),
+            ("window of ", ""),
+            ("the paper's rule", "paper's"),
+            ("average of all bins", "average"),
+            ("centred window", "centred"),
+        ] {
+            name = name.replace(long, short);
+        }
         Series::named(name, entry.pen, Style::Dots, vec![dot])
     }));
     chart(&Chart {
