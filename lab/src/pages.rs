@@ -8,6 +8,7 @@
 pub mod failures;
 pub mod methods;
 mod movie;
+mod timing;
 
 use crate::studies::failures::STUDY as FAILURES;
 use crate::studies::methods::{depth_error, event_depth, time_to_detect};
@@ -140,6 +141,7 @@ pub fn documents(
         documents.push((page.into(), values.fill(template)?));
     }
     documents.push(("figures/demo.svg".into(), movie::demo()?));
+    documents.push(("figures/processing.svg".into(), timing::timing()));
     Ok(documents)
 }
 
