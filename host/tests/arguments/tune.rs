@@ -206,10 +206,10 @@ const AVERAGE: &str = "--background 0.05 --signal 0.4 --sigma-bins 0.8 --rule av
 #[test]
 fn the_average_rule_has_an_alpha_by_simulation() {
     let text = text(AVERAGE);
-    let options: Vec<&str> = text.lines().last().unwrap().split_whitespace().collect();
+    let options = text.lines().last().unwrap();
     let scratch = Scratch::new();
     let photons = scratch.file("photons.csv", "pixel,cycle,bin\n0,1,2\n");
-    let settings = &scratch.replayed(&photons, &options)["settings"];
+    let settings = &scratch.replayed(&photons, options)["settings"];
     let result = json(AVERAGE);
     assert_eq!(settings["rule"], "average");
     assert_eq!(settings["alpha"].as_f64(), Some(value(&result, "alpha")));
