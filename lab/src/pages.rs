@@ -5,6 +5,7 @@
 //! `docs/results/data`. So a quick look that is taken again must give the kept numbers
 //! bit for bit, and together with the kept rest every document.
 
+mod bus;
 pub mod failures;
 pub mod methods;
 mod movie;
@@ -132,6 +133,8 @@ pub fn documents(
             );
         }
     }
+    values.set("bus.rates", bus::rates());
+    values.set("bus.waits", bus::waits());
     values.add(FAILURES.name, &failures::tables(part(FAILURES)?)?);
     for (page, template) in [
         ("results/failures.md", include_str!("pages/failures.md")),
