@@ -73,11 +73,12 @@ impl Changes {
         self.sides.iter().map(Sample::seen).sum()
     }
 
-    /// The picture and what is to be said of it; nothing without a change.
+    /// The picture and what is to be said of it; nothing without a change. What it is made
+    /// from is called `several`.
     ///
     /// # Errors
     /// If it cannot be drawn.
-    pub fn picture(&self, cycles: u64) -> Result<Option<(String, String)>> {
+    pub fn picture(&self, cycles: u64, several: &str) -> Result<Option<(String, String)>> {
         let dots = self.sides.each_ref().map(|side| -> Vec<Point> {
             let events = side.events();
             events
@@ -114,8 +115,8 @@ impl Changes {
             _ => String::new(),
         };
         let caption = format!(
-            "Dynamic depth: {count} changes in place of {} events. Each dot is a pixel whose mean depth \
-             of three events has moved by more than the threshold.{shown}",
+            "Dynamic depth: {count} changes in place of {} {several}. Each dot is a pixel whose mean depth \
+             of three {several} has moved by more than the threshold.{shown}",
             grouped(self.events)
         );
         Ok(Some((svg, caption)))
@@ -160,7 +161,7 @@ mod tests {
             .map(|event| event.range_mm)
             .collect();
         assert!(ranges.is_sorted_by(|a, b| a > b), "{ranges:?}");
-        let (svg, caption) = changes.picture(3000).unwrap().unwrap();
+        let (svg, caption) = changes.picture(3000, "events").unwrap().unwrap();
         assert!(svg.contains("nearer") && svg.contains("farther"));
         assert!(caption.starts_with("Dynamic depth: 6 changes in place of 120 events."));
         assert!(!caption.contains("At least"));
@@ -168,9 +169,9 @@ mod tests {
 
     #[test]
     fn a_wall_has_no_picture_and_a_busy_scene_a_small_one() {
-        assert!(stepped(1000).picture(1000).unwrap().is_none());
+        assert!(stepped(1000).picture(1000, "events").unwrap().is_none());
         let changes = stepped(8_000_000);
-        let (svg, caption) = changes.picture(8_000_000).unwrap().unwrap();
+        let (svg, caption) = changes.picture(8_000_000, "events").unwrap().unwrap();
         assert!(svg.len() < 1_500_000, "{}", svg.len());
         assert!(
             caption.ends_with(" At least one of 4 is shown."),

@@ -147,7 +147,7 @@ impl Output {
         let called = summary.settings.reports();
         let pictures = pictures(&self.maps, self.sides, called)?;
         let changes = self.changes.as_ref();
-        let changes = changes.map(|changes| changes.picture(summary.cycles));
+        let changes = changes.map(|changes| changes.picture(summary.cycles, called[1]));
         let changes = changes.transpose()?.flatten();
         let of_maps = pictures.iter().filter_map(|picture| {
             let Picture { svg, caption, .. } = picture;

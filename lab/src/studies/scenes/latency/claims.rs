@@ -4,7 +4,7 @@ use super::element::{AT_ONCE, PIPELINE, READINGS};
 use super::{PROTOTYPE_X, RATE_MHZ, first, next, shared_points, shortest_exposure};
 use crate::sweep::Part;
 use crate::sweep::mean::Measured;
-use crate::sweep::results::{Claim, Verdict, ends};
+use crate::sweep::results::{Claim, Verdict};
 use anyhow::Result;
 use dtof::rows::grouped;
 
@@ -43,13 +43,15 @@ pub fn is_later_by_the_delay(part: &Part) -> bool {
 
 fn processing(part: &Part) -> Claim {
     let later = |element| {
-        let by = shared_points(part).map(|point| {
-            let [with, without] =
-                [element, AT_ONCE].map(|element| Measured::mean(point, &next(element)).value);
-            with - without
-        });
-        let (least, most) = ends(by);
-        format!("{least:.1} to {most:.1}")
+        let at = |snr| {
+            let mut points = shared_points(part).filter(|point| point.is_at([("snr", snr)]));
+            points.next().map_or("none".to_owned(), |point| {
+                let [with, without] =
+                    [element, AT_ONCE].map(|element| Measured::mean(point, &next(element)).value);
+                format!("{:.1}", with - without)
+            })
+        };
+        [64.0, 16.0].map(at).join(" and ")
     };
     let readings = READINGS[1..]
         .iter()
@@ -60,7 +62,7 @@ fn processing(part: &Part) -> Claim {
         "processing",
         format!(
             "X = 4 takes a pipeline with {} histograms in it; its first event comes {} after that of a \
-             decision at once, of the same photons; mean laser cycles more from an event to the next: {}",
+             decision at once, of the same photons; mean laser cycles more from an event to the next at SNR 64 and 16: {}",
             PIPELINE.in_flight(),
             if is_later {
                 "exactly 4 laser cycles"
@@ -123,13 +125,13 @@ fn exposure(part: &Part) -> Result<Claim> {
     Ok(Claim::new(
         "exposure",
         format!(
-            "by arithmetic the first look is {:.1} µs after a reset and its answer, with four laser cycles \
-             of processing, {:.1} µs (L1 = 20: looks at {:.1} µs), in simulation the earliest {at_40}, and \
-             at L1 = 20 {at_20}; from the first photon {} µs at SNR 64, {} µs at SNR 16; events within \
-             2.4 µs of it: {} of {}",
+            "by arithmetic the first look is {:.1} µs after a reset (L1 = 20: {:.1} µs), in simulation the earliest \
+             {at_40}, and at L1 = 20 {at_20}; with four laser cycles of processing its answer comes after {:.1} \
+             µs; from the first photon to the look {} µs at SNR 64, {} µs at SNR 16; events within 2.4 µs of it: \
+             {} of {}",
             us(looks_40),
-            us(answered),
             us(looks_20),
+            us(answered),
             microseconds(best),
             microseconds(usual),
             best.count("latency by 24"),
