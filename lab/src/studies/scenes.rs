@@ -10,3 +10,4 @@ pub(crate) mod one_pixel;
 pub mod radial_motion;
 mod ranks;
 pub mod static_scene;
+pub(crate) mod systems;

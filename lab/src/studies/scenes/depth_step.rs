@@ -1,8 +1,14 @@
 //! How soon a pixel reports a surface that is suddenly there, and what it reports
-//! of an exposure that saw two (section III-D).
+//! of an exposure that saw two.
+//!
+//! With the FPGA's settings. The first is held against "reduces latency" (abstract). The
+//! second is a question of ours: the paper speaks of no step within an exposure.
 
-use super::mixed::{self, MARGIN, add_pair, excess, is_sharp, neither};
-use super::one_pixel::{CODES, PER_BIN, Reading, SENSORS, in_parts, pen, phases, watch_step};
+use super::mixed::{self, add_pair, excess, is_sharp, neither};
+use super::one_pixel::{
+    CODES, PER_BIN, Reading, SENSORS, in_parts, pen, phases, prototype, watch_step,
+};
+use super::systems::{FPGA, FPGA_SIGMAS, L1};
 use crate::sweep::mean::{Measured, add, add_value};
 use crate::sweep::results::{Claim, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
@@ -21,29 +27,34 @@ use rand_pcg::Pcg64;
 const STEPS: u64 = 10;
 /// Laser cycles after it in which it must be reported.
 const AFTER: u64 = 6000;
-/// Background photons a bin and laser cycle.
-const BACKGROUND: f64 = 0.02;
 /// Laser cycles after it by which every exposure over it has ended: L2, the
 /// longest frame.
 const OVER: u64 = 2000;
 /// A reading so near has noticed the new surface; others are false.
 const NOTICED: i64 = 3 * PER_BIN;
+/// The pulse of the figures, with jitter.
+const SIGMA: f64 = FPGA_SIGMAS[1];
 /// Signal photons a laser cycle of the verdict, and its step in bins.
 const SIGNAL: f64 = 0.5;
 const EDGE: f64 = 20.0;
 /// Bins of the steps.
 const STEPS_BINS: [f64; 3] = [2.0, 4.0, EDGE];
+/// The share of exposures that a figure is about.
+const LITTLE: f64 = 0.05;
+/// A claim agrees if it holds in signals that lie this far apart.
+const RANGE: f64 = 5.0;
 /// Of the brightest pixel and of the dimmest.
 const BRIGHT: f64 = 2.0;
-const DIM: f64 = 0.1;
+const DIM: f64 = 0.05;
+const SIGNALS: [f64; 6] = [DIM, 0.1, 0.2, SIGNAL, 1.0, BRIGHT];
 
-/// Held against "reduces latency" and "no motion blur".
+/// Held against "reduces latency".
 pub const STUDY: Study = Study {
     name: "depth-step",
     about: "laser cycles to notice a step in depth, and readings of both surfaces at once",
-    revision: 2,
-    few_seeds: 10,
-    all_seeds: 300,
+    revision: 3,
+    few_seeds: 8,
+    all_seeds: 150,
     points,
     trial,
     results,
@@ -51,11 +62,15 @@ pub const STUDY: Study = Study {
 
 /// Steps towards the sensor of 75 mm to 0.75 m.
 fn points() -> Vec<Point> {
-    let signals = [DIM, 0.2, SIGNAL, 1.0, BRIGHT];
-    grid([("step", &STEPS_BINS), ("signal", &signals)])
+    grid([
+        ("sigma", &FPGA_SIGMAS),
+        ("step", &STEPS_BINS),
+        ("signal", &SIGNALS),
+    ])
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+    let config = prototype(L1)?;
     let mut tally = Tally::new();
     for _ in 0..STEPS {
         // A random place in a bin, and random phases of exposures and frames.
@@ -64,14 +79,15 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         let at = 2000 + Uniform::new(0, 4000_u64)?.sample(rng);
         let phases = phases(rng)?;
         let rates = |position| Rates {
-            background: BACKGROUND,
+            background: FPGA.background,
             signal: point["signal"],
             position,
-            sigma: 1.0,
+            sigma: point["sigma"],
         };
         let photons = pixel_rng(rng.next_u64(), PixelAddress(0));
         let pixel = SimulatedPixel::new(&rates(old), CODES, photons)?;
-        let readings = |later, cycles| watch_step(&pixel, &rates(later), at, cycles, phases);
+        let readings =
+            |later, cycles| watch_step(&pixel, &config, &rates(later), at, cycles, phases);
         let (with, without) = (readings(new, at + AFTER)?, readings(old, at + OVER)?);
         let surfaces = [in_parts(old), in_parts(new)];
         for ((sensor, with), without) in SENSORS.into_iter().zip(&with).zip(&without) {
@@ -99,7 +115,7 @@ fn results(part: &Part) -> Result<Results> {
     let series = |step: f64, y: &dyn Fn(&PointTally, &str) -> Measured| {
         let sensors = SENSORS.into_iter().enumerate();
         let lines = sensors.map(|(number, sensor)| {
-            let points = part.at([("step", step)]).map(|point| {
+            let points = part.at([("sigma", SIGMA), ("step", step)]).map(|point| {
                 let measured = y(point, sensor);
                 measured.at(point.parameter("signal"))
             });
@@ -108,7 +124,7 @@ fn results(part: &Part) -> Result<Results> {
         Panel::only(lines.collect())
     };
     let signal = || Axis::logarithmic("signal photons a laser cycle");
-    let at = |signal: f64| part.one([("step", EDGE), ("signal", signal)]);
+    let at = |signal: f64| part.one([("sigma", SIGMA), ("step", EDGE), ("signal", signal)]);
     let [events, frames] = [0, 4].map(|sensor| -> Result<[Measured; 2]> {
         let of = |signal| anyhow::Ok(Measured::mean(at(signal)?, SENSORS[sensor]));
         Ok([of(BRIGHT)?, of(DIM)?])
@@ -131,15 +147,17 @@ fn results(part: &Part) -> Result<Results> {
         columns: 1,
         panels: vec![series(EDGE, &Measured::mean)],
     };
-    // Where a reading has enough photons to be right without the step.
-    let blurs = |point: &PointTally| {
+    let blurs_little = |point: &PointTally| {
         let mut sensors = SENSORS.into_iter();
-        sensors.all(|sensor| excess(point, sensor).interval.0 > MARGIN)
+        sensors.all(|sensor| excess(point, sensor).interval.1 < LITTLE)
     };
+    // Where a reading has enough photons to be right without the step.
     let bright = |point: &&PointTally| point.parameter("signal") >= SIGNAL;
+    let mut nearest = part.at([("step", STEPS_BINS[0])]).filter(bright);
     let blur = Chart {
-        finding: "A step of two bins within an exposure blurs events and frames alike".to_owned(),
-        holds: part.at([("step", STEPS_BINS[0])]).filter(bright).all(blurs),
+        finding: "A step of two bins blurs less than 5 % of exposures, of events or frames"
+            .to_owned(),
+        holds: nearest.all(blurs_little),
         note:
             "Bars hold 99 %. Farther apart two surfaces do not mix: the centroid sees three bins."
                 .to_owned(),
@@ -165,27 +183,37 @@ fn results(part: &Part) -> Result<Results> {
 /// What there are of `what` at every signal of a step, from dim to bright.
 fn at_signals(part: &Part, step: f64, what: &str) -> String {
     let counts = part
-        .at([("step", step)])
+        .at([("sigma", SIGMA), ("step", step)])
         .map(|point| grouped(point.count(what)));
     counts.collect::<Vec<_>>().join(", ")
 }
 
 fn latency_claim(part: &Part) -> Result<Claim> {
-    let edge = part.one([("step", EDGE), ("signal", SIGNAL)])?;
+    let edge = part.one([("sigma", SIGMA), ("step", EDGE), ("signal", SIGNAL)])?;
     let frames = SENSORS.map(|sensor| Measured::mean(edge, sensor));
     let events = frames[0];
-    let bright = part.one([("step", EDGE), ("signal", BRIGHT)])?;
-    let dim = part.one([("step", EDGE), ("signal", DIM)])?;
-    // Than frames of L2, at every signal.
-    let mut steps = part.at([("step", EDGE)]);
-    let faster = steps.all(|point| {
-        let [events, .., frames] = SENSORS.map(|sensor| Measured::mean(point, sensor));
-        events.interval.1 < frames.interval.0
-    });
+    let bright = part.one([("sigma", SIGMA), ("step", EDGE), ("signal", BRIGHT)])?;
+    let dim = part.one([("sigma", SIGMA), ("step", EDGE), ("signal", DIM)])?;
+    // Than frames of L2, with either pulse, from which signal on.
+    let is_faster = |signal: f64| {
+        let mut points = part.at([("step", EDGE), ("signal", signal)]);
+        points.all(|point| {
+            let [events, .., frames] = SENSORS.map(|sensor| Measured::mean(point, sensor));
+            events.interval.1 < frames.interval.0
+        })
+    };
+    let from = SIGNALS
+        .into_iter()
+        .rev()
+        .take_while(|&signal| is_faster(signal));
+    let from = from.last();
     Ok(Claim::new(
         "latency",
         format!(
-            "a step is noticed after {} laser cycles; by frames of 100 after {:.0}, of 500 {:.0}, of 1000 {:.0}, of 2000 {:.0} ({SIGNAL} signal photons a laser cycle); events {} and frames of 100 {} at {BRIGHT} photons; events {} and frames of 2000 {} at {DIM}; not noticed in {AFTER} laser cycles, and counted as {AFTER}: at 0.1, 0.2, 0.5, 1, 2 photons {} of {} by events, {} by frames of 100, {} by frames of 2000",
+            "sooner than by frames of 2000 {}; a step is noticed after {} laser cycles; by frames of 100 after {:.0}, of 500 {:.0}, of 1000 {:.0}, of 2000 {:.0} ({SIGNAL} signal photons a laser cycle); events {} and frames of 100 {} at {BRIGHT} photons; events {} and frames of 2000 {} at {DIM}; not noticed in {AFTER} laser cycles, and counted as {AFTER}: at 0.05, 0.1, 0.2, 0.5, 1, 2 photons {} of {} by events, {} by frames of 100, {} by frames of 2000",
+            from.map_or("at no signal".to_owned(), |from| format!(
+                "from {from} photons on"
+            )),
             events.text(0),
             frames[1].value,
             frames[2].value,
@@ -200,38 +228,40 @@ fn latency_claim(part: &Part) -> Result<Claim> {
             at_signals(part, EDGE, "frames of 100 not noticed"),
             at_signals(part, EDGE, "frames of 2000 not noticed"),
         ),
-        Verdict::graded(faster, events.interval.1 < frames[4].interval.0),
+        Verdict::graded(
+            from.is_some_and(|from| BRIGHT >= RANGE * from),
+            from.is_some(),
+        ),
     ))
 }
 
 fn blur_claim(part: &Part) -> Result<Claim> {
     let mut here = Vec::new();
     let mut verdicts = Vec::new();
-    for step in STEPS_BINS {
-        let points = part.at([("step", step)]);
-        let excesses = |sensor| points.clone().map(move |point| excess(point, sensor));
-        verdicts.push(is_sharp(&excesses(SENSORS[0]).collect::<Vec<_>>()));
-        let texts = excesses(SENSORS[0]).map(mixed::points);
-        let frames = mixed::worst(excesses(SENSORS[4])).map_or(String::new(), mixed::points);
-        here.push(format!(
-            "step of {step} bins {}, worst of frames of 2000 {frames}; exposures over it that expired {} of {} (without the step {})",
-            texts.collect::<Vec<_>>().join(", "),
-            at_signals(part, step, "events mixed, not read"),
-            grouped(STEPS * part.seed_count()),
-            at_signals(part, step, "events clean, not read"),
-        ));
+    for sigma in FPGA_SIGMAS {
+        for step in STEPS_BINS {
+            let points = part.at([("sigma", sigma), ("step", step)]);
+            let excesses = |sensor| points.clone().map(move |point| excess(point, sensor));
+            verdicts.push(is_sharp(&excesses(SENSORS[0]).collect::<Vec<_>>()));
+            let texts = excesses(SENSORS[0]).map(mixed::points);
+            let frames = mixed::worst(excesses(SENSORS[4])).map_or(String::new(), mixed::points);
+            here.push(format!(
+                "σ {sigma}, step of {step} bins {}, worst of frames of 2000 {frames}",
+                texts.collect::<Vec<_>>().join(", "),
+            ));
+        }
     }
     let is = |verdict| verdicts.iter().filter(|&&other| other == verdict).count();
     Ok(Claim::new(
         "blur",
         format!(
-            "percentage points by which an event over the step is read as neither surface more often than the same exposure without it, at 0.1, 0.2, 0.5, 1, 2 signal photons a laser cycle: {}",
+            "percentage points by which an event over the step is read as neither surface more often than the same exposure without it, at 0.05, 0.1, 0.2, 0.5, 1, 2 signal photons a laser cycle: {}",
             here.join("; ")
         ),
         match (is(Verdict::Agrees), is(Verdict::Refuted)) {
-            (3, _) => Verdict::Agrees,
-            (_, 3) => Verdict::Refuted,
-            (_, 1..) => Verdict::Differs,
+            (agrees, _) if agrees == verdicts.len() => Verdict::Agrees,
+            (_, refuted) if refuted == verdicts.len() => Verdict::Refuted,
+            (1.., _) => Verdict::Differs,
             _ => Verdict::NotDecided,
         },
     ))

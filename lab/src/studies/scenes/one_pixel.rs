@@ -1,10 +1,10 @@
 //! One pixel: its events, and what a frame-based sensor makes of the same
 //! photons.
 
+use super::systems::FPGA;
 use anyhow::Result;
 use dtof::engine::frame::FramePixel;
-use dtof::engine::settings::Settings;
-use dtof::simulate::{SimulatedPixel, scene};
+use dtof::simulate::SimulatedPixel;
 use dtof_core::{
     AnyRule, AsyncPixel, BinPosition, DepthEstimator, DepthEvent, LaserCycle, PixelAddress,
     PixelConfig, RangeGate, Statistics,
@@ -14,12 +14,10 @@ use dtof_theory::rates::Rates;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 
-/// Bins of a histogram.
+/// Bins of a histogram of the paper's prototype.
 pub const BINS: usize = CODES as usize;
 /// The same, as a TDC counts.
-pub const CODES: u16 = 128;
-/// Picoseconds a bin.
-pub const BIN_WIDTH_PS: f64 = 250.0;
+pub const CODES: u16 = FPGA.bins;
 /// Positions are counted in this part of a bin.
 pub const PER_BIN: i64 = 1 << BinPosition::FRACTIONAL_BITS;
 /// Exposures of the frames that events are held against, in laser cycles.
@@ -42,16 +40,11 @@ pub const fn pen(sensor: usize) -> Pen {
 }
 
 /// Laser cycles of the prototype from one look at the histogram to the next (X).
-pub const PROTOTYPE_X: u16 = 4;
+pub const PROTOTYPE_X: u16 = FPGA.x;
 
-/// The paper's FPGA prototype: α = 8, X = 4, L2 = 2000, and `l1`.
+/// The paper's FPGA prototype with `l1`.
 pub fn prototype(l1: u16) -> Result<PixelConfig<BINS, AnyRule>> {
-    let settings = Settings {
-        l1,
-        x: PROTOTYPE_X,
-        ..scene::settings(0)
-    };
-    settings.config()
+    FPGA.settings(FPGA.by, l1, 0).config()
 }
 
 /// A depth and the laser cycles it was exposed for.
@@ -81,15 +74,18 @@ impl Reading {
     }
 }
 
-/// Frames of a pixel of 128 bins, the first from laser cycle `first` on.
-pub fn frames(first: u64, length: u64) -> FramePixel<BINS> {
+/// Frames of a pixel, the first from laser cycle `first` on.
+pub fn frames<const BINS: usize>(first: u64, length: u64) -> FramePixel<BINS> {
     let length = u16::try_from(length).unwrap_or(u16::MAX);
     FramePixel::new(PixelAddress(0), first, length)
 }
 
 /// Ends a laser cycle of frames; without a gate, and with the same centre of mass as that
 /// of events.
-pub fn end_laser_cycle(frames: &mut FramePixel<BINS>, cycle: u64) -> Option<Reading> {
+pub fn end_laser_cycle<const BINS: usize>(
+    frames: &mut FramePixel<BINS>,
+    cycle: u64,
+) -> Option<Reading> {
     let read = frames.end_laser_cycle(&RangeGate::full(), &DepthEstimator::default(), cycle);
     read.as_ref().map(Reading::of)
 }
@@ -97,7 +93,7 @@ pub fn end_laser_cycle(frames: &mut FramePixel<BINS>, cycle: u64) -> Option<Read
 /// What each of [`SENSORS`] reports of `cycles` laser cycles. The frames of each
 /// length begin with the laser cycle of `phases`. `photons` gives the TDC codes of
 /// a laser cycle.
-pub fn watch(
+pub fn watch<const BINS: usize>(
     cycles: u64,
     config: &PixelConfig<BINS, AnyRule>,
     phases: [u64; 4],
@@ -106,7 +102,7 @@ pub fn watch(
     let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(0));
     let mut statistics = Statistics::new();
     let mut lengths = FRAMES.into_iter();
-    let mut frames = phases.map(|first| frames(first, lengths.next().unwrap_or_default()));
+    let mut frames = phases.map(|first| frames::<BINS>(first, lengths.next().unwrap_or_default()));
     let mut readings: [Vec<Reading>; 5] = Default::default();
     for cycle in 0..cycles {
         photons(cycle, &mut |code| {
@@ -135,15 +131,16 @@ pub fn phases(rng: &mut Pcg64) -> Result<[u64; 4]> {
 }
 
 /// What the sensors report of `pixel`, which has the rates `later` from laser cycle `at` on.
-pub fn watch_step(
+pub fn watch_step<const BINS: usize>(
     pixel: &SimulatedPixel,
+    config: &PixelConfig<BINS, AnyRule>,
     later: &Rates,
     at: u64,
     cycles: u64,
     phases: [u64; 4],
 ) -> Result<[Vec<Reading>; 5]> {
     let mut pixel = pixel.clone();
-    watch(cycles, &prototype(40)?, phases, |cycle, photon| {
+    watch(cycles, config, phases, |cycle, photon| {
         if cycle == at {
             pixel.set_rates(later)?;
         }

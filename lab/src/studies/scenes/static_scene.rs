@@ -1,6 +1,12 @@
 //! The static scene (section III-B): when, how often and how well pixels report,
-//! and what their events say of the reflectivity.
+//! and what their events say of the reflectivity. Events stand beside frames of the same
+//! photons.
+//!
+//! The PC with the average of all bins, and with quadrants beside it; boards before a wall,
+//! as bright as lets most pixels report, as the paper's do. One scene is the FPGA's
+//! (section IV-C), with its L1. Signals, distances and backgrounds are ours.
 
+mod claims;
 mod results;
 
 use anyhow::Result;
@@ -11,11 +17,12 @@ use rand_pcg::Pcg64;
 
 use super::one_pixel::{self, PER_BIN, in_parts};
 use super::ranks::rank_correlation;
+use super::systems::{self, Background, FPGA_SIGMAS, PC, PC_SIGMA, System};
 use crate::sweep::mean::{add, add_error, add_value};
 use crate::sweep::{Point, Study, Tally, point};
 use dtof::engine::host::host_engine;
 use dtof::input::source::{Geometry, PhotonSource};
-use dtof::simulate::scene::{self, Light, Scene};
+use dtof::simulate::scene::{Light, Scene};
 
 const CYCLES: u64 = 10_000;
 /// Laser cycles of a frame (L2).
@@ -25,14 +32,20 @@ const SLICE: u16 = 250;
 /// Events that are averaged.
 const MEAN_OF: usize = 10;
 /// A depth farther off is false and counts apart.
-const FALSE: i64 = 3 * PER_BIN;
+const FALSE: i64 = 3 * PER_BIN / 2;
 /// Whole numbers of a correlation, a relative error, a reflectivity.
 const MILLION: f64 = 1e6;
 /// Pixels of a row over which a surface turns by one bin of range: the boards are as
 /// wide, so that they lie evenly in a bin, not on the edge of one.
 const PIXELS_A_BIN: f64 = 8.0;
-/// The pulse of the figures, in bins.
-const WIDE: f64 = 1.0;
+/// L1 of section III-B.
+const PC_L1: u16 = 100;
+/// Bins at which the surfaces of the PC's scene begin to turn, in the file's order: the
+/// wall, then the boards. All stay within the 8 bins.
+const PC_BINS: [f64; 4] = [2.0, 1.0, 1.3, 1.6];
+/// B of the PC, that of the paper's analysis and the one of its rule of thumb, L1·B = 30.
+/// Then how many times the light of the file, so that most pixels report.
+const PC_LIGHTS: [(f64, f64); 2] = [(PC.background, 2.0), (0.3, 4.0)];
 const DEPTHS: [&str; 3] = ["frame of 2000", "last event", "mean of ten"];
 /// What differs from one of these to the next of the same pixel.
 const NOISES: [&str; 3] = [
@@ -44,51 +57,65 @@ const NOISES: [&str; 3] = [
 /// Held against the paper's static scene.
 pub const STUDY: Study = Study {
     name: "static-scene",
-    about: "first events, event rates, depth errors and reflectivity of two static scenes",
-    revision: 3,
-    few_seeds: 4,
-    all_seeds: 40,
+    about: "first events, event rates, depth errors and reflectivity of static scenes",
+    revision: 4,
+    few_seeds: 2,
+    all_seeds: 20,
     points,
     trial,
     results: results::results,
 };
 
-/// Both scenes, and the first with a pulse as narrow as that of the paper's system,
-/// 10 ns in bins of 8.75 ns.
 fn points() -> Vec<Point> {
-    let points = [(0.0, WIDE), (1.0, WIDE), (0.0, 0.5)].into_iter();
-    points
-        .map(|(scene, sigma)| point([("scene", scene), ("pulse_sigma_bins", sigma)]))
-        .collect()
+    let [low, high] = PC_LIGHTS;
+    let fpga = (systems::FPGA.background, 1.0);
+    let [narrow, wide] = FPGA_SIGMAS;
+    let points = [
+        (0.0, 1.0, low, PC_SIGMA),
+        (0.0, 1.0, high, PC_SIGMA),
+        (0.0, 0.0, low, PC_SIGMA),
+        (1.0, 0.0, fpga, wide),
+        (1.0, 0.0, fpga, narrow),
+    ];
+    let points = points.map(|(fpga, average, (background, light), sigma)| {
+        point([
+            ("fpga", fpga),
+            ("average", average),
+            ("background", background),
+            ("light", light),
+            ("sigma", sigma),
+        ])
+    });
+    points.into()
 }
 
-/// The scene of the file at 32×16 pixels, with every surface turned by a bin in
-/// [`PIXELS_A_BIN`], and `shift` bins farther away.
+/// The boards before a wall: 64×32 macropixels on the PC, 32×16 on the FPGA. Every surface
+/// turns by a bin in [`PIXELS_A_BIN`] of 32, and is `shift` bins farther away.
 fn scene(point: &Point, shift: f64) -> Result<Scene> {
-    let text = if point["scene"] > 0.0 {
-        include_str!("../../../../scenes/demo.toml")
-    } else {
-        include_str!("../../../../scenes/static.toml")
-    };
-    let mut scene = Scene {
-        geometry: Geometry {
-            columns: 32,
-            rows: 16,
-        },
-        pulse_sigma_bins: point["pulse_sigma_bins"],
-        ..Scene::parse(text)?
-    };
+    let system = System::of(point);
+    let text = include_str!("../../../../scenes/static.toml");
+    let mut scene = system.scene(text, point["sigma"])?;
+    scene.background = point["background"];
     let mm_per_bin = scene.mm_per_bin();
-    // From the first column of the layout to the last, in pixels.
-    let across = f64::from(scene.geometry.columns) / f64::from(scene.layout.columns);
-    let pixels = f64::from(scene.layout.columns - 1) * across;
-    for surface in &mut scene.surfaces {
-        // A surface that is turned already is as good.
-        if surface.range_right_mm == surface.range_mm {
-            surface.range_right_mm += pixels / PIXELS_A_BIN * mm_per_bin;
+    // From the first column of the layout to the last, in bins.
+    let turn = f64::from(scene.layout.columns - 1) / PIXELS_A_BIN;
+    let bright = point["light"] * scene.signal_at_one_metre;
+    for (surface, bins) in scene.surfaces.iter_mut().zip(PC_BINS) {
+        if system == PC {
+            if let Light::Reflectivity(share) = surface.light {
+                let metres = surface.range_mm / 1000.0;
+                surface.light = Light::Signal(bright * share / metres.powi(2));
+            }
+            surface.range_mm = bins * mm_per_bin;
         }
         surface.range_mm += shift * mm_per_bin;
-        surface.range_right_mm += shift * mm_per_bin;
+        surface.range_right_mm = surface.range_mm + turn * mm_per_bin;
+    }
+    if system == PC {
+        scene.geometry = Geometry {
+            columns: 64,
+            rows: 32,
+        };
     }
     Ok(scene)
 }
@@ -111,15 +138,26 @@ impl Pixel {
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+    if System::of(point) == PC {
+        watched::<8>(point, rng)
+    } else {
+        watched::<128>(point, rng)
+    }
+}
+
+fn watched<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let scene = scene(point, Uniform::new(0.0, 1.0)?.sample(rng))?;
-    let settings = scene::settings(rng.next_u64());
+    let system = System::of(point);
+    let background = Background::ALL[usize::from(point["average"] == 0.0)];
+    let l1 = if system == PC { PC_L1 } else { systems::L1 };
+    let settings = system.settings(background, l1, rng.next_u64());
     let mut photons = scene.photons(settings.seed, CYCLES)?;
     let addresses = photons.addresses();
     let mut engine = host_engine(&settings, &addresses)?;
     let mut pixels: Vec<Pixel> = addresses.iter().map(|_| Pixel::default()).collect();
     let mut frames: Vec<_> = addresses
         .iter()
-        .map(|_| one_pixel::frames(0, FRAME))
+        .map(|_| one_pixel::frames::<BINS>(0, FRAME))
         .collect();
     let mut tally = Tally::new();
     for _ in 0..CYCLES / u64::from(SLICE) {
@@ -165,6 +203,7 @@ fn add_pixel(tally: &mut Tally, scene: &Scene, address: PixelAddress, pixel: &Pi
     let events = i64::try_from(pixel.positions.len()).unwrap_or(i64::MAX);
     add_value(tally, &format!("{surface}, events"), events);
     add(tally, surface, "without an event", (events == 0).into());
+    add(tally, surface, "frames", pixel.frames.len() as u64);
     if pixel.positions.len() < MEAN_OF {
         return;
     }
@@ -232,30 +271,31 @@ fn add_scene(tally: &mut Tally, scene: &Scene, addresses: &[PixelAddress], pixel
         |pixel| pixel.reflectivity.signal().to_num(),
     ];
     for (name, estimate) in ESTIMATES.into_iter().zip(estimates) {
-        // Estimate over truth, up to one scale for all. A pixel without an event is
-        // black.
-        let ratios: Vec<(usize, f64)> = addresses
+        // Estimate and truth of pixels with an event, up to one scale for all.
+        let pairs: Vec<(usize, f64, f64)> = addresses
             .iter()
             .zip(pixels)
+            .filter(|(_, pixel)| !pixel.positions.is_empty())
             .filter_map(|(&address, pixel)| {
-                let surface = scene.truth(address, 0)?.surface;
-                let Light::Reflectivity(truth) = scene.surfaces[surface].light else {
-                    return None;
-                };
-                if pixel.positions.is_empty() {
-                    return Some((surface, 0.0));
-                }
+                let view = scene.truth(address, 0)?;
+                let signal = scene.rates(address, 0).signal;
                 let z = mean_of_last(&pixel.positions, MEAN_OF) / PER_BIN as f64;
-                Some((surface, estimate(pixel) * z * z / truth))
+                let true_z = view.range_mm / scene.mm_per_bin();
+                Some((
+                    view.surface,
+                    estimate(pixel) * z * z,
+                    signal * true_z * true_z,
+                ))
             })
             .collect();
+        let (of_events, of_truth): (Vec<f64>, Vec<f64>) =
+            pairs.iter().map(|pair| (pair.1, pair.2)).unzip();
+        let correlation = rank_correlation(&of_truth, &of_events).unwrap_or_default();
+        add_value(tally, &format!("{name}, ranks"), millionths(correlation));
+        let ratios = pairs.into_iter();
+        let ratios: Vec<(usize, f64)> = ratios.map(|(surface, a, b)| (surface, a / b)).collect();
         let (scale, error) = common_scale(ratios.iter().map(|(_, ratio)| *ratio));
         add_value(tally, name, millionths(error));
-        // Black pixels have no say in the scale.
-        let seen = ratios.iter().map(|(_, ratio)| *ratio);
-        let (_, error) = common_scale(seen.filter(|&ratio| ratio > 0.0));
-        let with_event = format!("{name}, with an event");
-        add_value(tally, &with_event, millionths(error));
         for (surface, ratio) in ratios {
             let name = format!("{}, {name}", scene.surfaces[surface].name);
             add_value(tally, &name, (ratio * scale * 1000.0).round() as i64);
@@ -302,21 +342,30 @@ mod tests {
         assert_eq!(mean_of_last(&positions[..3], 10), 2.0);
     }
 
-    /// The parts of a bin at which the pixels of a board lie.
+    /// The parts of a bin at which the pixels of a board lie, and all in the window.
     #[test]
     fn boards_lie_evenly_in_a_bin() {
-        let scene = scene(&points()[0], 0.3).unwrap();
-        for column in [2, 12, 22] {
-            let mut phases: Vec<f64> = (column..column + 8)
-                .map(|column| {
-                    let view = scene.truth(PixelAddress(8 * 32 + column), 0).unwrap();
-                    assert_ne!(scene.surfaces[view.surface].name, "wall");
-                    view.range_mm / scene.mm_per_bin() % 1.0
-                })
-                .collect();
-            phases.sort_by(f64::total_cmp);
-            for pair in phases.windows(2) {
-                assert!((pair[1] - pair[0] - 0.125).abs() < 1e-9, "{phases:?}");
+        for point in points() {
+            let scene = scene(&point, 0.3).unwrap();
+            let across = scene.geometry.columns / 32;
+            for board in [2, 12, 22] {
+                let columns = board * across..(board + 8) * across;
+                let mut phases: Vec<f64> = columns
+                    .map(|column| {
+                        let address = 8 * across * scene.geometry.columns + column;
+                        let address = PixelAddress(u16::try_from(address).unwrap());
+                        let view = scene.truth(address, 0).unwrap();
+                        assert_ne!(scene.surfaces[view.surface].name, "wall");
+                        let position = view.range_mm / scene.mm_per_bin();
+                        assert!((1.0..f64::from(scene.bins) - 1.0).contains(&position));
+                        position % 1.0
+                    })
+                    .collect();
+                phases.sort_by(f64::total_cmp);
+                for pair in phases.windows(2) {
+                    let step = 1.0 / PIXELS_A_BIN / f64::from(across);
+                    assert!((pair[1] - pair[0] - step).abs() < 1e-9, "{phases:?}");
+                }
             }
         }
     }

@@ -1,236 +1,143 @@
-//! The figure, the table and the claims.
+//! The figures and the table.
 
-use super::{REFERENCES, SCENES, THRESHOLDS, name};
+use super::super::systems::Background;
+use super::claims::claims;
+use super::outcome::{Outcome, REMOVED, SCENES, at_text, holding, on_pc, outcome};
+use super::{REFERENCES, SIGNALS};
+use crate::sweep::Part;
 use crate::sweep::mean::Measured;
-use crate::sweep::results::{Claim, Figure, Results, Verdict};
-use crate::sweep::{Part, PointTally};
+use crate::sweep::results::{Figure, Results};
 use anyhow::Result;
 use dtof::rows::grouped;
-use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
-use dtof_draw::palette::{EVENTS, PAPER};
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::{EVENTS, NEUTRAL, PAPER, STEPS, frames};
 use std::fmt::Write as _;
 
-/// The paper's threshold in millimetres.
-const PAPER_MM: u32 = 100;
-/// The paper's least share of events taken away.
-const REMOVED: f64 = 0.7;
-/// Changes an event below which a wall is silent.
-const SILENT: f64 = 1e-4;
-
-/// How a way of finding changes fares in a scene.
-struct Outcome {
-    /// Events that are not followed by a change.
-    removed: Measured,
-    /// The others.
-    left: Measured,
-    /// True steps that are reported.
-    found: Measured,
-    /// Changes that there were not.
-    is_false: Measured,
-    /// Laser cycles from a step to its report.
-    delay: Measured,
-    changes: u64,
-    steps: u64,
-    still_pixels: u64,
-    still_events: u64,
-    still_changes: u64,
-}
-
-fn outcome(point: &PointTally, threshold_mm: u32, reference: &str) -> Outcome {
-    let name = name(threshold_mm, reference);
-    let count = |what: &str| point.count(&format!("{name} {what}"));
-    let delay = format!("{name} delay");
-    let (events, changes) = (point.count("depth events"), count("changes"));
-    Outcome {
-        removed: Measured::share(events - changes, events),
-        left: Measured::share(changes, events),
-        found: Measured::share(point.count(&format!("{delay} values")), count("steps")),
-        is_false: Measured::share(count("false"), changes),
-        delay: Measured::mean(point, &delay),
-        changes,
-        steps: count("steps"),
-        still_pixels: count("still pixels"),
-        still_events: count("still events"),
-        still_changes: count("still changes"),
-    }
-}
-
-fn scenes(part: &Part) -> Result<Vec<(&'static str, &PointTally)>> {
-    let numbers = (0u8..).zip(SCENES);
-    numbers
-        .map(|(number, name)| Ok((name, part.one([("scene", number.into())])?)))
-        .collect()
-}
-
 pub fn results(part: &Part) -> Result<Results> {
-    let scenes = scenes(part)?;
-    let steps = scenes
-        .iter()
-        .map(|(_, point)| outcome(point, PAPER_MM, REFERENCES[0].1).steps);
+    let steps = part.points().iter().map(|point| {
+        let papers = outcome(point, Background::Average, REFERENCES[0].1);
+        papers.steps
+    });
     Ok(Results {
-        figures: vec![figure(&scenes)?],
-        claims: claims(&scenes),
+        figures: vec![left(part)?, a_frame(part)?],
+        claims: claims(part)?,
         values: [("steps", grouped(steps.sum()))].into(),
-        tables: vec![("results/data/dynamic-depth.csv", csv(&scenes)?)],
+        tables: vec![("results/data/dynamic-depth.csv", csv(part)?)],
     })
 }
 
-/// The share of the steps that is found, of the two cars.
-fn found_cars(scenes: &[(&str, &PointTally)], reference: usize) -> [Measured; 2] {
-    [0, 1].map(|car| outcome(scenes[car].1, PAPER_MM, REFERENCES[reference].1).found)
-}
-
-fn figure(scenes: &[(&str, &PointTally)]) -> Result<Figure> {
+fn left(part: &Part) -> Result<Figure> {
     let pens = [PAPER, EVENTS];
-    let panels = scenes.iter().map(|&(scene, point)| {
-        let series = REFERENCES
-            .into_iter()
-            .zip(pens)
-            .map(|((_, reference), pen)| {
-                let points = THRESHOLDS.map(|threshold_mm| {
-                    let outcome = outcome(point, threshold_mm, reference);
-                    outcome.left.at(threshold_mm.into())
-                });
-                Series::unnamed(pen, Style::JoinedDots, points.to_vec())
+    let mut panels = Vec::new();
+    for background in Background::ALL {
+        for (fan, scene) in SCENES {
+            let series = [0, 1].map(|reference| {
+                let points = on_pc(part, fan, background, reference).into_iter();
+                let dots = points.map(|(signal, outcome)| outcome.left.at(signal));
+                Series::unnamed(pens[reference], Style::JoinedDots, dots.collect())
             });
-        Panel {
-            title: scene.to_owned(),
-            series: series.collect(),
+            let limit = [SIGNALS[0], SIGNALS[SIGNALS.len() - 1]];
+            let limit = limit.map(|signal| Dot::exact(signal, 1.0 - REMOVED));
+            let limit = Series::unnamed(NEUTRAL, Style::Dashed, limit.to_vec());
+            panels.push(Panel {
+                title: format!("{scene}, {}", background.name()),
+                series: series.into_iter().chain([limit]).collect(),
+            });
         }
+    }
+    let from = holding(part, Background::Average, |of| {
+        of.removed.interval.0 > REMOVED
     });
-    let key = |(reference, pen)| Key::new(pen, Style::JoinedDots, format!("against {reference}"));
-    let references = ["the mean before (paper)", "the mean reported last"];
-    let found = |reference| found_cars(scenes, reference);
+    let key = |text: &str, pen| Key::new(pen, Style::JoinedDots, text);
     let chart = Chart {
-        finding: "Against the mean before, dynamic depth misses a moving car".to_owned(),
-        holds: found(0).iter().all(|share| share.interval.1 < 0.01)
-            && found(1).iter().all(|share| share.interval.0 > 0.9),
-        note: "Bars hold 99 %; an open dot is an upper limit where there was no change.".to_owned(),
-        x: Axis::logarithmic("threshold, mm").within(40.0, 1250.0),
-        y: Axis::logarithmic("changes reported, % of the events")
-            .percent()
-            .within(1e-7, 1.0),
-        key: references.into_iter().zip(pens).map(key).collect(),
+        finding: format!(
+            "With the average, dynamic depth takes away over 70 % {}",
+            at_text(&from)
+        ),
+        holds: !from.is_empty(),
+        note: "Bars hold 99 %.".to_owned(),
+        x: Axis::logarithmic("signal photons a laser cycle"),
+        y: Axis::logarithmic("changes reported, % of the events").percent(),
+        key: vec![
+            key("against the mean before (paper)", PAPER),
+            key("against the mean reported last", EVENTS),
+            Key::new(NEUTRAL, Style::Dashed, "the paper's 30 % that are left"),
+        ],
         columns: 2,
-        panels: panels.collect(),
+        panels,
     };
     Figure::new("dynamic-depth", &chart)
 }
 
-fn csv(scenes: &[(&str, &PointTally)]) -> Result<String> {
-    let mut csv = "scene,reference,threshold_mm,depth_events,changes,removed,steps,found,found_from,found_to,delay_cycles,\
-                   false,false_from,false_to,still_pixels,still_events,still_changes\n"
+/// What a pixel reports beside the frames of a sensor that sees the same photons.
+fn a_frame(part: &Part) -> Result<Figure> {
+    let cars = on_pc(part, 0.0, Background::Average, 0);
+    let dots = |of: fn(&Outcome) -> Measured| -> Vec<Dot> {
+        let dots = cars.iter().map(|(signal, outcome)| of(outcome).at(*signal));
+        dots.collect()
+    };
+    let events = dots(|of| of.still.a_frame(of.still.events));
+    let changes = dots(|of| of.still.a_frame(of.still.changes));
+    let one = SIGNALS.map(|signal| Dot::exact(signal, 1.0)).to_vec();
+    let most = |dots: &[Dot]| dots.iter().map(|dot| dot.y).fold(0.0, f64::max);
+    let chart = Chart {
+        finding: format!(
+            "A still wall gives up to {:.0} events a frame, with dynamic depth {:.1} at most",
+            most(&events),
+            most(&changes)
+        ),
+        holds: most(&events) > 10.0 * most(&changes),
+        note: "PC, average of all bins. Bars hold 99 %.".to_owned(),
+        x: Axis::logarithmic("signal photons a laser cycle"),
+        y: Axis::logarithmic("readings of the wall for each of frames of 2000"),
+        key: Vec::new(),
+        columns: 1,
+        panels: vec![Panel::only(vec![
+            Series::named("events", EVENTS, Style::JoinedDots, events),
+            Series::named("dynamic depth", STEPS[1], Style::JoinedDots, changes),
+            Series::named("frames of 2000", frames(2000), Style::Dashed, one),
+        ])],
+    };
+    Figure::new("dynamic-depth-frames", &chart)
+}
+
+fn csv(part: &Part) -> Result<String> {
+    let mut csv = "system,scene,background,reference,signal,events,changes,removed,steps,found,found_from,found_to,\
+                   delay_cycles,false,false_from,false_to,still_pixels,still_frames,still_events,still_changes\n"
         .to_owned();
-    for &(scene, point) in scenes {
-        for (_, reference) in REFERENCES {
-            for threshold_mm in THRESHOLDS {
-                let of = outcome(point, threshold_mm, reference);
+    for point in part.points() {
+        let system = if point.is_at([("fpga", 1.0)]) {
+            "FPGA"
+        } else {
+            "PC"
+        };
+        let scene = if point.is_at([("fan", 1.0)]) {
+            "fan"
+        } else {
+            "car"
+        };
+        for background in Background::ALL {
+            for (_, reference) in REFERENCES {
+                let of = outcome(point, background, reference);
                 writeln!(
                     csv,
-                    "\"{scene}\",{reference},{threshold_mm},{},{},{:.4},{},{},{:.0},{},{},{},{}",
-                    point.count("depth events"),
+                    "{system},{scene},{},{reference},{},{},{},{:.4},{},{},{:.0},{},{},{},{},{}",
+                    background.name(),
+                    point.parameter("signal"),
+                    of.events,
                     of.changes,
                     of.removed.value,
                     of.steps,
                     of.found.cells(4),
                     of.delay.value,
                     of.is_false.cells(4),
-                    of.still_pixels,
-                    of.still_events,
-                    of.still_changes,
+                    of.still.pixels,
+                    of.still.frames,
+                    of.still.events,
+                    of.still.changes,
                 )?;
             }
         }
     }
     Ok(csv)
-}
-
-/// `text` of both references, scene by scene.
-fn everywhere(
-    scenes: &[(&str, &PointTally)],
-    reference: &str,
-    text: impl Fn(&Outcome) -> String,
-) -> String {
-    let scenes = scenes
-        .iter()
-        .map(|(scene, point)| format!("{scene} {}", text(&outcome(point, PAPER_MM, reference))));
-    scenes.collect::<Vec<_>>().join(", ")
-}
-
-/// Agrees if `holds` of the paper's way in every scene, differs if in all but that of
-/// the wide bins.
-fn by_scene(scenes: &[(&str, &PointTally)], holds: impl Fn(&Outcome) -> bool) -> Verdict {
-    let papers = scenes
-        .iter()
-        .map(|(_, point)| holds(&outcome(point, PAPER_MM, REFERENCES[0].1)));
-    match papers.collect::<Vec<_>>()[..] {
-        [true, true, true, true] => Verdict::Agrees,
-        [true, true, true, false] => Verdict::Differs,
-        _ => Verdict::Refuted,
-    }
-}
-
-fn percent(share: Measured) -> String {
-    if share.value.is_nan() {
-        return "none".to_owned();
-    }
-    format!("{:.2} %", share.value * 100.0)
-}
-
-fn claims(scenes: &[(&str, &PointTally)]) -> Vec<Claim> {
-    let both = |text: fn(&Outcome) -> String| {
-        let texts = REFERENCES.map(|(_, reference)| {
-            format!(
-                "against the {reference}: {}",
-                everywhere(scenes, reference, text)
-            )
-        });
-        texts.join("; ")
-    };
-    let finds_cars = |reference: usize| {
-        let found = found_cars(scenes, reference);
-        found.iter().all(|share| share.interval.0 > 0.9)
-    };
-    vec![
-        Claim::new(
-            "removed",
-            both(|of| percent(of.removed)),
-            by_scene(scenes, |of| of.removed.interval.0 > REMOVED),
-        ),
-        Claim::new(
-            "motion",
-            both(|of| {
-                let delay = if of.delay.value.is_nan() {
-                    String::new()
-                } else {
-                    format!(" after {:.0} laser cycles", of.delay.value)
-                };
-                format!(
-                    "{} of {} steps{delay}, {} of {} changes false",
-                    percent(of.found),
-                    grouped(of.steps),
-                    percent(of.is_false),
-                    grouped(of.changes)
-                )
-            }),
-            Verdict::graded(finds_cars(0), finds_cars(1)),
-        ),
-        Claim::new(
-            "wall",
-            both(|of| {
-                format!(
-                    "{} changes of {} events of {} still pixels",
-                    grouped(of.still_changes),
-                    grouped(of.still_events),
-                    grouped(of.still_pixels)
-                )
-            }),
-            by_scene(scenes, |of| {
-                Measured::share(of.still_changes, of.still_events)
-                    .interval
-                    .1
-                    < SILENT
-            }),
-        ),
-    ]
 }

@@ -116,11 +116,11 @@ impl Watched {
         self.since = Extent::of(newest());
     }
 
-    /// Adds what was reported of what never moved.
-    pub fn add_still(&self, tally: &mut Tally, name: &str) {
-        add(tally, name, "still pixels", 1);
-        add(tally, name, "still events", self.events);
-        add(tally, name, "still changes", self.changes.len() as u64);
+    /// Adds the pixel, its events and changes to the counts of `name`.
+    pub fn add_of(&self, tally: &mut Tally, name: &str) {
+        add(tally, name, "pixels", 1);
+        add(tally, name, "events", self.events);
+        add(tally, name, "changes", self.changes.len() as u64);
     }
 
     /// Adds what was reported, beside the true `steps` of a run of `cycles` laser
@@ -195,7 +195,7 @@ mod tests {
     fn tallied(watched: &Watched, steps: &[(u64, i8)]) -> Tally {
         let mut tally = Tally::new();
         watched.add_to(&mut tally, "a", steps, 100_000);
-        watched.add_still(&mut tally, "a");
+        watched.add_of(&mut tally, "a still");
         tally
     }
 

@@ -1,0 +1,273 @@
+//! What the paper says of its static scene.
+
+use super::super::systems::{Background, System};
+use super::results::surfaces;
+use super::{DEPTHS, ESTIMATES, MILLION};
+use crate::sweep::mean::Measured;
+use crate::sweep::results::{Claim, Verdict};
+use crate::sweep::{Part, PointTally};
+use anyhow::Result;
+use dtof::rows::grouped;
+
+/// Of the file.
+const BRIGHTEST: &str = "white board";
+const WALL: &str = "wall";
+
+/// The PC with the paper's background: what the verdicts are of.
+fn is_papers(point: &PointTally) -> bool {
+    point.is_at([("fpga", 0.0), ("average", 1.0)])
+}
+
+/// For each scene what `text` makes of it.
+fn of_each(part: &Part, mut text: impl FnMut(&PointTally) -> Result<String>) -> Result<String> {
+    let mut texts = Vec::new();
+    for point in part.points() {
+        let system = System::of(&point.parameters);
+        let background = Background::ALL[usize::from(point.is_at([("average", 0.0)]))];
+        texts.push(format!(
+            "{}, {}, B = {}: {}",
+            system.with_pulse(point.parameter("sigma")),
+            background.name(),
+            point.parameter("background"),
+            text(point)?
+        ));
+    }
+    Ok(texts.join("; "))
+}
+
+/// What is said of the noise of a depth against that of the frame, and their ratio
+/// on every surface of which half of the pixels or more say it.
+fn noises(part: &Part, depth: &str) -> Result<(String, Vec<Measured>)> {
+    let mut all = Vec::new();
+    let text = of_each(part, |point| {
+        let mut ratios: Vec<(Measured, String)> = Vec::new();
+        let mut few = Vec::new();
+        let [mut beyond, mut frames_beyond] = [0; 2];
+        for (surface, _) in surfaces(point)? {
+            let name = |depth: &str| format!("{surface}, noise of {depth}");
+            beyond += point.count(&format!("{} false", name(depth)));
+            frames_beyond += point.count(&format!("{} false", name(DEPTHS[0])));
+            let pixels = point.count(&format!("{surface}, events values"));
+            if 2 * point.count(&format!("{} values", name(depth))) < pixels {
+                few.push(surface);
+                continue;
+            }
+            let noise = |depth: &str| Measured::root_mean_square(point, &name(depth));
+            ratios.push((noise(depth).over(noise(DEPTHS[0])), surface));
+        }
+        ratios.sort_by(|(a, _), (b, _)| a.value.total_cmp(&b.value));
+        let [least, most] = [ratios.first(), ratios.last()].map(|ratio| {
+            let text = |(ratio, surface): &(Measured, String)| {
+                format!("{} times ({surface})", ratio.text(2))
+            };
+            ratio.map_or("-".to_owned(), text)
+        });
+        if is_papers(point) {
+            all.extend(ratios.iter().map(|(ratio, _)| *ratio));
+        }
+        let few = match few.join(", ") {
+            few if few.is_empty() => String::new(),
+            few => format!("; fewer than half of the pixels have twenty events: {few}"),
+        };
+        Ok(format!(
+            "noise {least} to {most} that of the frame; {beyond} beyond 1.5 bins, of frames {frames_beyond}{few}"
+        ))
+    })?;
+    Ok((text, all))
+}
+
+/// Whether a depth is noisier than the frame, by the ratios of the surfaces.
+fn noisier(ratios: &[Measured]) -> Verdict {
+    let all = |holds: fn(&Measured) -> bool| !ratios.is_empty() && ratios.iter().all(holds);
+    if all(|ratio| ratio.interval.0 > 1.0) {
+        Verdict::Agrees
+    } else if all(|ratio| ratio.interval.1 < 1.0) {
+        Verdict::Refuted
+    } else if ratios.iter().any(|ratio| ratio.interval.1 < 1.0) {
+        Verdict::Differs
+    } else {
+        Verdict::NotDecided
+    }
+}
+
+/// Whether a depth is as noisy as the frame, within half as much again, by the
+/// worst surface.
+fn comparable(ratios: &[Measured]) -> Verdict {
+    let any = |least: f64| ratios.iter().any(|ratio| ratio.interval.0 > least);
+    if any(2.0) {
+        Verdict::Refuted
+    } else if any(1.5) {
+        Verdict::Differs
+    } else if !ratios.is_empty() && ratios.iter().all(|ratio| ratio.interval.1 <= 1.5) {
+        Verdict::Agrees
+    } else {
+        Verdict::NotDecided
+    }
+}
+
+/// Events of a surface for each reading of a frame of 2000.
+fn a_frame(point: &PointTally, surface: &str) -> Measured {
+    let events = Measured::mean(point, &format!("{surface}, events"));
+    let pixels = point.count(&format!("{surface}, events values")) as f64;
+    events.times(pixels / point.count(&format!("{surface} frames")) as f64)
+}
+
+fn frame_rate(part: &Part, papers: &[&PointTally]) -> Result<Claim> {
+    let rate = |point: &PointTally| a_frame(point, BRIGHTEST);
+    Ok(Claim::new(
+        "frame-rate",
+        format!(
+            "events of the brightest surface for each of its readings in frames of 2000: {}",
+            of_each(part, |point| Ok(rate(point).text(1)))?
+        ),
+        Verdict::graded(
+            papers.iter().all(|point| rate(point).interval.0 > 2.0),
+            papers.iter().any(|point| rate(point).interval.0 > 1.0),
+        ),
+    ))
+}
+
+fn redundant(part: &Part, papers: &[&PointTally]) -> Result<Claim> {
+    let rate = |point: &PointTally| a_frame(point, WALL);
+    // Of all events, and of all readings of frames.
+    let shares = |point: &PointTally| -> Result<[Measured; 2]> {
+        let [mut events, mut frames] = [0, 0];
+        for (surface, _) in surfaces(point)? {
+            events += point.count(&format!("{surface}, events above 0"));
+            frames += point.count(&format!("{surface} frames"));
+        }
+        let of = |what: &str| point.count(&format!("{WALL}{what}"));
+        Ok([
+            Measured::share(of(", events above 0"), events),
+            Measured::share(of(" frames"), frames),
+        ])
+    };
+    let mut less = true;
+    for point in papers {
+        let [events, frames] = shares(point)?;
+        less &= events.interval.1 < frames.interval.0;
+    }
+    Ok(Claim::new(
+        "redundant",
+        format!(
+            "events of the wall for each of its readings in frames of 2000, and its share of all events and of all readings: {}",
+            of_each(part, |point| {
+                let [events, frames] = shares(point)?.map(|share| share.value * 100.0);
+                Ok(format!(
+                    "{}, {events:.1} % and {frames:.1} %",
+                    rate(point).text(2)
+                ))
+            })?
+        ),
+        Verdict::graded(
+            papers.iter().all(|point| rate(point).interval.1 < 1.0),
+            less,
+        ),
+    ))
+}
+
+pub fn claims(part: &Part) -> Result<Vec<Claim>> {
+    let papers: Vec<&PointTally> = part
+        .points()
+        .iter()
+        .filter(|point| is_papers(point))
+        .collect();
+    let sum = |name: &str| -> u64 { papers.iter().map(|point| point.count(name)).sum() };
+    let [by_100, by_109, at_110] = [100, 109, 110].map(|by| sum(&format!("events by {by}")));
+    let correlation =
+        |point: &PointTally| Measured::mean(point, "rank correlation").times(1.0 / MILLION);
+    let lowest = papers.iter().map(|point| correlation(point).interval.0);
+    let lowest = lowest.fold(1.0, f64::min);
+    let (last, last_ratios) = noises(part, DEPTHS[1])?;
+    let (mean, mean_ratios) = noises(part, DEPTHS[2])?;
+    let percent =
+        |point: &PointTally, name: &str| Measured::mean(point, name).times(100.0 / MILLION);
+    let errors = papers
+        .iter()
+        .map(|point| percent(point, ESTIMATES[0]).value);
+    let worst = errors.fold(0.0, f64::max);
+    let ranks = |point: &PointTally| {
+        let name = format!("{}, ranks", ESTIMATES[0]);
+        Measured::mean(point, &name).times(1.0 / MILLION)
+    };
+    let ordered = papers.iter().all(|point| ranks(point).interval.0 > 0.8);
+    Ok(vec![
+        Claim::new(
+            "first",
+            format!(
+                "{by_100} of {} events by 100, {by_109} by 109, {} at 110",
+                grouped(sum("events of all pixels")),
+                grouped(at_110)
+            ),
+            Verdict::of(by_100 == 0 && by_109 == 0 && at_110 > 0),
+        ),
+        Claim::new(
+            "bright",
+            format!(
+                "rank correlation of events with the signal {}",
+                of_each(part, |point| Ok(correlation(point).text(3)))?
+            ),
+            Verdict::graded(lowest > 0.8, lowest > 0.5),
+        ),
+        Claim::new("last", last, noisier(&last_ratios)),
+        Claim::new("mean", mean, comparable(&mean_ratios)),
+        Claim::new(
+            "reflectivity",
+            format!(
+                "rms error after one scale, of pixels with an event {}",
+                of_each(part, |point| {
+                    let mut without = 0;
+                    let mut pixels = 0;
+                    for (surface, _) in surfaces(point)? {
+                        without += point.count(&format!("{surface} without an event"));
+                        pixels += point.count(&format!("{surface}, events values"));
+                    }
+                    Ok(format!(
+                        "{} % (by counts and exposure {} %), rank correlation {}, without an event {} of {} pixels",
+                        percent(point, ESTIMATES[0]).text(1),
+                        percent(point, ESTIMATES[1]).text(1),
+                        ranks(point).text(3),
+                        grouped(without),
+                        grouped(pixels),
+                    ))
+                })?
+            ),
+            Verdict::graded(worst < 10.0, worst < 25.0 || ordered),
+        ),
+        frame_rate(part, &papers)?,
+        redundant(part, &papers)?,
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ratios<const N: usize>(ratios: [(f64, f64); N]) -> Vec<Measured> {
+        let measured = |interval: (f64, f64)| Measured {
+            value: f64::midpoint(interval.0, interval.1),
+            interval,
+        };
+        ratios.map(measured).to_vec()
+    }
+
+    #[test]
+    fn the_worst_surface_decides() {
+        let of = |worst| comparable(&ratios([(0.8, 0.9), worst]));
+        assert_eq!(of((1.3, 1.5)), Verdict::Agrees);
+        assert_eq!(of((1.4, 1.6)), Verdict::NotDecided);
+        assert_eq!(of((1.6, 2.5)), Verdict::Differs);
+        assert_eq!(of((2.1, 2.5)), Verdict::Refuted);
+        assert_eq!(comparable(&[]), Verdict::NotDecided);
+    }
+
+    #[test]
+    fn noisier_on_every_surface() {
+        let of = |worst| noisier(&ratios([(1.2, 1.4), worst]));
+        assert_eq!(of((1.1, 1.5)), Verdict::Agrees);
+        assert_eq!(of((0.9, 1.1)), Verdict::NotDecided);
+        assert_eq!(of((0.8, 0.9)), Verdict::Differs);
+        assert_eq!(noisier(&ratios([(0.8, 0.9)])), Verdict::Refuted);
+        assert_eq!(noisier(&[]), Verdict::NotDecided);
+    }
+}

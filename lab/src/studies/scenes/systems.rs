@@ -1,0 +1,177 @@
+//! The paper's two systems, and what of their settings is the paper's.
+//!
+//! | | PC (section III) | FPGA (section IV) | source |
+//! |---|---|---|---|
+//! | bins | 8 of 8.75 ns | 128 of 250 ps | III-A, IV-B |
+//! | laser | 1.2 MHz | 10 MHz | III-A, IV-B |
+//! | pulse | rectangle of 10 ns: σ = 0.33 bins | 120 ps FWHM: σ = 0.2 bins | III-A, IV-B |
+//! | background | average of all bins | two quadrants | II-A, IV-B |
+//! | α | 8 | 8, ours | III-B |
+//! | L1 | 100 (III-B), 40 (III-D, III-E) | 40 | Table I for the FPGA |
+//! | L2 | 2000; ours in III-D, III-E | 2000, ours | III-B |
+//! | X | 10; ours in III-D, III-E | 4 | III-B, IV-A |
+//!
+//! The paper has no minimum count: it is 1. It gives neither background nor signal of its
+//! scenes. Ours are B = 0.05, that of its analysis (II-C), and 0.02 for the FPGA. With an
+//! assumed jitter of 70 ps, ours, the pulse of the FPGA has σ = 0.35 bins.
+//!
+//! The PC takes mini-frames of five laser cycles. A look each ten ends with one of them, so
+//! that photons counted one by one are the same.
+
+use crate::sweep::Point;
+use anyhow::Result;
+use dtof::engine::settings::Settings;
+use dtof::simulate::MM_PER_PS;
+use dtof::simulate::scene::{self, Scene};
+use dtof_core::fixed::types::{U8F8, U16F16};
+use dtof_core::{AnyRule, AverageRule, Count, PaperRule};
+
+/// Standard deviation of the PC's pulse in bins.
+pub const PC_SIGMA: f64 = 0.33;
+/// That of the FPGA's, and with a jitter of 70 ps.
+pub const FPGA_SIGMAS: [f64; 2] = [0.2, 0.35];
+/// Systems by `fpga`, with their pulses.
+pub const PULSES: [(f64, f64); 3] = [
+    (0.0, PC_SIGMA),
+    (1.0, FPGA_SIGMAS[0]),
+    (1.0, FPGA_SIGMAS[1]),
+];
+/// L1 of everything but the static scene.
+pub const L1: u16 = 40;
+
+/// What the threshold stands on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Background {
+    /// Of all bins.
+    Average,
+    /// The smaller of two quadrants.
+    Quadrants,
+}
+
+impl Background {
+    /// Both, as [`Self::name`] has them.
+    pub const ALL: [Self; 2] = [Self::Average, Self::Quadrants];
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Average => "average",
+            Self::Quadrants => "quadrants",
+        }
+    }
+
+    fn rule(self) -> AnyRule {
+        let (alpha, minimum) = (U8F8::lit("8"), Count::saturating(1));
+        match self {
+            Self::Average => AverageRule::new(alpha, minimum).into(),
+            Self::Quadrants => PaperRule::new(alpha, minimum).into(),
+        }
+    }
+}
+
+/// One of the two.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct System {
+    pub name: &'static str,
+    pub bins: u16,
+    pub bin_width_ps: f64,
+    pub laser_rate_mhz: f64,
+    /// Laser cycles from one look to the next.
+    pub x: u16,
+    /// Background photons a bin and laser cycle.
+    pub background: f64,
+    /// What its threshold stands on.
+    pub by: Background,
+}
+
+/// Section III.
+pub const PC: System = System {
+    name: "PC",
+    bins: 8,
+    bin_width_ps: 8750.0,
+    laser_rate_mhz: 1.2,
+    x: 10,
+    background: 0.05,
+    by: Background::Average,
+};
+
+/// Section IV.
+pub const FPGA: System = System {
+    name: "FPGA",
+    bins: 128,
+    bin_width_ps: 250.0,
+    laser_rate_mhz: 10.0,
+    x: 4,
+    background: 0.02,
+    by: Background::Quadrants,
+};
+
+impl System {
+    /// What the point's `fpga` stands for.
+    pub fn of(point: &Point) -> Self {
+        if point["fpga"] > 0.0 { FPGA } else { PC }
+    }
+
+    /// Its name, and the pulse.
+    pub fn with_pulse(&self, sigma: f64) -> String {
+        format!("{}, σ {sigma} bins", self.name)
+    }
+
+    /// Millimetres of range a bin.
+    pub fn mm_per_bin(&self) -> f64 {
+        self.bin_width_ps * MM_PER_PS
+    }
+
+    /// Its settings with a background that need not be its own.
+    pub fn settings(&self, by: Background, l1: u16, seed: u64) -> Settings {
+        Settings {
+            bins: self.bins.into(),
+            bin_width_ps: U16F16::from_num(self.bin_width_ps),
+            rule: by.rule(),
+            l1,
+            x: self.x,
+            ..scene::settings(seed)
+        }
+    }
+
+    /// The scene of a file before it, with a pulse of this standard deviation in bins.
+    pub fn scene(&self, text: &str, sigma: f64) -> Result<Scene> {
+        Ok(Scene {
+            bins: self.bins,
+            bin_width_ps: self.bin_width_ps,
+            laser_rate_mhz: self.laser_rate_mhz,
+            background: self.background,
+            pulse_sigma_bins: sigma,
+            ..Scene::parse(text)?
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rectangle's standard deviation is its width over the root of 12; 1.2 % of a
+    /// period of 1/1.2 MHz. A Gaussian's FWHM is 2.3548 of them.
+    #[test]
+    fn pulses_are_as_wide_as_the_lasers() {
+        let rectangle_ps = 0.012 * 1e6 / PC.laser_rate_mhz;
+        let sigma = rectangle_ps / 12.0_f64.sqrt() / PC.bin_width_ps;
+        assert!((sigma - PC_SIGMA).abs() < 0.005);
+        let sigma_ps = 120.0 / 2.3548;
+        for (jitter_ps, sigma) in [0.0, 70.0].into_iter().zip(FPGA_SIGMAS) {
+            let bins = f64::hypot(sigma_ps, jitter_ps) / FPGA.bin_width_ps;
+            assert!((bins - sigma).abs() < 0.005, "{bins}");
+        }
+    }
+
+    #[test]
+    fn settings_are_the_papers() {
+        let settings = PC.settings(PC.by, 100, 0);
+        assert_eq!((settings.bins, settings.l1), (8, 100));
+        assert_eq!((settings.l2, settings.x), (2000, 10));
+        assert!(matches!(settings.rule, AnyRule::Average(_)));
+        let settings = FPGA.settings(FPGA.by, L1, 0);
+        assert_eq!((settings.bins, settings.x), (128, 4));
+        assert!(matches!(settings.rule, AnyRule::Paper(_)));
+    }
+}
