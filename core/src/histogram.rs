@@ -363,7 +363,7 @@ impl<const BINS: usize, W: CounterWidth> Default for Histogram<BINS, W> {
 #[inline(never)]
 pub(crate) fn mean(photons: u32, bins: u32) -> Option<U24F8> {
     let whole = photons.checked_div(bins)?;
-    // Less than 2¹⁰ bins, so that the rest fits.
+    // At most 2¹⁰ bins, so that the rest fits.
     let rest = (photons.wrapping_sub(whole.wrapping_mul(bins)) << 8).checked_div(bins)?;
     Some(U24F8::from_bits((whole << 8) + rest))
 }

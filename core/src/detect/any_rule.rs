@@ -20,7 +20,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Cost: one comparison a look more than the rule itself, and a call for all but the paper's.
+//! Cost: one comparison a look more than the rule itself, and a call for all but the paper's
+//! with 10-bit counters.
 
 use fixed::types::U24F8;
 

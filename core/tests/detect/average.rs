@@ -2,8 +2,8 @@
 
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::{
-    AverageRule, Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DetectionRule,
-    Histogram, RangeGate, detect,
+    AverageRule, BinPosition, Count, Count10, Count16, Count24, CounterWidth, DepthEstimator,
+    DetectionRule, Histogram, RangeGate, centroid, detect,
 };
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
@@ -28,6 +28,10 @@ fn as_written<const BINS: usize, W: CounterWidth>(
     let alpha = u128::from(rule.threshold().alpha().to_bits());
     // Both sides times 256, squared.
     let clear = (256 * (bins * peak - total)).pow(2) > alpha.pow(2) * bins * total;
+    // As Eq. 5 is printed, where the real numbers are clear.
+    let mean = total as f64 / bins as f64;
+    let level = mean + alpha as f64 / 256.0 * mean.sqrt();
+    assert!((peak as f64 - level).abs() < 1e-9 * level || clear == (peak as f64 > level));
     let fires = clear && peak >= u128::from(rule.threshold().minimum_count().raw());
     fires.then(|| U24F8::from_bits((total * 256 / bins) as u32))
 }
@@ -103,6 +107,46 @@ fn the_widest_counters_do_not_overflow() {
             assert_eq!(rule.detect(&histogram, &gate, histogram.peak()), expected);
         }
     }
+}
+
+/// A pulse of 0.33 bins without background, in every 64th of a bin, and so many photons that
+/// none of it is noise: how far off the centroid is with the rule's background, and with none.
+#[test]
+fn the_pulse_in_the_average_moves_the_centroid() {
+    let share = |from: f64| 0.5 * (1.0 + libm::erf(from / 0.33 / 2f64.sqrt()));
+    let mut worst = [0.0_f64; 2];
+    for place in 0..64 {
+        let place = 4.0 + f64::from(place) / 64.0;
+        let frame: [u32; 8] = core::array::from_fn(|bin| {
+            let part = share((bin + 1) as f64 - place) - share(bin as f64 - place);
+            (1e6 * part.max(0.0)) as u32
+        });
+        let mut histogram = Histogram::<8, Count24>::new();
+        histogram.add_frame(&frame, &RangeGate::full());
+        let rule = AverageRule::new(U8F8::lit("4"), Count::saturating(5));
+        let found = detect(
+            &histogram,
+            &RangeGate::full(),
+            &rule,
+            &DepthEstimator::default(),
+        );
+        let none = centroid(
+            &histogram,
+            &RangeGate::full(),
+            histogram.peak(),
+            U24F8::ZERO,
+        );
+        let peak = found.unwrap().peak.bin;
+        let positions = [
+            found.unwrap().position(),
+            BinPosition::of(peak, none.offset),
+        ];
+        for (worst, position) in worst.iter_mut().zip(positions) {
+            *worst = worst.max((f64::from(position.raw()) / 256.0 - place).abs());
+        }
+    }
+    assert!((0.11..0.13).contains(&worst[0]), "{worst:?}");
+    assert!((0.02..0.04).contains(&worst[1]), "{worst:?}");
 }
 
 #[test]

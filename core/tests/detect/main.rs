@@ -1,6 +1,10 @@
 //! Rules, thresholds, roots and peaks.
 
-#![allow(clippy::cast_possible_truncation, reason = "small numbers")]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "small numbers"
+)]
 
 mod any_rule;
 mod average;

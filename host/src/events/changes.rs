@@ -86,9 +86,10 @@ impl Changes {
                 .collect()
         });
         let ranges = || dots.iter().flatten().map(|dot| dot.y);
-        let (low, high) = ranges().fold((f64::INFINITY, 0.0f64), |(low, high), range| {
-            (low.min(range), high.max(range))
-        });
+        let (low, high) = ranges()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), range| {
+                (low.min(range), high.max(range))
+            });
         if low > high {
             return Ok(None);
         }

@@ -2,7 +2,8 @@
 //!
 //! There is no table for it: exposures without a target are simulated. Each gives the
 //! highest α with which one of its looks fires. α is the smallest that so few exceed that
-//! the upper 99 % limit of their share is not above the wanted one. Of all L1 the one with
+//! the upper 99 % limit of their share is not above the wanted one, for each L1. So a share below
+//! 4.6 over the number of exposures cannot be had. Of all L1 the one with
 //! the shortest mean time to an event is taken. False alarms are counted in other exposures.
 
 use anyhow::{Result, ensure};
@@ -25,7 +26,7 @@ const TRIALS: u16 = 64;
 const LONGEST_TRIAL: f64 = 2000.0;
 /// The first of their trials, which no other simulation here takes.
 const FIRST_TRIAL: u16 = 1000;
-/// Above the upper limit of a simulated share lie as many of its samples.
+/// The upper limit of a simulated share is one-sided, for 99 % confidence.
 const UPPER_TAIL: f64 = 0.01;
 
 /// The settings and what to expect of them.

@@ -8,6 +8,7 @@
 
 mod claims;
 mod results;
+mod surfaces;
 
 use anyhow::Result;
 use dtof_core::{DepthEvent, PixelAddress, RangeGate, Reflectivity};

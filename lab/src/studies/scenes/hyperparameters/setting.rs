@@ -96,10 +96,15 @@ impl<'a> Setting<'a> {
         (!common.is_empty()).then(|| (by_l1.map(mean), common.len()))
     }
 
-    /// Whether a laser cycle more of L1 lowers the error less from 40 to 80 than from 20 to 40.
-    pub fn gain_diminishes(self) -> Option<bool> {
+    /// Whether the error falls less from L1 = 40 to 80 than from 20 to 40: by a laser cycle
+    /// more, as any convex curve does, or by a share for twice the L1.
+    pub fn gain_diminishes(self, by_doubling: bool) -> Option<bool> {
         let ([at_20, at_40, at_80], _) = self.mean_errors([20, 40, 80])?;
-        Some((at_40 - at_80) / 40.0 < (at_20 - at_40) / 20.0)
+        Some(if by_doubling {
+            at_80 / at_40 > at_40 / at_20
+        } else {
+            (at_40 - at_80) / 40.0 < (at_20 - at_40) / 20.0
+        })
     }
 
     /// What `of` gives for every point of an α and L1, each after its SNR.

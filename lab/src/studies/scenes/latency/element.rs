@@ -6,9 +6,9 @@
 //! when a pixel is cleared; this is ours.
 //!
 //! The paper says that a look comes every X = 4 laser cycles, that a histogram takes four
-//! laser cycles in the element, and that it has two stages. The three go together in one way
-//! only: a new histogram enters each laser cycle, and four are in the element at once. See
-//! [`READINGS`] for the others.
+//! laser cycles in the element, and that it has two stages. With one histogram
+//! a stage the three do not go together. X = 4 takes a new histogram each laser cycle, so four
+//! in the element at once: a pipeline of four. See [`READINGS`] for the others.
 
 use crate::studies::scenes::one_pixel::BINS;
 use dtof_core::{AnyRule, Histogram, PixelConfig};

@@ -1,7 +1,7 @@
 //! What the paper says of its static scene.
 
 use super::super::systems::{Background, System};
-use super::results::surfaces;
+use super::surfaces::surfaces;
 use super::{DEPTHS, ESTIMATES, MILLION};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Verdict};

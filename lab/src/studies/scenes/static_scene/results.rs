@@ -2,37 +2,16 @@
 
 use super::super::one_pixel::PER_BIN;
 use super::claims::claims;
-use super::{DEPTHS, ESTIMATES, NOISES, PC_L1, PC_LIGHTS, scene};
+use super::surfaces::surfaces;
+use super::{DEPTHS, ESTIMATES, NOISES, PC_L1, PC_LIGHTS};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, PointTally};
 use anyhow::Result;
 use dtof::rows::grouped;
-use dtof_core::PixelAddress;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::STEPS;
 use std::f64::consts::SQRT_2;
-
-/// Every surface of a point with its mean signal photons a laser cycle.
-pub fn surfaces(point: &PointTally) -> Result<Vec<(String, f64)>> {
-    let scene = scene(&point.parameters, 0.0)?;
-    let mut sums = vec![(0.0, 0.0); scene.surfaces.len()];
-    for address in (0..u16::MAX)
-        .take(scene.geometry.addresses())
-        .map(PixelAddress)
-    {
-        if let Some(view) = scene.truth(address, 0) {
-            let (sum, count) = &mut sums[view.surface];
-            *sum += scene.rates(address, 0).signal;
-            *count += 1.0;
-        }
-    }
-    let names = scene.surfaces.into_iter().map(|surface| surface.name);
-    Ok(names
-        .zip(sums)
-        .map(|(name, (sum, count))| (name, sum / count))
-        .collect())
-}
 
 /// What a chart over the signal of every surface shows.
 struct Shown<'a> {
