@@ -186,7 +186,7 @@ fn refused() -> Vec<(Vec<u8>, Refusal)> {
     // From which byte on what stands there, as `docs/link-format.md` numbers them.
     let bad: [(usize, &[u8], Refusal); 25] = [
         (24, &[2], Refusal::Unknown),
-        (25, &[2], Refusal::Unknown),
+        (25, &[3], Refusal::Unknown),
         (29, &[2], Refusal::Unknown),
         (32, &[2], Refusal::Unknown),
         (32, &[1, 2, 0, 1, 0, 0], Refusal::Unknown),

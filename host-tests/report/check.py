@@ -317,7 +317,7 @@ def main(chromium, pictures, static, moving, large):
             page = report.page
             check("says so", page.locator("#unscripted").is_visible())
             check("nothing that does nothing", not page.locator("#interactive").is_visible())
-            check("all maps", page.locator("figure svg").count() == 3)
+            check("all maps", page.locator("figure svg").count() == 4)
             check("maps are seen", page.locator("figure svg").last.is_visible())
         browser.close()
 

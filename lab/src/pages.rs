@@ -5,9 +5,11 @@
 //! `docs/results/data`. So a quick look that is taken again must give the kept numbers
 //! bit for bit, and together with the kept rest every document.
 
+mod bus;
 pub mod failures;
 pub mod methods;
 mod movie;
+mod timing;
 
 use crate::studies::failures::STUDY as FAILURES;
 use crate::studies::methods::{depth_error, event_depth, time_to_detect};
@@ -131,6 +133,8 @@ pub fn documents(
             );
         }
     }
+    values.set("bus.rates", bus::rates());
+    values.set("bus.waits", bus::waits());
     values.add(FAILURES.name, &failures::tables(part(FAILURES)?)?);
     for (page, template) in [
         ("results/failures.md", include_str!("pages/failures.md")),
@@ -140,6 +144,7 @@ pub fn documents(
         documents.push((page.into(), values.fill(template)?));
     }
     documents.push(("figures/demo.svg".into(), movie::demo()?));
+    documents.push(("figures/processing.svg".into(), timing::timing()));
     Ok(documents)
 }
 

@@ -22,7 +22,7 @@ const REPORTS: [(&str, &str); 3] = [
     ("static", "demo --quiet --out"),
     (
         "moving",
-        "simulate --quiet --scene scenes/fan.toml --cycles 100000 --alpha 8 --out",
+        "simulate --quiet --scene scenes/fan.toml --cycles 100000 --alpha 8 --dynamic-depth --out",
     ),
     ("large", "demo --quiet --array 256x256 --cycles 2000 --out"),
 ];

@@ -57,6 +57,7 @@ impl Demo {
             file: None,
             cycles: self.cycles,
             settings: &settings,
+            changes: None,
             device: self.device.as_deref(),
             image: self.image.as_deref(),
             out: &self.out,

@@ -1,5 +1,6 @@
 //! The options of dynamic depth, the same for every command.
 
+use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use dtof::cli::arguments::fixed;
 use dtof_core::fixed::types::U24F8;
@@ -23,7 +24,39 @@ enum Reference {
     Reported,
 }
 
+/// Dynamic depth in a report.
+#[derive(Args)]
+pub struct Shown {
+    /// Show in the report when the depth of pixels changes, and to which side
+    #[arg(long)]
+    dynamic_depth: bool,
+    #[command(flatten)]
+    options: Options,
+}
+
+impl Shown {
+    /// If it is asked for.
+    ///
+    /// # Errors
+    /// Options without it.
+    pub fn wanted(&self) -> Result<Option<DynamicDepth>> {
+        self.options.wanted(self.dynamic_depth)
+    }
+}
+
 impl Options {
+    /// If it is asked for.
+    ///
+    /// # Errors
+    /// Options without it.
+    pub fn wanted(&self, is_asked: bool) -> Result<Option<DynamicDepth>> {
+        ensure!(
+            is_asked || !self.are_given(),
+            "--threshold-mm and --reference are of --dynamic-depth"
+        );
+        Ok(is_asked.then(|| self.dynamic_depth()))
+    }
+
     /// Whether any was given.
     pub fn are_given(&self) -> bool {
         self.threshold_mm.is_some() || self.reference.is_some()

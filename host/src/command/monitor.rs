@@ -65,10 +65,7 @@ pub struct Monitor {
 
 impl Monitor {
     pub fn run(&self) -> Result<()> {
-        ensure!(
-            self.dynamic_depth || !self.of_dynamic_depth.are_given(),
-            "--threshold-mm and --reference are of --dynamic-depth"
-        );
+        let dynamic_depth = self.of_dynamic_depth.wanted(self.dynamic_depth)?;
         ensure!(
             !self.map || io::stderr().is_terminal(),
             "--map draws on standard error, which is no terminal here"
@@ -142,9 +139,7 @@ impl Monitor {
         let task = Task {
             settings: &settings,
             pixels,
-            dynamic_depth: self
-                .dynamic_depth
-                .then(|| self.of_dynamic_depth.dynamic_depth()),
+            dynamic_depth,
         };
         let monitored = monitor(
             &mut client,

@@ -15,6 +15,7 @@ use dtof::input::source::{Geometry, PhotonSource};
 use dtof::input::{npy, tmf8820};
 use dtof_core::fixed::types::{I24F8, U16F16};
 
+use super::dynamic_depth::Shown;
 use super::operation::{Frames, Operation};
 use super::print_summary;
 
@@ -43,6 +44,8 @@ pub struct Replay {
     operation: Operation,
     #[command(flatten)]
     frames: Frames,
+    #[command(flatten)]
+    changes: Shown,
     /// Histograms: photons a laser cycle in the brightest pixel of each capture [default: 1]
     #[arg(long, value_name = "R", value_parser = positive, conflicts_with = "recorded_cycles")]
     photons_per_cycle: Option<f64>,
@@ -86,7 +89,8 @@ impl Replay {
             )?
         };
         let mut engine = host_engine(&settings, &photons.addresses())?;
-        let mut output = Output::create(&self.out, &settings, photons.as_ref(), Some(&self.input))?;
+        let mut output = Output::create(&self.out, &settings, photons.as_ref(), Some(&self.input))?
+            .with_changes(self.changes.wanted()?.as_ref())?;
         let mut summary = run(
             photons.as_mut(),
             engine.as_mut(),

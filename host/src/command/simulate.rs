@@ -18,7 +18,9 @@ use dtof::simulate::scene::Scene;
 use dtof::view::report::Section;
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_link::DynamicDepth;
 
+use super::dynamic_depth::Shown;
 use super::operation::{Frames, Operation};
 use super::print_summary;
 
@@ -33,10 +35,15 @@ pub struct Simulate {
     /// Macropixels of the array that looks at the scene [default: the file's]
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = array)]
     array: Option<Geometry>,
+    /// Without signal: photon-counts.svg is then a passive image
+    #[arg(long)]
+    laser_off: bool,
     #[command(flatten)]
     operation: Operation,
     #[command(flatten)]
     frames: Frames,
+    #[command(flatten)]
+    changes: Shown,
     /// Decide on a device: tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated
     /// device [default: this computer]
     #[arg(long, value_name = "DEVICE")]
@@ -59,6 +66,9 @@ impl Simulate {
     pub fn run(&self) -> Result<()> {
         let mut scene = Scene::read(&self.scene)?;
         scene.geometry = self.array.unwrap_or(scene.geometry);
+        if self.laser_off {
+            scene = scene.with_laser_off();
+        }
         let bin_width_ps = U16F16::from_num(scene.bin_width_ps);
         let bins = scene.bins.into();
         let settings = Settings {
@@ -70,12 +80,18 @@ impl Simulate {
         };
         let file = self.scene.display().to_string();
         let Geometry { columns, rows } = scene.geometry;
-        let lead = format!("Simulated photons of {file}, {columns}×{rows} macropixels.");
+        let laser = if self.laser_off {
+            ", the laser off"
+        } else {
+            ""
+        };
+        let lead = format!("Simulated photons of {file}, {columns}×{rows} macropixels{laser}.");
         Simulation {
             scene: &scene,
             file: Some(&self.scene),
             cycles: self.cycles.unwrap_or(scene.cycles),
             settings: &settings,
+            changes: self.changes.wanted()?,
             device: self.device.as_deref(),
             image: self.image.as_deref(),
             out: &self.out,
@@ -93,6 +109,8 @@ pub struct Simulation<'a> {
     pub file: Option<&'a Path>,
     pub cycles: u64,
     pub settings: &'a Settings,
+    /// Dynamic depth, if the report is to show it.
+    pub changes: Option<DynamicDepth>,
     pub device: Option<&'a str>,
     /// The image of an emulated device.
     pub image: Option<&'a Path>,
@@ -110,7 +128,8 @@ impl Simulation<'_> {
             None => photons?,
         };
         let mut engine = engine(self.device, self.image, self.settings, &photons.addresses())?;
-        let mut output = Output::create(self.out, self.settings, &photons, self.file)?;
+        let mut output = Output::create(self.out, self.settings, &photons, self.file)?
+            .with_changes(self.changes.as_ref())?;
         let mut comparison = self.scene.comparison(self.settings, self.cycles)?;
         let mut summary = run(
             &mut photons,

@@ -31,6 +31,7 @@ pub fn run(
 ) -> Result<Summary> {
     let cycles = source.cycles();
     let progress = Progress::new(cycles, "laser cycles", quiet);
+    let pixels = source.addresses();
     let mut done = 0;
     while done < cycles {
         #[allow(
@@ -41,6 +42,7 @@ pub fn run(
         let most = (SLICE_PHOTONS / source.photons_per_cycle()).clamp(1.0, SLICE.into()) as u16;
         let next = u16::try_from(cycles - done).map_or(most, |left| left.min(most));
         let slice = source.next_slice(next)?;
+        output.count(&pixels, &slice);
         let events = engine.run(&slice)?;
         output.write(&events)?;
         watch(&events);

@@ -6,7 +6,7 @@ use dtof_core::fixed::types::I24F8;
 use dtof_core::{DepthEvent, PixelAddress, RangeScale, Reflectivity};
 
 use crate::events::events_csv::range_mm;
-use crate::input::source::Geometry;
+use crate::input::source::{Geometry, Slice};
 
 /// How many events the mean map averages, as in the paper's figure.
 pub const MEAN_OF: usize = 10;
@@ -20,6 +20,8 @@ pub struct PixelHistory {
     reflectivity: Reflectivity,
     /// All events.
     pub events: u64,
+    /// All photons, whatever became of them.
+    pub photons: u64,
 }
 
 impl PixelHistory {
@@ -87,6 +89,13 @@ impl Maps {
         pixel.events += 1;
     }
 
+    /// Takes the photons of `pixels` into account.
+    pub fn count(&mut self, pixels: &[PixelAddress], slice: &Slice) {
+        for (address, received) in pixels.iter().zip(&slice.pixels) {
+            self.pixels[usize::from(address.0)].photons += received.photons.len() as u64;
+        }
+    }
+
     /// Pixels with at least one event.
     #[must_use]
     pub fn reporting(&self) -> usize {
@@ -113,6 +122,7 @@ impl Maps {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::source::{Photon, PixelPhotons};
 
     #[test]
     fn the_last_range_is_the_newest_and_the_mean_that_of_the_last_ten() {
@@ -123,6 +133,25 @@ mod tests {
         }
         assert_eq!(pixel.last_mm(), Some(12.0));
         assert_eq!(pixel.mean_mm(), Some(7.5)); // of 3 to 12
+    }
+
+    #[test]
+    fn photons_are_those_of_their_pixel() {
+        let mut maps = Maps::new(Geometry::new(3, 1));
+        let photon = Photon { cycle: 0, code: 5 };
+        let received = |photons| PixelPhotons {
+            cycles: 1,
+            photons: vec![photon; photons],
+        };
+        let slice = Slice {
+            first_cycle: 0,
+            pixels: vec![received(2), received(7)],
+        };
+        for _ in 0..2 {
+            maps.count(&[0, 2].map(PixelAddress), &slice);
+        }
+        let photons = maps.pixels.iter().map(|pixel| pixel.photons);
+        assert!(photons.eq([4, 0, 14]));
     }
 
     #[test]

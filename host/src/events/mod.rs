@@ -1,6 +1,7 @@
 //! The output of events: tables, words, maps, a folder of results.
 
 pub mod aer_file;
+pub mod changes;
 pub mod events_csv;
 #[cfg(test)]
 pub(crate) mod fixtures;

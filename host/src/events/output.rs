@@ -11,20 +11,22 @@ use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use dtof_core::{DepthEvent, RangeScale};
+use dtof_core::{DepthEvent, PixelAddress, RangeScale};
 use tempfile::NamedTempFile;
 
 use super::aer_file;
 use crate::engine::settings::Settings;
+use crate::events::changes::Changes;
 use crate::events::events_csv::{self, range_mm};
 use crate::events::maps::Maps;
 use crate::events::sample::Sample;
 use crate::events::summary::{self, Summary};
 use crate::files::{ASIDE, are_same, aside, flushed, may_replace};
-use crate::input::source::PhotonSource;
+use crate::input::source::{PhotonSource, Slice};
 use crate::view::report::{self, Cloud, Figure, Section};
 use dtof_draw::svg;
-use pictures::pictures;
+use dtof_link::DynamicDepth;
+use pictures::{Picture, pictures};
 
 const CSV: &str = "events.csv";
 const AER: &str = "events.aer";
@@ -45,6 +47,8 @@ pub struct Output {
     maps: Maps,
     sides: [&'static str; 2],
     sample: Sample,
+    /// If they are asked for.
+    changes: Option<Changes>,
 }
 
 impl Output {
@@ -84,7 +88,19 @@ impl Output {
             maps: Maps::new(geometry),
             sides: source.sides(),
             sample: Sample::new(Sample::LIMIT),
+            changes: None,
         })
+    }
+
+    /// The report shows dynamic depth as well, if there are `options` for it.
+    ///
+    /// # Errors
+    /// If the threshold is too low.
+    pub fn with_changes(mut self, options: Option<&DynamicDepth>) -> Result<Self> {
+        let addresses = self.maps.geometry.addresses();
+        let changes = options.map(|options| Changes::new(options, self.scale, addresses));
+        self.changes = changes.transpose()?;
+        Ok(self)
     }
 
     /// Writes events in the order they come.
@@ -98,8 +114,16 @@ impl Output {
                 .with_context(|| self.folder.display().to_string())?;
             self.maps.add(event, &self.scale);
             self.sample.add(event, range_mm(event, &self.scale));
+            if let Some(changes) = &mut self.changes {
+                changes.add(event);
+            }
         }
         Ok(())
+    }
+
+    /// Takes the photons of `pixels` into account.
+    pub fn count(&mut self, pixels: &[PixelAddress], slice: &Slice) {
+        self.maps.count(pixels, slice);
     }
 
     /// The events so far, pixel by pixel.
@@ -122,17 +146,20 @@ impl Output {
     ) -> Result<()> {
         let called = summary.settings.reports();
         let pictures = pictures(&self.maps, self.sides, called)?;
-        let bytes = pictures.iter().map(|picture| picture.svg.len()).sum();
-        self.sample.limit(report::room_for_events(bytes));
-        let figures: Vec<Figure> = pictures
-            .iter()
-            .filter_map(|picture| {
-                Some(Figure {
-                    svg: &picture.svg,
-                    caption: picture.caption.as_deref()?,
-                })
-            })
+        let changes = self.changes.as_ref();
+        let changes = changes.map(|changes| changes.picture(summary.cycles, called[1]));
+        let changes = changes.transpose()?.flatten();
+        let of_maps = pictures.iter().filter_map(|picture| {
+            let Picture { svg, caption, .. } = picture;
+            Some((svg, caption.as_ref()?))
+        });
+        let of_changes = changes.iter().map(|(svg, caption)| (svg, caption));
+        let figures = of_maps.chain(of_changes);
+        let figures: Vec<Figure> = figures
+            .map(|(svg, caption)| Figure { svg, caption })
             .collect();
+        let bytes = figures.iter().map(|figure| figure.svg.len()).sum();
+        self.sample.limit(report::room_for_events(bytes));
         let totals = summary.rows();
         let settings = summary.settings.rows();
         let section = |heading, rows| Section { heading, rows };

@@ -80,6 +80,16 @@ impl Scene {
         Self::parse(include_str!("../../../scenes/demo.toml"))
     }
 
+    /// The same scene with the laser off: no signal, and no crosstalk.
+    #[must_use]
+    pub fn with_laser_off(mut self) -> Self {
+        for surface in &mut self.surfaces {
+            surface.light = Light::Signal(0.0);
+        }
+        self.effects.cover_glass = None;
+        self
+    }
+
     /// The view of `pixel` in laser cycle `cycle`: the truth its events are
     /// compared with. None if there is nothing at its place.
     #[must_use]

@@ -12,12 +12,13 @@ use dtof_core::Statistics;
 
 const PHOTONS: &str = "pixel,cycle,bin\n0,0,0\n";
 const SCENE: &str = "cycles = 100\n[[surface]]\nrange_mm = 1000\nsignal = 1\n";
-const RESULTS: [&str; 9] = [
+const RESULTS: [&str; 10] = [
     "depth-last.svg",
     "depth-mean.svg",
     "event-counts.svg",
     "events.aer",
     "events.csv",
+    "photon-counts.svg",
     "reflectivity-events.svg",
     "reflectivity-signal.svg",
     "report.html",

@@ -222,7 +222,7 @@ fn the_demo_is_the_papers_static_scene_and_every_pixel_reports() {
     let first = events.lines().nth(1).unwrap();
     assert!(first.starts_with("109,"), "{first}");
     let report = read("report.html");
-    assert!(report.contains("</html>") && report.matches("<svg").count() == 3);
+    assert!(report.contains("</html>") && report.matches("<svg").count() == 4);
     // As documented: the report stays small enough to send.
     assert!(report.len() < 5_000_000 && report.contains("All 53,534 events are shown."));
     for picture in ["depth-mean", "reflectivity-events", "reflectivity-signal"] {
@@ -235,10 +235,37 @@ fn the_demo_is_the_papers_static_scene_and_every_pixel_reports() {
     for (picture, shown) in [
         ("depth-last", "demo-depth"),
         ("event-counts", "demo-events"),
+        ("photon-counts", "demo-photons"),
     ] {
         let path = format!("{}/../docs/figures/{shown}.svg", env!("CARGO_MANIFEST_DIR"));
         let committed = std::fs::read_to_string(path).unwrap();
         assert!(read(&format!("{picture}.svg")) == committed, "{shown}");
+    }
+}
+
+/// A target that comes nearer by 20 bins after 1,000 laser cycles.
+#[test]
+fn dynamic_depth_is_shown_over_time_where_it_is_asked_for() {
+    let scratch = Scratch::new();
+    let far = steady(0, 60, 1000);
+    let near = (1000..2000).map(|cycle| format!("0,{cycle},40\n"));
+    let input = scratch.file("photons.csv", far + &near.collect::<String>());
+    scratch.replayed(&input, "");
+    let (plain, events) = (
+        scratch.read("out/report.html"),
+        scratch.read("out/events.csv"),
+    );
+    assert!(!plain.contains("Dynamic depth"));
+    scratch.replayed(&input, "--dynamic-depth");
+    let shown = scratch.read("out/report.html");
+    assert!(shown.contains("<figcaption>Dynamic depth: 3 changes in place of 45 events."));
+    let figures = |report: &str| report.matches("<svg").count();
+    assert_eq!(figures(&shown), figures(&plain) + 1);
+    assert_eq!(scratch.read("out/events.csv"), events);
+    // More than a third of 20 bins; a wall has no changes.
+    for options in ["--threshold-mm 300", "--cycles 1000"] {
+        scratch.replayed(&input, &format!("--dynamic-depth {options}"));
+        assert_eq!(figures(&scratch.read("out/report.html")), figures(&plain));
     }
 }
 

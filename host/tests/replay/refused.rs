@@ -187,6 +187,8 @@ fn settings_that_cannot_be_are_refused() {
             --alpha NaN | --alpha
             --alpha 0.001 | less than half
             --bins 100 | power of two
+            --threshold-mm 50 | are of --dynamic-depth
+            --dynamic-depth --threshold-mm 0.01 | --threshold-mm 0.01: | less than 1/512 bin
             --bins 4 | power of two
             --bins 2048 | power of two
             --columns 0 | --columns

@@ -141,3 +141,23 @@ fn a_cover_glass_is_named_with_the_gate_that_leaves_it_out() {
     scratch.simulated(&near, "");
     assert!(scratch.summary()["against_truth"]["cover_glass"].is_null());
 }
+
+/// The passive image of the paper's Fig. 8.
+#[test]
+fn with_the_laser_off_there_is_background_alone() {
+    let scratch = Scratch::new();
+    let photons = |background: &str| {
+        let scene = format!(
+            "cycles = 2000\nbackground = {background}\n[cover_glass]\nsignal = 1\nposition_bins = 3\n\
+             [[surface]]\nrange_mm = 1000\nsignal = 2\n"
+        );
+        let scene = scratch.file("scene.toml", scene);
+        scratch.simulated(&scene, "--laser-off --quiet");
+        let map = scratch.read("out/photon-counts.svg");
+        assert_eq!(map.contains("no photon in any pixel"), background == "0");
+        scratch.summary()["photons"].as_f64().unwrap()
+    };
+    assert_eq!(photons("0"), 0.0);
+    // 0.05 in each of 128 bins: 12,800, give or take five standard deviations.
+    assert!((photons("0.05") - 12_800.0).abs() < 566.0);
+}

@@ -7,12 +7,13 @@ use crate::input::source::Geometry;
 use dtof_draw::picture::{Map, heat_map};
 
 /// The files, in the order of [`pictures`].
-pub const NAMES: [&str; 5] = [
+pub const NAMES: [&str; 6] = [
     "depth-last.svg",
     "depth-mean.svg",
     "event-counts.svg",
     "reflectivity-events.svg",
     "reflectivity-signal.svg",
+    "photon-counts.svg",
 ];
 
 /// A picture and the file it becomes.
@@ -25,19 +26,22 @@ pub struct Picture {
 
 /// The maps of a run on an array with these `sides`, whose pixels report what is called
 /// `one` and `several`.
-pub fn pictures(maps: &Maps, sides: [&str; 2], [one, several]: [&str; 2]) -> Result<[Picture; 5]> {
-    let draw = |name, title: &str, unit, caption, values: Vec<Option<f64>>| {
+pub fn pictures(maps: &Maps, sides: [&str; 2], [one, several]: [&str; 2]) -> Result<[Picture; 6]> {
+    let draw_without = |missing, name, title: &str, unit, caption, values: Vec<Option<f64>>| {
         let Geometry { columns, rows } = maps.geometry;
         let svg = heat_map(&Map {
             title,
             unit,
             sides,
-            missing: one,
+            missing,
             columns: columns as usize,
             rows: rows as usize,
             values: &values,
         })?;
         anyhow::Ok(Picture { name, svg, caption })
+    };
+    let draw = |name, title: &str, unit, caption, values| {
+        draw_without(one, name, title, unit, caption, values)
     };
     let all = |value: &dyn Fn(&PixelHistory) -> Option<f64>| -> Vec<Option<f64>> {
         maps.pixels.iter().map(value).collect()
@@ -85,6 +89,18 @@ pub fn pictures(maps: &Maps, sides: [&str; 2], [one, several]: [&str; 2]) -> Res
                  of the pixel."
             )),
             relative(all(&PixelHistory::reflectivity_of_signal)),
+        )?,
+        draw_without(
+            "photon",
+            "photon-counts.svg",
+            "Number of photons",
+            "photons",
+            Some(
+                "How many photons each pixel received in the whole run, signal and background: an \
+                 active image. With the laser off (simulate --laser-off) it is the passive one."
+                    .to_owned(),
+            ),
+            all(&|pixel| (pixel.photons > 0).then_some(pixel.photons as f64)),
         )?,
     ])
 }

@@ -8,7 +8,7 @@ use anyhow::Result;
 use dtof::rows::grouped;
 use dtof_core::isqrt;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
-use dtof_draw::palette::alpha as pen;
+use dtof_draw::palette::{STEPS, alpha as pen};
 use dtof_theory::gaussian::threshold;
 use dtof_theory::{gaussian as printed, known_background};
 use rand_pcg::Pcg64;
@@ -113,6 +113,7 @@ fn results(part: &Part) -> Result<Results> {
             Figure::new("gaussian-error-false", &rates(part, Rate::FalsePositive))?,
             Figure::new("gaussian-error-ratio", &ratio())?,
             Figure::new("gaussian-error-pass", &rates(part, Rate::Pass))?,
+            Figure::new("root-error", &root_error())?,
         ],
         claims: claims(part),
         values: [("histograms", histograms)].into(),
@@ -139,9 +140,7 @@ fn claims(part: &Part) -> Vec<Claim> {
     let (low, high) = ends(at_4);
     let (enough_low, enough_high) = ends(enough().map(|at| Rate::FalsePositive.exact(at, 4)));
     let factor = enough_high / enough_low;
-    let root_error = (0..=1023u32)
-        .map(|value| f64::from(value).sqrt() - f64::from(isqrt::<5>(value)))
-        .fold(0.0, f64::max);
+    let root_error = greatest_root_error(5);
     vec![
         Claim::new(
             "enough",
@@ -268,5 +267,60 @@ fn ratio() -> Chart {
         key: Vec::new(),
         columns: 1,
         panels: vec![Panel::only(series)],
+    }
+}
+
+/// The most by which a root of a 10-bit count is too low after so many steps.
+fn greatest_root_error(steps: u32) -> f64 {
+    let errors = (0..=1023).map(|count| root_error_of(count, steps));
+    errors.fold(0.0, f64::max)
+}
+
+/// By how much the root of `count` is too low after so many of the five steps of Alg. 1.
+/// Each step finds a bit of the root, from the highest down.
+fn root_error_of(count: u32, steps: u32) -> f64 {
+    let left = 5 - steps;
+    f64::from(count).sqrt() - f64::from(isqrt::<5>(count) >> left << left)
+}
+
+/// The paper's Fig. 23.
+fn root_error() -> Chart {
+    let all_steps = [3, 4, 5];
+    let series = all_steps.into_iter().zip(STEPS).map(|(steps, pen)| {
+        let points = (0..=1023).map(|count| Dot::exact(count.into(), root_error_of(count, steps)));
+        let name = format!("{steps} steps");
+        Series::named(name, pen, Style::Line, points.collect())
+    });
+    let [of_3, of_4, of_5] = all_steps.map(greatest_root_error);
+    Chart {
+        finding: "The root after five steps is less than one too low, a step fewer doubles that"
+            .to_owned(),
+        holds: of_5 < 1.0 && (1.9..2.0).contains(&of_4) && (3.8..4.0).contains(&of_3),
+        note: "Worked out for every count. The root is never too high.".to_owned(),
+        x: Axis::linear("background counts, 10 bits").within(0.0, 1023.0),
+        y: Axis::linear("root less its result by Alg. 1"),
+        key: Vec::new(),
+        columns: 1,
+        panels: vec![Panel::only(series.collect())],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_root_is_too_low_by_what_its_last_bits_hold() {
+        // The root of 1023 is 31.98: 31, 30 or 28.
+        let errors = [5, 4, 3].map(|steps| (root_error_of(1023, steps) * 1000.0).round());
+        assert_eq!(errors, [984.0, 1984.0, 3984.0]);
+        let counts = 0..=1023;
+        assert!(counts.clone().all(|count| root_error_of(count, 3) >= 0.0));
+        assert_eq!(
+            counts
+                .filter(|&count| root_error_of(count, 5) == 0.0)
+                .count(),
+            32
+        );
     }
 }
