@@ -289,12 +289,10 @@ fn add_scene(tally: &mut Tally, scene: &Scene, addresses: &[PixelAddress], pixel
                 ))
             })
             .collect();
-        let (of_events, of_truth): (Vec<f64>, Vec<f64>) =
-            pairs.iter().map(|pair| (pair.1, pair.2)).unzip();
+        let (of_events, of_truth): (Vec<_>, Vec<_>) = pairs.iter().map(|p| (p.1, p.2)).unzip();
         let correlation = rank_correlation(&of_truth, &of_events).unwrap_or_default();
         add_value(tally, &format!("{name}, ranks"), millionths(correlation));
-        let ratios = pairs.into_iter();
-        let ratios: Vec<(usize, f64)> = ratios.map(|(surface, a, b)| (surface, a / b)).collect();
+        let ratios: Vec<_> = pairs.into_iter().map(|(of, a, b)| (of, a / b)).collect();
         let (scale, error) = common_scale(ratios.iter().map(|(_, ratio)| *ratio));
         add_value(tally, name, millionths(error));
         for (surface, ratio) in ratios {
