@@ -131,7 +131,8 @@ fn widest_level(values: &[(f64, f64)]) -> (f64, f64, f64) {
         for last in first..values.len() {
             let (low, high) = ends(values[first..=last].iter().map(|value| value.1));
             let (from, to) = (values[first].0, values[last].0);
-            if high <= 2.0 * low && to / from > widest.1 / widest.0 {
+            // Where there are none, nothing is alike.
+            if low > 0.0 && high <= 2.0 * low && to / from > widest.1 / widest.0 {
                 widest = (from, to, high / low);
             }
         }
@@ -299,5 +300,6 @@ mod tests {
         assert_eq!((from, to), (2.0, 20.0));
         assert!((factor - 6.7 / 5.1).abs() < 1e-12);
         assert_eq!(widest_level(&[(1.0, 9.0), (2.0, 1.0)]), (1.0, 1.0, 1.0));
+        assert_eq!(widest_level(&[(1.0, 0.0), (9.0, 0.0)]), (1.0, 1.0, 1.0));
     }
 }
