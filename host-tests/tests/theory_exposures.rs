@@ -159,12 +159,7 @@ struct Place {
 impl Place {
     fn new(trial: u16, place: (f64, u32, u32), exposures: u32) -> Self {
         let (first_mean, first, last) = place;
-        let rates = Rates {
-            background: first_mean / f64::from(first),
-            signal: 0.0,
-            position: 0.0,
-            sigma: 1.0,
-        };
+        let rates = Rates::without_target(first_mean / f64::from(first));
         let simulated = Exposures::new(&rates, 128, Looks { x: 1, first, last }).unwrap();
         let minimum_count = Count::saturating(MINIMUM_COUNT.into());
         let mut rng = trial_rng(SEEDS[1], trial);

@@ -35,6 +35,9 @@ pub type Point = BTreeMap<String, f64>;
 /// Counts of a point, by name. They add up without rounding.
 pub type Tally = BTreeMap<String, u64>;
 
+/// The trials of one seed at one point.
+pub type Trial = fn(&Point, &mut Pcg64) -> Result<Tally>;
+
 /// What is swept.
 #[derive(Clone, Copy)]
 pub struct Study {
@@ -51,7 +54,7 @@ pub struct Study {
     /// The grid.
     pub points: fn() -> Vec<Point>,
     /// The trials of one seed at one point.
-    pub trial: fn(&Point, &mut Pcg64) -> Result<Tally>,
+    pub trial: Trial,
     /// What all seeds come to.
     pub results: fn(&Part) -> Result<Results>,
 }

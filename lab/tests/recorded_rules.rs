@@ -123,12 +123,7 @@ impl Recording<'_> {
 /// For each method the least threshold with no more false alarms than wanted, in
 /// simulated exposures to a background and nothing else, and their share there.
 fn calibrated(methods: &[Method], background: f64) -> Vec<(f64, f64)> {
-    let rates = Rates {
-        background,
-        signal: 0.0,
-        position: 64.0,
-        sigma: 1.0,
-    };
+    let rates = Rates::without_target(background);
     let ladder = |&method: &Method| match method {
         Method::Average => Ladder::new(method, 0, 160, 8),
         _ => Ladder::new(method, 0, 56, 8),

@@ -17,6 +17,19 @@ pub struct Rates {
     pub sigma: f64,
 }
 
+impl Rates {
+    /// Without a target: `background` photons a bin, and no pulse.
+    #[must_use]
+    pub const fn without_target(background: f64) -> Self {
+        Self {
+            background,
+            signal: 0.0,
+            position: 0.0,
+            sigma: 1.0,
+        }
+    }
+}
+
 /// What one object returns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflection {

@@ -1,6 +1,7 @@
 //! What the tests of more than one rule need.
 
-use dtof_core::{CounterWidth, Histogram, RangeGate};
+use dtof_core::fixed::types::U24F8;
+use dtof_core::{CounterWidth, DepthEstimator, DetectionRule, Histogram, RangeGate, detect};
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
@@ -26,4 +27,27 @@ pub fn histogram<const BINS: usize, W: CounterWidth>(
     let mut histogram = Histogram::new();
     histogram.add_frame(&frame, &gate);
     (gate, histogram, most)
+}
+
+/// The rule gives the background `expected`, and a detection that one rounded. Whether it
+/// fires.
+#[track_caller]
+pub fn gives<const BINS: usize, W: CounterWidth>(
+    rule: &impl DetectionRule,
+    histogram: &Histogram<BINS, W>,
+    gate: &RangeGate<BINS>,
+    expected: Option<U24F8>,
+) -> bool {
+    assert_eq!(rule.detect(histogram, gate, histogram.peak()), expected);
+    let detection = detect(histogram, gate, rule, &DepthEstimator::default());
+    let rounded = detection.map(|detection| detection.background.raw());
+    assert_eq!(rounded, expected.map(|level| (level.to_bits() + 128) >> 8));
+    expected.is_some()
+}
+
+/// So many of the rounds fired that both answers came often.
+#[track_caller]
+pub fn both_often(fired: u32, rounds: u32) {
+    let often = rounds / 20..rounds - rounds / 20;
+    assert!(often.contains(&fired), "{fired} of {rounds}");
 }

@@ -73,6 +73,7 @@ struct Recording {
 
 impl Replay {
     pub fn run(&self) -> Result<()> {
+        let changes = self.changes.wanted()?;
         let Recording {
             mut photons,
             bins,
@@ -90,7 +91,7 @@ impl Replay {
         };
         let mut engine = host_engine(&settings, &photons.addresses())?;
         let mut output = Output::create(&self.out, &settings, photons.as_ref(), Some(&self.input))?
-            .with_changes(self.changes.wanted()?.as_ref())?;
+            .with_changes(changes.as_ref())?;
         let mut summary = run(
             photons.as_mut(),
             engine.as_mut(),

@@ -333,12 +333,7 @@ mod tests {
     /// Random numbers of its own.
     #[test]
     fn four_is_the_least_alpha_with_one_percent_of_false_events_in_the_plain_scene() {
-        let rates = Rates {
-            background: cases::BACKGROUND,
-            signal: 0.0,
-            position: 64.0,
-            sigma: SIGMA,
-        };
+        let rates = Rates::without_target(cases::BACKGROUND);
         let ladders = [Ladder::new(Passed::Paper, 255, 256, 64)];
         let tallies: Vec<Tally> = (0..8)
             .into_par_iter()

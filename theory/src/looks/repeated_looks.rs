@@ -115,12 +115,7 @@ impl FalseAlarms {
     /// # Errors
     /// If the mean is negative or not a number.
     pub fn trial(point: &Point, exposures: u32, rng: &mut Pcg64) -> Result<Self> {
-        let rates = Rates {
-            background: point.first_mean / f64::from(point.first),
-            signal: 0.0,
-            position: 0.0,
-            sigma: 1.0,
-        };
+        let rates = Rates::without_target(point.first_mean / f64::from(point.first));
         let looks = Looks {
             x: 1,
             first: point.first,

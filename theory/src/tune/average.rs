@@ -94,11 +94,10 @@ pub fn tune(request: &Request) -> Result<Tuned> {
 /// 99 % confidence; `None` if there is none.
 fn smallest_alpha(mut highest: Vec<Option<u16>>, wanted: f64) -> Option<U8F8> {
     let times = highest.len();
-    let holds = |&reached: &usize| {
-        let (_, upper) = binomial::interval(reached as u64, times as u64, UPPER_TAIL);
-        upper <= wanted
-    };
-    // The limit grows with the count.
+    // The upper limit is not above `wanted` if that gives so few with a probability of
+    // the tail at most. It grows with the count.
+    let holds =
+        |&reached: &usize| binomial::at_most(reached as u64, times as u64, wanted) <= UPPER_TAIL;
     let reached = (0..times).take_while(holds).last()?;
     highest.sort_unstable();
     let first_above = highest.get(times - 1 - reached)?;
@@ -127,12 +126,7 @@ fn trial<const BINS: usize>(
     number: u16,
     exposures: u32,
 ) -> Result<Vec<Vec<Option<u16>>>> {
-    let rates = Rates {
-        background: request.background,
-        signal: 0.0,
-        position: 0.0,
-        sigma: 1.0,
-    };
+    let rates = Rates::without_target(request.background);
     let minimum_count = Count::saturating(request.minimum_count.into());
     // Of all candidates the first look and the last.
     let first = looks.iter().map(|looks| looks.first).min().unwrap_or(1);

@@ -51,12 +51,7 @@ fn ladders() -> Vec<Ladder> {
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    let rates = Rates {
-        background: point["first_mean"] / f64::from(LOOKS.first * LOOKS.x),
-        signal: 0.0,
-        position: 0.0,
-        sigma: 1.0,
-    };
+    let rates = Rates::without_target(point["first_mean"] / f64::from(LOOKS.first * LOOKS.x));
     let ladders = ladders();
     let exposures = Exposures::new(&rates, u16::try_from(BINS)?, LOOKS)?;
     let mut passage = Passage::new(&ladders, exposures, None)?;

@@ -8,7 +8,7 @@ use super::one_pixel::{SENSORS, in_parts, phases, watch, watch_step};
 use super::systems::{FPGA, L1, PC, PULSES, System};
 use crate::sweep::mean::{Measured, add};
 use crate::sweep::results::{Claim, Figure, Results, Verdict};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, point};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, Trial, point};
 use anyhow::{Result, bail, ensure};
 use dtof::rows::grouped;
 use dtof::simulate::SimulatedPixel;
@@ -161,11 +161,7 @@ fn add_edge<const BINS: usize>(
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    if System::of(point) == PC {
-        watched::<8>(point, rng)
-    } else {
-        watched::<128>(point, rng)
-    }
+    System::of(point).choose::<Trial>(watched::<8>, watched::<128>)(point, rng)
 }
 
 fn watched<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {

@@ -7,7 +7,7 @@ use super::one_pixel::{PER_BIN, SENSORS, in_parts, pen, phases, watch};
 use super::systems::{FPGA, L1, PC, PULSES, System};
 use crate::sweep::mean::{Measured, add, add_value};
 use crate::sweep::results::{Claim, Figure, Results, Verdict};
-use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, Trial, grid};
 use anyhow::Result;
 use dtof::rows::grouped;
 use dtof::simulate::SimulatedPixel;
@@ -65,11 +65,7 @@ fn bins_per_cycle(point: &Point) -> f64 {
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    if System::of(point) == PC {
-        runs::<8>(point, rng)
-    } else {
-        runs::<128>(point, rng)
-    }
+    System::of(point).choose::<Trial>(runs::<8>, runs::<128>)(point, rng)
 }
 
 fn runs<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {

@@ -20,7 +20,7 @@ use super::one_pixel::{self, PER_BIN, in_parts};
 use super::ranks::rank_correlation;
 use super::systems::{self, Background, FPGA_SIGMAS, PC, PC_SIGMA, System};
 use crate::sweep::mean::{add, add_error, add_value};
-use crate::sweep::{Point, Study, Tally, point};
+use crate::sweep::{Point, Study, Tally, Trial, point};
 use dtof::engine::host::host_engine;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::scene::{Light, Scene};
@@ -139,18 +139,14 @@ impl Pixel {
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    if System::of(point) == PC {
-        watched::<8>(point, rng)
-    } else {
-        watched::<128>(point, rng)
-    }
+    System::of(point).choose::<Trial>(watched::<8>, watched::<128>)(point, rng)
 }
 
 fn watched<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let scene = scene(point, Uniform::new(0.0, 1.0)?.sample(rng))?;
     let system = System::of(point);
     let background = Background::ALL[usize::from(point["average"] == 0.0)];
-    let l1 = if system == PC { PC_L1 } else { systems::L1 };
+    let l1 = system.choose(PC_L1, systems::L1);
     let settings = system.settings(background, l1, rng.next_u64());
     let mut photons = scene.photons(settings.seed, CYCLES)?;
     let addresses = photons.addresses();

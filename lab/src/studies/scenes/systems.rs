@@ -111,6 +111,11 @@ impl System {
         if point["fpga"] > 0.0 { FPGA } else { PC }
     }
 
+    /// What is for this system, of the two: a function for its bins, say.
+    pub fn choose<T>(self, pc: T, fpga: T) -> T {
+        if self == PC { pc } else { fpga }
+    }
+
     /// Its name, and the pulse.
     pub fn with_pulse(&self, sigma: f64) -> String {
         format!("{}, σ {sigma} bins", self.name)
