@@ -2,7 +2,7 @@
 //!
 //! One depth event is one 128-bit word, sent as 16 bytes, least significant
 //! first. The layout, its golden vectors and what will not change are in
-//! `docs/aer-format.md`. A word carries the low 20 bits of its laser cycle; a
+//! `docs/aer-format.md`. A word carries the low 16 bits of its laser cycle; a
 //! time word carries the rest and precedes the first event and every event
 //! whose upper bits differ from those of the event before. It is absolute, so
 //! that a receiver which joins late, or has lost words, is right again at the
@@ -13,6 +13,8 @@
 //!
 //! let event = DepthEvent {
 //!     pixel: PixelAddress(2047),
+//!     level: BlockLevel::PIXEL,
+//!     echo: EchoNumber::FIRST,
 //!     cycle: LaserCycle(5_000_000),
 //!     exposure: 110,
 //!     peak_bin: BinIndex::saturating(40),
@@ -35,10 +37,12 @@ use core::fmt;
 use crate::event::DepthEvent;
 use crate::events::DynamicDepthEvent;
 use crate::flags::Flags;
-use crate::units::{BinIndex, BinPosition, Count, LaserCycle, PixelAddress, SubBinOffset};
+use crate::units::{
+    BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,
+};
 
 /// The version of the word layout, which file headers and links announce.
-pub const AER_VERSION: u16 = 2;
+pub const AER_VERSION: u16 = 3;
 
 /// A bit field of one 64-bit half of a word.
 #[derive(Clone, Copy)]
@@ -70,15 +74,18 @@ const KIND: Field = field(62, 2);
 // The low half of an event.
 const PIXEL: Field = field(0, 16);
 const EXPOSURE: Field = field(16, 16);
-const CYCLE_LOW: Field = field(32, 20);
+const CYCLE_LOW: Field = field(32, 16);
+const LEVEL: Field = field(48, 2);
+/// The number of the echo, less 1.
+const ECHO: Field = field(50, 2);
 const PEAK_BIN: Field = field(52, 10);
 // The high half of an event.
 const PEAK_COUNT: Field = field(0, 24);
 const BACKGROUND: Field = field(24, 24);
 const OFFSET: Field = field(48, 10);
 const FLAGS: Field = field(58, 6);
-// The low half of a dynamic depth event; its pixel and cycle are where those of a depth
-// event are.
+// The low half of a dynamic depth event; its pixel, cycle and level are where those of a
+// depth event are.
 const CHANGE_FLAGS: Field = field(52, 6);
 // The high half of a dynamic depth event.
 const POSITION: Field = field(0, 32);
@@ -87,7 +94,7 @@ const CHANGE: Field = field(32, 32);
 const CONTROL: Field = field(52, 10);
 const CHECKSUM: Field = field(0, 32);
 // The high half of a time word.
-const CYCLE_HIGH: Field = field(0, 44);
+const CYCLE_HIGH: Field = field(0, 48);
 
 const KIND_CONTROL: u64 = 0;
 const KIND_DEPTH_EVENT: u64 = 1;
@@ -137,6 +144,8 @@ impl AerWord {
                 | PIXEL.put(event.pixel.0 as u64)
                 | EXPOSURE.put(event.exposure as u64)
                 | CYCLE_LOW.put(event.cycle.0)
+                | LEVEL.put(event.level.raw() as u64)
+                | ECHO.put(event.echo.raw() as u64 - 1)
                 | PEAK_BIN.put(event.peak_bin.raw() as u64),
             high: PEAK_COUNT.put(event.peak_count.raw() as u64)
                 | BACKGROUND.put(event.background.raw() as u64)
@@ -153,6 +162,7 @@ impl AerWord {
             low: KIND.put(KIND_DYNAMIC_DEPTH)
                 | PIXEL.put(event.pixel.0 as u64)
                 | CYCLE_LOW.put(event.cycle.0)
+                | LEVEL.put(event.level.raw() as u64)
                 | CHANGE_FLAGS.put(event.flags.bits() as u64),
             high: POSITION.put(event.position.raw().cast_unsigned() as u64)
                 | CHANGE.put(event.change().cast_unsigned() as u64),
@@ -233,7 +243,7 @@ pub enum AerRecord {
     /// A dynamic depth event with its whole laser cycle.
     DynamicDepth(DynamicDepthEvent),
     /// A time word: the events that follow lie in this laser cycle or in the
-    /// 2²⁰ − 1 after it.
+    /// 2¹⁶ − 1 after it.
     Time(LaserCycle),
     /// The end of a recording.
     End {
@@ -345,6 +355,8 @@ fn unpack(word: AerWord, cycle_high: u64) -> DepthEvent {
     let offset = ((OFFSET.get(word.high) << 6) as u16).cast_signed() >> 6;
     DepthEvent {
         pixel: PixelAddress(PIXEL.get(word.low) as u16),
+        level: BlockLevel::saturating(LEVEL.get(word.low) as u8),
+        echo: EchoNumber::new(ECHO.get(word.low) as u8 + 1).unwrap_or(EchoNumber::LAST),
         cycle: LaserCycle(cycle_high << CYCLE_LOW.bits | CYCLE_LOW.get(word.low)),
         exposure: EXPOSURE.get(word.low) as u16,
         peak_bin: BinIndex::saturating(PEAK_BIN.get(word.low) as u16),
@@ -361,6 +373,7 @@ fn unpack_dynamic_depth(word: AerWord, cycle_high: u64) -> Result<DynamicDepthEv
     let position = BinPosition::new((POSITION.get(word.high) as u32).cast_signed());
     let event = DynamicDepthEvent::new(
         PixelAddress(PIXEL.get(word.low) as u16),
+        BlockLevel::saturating(LEVEL.get(word.low) as u8),
         LaserCycle(cycle_high << CYCLE_LOW.bits | CYCLE_LOW.get(word.low)),
         position.ok_or(AerError::OutOfRange)?,
         (CHANGE.get(word.high) as u32).cast_signed(),

@@ -32,12 +32,13 @@
 use fixed::types::U8F8;
 
 use crate::check::written_as_its_text;
-use crate::counter::CounterWidth;
 use crate::depth::DepthEstimator;
-use crate::detect::{Detection, DetectionRule, PaperRule, detect};
-use crate::gate::RangeGate;
+use crate::detect::{Detection, DetectionRule, PaperRule, Tracking, detect, detect_at};
 use crate::histogram::Histogram;
-use crate::units::Count;
+use crate::histogram::counter::CounterWidth;
+use crate::histogram::gate::RangeGate;
+use crate::histogram::peeled::PeeledBins;
+use crate::units::{BinIndex, Count, EchoNumber};
 
 /// How pixels operate. Valid by construction: made by [`Self::paper`] or [`Self::with_rule`],
 /// some settings, and [`PixelConfigBuilder::build`].
@@ -51,6 +52,9 @@ pub struct PixelConfig<const BINS: usize, R: DetectionRule = PaperRule> {
     rule: R,
     estimator: DepthEstimator,
     is_one_hit: bool,
+    tracking: Option<Tracking<R>>,
+    echoes: EchoNumber,
+    peel_reach: u8,
 }
 
 /// Settings of pixels that are not checked yet.
@@ -111,6 +115,9 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
             rule,
             estimator: DepthEstimator::Centroid3,
             is_one_hit: false,
+            tracking: None,
+            echoes: EchoNumber::FIRST,
+            peel_reach: 0,
         })
     }
 
@@ -130,6 +137,64 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
     #[must_use]
     pub fn detect<W: CounterWidth>(&self, histogram: &Histogram<BINS, W>) -> Option<Detection> {
         detect(histogram, &self.gate, &self.rule, &self.estimator)
+    }
+
+    /// The decision of a pixel that has peeled some bins, or expects its next event.
+    pub(crate) fn detect_further<W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        expected: Option<BinIndex>,
+        peeled: &PeeledBins,
+    ) -> Option<Detection> {
+        let (gate, estimator) = (&self.gate, &self.estimator);
+        if let (Some(tracking), Some(expected)) = (&self.tracking, expected) {
+            return tracking.detect(histogram, gate, estimator, expected, peeled);
+        }
+        detect_at(
+            histogram,
+            gate,
+            histogram.peak(),
+            &self.rule,
+            estimator,
+            peeled,
+        )
+    }
+
+    /// The echoes of a histogram that arrives whole, as many as the configuration has, in
+    /// the order in which they stand clear. Empties the bins around all but the last.
+    pub fn detect_echoes<W: CounterWidth>(
+        &self,
+        histogram: &mut Histogram<BINS, W>,
+        mut echo: impl FnMut(EchoNumber, &Detection),
+    ) {
+        let mut peeled = PeeledBins::new(self.peel_reach);
+        let mut number = EchoNumber::FIRST;
+        while let Some(detection) = self.detect_further(histogram, None, &peeled) {
+            echo(number, &detection);
+            let next = self.echo_after(number, &mut peeled, detection.peak.bin);
+            let Some(next) = next else {
+                return;
+            };
+            number = next;
+            peeled.empty(histogram);
+        }
+    }
+
+    /// The number of the echo that is looked for after one with its peak in `bin`, whose
+    /// bins are left out from now on; `None` if that was the last, or fewer than
+    /// [`RangeGate::MIN_BINS`] bins would be left.
+    pub(crate) fn echo_after(
+        &self,
+        number: EchoNumber,
+        peeled: &mut PeeledBins,
+        bin: BinIndex,
+    ) -> Option<EchoNumber> {
+        if number >= self.echoes {
+            return None;
+        }
+        peeled.push(bin);
+        peeled.bins_left(&self.gate)?;
+        EchoNumber::new(number.raw() + 1)
     }
 
     /// Laser cycles between looks.
@@ -168,6 +233,24 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
         &self.estimator
     }
 
+    /// The rules of pixels that expect their next event where the last was.
+    #[must_use]
+    pub const fn tracking(&self) -> Option<&Tracking<R>> {
+        self.tracking.as_ref()
+    }
+
+    /// The last echo that a pixel reports in an exposure.
+    #[must_use]
+    pub const fn echoes(&self) -> EchoNumber {
+        self.echoes
+    }
+
+    /// Bins to either side of an echo's peak that are left out once it is reported.
+    #[must_use]
+    pub const fn peel_reach(&self) -> u8 {
+        self.peel_reach
+    }
+
     /// Whether the TDC takes one photon a laser cycle.
     #[must_use]
     pub const fn is_one_hit(&self) -> bool {
@@ -203,6 +286,21 @@ impl<const BINS: usize, R: DetectionRule> PixelConfigBuilder<BINS, R> {
     /// Finds the depth with `estimator`.
     pub const fn estimator(mut self, estimator: DepthEstimator) -> Self {
         self.0.estimator = estimator;
+        self
+    }
+
+    /// Pixels expect their next event where the last was: see [`Tracking`].
+    pub const fn tracking(mut self, tracking: Option<Tracking<R>>) -> Self {
+        self.0.tracking = tracking;
+        self
+    }
+
+    /// Pixels report up to the echo number `last` in an exposure, which goes on until then
+    /// or until L2. Once an echo is reported the bins up to `reach` from its peak are empty
+    /// and left out for the rest of the exposure: see [`PeeledBins`].
+    pub const fn echoes(mut self, last: EchoNumber, reach: u8) -> Self {
+        self.0.echoes = last;
+        self.0.peel_reach = reach;
         self
     }
 

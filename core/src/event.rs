@@ -19,14 +19,20 @@
 //! Cost: 32 bytes.
 
 use crate::flags::Flags;
-use crate::units::{BinIndex, BinPosition, Count, LaserCycle, PixelAddress, SubBinOffset};
+use crate::units::{
+    BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,
+};
 
 /// A peak stood clear of the background: what a pixel reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DepthEvent {
-    /// Which macropixel.
+    /// Which macropixel; of a block its first, the one of the lowest row and column.
     pub pixel: PixelAddress,
+    /// Whether it is one pixel that reports, or a block.
+    pub level: BlockLevel,
+    /// Which echo of the exposure.
+    pub echo: EchoNumber,
     /// The laser cycle whose end brought the decision.
     pub cycle: LaserCycle,
     /// Laser cycles in the histogram the event was decided from (N).

@@ -27,6 +27,10 @@ impl Flags {
     /// [`PixelConfig::with_one_hit_tdc`](crate::PixelConfig::with_one_hit_tdc).
     pub const PILE_UP: Self = Self(1 << 3);
 
+    /// Bit 4: the peak lies on the tail of an echo that was reported before in the same
+    /// exposure, and may be a part of it.
+    pub const TAIL: Self = Self(1 << 4);
+
     /// From bits, or `None` above six bits.
     #[must_use]
     pub const fn from_bits(bits: u8) -> Option<Self> {

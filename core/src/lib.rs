@@ -58,12 +58,13 @@
 //!
 //! | module | what it has |
 //! |---|---|
-//! | `units`, `flags` | quantities as types; what is to be said against an event |
-//! | `gate`, `counter`, `histogram` | the range gate, counter widths, the histogram |
+//! | `units`, `flags`, `array` | quantities as types; what is to be said against an event; pixels and blocks |
+//! | `histogram` | counter widths, the range gate, the histogram, bins that are left out |
 //! | `event` | the depth event |
 //! | `depth` | where in its bins the pulse lies, and how far that is |
 //! | `detect` | whether the peak stands clear: rules, thresholds, one decision |
 //! | `config`, `statistics`, `pixel` | one configuration and one statistics, many pixels |
+//! | `binning` | blocks of pixels that decide together |
 //! | `events` | what comes of events: means, changes of depth, reflectivity |
 //! | `aer` | events as words |
 //!
@@ -105,15 +106,15 @@
 )]
 
 mod aer;
+mod array;
+mod binning;
 mod check;
 mod config;
-mod counter;
 mod depth;
 mod detect;
 mod event;
 mod events;
 mod flags;
-mod gate;
 mod histogram;
 mod pixel;
 mod statistics;
@@ -123,13 +124,14 @@ mod units;
 pub use fixed;
 
 pub use aer::{AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord};
+pub use array::Array;
+pub use binning::{Binning, Block, BlockPlace, Feed, count_in_blocks, end_laser_cycles_of_blocks};
 pub use config::{ConfigError, PixelConfig, PixelConfigBuilder};
-pub use counter::{Count10, Count16, Count24, CounterWidth, PhotonCount};
 pub use depth::{CentredWindow, Depth, DepthEstimator, RangeScale, RangeScaleError, centroid};
 pub use detect::{
     AnyRule, AverageRule, ComparatorTree, Detection, DetectionRule, HIGHEST_Z, PaperRule,
-    Threshold, WindowRule, WindowWidthError, detect, isqrt, quadrant_background, whole_background,
-    z_for,
+    Threshold, Tracking, WindowRule, WindowWidthError, detect, isqrt, quadrant_background,
+    whole_background, z_for, z_for_levels,
 };
 pub use event::DepthEvent;
 pub use events::{
@@ -137,8 +139,12 @@ pub use events::{
     RunningMean, ZeroThresholdError,
 };
 pub use flags::Flags;
-pub use gate::{GateError, RangeGate};
+pub use histogram::counter::{Count10, Count16, Count24, CounterWidth, PhotonCount};
+pub use histogram::gate::{GateError, RangeGate};
+pub use histogram::peeled::PeeledBins;
 pub use histogram::{Histogram, Peak};
 pub use pixel::{AsyncPixel, Look};
 pub use statistics::Statistics;
-pub use units::{BinIndex, BinPosition, Count, LaserCycle, PixelAddress, SubBinOffset};
+pub use units::{
+    BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,
+};

@@ -13,6 +13,8 @@
 //! | [`BinIndex`] | histogram bin | 0..=1,023 | 10 bits |
 //! | [`Count`] | photons | 0..=16,777,215 | 24 bits |
 //! | [`SubBinOffset`] | 1/256 bin from the start of the peak bin | −2..+2 bins | 10 bits |
+//! | [`BlockLevel`] | pixels of a side, as a power of two | 0..=3 | 2 bits |
+//! | [`EchoNumber`] | echoes of an exposure | 1..=4 | 2 bits |
 //! | [`BinPosition`] | 1/256 bin from the start of bin 0 | −2..1,025 bins | derived |
 
 use core::fmt;
@@ -68,6 +70,61 @@ bounded! {
     /// Photons in one bin: 10 bits in the paper's FPGA, up to 24 bits in
     /// recorded histograms.
     Count(u32), max 0x00ff_ffff
+}
+
+bounded! {
+    /// How many pixels decide together (adaptive binning): level 0 is one pixel, level `k`
+    /// a block of 2ᵏ × 2ᵏ pixels, fewer at the array's edge.
+    BlockLevel(u8), max 3
+}
+
+impl BlockLevel {
+    /// One pixel.
+    pub const PIXEL: Self = Self(0);
+
+    /// Pixels of a whole block: 1, 4, 16 or 64.
+    #[inline]
+    #[must_use]
+    pub const fn pixels(self) -> u64 {
+        1 << (2 * self.0)
+    }
+}
+
+/// Which of the echoes that a pixel reports within an exposure: 1 to 4, in the order in
+/// which they stood clear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct EchoNumber(u8);
+
+impl EchoNumber {
+    /// The only one, unless pixels report more.
+    pub const FIRST: Self = Self(1);
+    /// The last that a pixel can report.
+    pub const LAST: Self = Self(4);
+
+    /// From 1 to 4, or `None`.
+    #[inline]
+    #[must_use]
+    pub const fn new(raw: u8) -> Option<Self> {
+        if 1 <= raw && raw <= Self::LAST.0 {
+            Some(Self(raw))
+        } else {
+            None
+        }
+    }
+
+    /// From 1 to 4.
+    #[inline]
+    #[must_use]
+    pub const fn raw(self) -> u8 {
+        self.0
+    }
+}
+
+impl fmt::Display for EchoNumber {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.0, f)
+    }
 }
 
 /// Which macropixel an event comes from; row-major in an array.

@@ -7,10 +7,12 @@
 
 use core::fmt::{self, Write};
 
-use dtof_core::fixed::types::U8F8;
+use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
-    AerDecoder, AerEncoder, AerRecord, AerWord, AsyncPixel, Count, DepthEvent, LaserCycle,
-    PaperRule, PixelAddress, PixelConfig, Statistics, isqrt,
+    AerDecoder, AerEncoder, AerRecord, AerWord, Array, AsyncPixel, Binning, Block, BlockLevel,
+    Count, DepthEvent, EchoNumber, LaserCycle, PaperRule, PixelAddress, PixelConfig,
+    PixelConfigBuilder, RangeGate, Statistics, WindowRule, checked, count_in_blocks,
+    end_laser_cycles_of_blocks, isqrt,
 };
 
 /// The last line of a run that came to its end.
@@ -25,6 +27,12 @@ pub fn run(out: &mut impl Write) -> fmt::Result {
     let mut encoder = AerEncoder::new();
     stream::<8>(out, &mut encoder, 3)?;
     stream::<128>(out, &mut encoder, 60)?;
+    let echoes = windows(&WINDOW).l2(100).echoes(EchoNumber::LAST, 4);
+    watched(out, &mut encoder, "echoes", echoes, [2, 4])?;
+    let tracking = WINDOW.tracking(&RangeGate::<128>::full());
+    let tracking = windows(&WINDOW).l2(200).tracking(Some(tracking));
+    watched(out, &mut encoder, "tracking", tracking, [0, 16])?;
+    block(out, &mut encoder)?;
     writeln!(out, "{LAST_LINE}")
 }
 
@@ -63,7 +71,7 @@ fn stream<const BINS: usize>(
     let mut statistics = Statistics::default();
     let mut random = Random(1);
     // Just before the upper bits of the laser cycle change.
-    let first = (1 << 20) - 400;
+    let first = (1 << 16) - 400;
     for cycle in first..first + 800 {
         if random.below(2) == 0 {
             pixel.count(&config, target + u16::from(random.below(4) == 0));
@@ -85,11 +93,113 @@ fn stream<const BINS: usize>(
     writeln!(out, "{statistics:?}")
 }
 
+const WINDOW: WindowRule = checked!(WindowRule::new(3, U4F12::lit("4.5"), Count::saturating(5)));
+
+/// Pixels with a rule of windows.
+fn windows(rule: &WindowRule) -> PixelConfigBuilder<128, WindowRule> {
+    PixelConfig::with_rule(*rule)
+}
+
+/// A macropixel that sees a surface at bin 30 and one at bin 60, with a photon in one of so
+/// many laser cycles, or none.
+fn watched(
+    out: &mut impl Write,
+    encoder: &mut AerEncoder,
+    name: &str,
+    config: PixelConfigBuilder<128, WindowRule>,
+    one_in: [usize; 2],
+) -> fmt::Result {
+    writeln!(out, "stream with {name}")?;
+    let config = match config.build() {
+        Ok(config) => config,
+        Err(error) => return writeln!(out, "{error}"),
+    };
+    let mut pixel = AsyncPixel::<128>::new(PixelAddress(2));
+    let mut statistics = Statistics::default();
+    let mut random = Random(1);
+    for cycle in 0..400 {
+        for (target, one_in) in [30, 60].into_iter().zip(one_in) {
+            if one_in > 0 && random.below(one_in) == 0 {
+                pixel.count(&config, target + u16::from(random.below(4) == 0));
+            }
+        }
+        if random.below(2) == 0 {
+            pixel.count(&config, random.below(128));
+        }
+        pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle));
+        if let Some(event) = pixel.acknowledge() {
+            write_event(out, encoder, &event)?;
+        }
+    }
+    pixel.add_photons_to(&mut statistics);
+    writeln!(out, "{statistics:?}")
+}
+
+/// Two macropixels too dim for themselves, and the block that they are in.
+fn block(out: &mut impl Write, encoder: &mut AerEncoder) -> fmt::Result {
+    writeln!(out, "stream of a block")?;
+    let levels = BlockLevel::saturating(1);
+    let (Ok(config), Ok(of_blocks), Some(binning)) = (
+        windows(&WINDOW).l2(100).build(),
+        windows(&WINDOW.of_blocks(levels)).l2(100).build(),
+        Array::new(2, 1).and_then(|array| Binning::new(array, levels)),
+    ) else {
+        return writeln!(out, "no such block");
+    };
+    let mut pixels = [0, 1].map(|address| {
+        let address = PixelAddress(address);
+        (AsyncPixel::<128>::new(address), binning.feed_of(address))
+    });
+    let Some(place) = binning.blocks().next() else {
+        return writeln!(out, "no such block");
+    };
+    let mut blocks = [Block::<128>::new(place)];
+    let [mut statistics, mut of_block] = [Statistics::default(); 2];
+    let mut random = Random(1);
+    for cycle in 0..400 {
+        let now = LaserCycle(cycle);
+        for (pixel, feed) in &mut pixels {
+            for (one_in, code) in [(24, 60), (8, random.below(128))] {
+                if random.below(one_in) == 0 {
+                    pixel.count(&config, code);
+                    count_in_blocks(&mut blocks, feed, &of_blocks, code);
+                }
+            }
+            pixel.end_laser_cycle(&config, &mut statistics, now);
+            if let Some(event) = pixel.acknowledge() {
+                feed.reported();
+                write_event(out, encoder, &event)?;
+            }
+        }
+        if end_laser_cycles_of_blocks(&mut blocks, &of_blocks, &mut of_block, now, 1) {
+            for event in blocks.iter_mut().filter_map(Block::acknowledge) {
+                write_event(out, encoder, &event)?;
+            }
+        }
+        if cycle % 40 == 39 {
+            for (pixel, feed) in &mut pixels {
+                feed.tick(pixel.has_reported());
+            }
+            blocks.iter_mut().for_each(Block::tick);
+        }
+    }
+    for (pixel, _) in &pixels {
+        pixel.add_photons_to(&mut statistics);
+    }
+    for block in &blocks {
+        block.pixel().add_photons_to(&mut of_block);
+    }
+    writeln!(out, "{statistics:?}")?;
+    writeln!(out, "{of_block:?}")
+}
+
 /// An event, its words, and whether they come back as the event.
 fn write_event(out: &mut impl Write, encoder: &mut AerEncoder, event: &DepthEvent) -> fmt::Result {
     writeln!(
         out,
-        "cycle {} exposure {} bin {} offset {} count {} background {} flags {}",
+        "level {} echo {} cycle {} exposure {} bin {} offset {} count {} background {} flags {}",
+        event.level.raw(),
+        event.echo,
         event.cycle.0,
         event.exposure,
         event.peak_bin.raw(),
@@ -163,7 +273,14 @@ mod tests {
     #[test]
     fn the_lines_show_what_they_should() {
         let text = include_str!("../self-test.out");
-        for part in ["offset ", "rejected: ", "flags 4", "deferred: "] {
+        for part in [
+            "offset ",
+            "rejected: ",
+            "flags 4",
+            "deferred: ",
+            "level 0 echo 2 ",
+            "level 1 echo 1 ",
+        ] {
             assert!(text.contains(part), "{part}");
         }
         assert!(!text.contains("does not come back"));

@@ -5,14 +5,14 @@ mod common;
 
 use std::collections::VecDeque;
 
-use common::host::{CONFIGURATION, Call, Host, deliver, device};
+use common::host::{CONFIGURATION, Host, deliver, device};
 use common::script;
 use dtof_core::DepthEvent;
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
-use dtof_link::{Configuration, Report, Source, Token};
+use dtof_link::{Configuration, Report, Source};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -70,31 +70,8 @@ struct Script {
 
 fn script(cycles: usize, rng: &mut Pcg32) -> Script {
     let calls = script::script(cycles, rng);
-    let mut messages = vec![Vec::new()];
-    for cycle in &calls {
-        // One piece, some of them a message.
-        let (mut piece, mut at) = (Vec::new(), 0);
-        for call in cycle {
-            let token = match *call {
-                Call::Photon(pixel, code) => {
-                    for _ in at..pixel {
-                        piece.extend(Token::Advance { pixels: 1 }.to_bytes());
-                    }
-                    at = pixel;
-                    Token::Photon { code }
-                }
-                Call::End(cycles) => Token::EndOfCycles { cycles },
-                Call::Histogram(..) => unreachable!(),
-            };
-            piece.extend(token.to_bytes());
-        }
-        if messages.last().unwrap().len() + piece.len() > BODY_BYTES {
-            messages.push(Vec::new());
-        }
-        messages.last_mut().unwrap().extend(piece);
-    }
     Script {
-        messages,
+        messages: script::messages(&calls),
         events: script::reference(&calls, &script::config(&CONFIGURATION)),
         photons: script::photons(&calls),
     }

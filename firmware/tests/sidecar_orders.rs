@@ -105,11 +105,14 @@ fn the_host_is_told_what_the_sensor_is() {
         pixels: told.pixels,
         bin_width: told.bin_width,
         offset: told.offset,
+        laser_millihertz: 0,
     };
     let mut host = Host::new(1, 0);
     let mut with_one = device::<8>(Some(told));
     let body = host.answer(&mut with_one, 0, message::SENSOR_REQUEST, &[]);
-    assert_eq!(body, [3, 0, 0, 0, 160, 0, 0, 0, 0, 0]);
+    // Then the range of bin 0, and a laser rate that is not known.
+    let expected = [[3, 0, 0, 0, 160, 0].as_slice(), &[0; 4], &[0; 8]].concat();
+    assert_eq!(body, expected);
     assert_eq!(SensorRecord::from_le_bytes(&body), Some(Some(told_record)));
 
     let mut host = Host::new(1, 0);

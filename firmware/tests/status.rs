@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::host::{CONFIGURATION, Host, configured, device};
+use common::host::{CONFIGURATION, Host, configured, device_with_blocks};
 use common::mocks::plug::{Answers, Bus, Tdc, Tmf};
 use common::mocks::{Broken, Line};
 use common::scene;
@@ -21,6 +21,14 @@ use dtof_sensors::{Sensor, SensorFault, tdc7200, tmf882x};
 const GOOD: Configuration = Configuration {
     source: Source::Link,
     ..CONFIGURATION
+};
+
+/// From the rule's byte to that of tracking.
+const AVERAGE_TRACKS: [u8; 20] = {
+    let mut fields = [0; 20];
+    fields[0] = 2;
+    fields[19] = 1;
+    fields
 };
 
 /// A second with `sensor` and a host that reads; what the device says then. The
@@ -180,11 +188,16 @@ fn a_host_that_comes_after_a_minute_gets_what_it_would_have_got_at_once() {
     assert!(late.events == at_once.events);
 }
 
+/// A device without a sensor, with room for nine pixels and six blocks.
+fn device() -> Sidecar<'static> {
+    device_with_blocks::<9, 6>(None)
+}
+
 /// A configuration of each kind that cannot be, for eight pixels without a sensor.
 fn refused() -> Vec<(Vec<u8>, Refusal)> {
     let good = GOOD.to_le_bytes();
     // From which byte on what stands there, as `docs/link-format.md` numbers them.
-    let bad: [(usize, &[u8], Refusal); 25] = [
+    let bad: [(usize, &[u8], Refusal); 35] = [
         (24, &[2], Refusal::Unknown),
         (25, &[3], Refusal::Unknown),
         (29, &[2], Refusal::Unknown),
@@ -212,8 +225,24 @@ fn refused() -> Vec<(Vec<u8>, Refusal)> {
         (32, &[1, 0, 0], Refusal::ZeroThreshold),
         // 1/512 of a bin of 37.5 mm is 0.07 mm, 18.7 of 1/256 mm.
         (32, &[1, 0, 18], Refusal::ZeroThreshold),
+        (41, &[4], Refusal::Unknown),
+        (44, &[2], Refusal::Unknown),
+        (45, &[0], Refusal::Unknown),
+        (45, &[5], Refusal::Unknown),
+        (41, &[1, 0, 0], Refusal::Patience),
+        // No column, and pixels one above the other: four, two and one block.
+        (39, &[0, 0, 1, 100, 0], Refusal::Blocks),
+        (39, &[1, 0, 3, 100, 0], Refusal::Blocks),
+        // The paper's rule, also for blocks, and that with the average of all bins.
+        (44, &[1], Refusal::Tracking),
+        (41, &[1, 100, 0, 1], Refusal::Tracking),
+        (25, &AVERAGE_TRACKS, Refusal::Tracking),
     ];
-    let mut all = vec![(good[1..].to_vec(), Refusal::Unknown)];
+    // Too short, and as long as that of version 3.
+    let mut all = vec![
+        (good[1..].to_vec(), Refusal::Unknown),
+        (good[..39].to_vec(), Refusal::Unknown),
+    ];
     for (from, fields, refusal) in bad {
         let mut wanted = good.to_vec();
         wanted[from..from + fields.len()].copy_from_slice(fields);
@@ -243,7 +272,7 @@ fn is_refused(host: &mut Host, device: &mut Sidecar, wanted: &[u8], refusal: Ref
 
 /// Events and counts of photons between which these configurations are asked for.
 fn photons_between(refused: &[(Vec<u8>, Refusal)]) -> (Vec<DepthEvent>, Statistics, u64) {
-    let mut device = device::<9>(None);
+    let mut device = device();
     let mut host = Host::new(1, 0);
     host.configure(&mut device, 0, &GOOD);
     for turn in 0..100 {
@@ -266,7 +295,7 @@ fn every_refused_configuration_names_its_reason_and_changes_nothing() {
     numbers.sort_unstable();
     numbers.dedup();
     // 12 takes a sensor.
-    assert_eq!(numbers, Vec::from_iter((1..=11).chain(13..=15)));
+    assert_eq!(numbers, Vec::from_iter((1..=11).chain(13..=18)));
 
     let undisturbed = photons_between(&[]);
     assert_eq!((undisturbed.0.len(), undisturbed.2), (2 * 25, 600));
@@ -275,7 +304,7 @@ fn every_refused_configuration_names_its_reason_and_changes_nothing() {
 
 #[test]
 fn a_device_that_has_refused_its_first_configuration_waits_for_a_better_one() {
-    let mut device = device::<9>(None);
+    let mut device = device();
     let mut host = Host::new(1, 0);
     for (wanted, refusal) in refused() {
         is_refused(&mut host, &mut device, &wanted, refusal);

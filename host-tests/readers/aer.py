@@ -19,6 +19,8 @@ class Depth(NamedTuple):
     position: int  # 1/256 bin
     peak_count: int = 20
     flags: int = 0
+    level: int = 0
+    echo: int = 1
 
 
 class Dynamic(NamedTuple):
@@ -27,23 +29,24 @@ class Dynamic(NamedTuple):
     position: int  # 1/256 bin
     change: int  # 1/256 bin
     flags: int = 0
+    level: int = 0
 
 
 def write(path, header, events):
     data = bytearray(struct.pack(
-        "<8sHHIIIIi", b"DTOF-AER", 2, 64, header.bins, header.columns, header.rows,
+        "<8sHHIIIIi", b"DTOF-AER", 3, 64, header.bins, header.columns, header.rows,
         round(header.bin_width_ps * 65536), round(header.offset_mm * 256),
     ).ljust(64, b"\0"))
     cycle_high = None
     for event in events:
-        if event.cycle >> 20 != cycle_high:
-            cycle_high = event.cycle >> 20
+        if event.cycle >> 16 != cycle_high:
+            cycle_high = event.cycle >> 16
             data += struct.pack("<QQ", 1 << 52, cycle_high)
-        low = event.pixel | (event.cycle & 0xFFFFF) << 32
+        low = event.pixel | (event.cycle & 0xFFFF) << 32 | event.level << 48
         if isinstance(event, Depth):
             peak_bin = event.position >> 8
             offset = event.position & 0xFF
-            low |= 44 << 16 | peak_bin << 52 | 1 << 62
+            low |= 44 << 16 | (event.echo - 1) << 50 | peak_bin << 52 | 1 << 62
             high = event.peak_count | 2 << 24 | offset << 48 | event.flags << 58
             data += struct.pack("<QQ", low, high)
         else:
@@ -57,21 +60,22 @@ def read(path):
     """The header, and the events up to the end word or the end of a cut file."""
     data = open(path, "rb").read()
     magic, version, length, bins, columns, rows, width, offset = struct.unpack_from("<8sHHIIIIi", data)
-    assert (magic, version, length) == (b"DTOF-AER", 2, 64), path
+    assert (magic, version) == (b"DTOF-AER", 3), path
     events = []
-    for at in range(64, len(data) - 15, 16):
+    for at in range(length, len(data) - 15, 16):
         low, high = struct.unpack_from("<QQ", data, at)
         kind, bits_52_to_61 = low >> 62, low >> 52 & 0x3FF
-        pixel, cycle_low = low & 0xFFFF, low >> 32 & 0xFFFFF
+        pixel, cycle_low, level = low & 0xFFFF, low >> 32 & 0xFFFF, low >> 48 & 3
         if kind == 1:
             offset_bins = (high >> 48 & 0x3FF ^ 0x200) - 0x200
             position = bits_52_to_61 * 256 + offset_bins
-            events.append(Depth(time + cycle_low, pixel, position, high & 0xFFFFFF, high >> 58))
+            echo = (low >> 50 & 3) + 1
+            events.append(Depth(time + cycle_low, pixel, position, high & 0xFFFFFF, high >> 58, level, echo))
         elif kind == 2:
             position, change = struct.unpack_from("<ii", data, at + 8)
-            events.append(Dynamic(time + cycle_low, pixel, position, change, low >> 52 & 0x3F))
+            events.append(Dynamic(time + cycle_low, pixel, position, change, low >> 52 & 0x3F, level))
         elif bits_52_to_61 == 1:
-            time = high << 20
+            time = high << 16
         else:
             break
     return Header(bins, columns, rows, width / 65536, offset / 256), events

@@ -54,14 +54,14 @@ def check_points(header, events, name, laser_hz, fov, decoded, slice_us=None):
         ns = expected.nanoseconds(event, laser_hz)
         assert row[0] == f"{ns // 1000}.{ns % 1000:03}", (row, event)
     point = np.array([row[1:4] for row in rows], dtype=np.float32).reshape(-1, 3)
-    ray = expected.pinhole(header, fov)[[event.pixel for event in events]]
+    ray = expected.rays(header, fov, events)
     metres = np.array([expected.range_mm(header, event) / 1000 for event in events])
     # The core's range is within 0.01 mm of the formula.
     error = np.abs(point - ray * metres[:, None]).max(initial=0)
     assert error < 1.1e-5, error
 
     wanted = expected.records(header, events, laser_hz)
-    fields = ["x", "y", "z", "intensity", "pixel", "flags", "t_ns"]
+    fields = ["x", "y", "z", "intensity", "pixel", "flags", "level", "echo", "t_ns"]
     if events and isinstance(events[0], aer.Dynamic):
         fields[3] = "change"
 
@@ -84,7 +84,7 @@ def check_points(header, events, name, laser_hz, fov, decoded, slice_us=None):
     length, end = slice_ns(events, laser_hz, slice_us)
     slices = {}
     for index in in_time:
-        slices.setdefault(wanted[index][3] // length, []).append(index)
+        slices.setdefault(wanted[index][-1] // length, []).append(index)
     assert [time for time, _ in clouds] == [number * length for number in slices]
     assert [time for time, _ in statistics] == [time for time, _ in clouds]
     so_far = 0
@@ -107,6 +107,8 @@ def check_points(header, events, name, laser_hz, fov, decoded, slice_us=None):
             "clipped": sum(flag >> 1 & 1 for flag in flags),
             "deferred": sum(flag >> 2 & 1 for flag in flags),
             "pile_up": sum(flag >> 3 & 1 for flag in flags),
+            "tail": sum(flag >> 4 & 1 for flag in flags),
+            "blocks": sum(wanted[index][3] > 0 for index in order),
             "events_so_far": so_far,
         }, said
 
@@ -198,14 +200,17 @@ def late_events(dynamic):
         cycles[at], cycles[at + 1] = cycles[at + 1], cycles[at]
     events = []
     for cycle in cycles:
-        pixel = rng.choice([0, 1279, 1280 * 50, 1280 * 51 - 1])
+        # Of 1280 x 51 pixels; some of the blocks are cut by the last row.
+        pixel, levels = rng.choice([(0, 4), (1279, 1), (1280 * 48, 4), (1280 * 50, 2), (1280 * 51 - 1, 1)])
+        level = rng.randrange(levels)
         position = rng.randrange(10 * 256, 118 * 256)
         if dynamic:
             change = rng.choice([-1, 1]) * rng.randrange(1, 50 * 256)
-            events.append(aer.Dynamic(cycle, pixel, position, change, rng.randrange(16)))
+            events.append(aer.Dynamic(cycle, pixel, position, change, rng.randrange(32), level))
         else:
             peak = rng.choice([5, 1023, 2**24 - 1])
-            events.append(aer.Depth(cycle, pixel, position, peak, rng.randrange(16)))
+            echo = rng.choice([1, 1, 1, 2, 4])
+            events.append(aer.Depth(cycle, pixel, position, peak, rng.randrange(32), level, echo))
     return events
 
 

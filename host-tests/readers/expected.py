@@ -25,6 +25,25 @@ def pinhole(header, fov):
     return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
 
+def block(header, event):
+    """The pixels that an event stands for, row by row."""
+    side = 1 << event.level
+    row, column = divmod(event.pixel, header.columns)
+    assert row % side == 0 and column % side == 0
+    return [
+        r * header.columns + c
+        for r in range(row, min(row + side, header.rows))
+        for c in range(column, min(column + side, header.columns))
+    ]
+
+
+def rays(header, fov, events):
+    """x, y and z of the unit ray of each event."""
+    of_pixels = pinhole(header, fov)
+    sums = np.array([of_pixels[block(header, event)].sum(axis=0) for event in events]).reshape(-1, 3)
+    return sums / np.linalg.norm(sums, axis=1, keepdims=True)
+
+
 def nanoseconds(event, laser_hz):
     return event.cycle * 10**9 // laser_hz
 
@@ -39,13 +58,14 @@ def range_mm(header, event):
 
 
 def records(header, events, laser_hz):
-    """Value, pixel, flags and time of each point."""
+    """Value, pixel, flags, level, echo and time of each point."""
     def value(event):
         if isinstance(event, Depth):
             return event.peak_count
         return event.change / 256 * header.bin_width_ps * MM_PER_PS / 1000
     return [
-        (value(event), event.pixel, event.flags, nanoseconds(event, laser_hz)) for event in events
+        (value(event), event.pixel, event.flags, event.level, getattr(event, "echo", 1),
+         nanoseconds(event, laser_hz)) for event in events
     ]
 
 
@@ -58,20 +78,24 @@ def changes(header, events, laser_hz, threshold_mm, reference):
     found = []
     for event in events:
         if isinstance(event, Depth):
-            last = recent[event.pixel]
+            if event.echo > 1:
+                continue
+            who = event.pixel, event.level
+            last = recent[who]
             last.append(event.position)
             if len(last) < 3:
                 continue
             mean = sum(last)
-            moved = mean - compared_with.setdefault(event.pixel, mean)
+            moved = mean - compared_with.setdefault(who, mean)
             changed = abs(moved) > threshold
             if changed or reference == "previous":
-                compared_with[event.pixel] = mean
+                compared_with[who] = mean
             if not changed:
                 continue
         else:
             moved = event.change
-        column, row = event.pixel % header.columns, event.pixel // header.columns
-        found.append((microseconds(event, laser_hz), column, row, int(moved > 0)))
+        for pixel in block(header, event):
+            row, column = divmod(pixel, header.columns)
+            found.append((microseconds(event, laser_hz), column, row, int(moved > 0)))
     # Events of one microsecond stay in the order they came in.
     return sorted(found, key=lambda change: change[0])

@@ -216,7 +216,7 @@ def is_closed(report):
 def places_are_true(browser):
     """Ranges beyond the colours, too: the axis is linear over all of them."""
     ranges = [500, 1000, 2000, 9000]
-    records = b"".join(struct.pack("<IfH", at, mm, 0) for at, mm in enumerate(ranges))
+    records = b"".join(struct.pack("<IfHB", at, mm, 0, 0x01) for at, mm in enumerate(ranges))
     data = {"columns": 1, "rows": 1, "cycles": 4, "unit": 1, "oneOf": 1, "low": 1000, "high": 2000}
     data |= {"sides": ["column", "row"], "events": "events"}
     data |= {"colours": "000000" * 256, "records": base64.b64encode(records).decode()}
@@ -241,6 +241,43 @@ def places_are_true(browser):
     page.close()
 
 
+def blocks_are_as_large_as_their_pixels(browser):
+    """On 5x3 pixels: a pixel, blocks of each level, and one that the array cuts."""
+    events = [(7, 0x01), (2, 0x11), (0, 0x22), (0, 0x33), (14, 0x14)]
+    records = b"".join(struct.pack("<IfHB", 9, 1000, *event) for event in events)
+    data = {"columns": 5, "rows": 3, "cycles": 10, "unit": 1, "oneOf": 1, "low": 900, "high": 1100}
+    data |= {"sides": ["column", "row"], "events": "events"}
+    data |= {"colours": "000000" * 256, "records": base64.b64encode(records).decode()}
+    page = browser.new_page()
+    page.set_content(f'<script type="application/json" id="data">{json.dumps(data)}</script>')
+    for script in ["events.js", "projection.js"]:
+        page.add_script_tag(content=(SCRIPTS / script).read_text())
+    found = page.evaluate(
+        """() => {
+            Object.assign(view, VIEWS.front, { third: "range" });
+            showWindow(0, 10);
+            const places = [], sides = axes(), eye = camera(sides, 800, 600);
+            const cell = eye.scale * sides[0].length / data.columns;
+            const [left, top] = [400 - 2.5 * cell, 292 - 1.5 * cell];
+            eachPlace(sides, eye, (event, x, y, depth, wide, high) =>
+                places.push([(x - left) / cell, (y - top) / cell, wide, high]));
+            const pixels = [...Array(15).keys()];
+            const of = places.map((place, event) => pixels.filter((pixel) => isOf(event, pixel)));
+            return { places, of, names: places.map((place, event) => kindName(event)) };
+        }"""
+    )
+    middles = [[2.5, 1.5, 1, 1], [3, 1, 2, 2], [2, 1.5, 4, 3], [2.5, 1.5, 5, 3], [4.5, 2.5, 1, 1]]
+    pairs = zip(sum(found["places"], []), sum(middles, []))
+    check("the point of a block lies in its middle", max(abs(a - b) for a, b in pairs) < 1e-6)
+    four = [0, 1, 2, 3, 5, 6, 7, 8, 10, 11, 12, 13]
+    check("a block has its pixels", found["of"] == [[7], [2, 3, 7, 8], four, list(range(15)), [14]])
+    names = ["column 2, row 1, echo 1", "2x2 block from column 2, row 0, echo 1"]
+    names += ["4x4 block from column 0, row 0, echo 2", "8x8 block from column 0, row 0, echo 3"]
+    names += ["2x2 block from column 4, row 2, echo 4"]
+    check("it says which block and echo it is", found["names"] == names)
+    page.close()
+
+
 def main(chromium, pictures, static, moving, large):
     pictures, static, moving, large = map(Path, (pictures, static, moving, large))
     with sync_playwright() as driver:
@@ -250,6 +287,9 @@ def main(chromium, pictures, static, moving, large):
 
         print("ranges")
         places_are_true(browser)
+
+        print("blocks")
+        blocks_are_as_large_as_their_pixels(browser)
 
         print("static scene")
         check("smaller than 5 MB", static.stat().st_size < MOST_BYTES)

@@ -57,7 +57,7 @@ fn names_of_the_page_are_there() {
     let gone: Vec<&str> = cells.filter(|cell| !is_there(cell)).collect();
     assert_eq!(gone, [""; 0]);
     assert!(rows.len() >= 70, "{} rows", rows.len());
-    assert!(!is_there("`core/src/pixel.rs: Pixel`") && !is_there("`core/src/nothing.rs`"));
+    assert!(!is_there("`core/src/pixel/mod.rs: Pixel`") && !is_there("`core/src/nothing.rs`"));
 }
 
 /// The verdict of a claim, by its name in the template of the claims: the row in the results

@@ -143,7 +143,9 @@ fn run<const BINS: usize>(seed: u64, background: Background, exposures: u32, tal
                 tally.exposures += u32::from(look == Look::Expired);
                 continue;
             }
-            Look::Deferred => unreachable!("every event is taken at once"),
+            Look::Deferred | Look::Ended => {
+                unreachable!("every event is taken at once, and ends its exposure")
+            }
             Look::Event | Look::NoPeak => tally.decisions += 1,
         }
         let float = float.expect("both decide in the same laser cycle");

@@ -43,7 +43,7 @@ fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES
     let length = RecordingLength::PhotonsPerCycle(photons_per_cycle);
     let mut photons =
         RecordedHistograms::new(recorded.geometry, &recorded.captures, length, 10_000, 1).unwrap();
-    let mut engine = host_engine(&settings, &photons.addresses()).unwrap();
+    let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses()).unwrap();
     let events = engine.run(&photons.next_slice(10_000).unwrap()).unwrap();
     let scale = settings.range_scale().unwrap();
 

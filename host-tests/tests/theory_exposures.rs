@@ -6,7 +6,7 @@ use dtof::engine::settings::Settings;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::{SimulatedArray, SimulatedPixel, scene};
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{Count, DepthEvent, PaperRule, PixelAddress, Threshold};
+use dtof_core::{BlockLevel, Count, DepthEvent, PaperRule, PixelAddress, Threshold};
 use dtof_theory::counts::binomial::{alike, plausible};
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::looks::repeated_looks::{
@@ -270,6 +270,7 @@ fn request(background: f64, signal: f64, l2: u16, wanted: f64) -> Request {
         x: 4,
         l1: None,
         l2,
+        levels: BlockLevel::PIXEL,
         wanted: Wanted::PerExposure(wanted),
         seed: 1,
     }
@@ -298,7 +299,7 @@ fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec
     });
     let cycles = tuned.looks.expiry();
     let mut photons = SimulatedArray::new(geometry, pixels.collect(), cycles.into(), None);
-    let mut engine = host_engine(&settings, &photons.addresses()).unwrap();
+    let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses()).unwrap();
     let slice = photons.next_slice(u16::try_from(cycles).unwrap()).unwrap();
     let mut events = engine.run(&slice).unwrap();
     events.sort_by_key(|event| (event.pixel, event.cycle));

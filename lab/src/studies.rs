@@ -1,6 +1,7 @@
 //! The studies there are.
 
 pub mod analysis;
+pub mod beyond;
 pub mod failures;
 pub mod methods;
 pub mod scenes;
@@ -8,6 +9,7 @@ pub mod scenes;
 use anyhow::{Context, Result};
 
 use self::analysis::{false_events, gaussian_error, hit_rate, roc};
+use self::beyond::{binning_edges, binning_rate, binning_reports, echoes, tracking};
 use self::methods::{depth_error, event_depth, false_rate, time_to_detect};
 use self::scenes::{
     depth_step, dynamic_depth, fan_motion, hyperparameters, latency, radial_motion, static_scene,
@@ -31,6 +33,11 @@ pub const ALL: &[Study] = &[
     time_to_detect::STUDY,
     depth_error::STUDY,
     event_depth::STUDY,
+    binning_rate::STUDY,
+    binning_reports::STUDY,
+    binning_edges::STUDY,
+    tracking::STUDY,
+    echoes::STUDY,
     failures::STUDY,
 ];
 

@@ -2,10 +2,11 @@
 
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
-    AnyRule, AverageRule, CentredWindow, Count, DepthEstimator, PaperRule, Reference, Threshold,
-    WindowRule,
+    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, PaperRule,
+    Reference, Threshold, WindowRule,
 };
 
+use crate::adaptive_binning::AdaptiveBinning;
 use crate::dynamic_depth::DynamicDepth;
 use crate::refusal::Refusal;
 
@@ -40,6 +41,16 @@ pub struct Configuration {
     pub one_hit_tdc: bool,
     /// Pixels, addresses 0 up.
     pub pixels: u16,
+    /// How many of them are a row of the array.
+    pub columns: u16,
+    /// Blocks of pixels that decide together.
+    pub binning: Option<AdaptiveBinning>,
+    /// Whether pixels expect their next event where the last was; with a window rule.
+    pub tracking: bool,
+    /// The last echo that a pixel reports in an exposure.
+    pub echoes: EchoNumber,
+    /// Bins to either side of an echo's peak that are left out once it is reported.
+    pub peel_reach: u8,
     /// Picoseconds a bin.
     pub bin_width_ps: U16F16,
     /// Millimetres added to every range.
@@ -64,10 +75,12 @@ const PREVIOUS: u8 = 0;
 const REPORTED: u8 = 1;
 const ANY_HITS: u8 = 0;
 const ONE_HIT: u8 = 1;
+const NOT_TRACKING: u8 = 0;
+const TRACKING: u8 = 1;
 
 impl Configuration {
     /// Bytes of the record.
-    pub const BYTES: usize = 39;
+    pub const BYTES: usize = 47;
     /// What a minimum count may be: photons that a counter of 10 bits holds.
     const MINIMUM_COUNTS: core::ops::RangeInclusive<u16> = 1..=1023;
 
@@ -105,6 +118,15 @@ impl Configuration {
             Source::Sensor => FROM_SENSOR,
         };
         let hits = if self.one_hit_tdc { ONE_HIT } else { ANY_HITS };
+        let binning = self.binning.unwrap_or(AdaptiveBinning {
+            levels: BlockLevel::PIXEL,
+            patience: 0,
+        });
+        let tracking = if self.tracking {
+            TRACKING
+        } else {
+            NOT_TRACKING
+        };
 
         let first = [
             alpha.to_bits(),
@@ -128,7 +150,11 @@ impl Configuration {
             .chain(half_width.to_le_bytes())
             .chain([output, reference])
             .chain(threshold.to_le_bytes())
-            .chain([hits]);
+            .chain([hits])
+            .chain(self.columns.to_le_bytes())
+            .chain([binning.levels.raw()])
+            .chain(binning.patience.to_le_bytes())
+            .chain([tracking, self.echoes.raw(), self.peel_reach]);
         let mut bytes = [0; Self::BYTES];
         for (place, byte) in bytes.iter_mut().zip(fields) {
             *place = byte;
@@ -160,6 +186,10 @@ impl Configuration {
         let [output, reference] = fields.next()?;
         let threshold_mm = U24F8::from_le_bytes(fields.next()?);
         let [hits] = fields.next()?;
+        let columns = u16::from_le_bytes(fields.next()?);
+        let [levels] = fields.next()?;
+        let patience = u16::from_le_bytes(fields.next()?);
+        let [tracking, echoes, peel_reach] = fields.next()?;
 
         let changes = |reference| DynamicDepth {
             threshold_mm,
@@ -193,6 +223,19 @@ impl Configuration {
                 _ => return Err(Refusal::Unknown),
             },
             pixels,
+            columns,
+            binning: match BlockLevel::new(levels).ok_or(Refusal::Unknown)? {
+                BlockLevel::PIXEL => None,
+                _ if patience == 0 => return Err(Refusal::Patience),
+                levels => Some(AdaptiveBinning { levels, patience }),
+            },
+            tracking: match tracking {
+                NOT_TRACKING => false,
+                TRACKING => true,
+                _ => return Err(Refusal::Unknown),
+            },
+            echoes: EchoNumber::new(echoes).ok_or(Refusal::Unknown)?,
+            peel_reach,
             bin_width_ps,
             offset_mm,
             source: match source {

@@ -25,6 +25,7 @@
     clippy::unwrap_used
 )]
 
+mod adaptive_binning;
 mod configuration;
 mod dynamic_depth;
 pub mod endpoint;
@@ -36,6 +37,7 @@ mod report;
 mod sensor;
 mod token;
 
+pub use self::adaptive_binning::AdaptiveBinning;
 pub use self::configuration::{Configuration, Source};
 pub use self::dynamic_depth::DynamicDepth;
 pub use self::refusal::Refusal;

@@ -2,7 +2,7 @@
 //!
 //! | kind | to | message | body |
 //! |---|---|---|---|
-//! | 0x01 | device | configure | [`Configuration`](crate::Configuration), 39 bytes |
+//! | 0x01 | device | configure | [`Configuration`](crate::Configuration), 47 bytes |
 //! | 0x02 | device | photons | [`Token`](crate::Token)s |
 //! | 0x03 | device | synchronise | anything |
 //! | 0x04 | device | statistics request | none |
@@ -11,15 +11,18 @@
 //! | 0x82 | host | refused | a [`Refusal`](crate::Refusal), 1 byte |
 //! | 0x83 | host | events | AER words of 16 bytes |
 //! | 0x84 | host | synchronised | the same, after all that came before it |
-//! | 0x85 | host | statistics | [`Report`](crate::Report), 121 bytes |
-//! | 0x86 | host | sensor | [`SensorRecord`](crate::SensorRecord), 10 bytes |
+//! | 0x85 | host | statistics | [`Report`](crate::Report), 201 bytes |
+//! | 0x86 | host | sensor | [`SensorRecord`](crate::SensorRecord), 18 bytes |
+//!
+//! Reserved: 0x06 and 0x87 for a histogram request and the histogram, 0x07 and 0x88 for a
+//! settings request and the settings.
 
 use dtof_core::AER_VERSION;
 
 use crate::endpoint::GREETING_BYTES;
 
 /// The version both ends announce when a session begins.
-pub const LINK_VERSION: u16 = 3;
+pub const LINK_VERSION: u16 = 4;
 
 /// Host to device: a [`Configuration`](crate::Configuration).
 pub const CONFIGURE: u8 = 0x01;

@@ -8,7 +8,7 @@ numbered! {
     /// Why a configuration is not taken.
     Refusal {
         /// Not as long as the record, or of an unknown source, rule, estimator, output,
-        /// reference or number of hits.
+        /// reference, number of hits, levels, tracking or number of echoes.
         Unknown = 1: "the configuration is not one this device knows",
         /// X is 0.
         ZeroX = 2: ConfigError::ZeroX.text(),
@@ -38,6 +38,12 @@ numbered! {
         HalfWidth = 14: "the centred window must be 1 to 4 bins to either side",
         /// The threshold of dynamic depth is less than half of 1/256 bin.
         ZeroThreshold = 15: ZeroThresholdError.text(),
+        /// The patience of adaptive binning is 0.
+        Patience = 16: "the patience of adaptive binning must be at least 1",
+        /// There is no room for so many blocks of pixels, or no column.
+        Blocks = 17: "the device has no room for the blocks of pixels",
+        /// Tracking with a rule that has none.
+        Tracking = 18: "tracking needs the window rule",
     }
 }
 

@@ -15,6 +15,8 @@ pub struct Report {
     /// All pixels and whole histograms together; of events those sent before
     /// the report.
     pub statistics: Statistics,
+    /// The same of all blocks of pixels. Their photons are those of pixels, counted again.
+    pub blocks: Statistics,
     /// Photons of pixels the device does not have.
     pub unaddressed: u64,
     /// Bytes the receive queue had no room for.
@@ -32,23 +34,36 @@ pub struct Report {
 
 impl Report {
     /// Bytes of the record.
-    pub const BYTES: usize = 10 * 8 + 10 * 4 + 1;
+    pub const BYTES: usize = Self::WIDE * 8 + 10 * 4 + 1;
+    /// Numbers of 8 bytes.
+    const WIDE: usize = 20;
 
     /// Its numbers in the order they are sent: those of 8 bytes, then those of 4.
-    const fn numbers(&mut self) -> ([&mut u64; 10], [&mut u32; 10]) {
-        let (statistics, link) = (&mut self.statistics, &mut self.link);
+    const fn numbers(&mut self) -> ([&mut u64; Self::WIDE], [&mut u32; 10]) {
+        let (pixels, blocks) = (&mut self.statistics, &mut self.blocks);
+        let link = &mut self.link;
         (
             [
                 &mut self.cycles,
-                &mut statistics.counted,
-                &mut statistics.saturated,
-                &mut statistics.rejected,
-                &mut statistics.gated_out,
-                &mut statistics.events,
-                &mut statistics.deferred,
-                &mut statistics.expired,
-                &mut statistics.expired_deferred,
                 &mut self.unaddressed,
+                &mut pixels.counted,
+                &mut pixels.held,
+                &mut pixels.saturated,
+                &mut pixels.rejected,
+                &mut pixels.gated_out,
+                &mut pixels.events,
+                &mut pixels.deferred,
+                &mut pixels.expired,
+                &mut pixels.expired_deferred,
+                &mut blocks.counted,
+                &mut blocks.held,
+                &mut blocks.saturated,
+                &mut blocks.rejected,
+                &mut blocks.gated_out,
+                &mut blocks.events,
+                &mut blocks.deferred,
+                &mut blocks.expired,
+                &mut blocks.expired_deferred,
             ],
             [
                 &mut self.overrun,
@@ -80,7 +95,7 @@ impl Report {
     pub fn from_le_bytes(bytes: &[u8]) -> Option<Self> {
         let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;
         let (&last_sensor_error, numbers) = bytes.split_last()?;
-        let (eights, fours) = numbers.split_at_checked(10 * 8)?;
+        let (eights, fours) = numbers.split_at_checked(Self::WIDE * 8)?;
         let mut report = Self {
             last_sensor_error,
             ..Self::default()

@@ -15,11 +15,13 @@ pub struct SensorRecord {
     pub bin_width: Option<U16F16>,
     /// The range of the start of bin 0 in millimetres, as far as it is known.
     pub offset: I24F8,
+    /// Laser cycles a second in thousandths, 0 if that is not known.
+    pub laser_millihertz: u64,
 }
 
 impl SensorRecord {
     /// Bytes of the record.
-    pub const BYTES: usize = 10;
+    pub const BYTES: usize = 18;
 
     /// The record as bytes. A device without a sensor sends one without pixels.
     #[must_use]
@@ -30,20 +32,28 @@ impl SensorRecord {
         let [a, b] = sensor.pixels.to_le_bytes();
         let [c, d, e, f] = sensor.bin_width.unwrap_or_default().to_le_bytes();
         let [g, h, i, j] = sensor.offset.to_le_bytes();
-        [a, b, c, d, e, f, g, h, i, j]
+        let mut bytes = [0; Self::BYTES];
+        let rate = sensor.laser_millihertz.to_le_bytes();
+        let fields = [a, b, c, d, e, f, g, h, i, j].into_iter().chain(rate);
+        for (place, byte) in bytes.iter_mut().zip(fields) {
+            *place = byte;
+        }
+        bytes
     }
 
     /// Reads the record: the sensor, or that there is none. `None` if the length is
     /// wrong.
     #[must_use]
     pub fn from_le_bytes(bytes: &[u8]) -> Option<Option<Self>> {
-        let [a, b, c, d, e, f, g, h, i, j]: [u8; Self::BYTES] = bytes.try_into().ok()?;
+        let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;
+        let [a, b, c, d, e, f, g, h, i, j, rate @ ..] = *bytes;
         let pixels = u16::from_le_bytes([a, b]);
         let bin_width = U16F16::from_le_bytes([c, d, e, f]);
         Some((pixels > 0).then_some(Self {
             pixels,
             bin_width: (bin_width > 0).then_some(bin_width),
             offset: I24F8::from_le_bytes([g, h, i, j]),
+            laser_millihertz: u64::from_le_bytes(rate),
         }))
     }
 }

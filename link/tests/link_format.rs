@@ -1,17 +1,18 @@
 //! The golden frames of `docs/link-format.md`, and what a receiver makes of
 //! bytes that are no frames.
 
-use std::fmt::Display;
-
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
-    AnyRule, AverageRule, CentredWindow, Count, DepthEstimator, PaperRule, Reference, WindowRule,
+    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, PaperRule,
+    Reference, WindowRule,
 };
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, FrameError, PAYLOAD_BYTES, WIRE_BYTES, encode};
 use dtof_link::message::greeting;
 use dtof_link::message::{CONFIGURE, PHOTONS};
-use dtof_link::{Configuration, DynamicDepth, FaultRecord, Refusal, Report, Source, Token};
+use dtof_link::{
+    AdaptiveBinning, Configuration, DynamicDepth, Refusal, Report, SensorRecord, Source, Token,
+};
 use proptest::prelude::*;
 
 /// The golden frame whose line in the document begins so.
@@ -89,6 +90,14 @@ fn a_host_configures_with_the_golden_frame() {
         gate: (10, 119),
         one_hit_tdc: true,
         pixels: 64,
+        columns: 8,
+        binning: Some(AdaptiveBinning {
+            levels: BlockLevel::saturating(2),
+            patience: 100,
+        }),
+        tracking: true,
+        echoes: EchoNumber::new(2).unwrap(),
+        peel_reach: 4,
         bin_width_ps: U16F16::lit("250"),
         offset_mm: I24F8::lit("-179.5"),
         source: Source::Link,
@@ -136,38 +145,6 @@ fn what_is_too_long_is_named_so() {
     assert_eq!(found, Some(Some(FrameError::Oversized)));
 }
 
-/// Each of them has a number from 1 on, a line in the document's table that begins
-/// so, and words of its own.
-#[track_caller]
-fn are_documented<T: Display>(all: &[T], number: impl Fn(&T) -> u8, table: &str) {
-    let document = include_str!("../../docs/link-format.md");
-    let (_, rest) = document.split_once(table).unwrap();
-    let (table, _) = rest.split_once("\n\n").unwrap();
-    for (expected, item) in (1..).zip(all) {
-        assert_eq!(number(item), expected);
-        assert!(table.contains(&format!("\n| {expected} | ")), "{expected}");
-    }
-    assert!(!table.contains(&format!("\n| {} | ", all.len() + 1)));
-    let mut words: Vec<String> = all.iter().map(ToString::to_string).collect();
-    words.sort();
-    words.dedup();
-    assert_eq!(words.len(), all.len());
-}
-
-#[test]
-fn every_refusal_has_its_own_number_and_reason() {
-    let all: Vec<Refusal> = (0..=255).filter_map(Refusal::from_number).collect();
-    assert_eq!(all.len(), 15);
-    are_documented(&all, |&refusal| refusal as u8, "\n| reason | |\n");
-}
-
-#[test]
-fn every_sensor_fault_has_its_own_number_and_words() {
-    let all: Vec<FaultRecord> = (0..=255).filter_map(FaultRecord::from_number).collect();
-    assert_eq!(all.len(), 9);
-    are_documented(&all, |&fault| fault as u8, "\n| last sensor error | |\n");
-}
-
 /// Every choice with any numbers; x, gate and the like are checked by the device.
 fn configuration() -> impl Strategy<Value = Configuration> {
     let count = || (1u32..=1023).prop_map(Count::saturating);
@@ -188,18 +165,26 @@ fn configuration() -> impl Strategy<Value = Configuration> {
         reference,
     });
     let source = prop_oneof![Just(Source::Link), Just(Source::Sensor)];
+    let levels = (1u8..=3).prop_map(BlockLevel::saturating);
+    let binning =
+        (levels, 1..=u16::MAX).prop_map(|(levels, patience)| AdaptiveBinning { levels, patience });
+    let echoes = (1u8..=4).prop_map(|echo| EchoNumber::new(echo).unwrap());
     (
         prop_oneof![paper, average, window],
         prop_oneof![Just(DepthEstimator::Centroid3), centred],
         prop::option::of(changes),
         source,
-        any::<bool>(),
-        any::<[u16; 6]>(),
+        prop::option::of(binning),
+        echoes,
+        any::<(bool, bool, u8)>(),
+        any::<[u16; 7]>(),
         any::<(u32, i32)>(),
     )
         .prop_map(
-            |(rule, estimator, dynamic_depth, source, one_hit_tdc, words, (width, offset))| {
-                let [x, l1, l2, first, last, pixels] = words;
+            |(rule, estimator, dynamic_depth, source, binning, echoes, plain, words, range)| {
+                let [x, l1, l2, first, last, pixels, columns] = words;
+                let (one_hit_tdc, tracking, peel_reach) = plain;
+                let (width, offset) = range;
                 Configuration {
                     rule,
                     estimator,
@@ -209,6 +194,11 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                     gate: (first, last),
                     one_hit_tdc,
                     pixels,
+                    columns,
+                    binning,
+                    tracking,
+                    echoes,
+                    peel_reach,
                     bin_width_ps: U16F16::from_bits(width),
                     offset_mm: I24F8::from_bits(offset),
                     source,
@@ -252,26 +242,29 @@ proptest! {
     #[test]
     fn what_any_bytes_configure_comes_back(
         numbers in any::<[u8; Configuration::BYTES]>(), minimum_count in 1u16..=1023,
-        choices in prop::array::uniform5(0u8..3), rule in 0u8..4, width in 0u8..9,
-        half_width in 200u16..1100,
+        choices in prop::array::uniform6(0u8..3), rule in 0u8..4, width in 0u8..9,
+        half_width in 200u16..1100, levels in 0u8..5, patience in 0u16..9, echoes in 0u8..6,
     ) {
         let mut bytes = numbers;
         bytes[2..4].copy_from_slice(&minimum_count.to_le_bytes());
-        let [source, estimator, output, reference, hits] = choices;
+        let [source, estimator, output, reference, hits, tracking] = choices;
         for (at, value) in [
             (24, source), (25, rule), (26, width), (29, estimator), (32, output),
-            (33, reference), (38, hits),
+            (33, reference), (38, hits), (41, levels), (44, tracking), (45, echoes),
         ] {
             bytes[at] = value;
         }
         bytes[30..32].copy_from_slice(&half_width.to_le_bytes());
+        bytes[42..44].copy_from_slice(&patience.to_le_bytes());
         let found = Configuration::from_le_bytes(&bytes);
         let unknown = source == 2 || rule == 3 || estimator == 2 || output == 2 || hits == 2
-            || (output == 1 && reference == 2);
+            || (output == 1 && reference == 2)
+            || levels == 4 || tracking == 2 || !(1..=4).contains(&echoes);
         prop_assert_eq!(
             found.is_err(),
             unknown || (rule == 1 && !(1..=7).contains(&width))
                 || (estimator == 1 && !(256..=1024).contains(&half_width))
+                || (levels > 0 && patience == 0)
         );
         if let Ok(configuration) = found {
             let again = Configuration::from_le_bytes(&configuration.to_le_bytes());
@@ -284,6 +277,20 @@ proptest! {
         let report = Report::from_le_bytes(&bytes).unwrap();
         prop_assert_eq!(&report.to_le_bytes()[..], &bytes[..]);
         prop_assert_eq!(Report::from_le_bytes(&bytes[1..]), None);
+    }
+
+    #[test]
+    fn sensors_come_back(pixels: u16, width: u32, offset: i32, laser_millihertz: u64) {
+        let sensor = SensorRecord {
+            pixels,
+            bin_width: (width > 0).then_some(U16F16::from_bits(width)),
+            offset: I24F8::from_bits(offset),
+            laser_millihertz,
+        };
+        let bytes = SensorRecord::to_le_bytes(Some(&sensor));
+        let expected = (pixels > 0).then_some(sensor);
+        prop_assert_eq!(SensorRecord::from_le_bytes(&bytes), Some(expected));
+        prop_assert_eq!(SensorRecord::from_le_bytes(&bytes[1..]), None);
     }
 
     #[test]

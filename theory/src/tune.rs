@@ -15,7 +15,9 @@ pub mod window;
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{Count, Count10, CounterWidth, DepthEstimator, PaperRule, PixelConfig, Threshold};
+use dtof_core::{
+    BlockLevel, Count, Count10, CounterWidth, DepthEstimator, PaperRule, PixelConfig, Threshold,
+};
 
 use self::shortest::shortest;
 use crate::counts::poisson::Poisson;
@@ -70,6 +72,9 @@ pub struct Request {
     pub l2: u16,
     /// The limit on false alarms.
     pub wanted: Wanted,
+    /// With a window rule: the largest blocks of adaptive binning, which share that limit with
+    /// the pixels.
+    pub levels: BlockLevel,
     /// Seed of the simulated exposures.
     pub seed: u64,
 }

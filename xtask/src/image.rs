@@ -24,7 +24,7 @@ const UNDEFINED: &str = "dtof_core_has_a_reachable_panic";
 
 /// The functions of `core_image/main.rs` that between them use all of dtof-core.
 const PARTS: &str =
-    "units roots ranges words products texts gates trees thresholds histograms pixels";
+    "units roots ranges words products texts gates trees thresholds histograms pixels blocks peels";
 
 /// Bytes of code below which something has been optimised away: half of the
 /// smallest image there was when this was written.

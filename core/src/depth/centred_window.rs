@@ -41,9 +41,9 @@
 use fixed::types::{U8F8, U24F8};
 
 use super::estimate::Depth;
-use crate::counter::CounterWidth;
 use crate::flags::Flags;
-use crate::gate::RangeGate;
+use crate::histogram::counter::CounterWidth;
+use crate::histogram::gate::RangeGate;
 use crate::histogram::{Histogram, Peak, mean};
 use crate::units::SubBinOffset;
 
@@ -106,7 +106,8 @@ impl CentredWindow {
     }
 
     /// The mean of the gated bins farther from the peak bin than half the width, in 1/256
-    /// rounded down; `None` if there are none, or the peak is not in the gate.
+    /// rounded down; `None` if there are none, or the peak is not in the gate. Of these,
+    /// `left_out` bins are empty and do not count.
     #[inline(never)]
     #[must_use]
     pub fn background_outside<const BINS: usize, W: CounterWidth>(
@@ -114,6 +115,7 @@ impl CentredWindow {
         histogram: &Histogram<BINS, W>,
         gate: &RangeGate<BINS>,
         peak: Peak,
+        left_out: u32,
     ) -> Option<U24F8> {
         let (bin, reach) = (peak.bin.raw(), self.half_width.to_bits().div_ceil(256));
         if !gate.contains(bin) {
@@ -126,7 +128,7 @@ impl CentredWindow {
         let inside = inside
             .iter()
             .fold(0, |sum: u32, &count| sum.wrapping_add(count.into()));
-        let bins = u32::from(gate.last() + 1 - gate.first());
+        let bins = u32::from(gate.last() + 1 - gate.first()).checked_sub(left_out)?;
         mean(
             histogram.total().wrapping_sub(inside),
             bins.checked_sub(inside_bins)?,

@@ -30,9 +30,9 @@
 use fixed::types::U24F8;
 
 use super::estimate::Depth;
-use crate::counter::CounterWidth;
 use crate::flags::Flags;
-use crate::gate::RangeGate;
+use crate::histogram::counter::CounterWidth;
+use crate::histogram::gate::RangeGate;
 use crate::histogram::{Histogram, Peak};
 use crate::units::SubBinOffset;
 

@@ -16,8 +16,9 @@ use fixed::types::{U8F8, U24F8};
 use super::centred_window::CentredWindow;
 use super::centroid::centroid;
 use super::estimate::Depth;
-use crate::counter::CounterWidth;
-use crate::gate::RangeGate;
+use crate::histogram::counter::CounterWidth;
+use crate::histogram::gate::RangeGate;
+use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak};
 
 /// How the place of the pulse in its bins is found.
@@ -50,12 +51,43 @@ impl DepthEstimator {
         peak: Peak,
         background: U24F8,
     ) -> Depth {
+        self.estimate_without(histogram, gate, peak, background, &PeeledBins::NONE)
+    }
+
+    /// The same where some bins are left out, which are empty.
+    #[inline(always)]
+    #[must_use]
+    pub fn estimate_without<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        peak: Peak,
+        background: U24F8,
+        peeled: &PeeledBins,
+    ) -> Depth {
         match self {
             Self::Centroid3 => centroid(histogram, gate, peak, background),
             Self::CentredWindow(window) => {
-                let outside = window.background_outside(histogram, gate, peak);
+                let mut left_out = 0;
+                if peeled.echoes() > 0 {
+                    let (bin, reach) = (peak.bin.raw(), self.reach());
+                    let first = bin.saturating_sub(reach).max(gate.first());
+                    let last = bin.saturating_add(reach).min(gate.last());
+                    left_out = peeled.bins_among(gate.first()..=gate.last())
+                        - peeled.bins_among(first..=last);
+                }
+                let outside = window.background_outside(histogram, gate, peak, left_out);
                 window.estimate(histogram, gate, peak, outside.unwrap_or(background))
             }
+        }
+    }
+
+    /// How far from the peak bin it looks for photons of the pulse, in bins.
+    #[must_use]
+    pub const fn reach(&self) -> u16 {
+        match self {
+            Self::Centroid3 => 1,
+            Self::CentredWindow(window) => window.half_width().to_bits().div_ceil(256),
         }
     }
 }

@@ -28,10 +28,13 @@ use fixed::types::U24F8;
 use super::average::AverageRule;
 use super::quadrant::PaperRule;
 use super::rule::DetectionRule;
+use super::tracking::Tracking;
 use super::window::WindowRule;
-use crate::counter::CounterWidth;
-use crate::gate::RangeGate;
+use crate::histogram::counter::CounterWidth;
+use crate::histogram::gate::RangeGate;
+use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak};
+use crate::units::BlockLevel;
 
 /// One of the rules; decides as the one it holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +46,31 @@ pub enum AnyRule {
     Average(AverageRule),
     /// All photons of the pulse against all the others.
     Window(WindowRule),
+}
+
+impl AnyRule {
+    /// The rules of a pixel that tracks; `None` but for the window rule.
+    #[must_use]
+    pub fn tracking<const BINS: usize>(&self, gate: &RangeGate<BINS>) -> Option<Tracking<Self>> {
+        let Self::Window(rule) = self else {
+            return None;
+        };
+        let tracking = rule.tracking(gate);
+        Some(Tracking::new(
+            Self::Window(*tracking.near()),
+            Self::Window(*tracking.far()),
+            tracking.reach(),
+        ))
+    }
+
+    /// The rule of blocks of pixels with this rule: the same but for the window rule.
+    #[must_use]
+    pub fn of_blocks(&self, levels: BlockLevel) -> Self {
+        match self {
+            Self::Window(rule) => Self::Window(rule.of_blocks(levels)),
+            _ => *self,
+        }
+    }
 }
 
 impl From<PaperRule> for AnyRule {
@@ -74,9 +102,22 @@ impl DetectionRule for AnyRule {
         match self {
             // The looks of a pixel with the default rule stay as fast as they are.
             Self::Paper(rule) if W::BITS <= 10 => rule.detect(histogram, gate, peak),
-            Self::Paper(rule) => once(rule, histogram, gate, peak),
-            Self::Average(rule) => once(rule, histogram, gate, peak),
-            Self::Window(rule) => once(rule, histogram, gate, peak),
+            _ => self.detect_without(histogram, gate, peak, &PeeledBins::NONE),
+        }
+    }
+
+    #[inline(always)]
+    fn detect_without<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        peak: Peak,
+        peeled: &PeeledBins,
+    ) -> Option<U24F8> {
+        match self {
+            Self::Paper(rule) => once(rule, histogram, gate, peak, peeled),
+            Self::Average(rule) => once(rule, histogram, gate, peak, peeled),
+            Self::Window(rule) => once(rule, histogram, gate, peak, peeled),
         }
     }
 }
@@ -89,6 +130,7 @@ fn once<const BINS: usize, W: CounterWidth>(
     histogram: &Histogram<BINS, W>,
     gate: &RangeGate<BINS>,
     peak: Peak,
+    peeled: &PeeledBins,
 ) -> Option<U24F8> {
-    rule.detect(histogram, gate, peak)
+    rule.detect_without(histogram, gate, peak, peeled)
 }

@@ -38,8 +38,9 @@ use fixed::types::{U8F8, U24F8};
 
 use super::rule::DetectionRule;
 use super::threshold::Threshold;
-use crate::counter::CounterWidth;
-use crate::gate::RangeGate;
+use crate::histogram::counter::CounterWidth;
+use crate::histogram::gate::RangeGate;
+use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak, mean};
 use crate::units::Count;
 
@@ -74,10 +75,21 @@ impl DetectionRule for AverageRule {
         gate: &RangeGate<BINS>,
         peak: Peak,
     ) -> Option<U24F8> {
+        self.detect_without(histogram, gate, peak, &PeeledBins::NONE)
+    }
+
+    #[inline(always)]
+    fn detect_without<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        peak: Peak,
+        peeled: &PeeledBins,
+    ) -> Option<U24F8> {
         if peak.count < self.threshold.minimum_count() {
             return None;
         }
-        let bins = u32::from(gate.last() + 1 - gate.first());
+        let bins = peeled.bins_left(gate)?;
         let total = histogram.total();
         // A peak key fits 32 bits, so B times the highest count does.
         let above = bins.wrapping_mul(peak.count.raw()).saturating_sub(total);

@@ -22,8 +22,11 @@
 //! Source: the paper's section IV-B, which has it in place of the average of all bins:
 //! [`AverageRule`](crate::AverageRule).
 
-use crate::counter::PhotonCount;
-use crate::gate::RangeGate;
+use core::ops::Range;
+
+use crate::histogram::counter::PhotonCount;
+use crate::histogram::gate::RangeGate;
+use crate::histogram::peeled::PeeledBins;
 use crate::units::{BinIndex, Count};
 
 /// The paper's quadrant estimate over the gated bins.
@@ -53,6 +56,35 @@ pub(super) fn background_reaches<C: PhotonCount, const BINS: usize>(
 ) -> bool {
     let [lower, upper] = quadrants_without(counts, gate, peak);
     C::any_reaches(lower, level) && C::any_reaches(upper, level)
+}
+
+/// [`quadrant_background`] where the bins of some echoes are empty: a quadrant of which more
+/// than half is empty is left out. `None` if no quadrant is left.
+#[inline(never)]
+pub(super) fn background_without<C: PhotonCount, const BINS: usize>(
+    counts: &[C; BINS],
+    gate: &RangeGate<BINS>,
+    peak: BinIndex,
+    peeled: &PeeledBins,
+) -> Option<Count> {
+    let [start, lower, middle, upper, end] = gate.quadrant_starts();
+    let quadrants = if peak.raw() < middle {
+        [middle..upper, upper..end]
+    } else {
+        [start..lower, lower..middle]
+    };
+    let highest = |bins: Range<u16>| {
+        let (first, last) = (bins.start, bins.end.saturating_sub(1));
+        let is_kept = 2 * peeled.bins_among(first..=last) <= u32::from(bins.end - bins.start);
+        let bins = usize::from(bins.start)..usize::from(bins.end);
+        is_kept.then(|| C::highest(counts.get(bins).unwrap_or_default()))
+    };
+    let [one, other] = quadrants.map(highest);
+    let least = match (one, other) {
+        (Some(one), Some(other)) => one.min(other),
+        _ => one.or(other)?,
+    };
+    Some(Count::saturating(least))
 }
 
 /// The two quadrants of the half without the peak.

@@ -24,12 +24,14 @@
 use fixed::types::U24F8;
 
 use super::rule::DetectionRule;
-use crate::counter::CounterWidth;
 use crate::depth::{Depth, DepthEstimator};
 use crate::event::DepthEvent;
-use crate::gate::RangeGate;
+use crate::flags::Flags;
+use crate::histogram::counter::CounterWidth;
+use crate::histogram::gate::RangeGate;
+use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak};
-use crate::units::{BinPosition, Count, LaserCycle, PixelAddress};
+use crate::units::{BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress};
 
 /// A peak that stands clear of the background.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,12 +54,14 @@ impl Detection {
     }
 
     /// The event that reports it. Laser cycle `cycle` brought the decision, and the
-    /// histogram was counted over `exposure` laser cycles.
+    /// histogram was counted over `exposure` laser cycles. It is the first echo of one pixel.
     #[inline(always)]
     #[must_use]
     pub const fn event(&self, pixel: PixelAddress, cycle: LaserCycle, exposure: u16) -> DepthEvent {
         DepthEvent {
             pixel,
+            level: BlockLevel::PIXEL,
+            echo: EchoNumber::FIRST,
             cycle,
             exposure,
             peak_bin: self.peak.bin,
@@ -108,6 +112,50 @@ fn detect_gated<const BINS: usize, W: CounterWidth, R: DetectionRule>(
         background: rounded(background),
         depth,
     })
+}
+
+/// Whether `peak` stands clear where some bins are left out. A window that reaches them is
+/// flagged as [`Flags::CLIPPED`], a peak right behind them as [`Flags::TAIL`].
+// Once for each rule: not with the looks of pixels that have reported nothing yet.
+#[inline(never)]
+pub(crate) fn detect_at<const BINS: usize, W: CounterWidth, R: DetectionRule>(
+    histogram: &Histogram<BINS, W>,
+    gate: &RangeGate<BINS>,
+    peak: Peak,
+    rule: &R,
+    estimator: &DepthEstimator,
+    peeled: &PeeledBins,
+) -> Option<Detection> {
+    if !gate.contains(peak.bin.raw()) {
+        return None;
+    }
+    let background = rule.detect_without(histogram, gate, peak, peeled)?;
+    Some(detection_at(
+        histogram, gate, peak, background, estimator, peeled,
+    ))
+}
+
+/// The detection of a peak above such a background, where some bins are left out.
+pub(crate) fn detection_at<const BINS: usize, W: CounterWidth>(
+    histogram: &Histogram<BINS, W>,
+    gate: &RangeGate<BINS>,
+    peak: Peak,
+    background: U24F8,
+    estimator: &DepthEstimator,
+    peeled: &PeeledBins,
+) -> Detection {
+    let mut depth = estimator.estimate_without(histogram, gate, peak, background, peeled);
+    if peeled.touches(peak.bin.raw(), estimator.reach()) {
+        depth.flags |= Flags::CLIPPED;
+    }
+    if peeled.is_tail(peak.bin) {
+        depth.flags |= Flags::TAIL;
+    }
+    Detection {
+        peak,
+        background: rounded(background),
+        depth,
+    }
 }
 
 /// To the nearest whole count, halves up.

@@ -28,11 +28,12 @@
 
 use fixed::types::{U8F8, U24F8};
 
-use super::background::{background_reaches, quadrant_background};
+use super::background::{background_reaches, background_without, quadrant_background};
 use super::rule::{DetectionRule, whole_background};
 use super::threshold::Threshold;
-use crate::counter::CounterWidth;
-use crate::gate::RangeGate;
+use crate::histogram::counter::CounterWidth;
+use crate::histogram::gate::RangeGate;
+use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak};
 use crate::units::Count;
 
@@ -68,8 +69,24 @@ impl DetectionRule for PaperRule {
         gate: &RangeGate<BINS>,
         peak: Peak,
     ) -> Option<U24F8> {
+        self.detect_without(histogram, gate, peak, &PeeledBins::NONE)
+    }
+
+    #[inline(always)]
+    fn detect_without<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        peak: Peak,
+        peeled: &PeeledBins,
+    ) -> Option<U24F8> {
         if peak.count < self.threshold.minimum_count() {
             return None;
+        }
+        if peeled.echoes() > 0 {
+            let background = background_without(histogram.counts(), gate, peak.bin, peeled)?;
+            let exceeded = self.threshold.is_exceeded::<W>(peak.count, background);
+            return exceeded.then_some(whole_background(background));
         }
         // Most looks end here, without the background itself.
         let lowest = self.threshold.lowest_background::<W>(peak.count);

@@ -17,7 +17,7 @@
 //! Source: the paper's Alg. 1. Its listing starts at `b = 32`, a sixth iteration that
 //! no 10-bit input ever takes.
 
-use crate::counter::CounterWidth;
+use crate::histogram::counter::CounterWidth;
 
 /// Does `$step` for each shift below `$iterations`, from the highest down. Not a
 /// loop, which takes twice as long where it is not unrolled, at opt-level s.
@@ -109,7 +109,7 @@ mod tests {
     use rand_pcg::Pcg32;
 
     use super::*;
-    use crate::counter::{Count10, Count16, Count24};
+    use crate::histogram::counter::{Count10, Count16, Count24};
 
     /// Of any level and α, the largest there are among them.
     #[test]

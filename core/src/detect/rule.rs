@@ -28,8 +28,9 @@
 
 use fixed::types::U24F8;
 
-use crate::counter::CounterWidth;
-use crate::gate::RangeGate;
+use crate::histogram::counter::CounterWidth;
+use crate::histogram::gate::RangeGate;
+use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak};
 use crate::units::Count;
 
@@ -44,6 +45,18 @@ pub trait DetectionRule: Copy {
         gate: &RangeGate<BINS>,
         peak: Peak,
     ) -> Option<U24F8>;
+
+    /// The same where some bins are left out, which are empty. A rule that counts bins or
+    /// compares parts of the histogram takes them into account.
+    fn detect_without<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        peak: Peak,
+        _peeled: &PeeledBins,
+    ) -> Option<U24F8> {
+        self.detect(histogram, gate, peak)
+    }
 }
 
 /// A background of whole counts, as [`DetectionRule::detect`] gives it. Exact.

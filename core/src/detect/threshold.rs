@@ -26,7 +26,7 @@
 use fixed::types::{U8F8, U24F8};
 
 use super::root::{root_below, square_root};
-use crate::counter::CounterWidth;
+use crate::histogram::counter::CounterWidth;
 use crate::units::Count;
 
 /// α and the minimum peak count.

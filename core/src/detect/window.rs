@@ -43,11 +43,14 @@
 use fixed::types::{U4F12, U8F8, U24F8};
 
 use super::rule::DetectionRule;
+use super::tracking::Tracking;
+use super::window_z::{block_z, tracking_z};
 use crate::check::written_as_its_text;
-use crate::counter::CounterWidth;
-use crate::gate::RangeGate;
+use crate::histogram::counter::CounterWidth;
+use crate::histogram::gate::RangeGate;
+use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak, mean};
-use crate::units::Count;
+use crate::units::{BlockLevel, Count};
 
 /// The sum of a window around the peak against the photons of all bins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,6 +134,27 @@ impl WindowRule {
         self.minimum_count
     }
 
+    /// The rules of a pixel that tracks, with together the false alarms of this rule. What
+    /// is outside of the range of [`z_for`](crate::z_for) is limited to it; near the last
+    /// event z never gets higher, and elsewhere never lower.
+    #[must_use]
+    pub fn tracking<const BINS: usize>(&self, gate: &RangeGate<BINS>) -> Tracking<Self> {
+        let [near, far] = tracking_z(self.z, gate);
+        let near = Self { z: near, ..*self };
+        Tracking::new(near, Self { z: far, ..*self }, u16::from(self.width) - 1)
+    }
+
+    /// The rule of blocks of pixels with this rule, of which z never gets lower. Blocks of all
+    /// `levels` have together a third as many false alarms as pixels: see
+    /// [`z_for_levels`](crate::z_for_levels).
+    #[must_use]
+    pub fn of_blocks(&self, levels: BlockLevel) -> Self {
+        Self {
+            z: block_z(self.z, levels),
+            ..*self
+        }
+    }
+
     /// The most photons in a gated window that holds the peak bin: at most 7 · 2²⁴.
     #[inline(always)]
     fn window_sum<const BINS: usize, W: CounterWidth>(
@@ -170,12 +194,23 @@ impl DetectionRule for WindowRule {
         gate: &RangeGate<BINS>,
         peak: Peak,
     ) -> Option<U24F8> {
+        self.detect_without(histogram, gate, peak, &PeeledBins::NONE)
+    }
+
+    #[inline(always)]
+    fn detect_without<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        peak: Peak,
+        peeled: &PeeledBins,
+    ) -> Option<U24F8> {
         let inside = self.window_sum(histogram, gate, peak);
         if inside < self.minimum_count.raw() {
             return None;
         }
         let width = u32::from(self.width);
-        let bins = u32::from(gate.last() + 1 - gate.first());
+        let bins = peeled.bins_left(gate)?;
         let bins_outside = bins - width;
 
         // In 1/16 counts.

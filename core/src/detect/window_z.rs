@@ -12,7 +12,8 @@
 
 use fixed::types::U4F12;
 
-use crate::gate::RangeGate;
+use crate::histogram::gate::RangeGate;
+use crate::units::BlockLevel;
 
 /// What the first 1, 2, 4, … looks are worth, in 1/16.
 const LOOKS: [u16; 11] = [12, 23, 45, 73, 112, 164, 222, 300, 388, 469, 573];
@@ -46,7 +47,6 @@ const Z: [u16; 15] = [
 /// assert_eq!((z.to_num::<f64>() * 100.0).round(), 446.0);
 /// ```
 #[must_use]
-#[allow(clippy::cast_possible_truncation, reason = "the highest z is 16 bits")]
 pub fn z_for<const BINS: usize>(
     one_in: u32,
     gate: &RangeGate<BINS>,
@@ -61,13 +61,77 @@ pub fn z_for<const BINS: usize>(
     // At most 32 + 11 + 11 bits.
     let trials = u64::from(one_in) * u64::from(bins) * u64::from(looks) / 16;
 
-    let above = log2(trials).saturating_sub(6 << 8);
+    z_of(log2(trials))
+}
+
+/// [`z_for`] for pixels and blocks of so many levels: one in `one_in` is the share of pixels
+/// that are covered by a false report in L2 laser cycles, their own or that of a block. Pixels
+/// have three quarters of it, and blocks, with the z of
+/// [`WindowRule::of_blocks`](crate::WindowRule::of_blocks), the rest. How patient pixels are
+/// does not matter: without a target nearly all feed their blocks.
+#[must_use]
+pub fn z_for_levels<const BINS: usize>(
+    one_in: u32,
+    gate: &RangeGate<BINS>,
+    x: u16,
+    l1: u16,
+    l2: u16,
+    levels: BlockLevel,
+) -> U4F12 {
+    let z = z_for(one_in, gate, x, l1, l2);
+    if levels == BlockLevel::PIXEL {
+        return z;
+    }
+    // 4/3 as many trials.
+    z_of(trials_of(z) + 106)
+}
+
+/// 1 as [`log2`] has it.
+const ONE: u32 = 256;
+
+/// The z for so many trials, as a binary logarithm in 1/256.
+#[allow(clippy::cast_possible_truncation, reason = "the highest z is 16 bits")]
+fn z_of(trials: u32) -> U4F12 {
+    let above = trials.saturating_sub(6 * ONE);
     let (index, part) = ((above >> 9) as usize, above & 511);
     let z = match Z.get(index..) {
         Some(&[low, high, ..]) => u32::from(low) + ((u32::from(high - low) * part) >> 9),
         _ => u32::from(HIGHEST_Z.to_bits()),
     };
     U4F12::from_bits(z as u16)
+}
+
+/// How many trials a z is for, as a binary logarithm in 1/256: the inverse of [`z_of`],
+/// limited to what it covers.
+fn trials_of(z: U4F12) -> u32 {
+    let z = z.to_bits();
+    let mut trials = 6 * ONE;
+    for (&low, &high) in Z.iter().zip(Z.iter().skip(1)) {
+        let above = u32::from(z.saturating_sub(low)) << 9;
+        let part = above.checked_div(u32::from(high - low)).unwrap_or(0);
+        trials += part.min(2 * ONE);
+    }
+    trials
+}
+
+/// The z near the last event, and elsewhere, that have each half of the false alarms of `z`.
+/// The windows that hold one bin are worth [`NEAR`] bins.
+pub(super) fn tracking_z<const BINS: usize>(z: U4F12, gate: &RangeGate<BINS>) -> [U4F12; 2] {
+    let bins = gate.last() - gate.first() + 1;
+    let half = trials_of(z) + ONE;
+    let near = (half + log2(NEAR.into())).saturating_sub(log2(bins.into()));
+    [z_of(near).min(z), z_of(half).max(z)]
+}
+
+/// Bins that the windows around an expected one are worth.
+const NEAR: u16 = 2;
+
+/// The z of blocks of so many levels that have together a third of the false alarms of pixels
+/// with `z`. A block has a quarter more than a pixel with the same z.
+pub(super) fn block_z(z: U4F12, levels: BlockLevel) -> U4F12 {
+    // 3 · 5/4 · levels.
+    let share = log2(15 * u64::from(levels.raw())).saturating_sub(2 * ONE);
+    z_of(trials_of(z) + share).max(z)
 }
 
 /// What the first `looks` are worth, in 1/16: between powers of two a straight line in

@@ -14,15 +14,16 @@
 //! ```
 //! use dtof_core::fixed::types::{I24F8, U16F16, U24F8};
 //! use dtof_core::{
-//!     BinIndex, Count, DepthEvent, DynamicDepthConfig, DynamicDepthPixel, Flags, LaserCycle,
-//!     PixelAddress, Polarity, RangeScale, Reference, SubBinOffset,
+//!     BinIndex, BlockLevel, Count, DepthEvent, DynamicDepthConfig, DynamicDepthPixel, EchoNumber,
+//!     Flags, LaserCycle, PixelAddress, Polarity, RangeScale, Reference, SubBinOffset,
 //! };
 //!
 //! let scale = RangeScale::new(const { U16F16::lit("250") }, I24F8::ZERO)?; // 37.5 mm a bin
 //! let config = DynamicDepthConfig::new(U24F8::from_num(100), &scale, Reference::Previous)?;
 //! let mut pixel = DynamicDepthPixel::<3>::new();
 //! let mut event = |cycle, bin| DepthEvent {
-//!     pixel: PixelAddress(0), cycle: LaserCycle(cycle), exposure: 44,
+//!     pixel: PixelAddress(0), level: BlockLevel::PIXEL, echo: EchoNumber::FIRST,
+//!     cycle: LaserCycle(cycle), exposure: 44,
 //!     peak_bin: BinIndex::saturating(bin), offset: SubBinOffset::CENTRE,
 //!     peak_count: Count::saturating(20), background: Count::saturating(2), flags: Flags::NONE,
 //! };
@@ -43,7 +44,7 @@ use crate::check::written_as_its_text;
 use crate::depth::RangeScale;
 use crate::event::DepthEvent;
 use crate::flags::Flags;
-use crate::units::{BinPosition, LaserCycle, PixelAddress};
+use crate::units::{BinPosition, BlockLevel, LaserCycle, PixelAddress};
 
 /// What a mean depth is compared with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -134,8 +135,10 @@ pub enum Polarity {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DynamicDepthEvent {
-    /// Which macropixel.
+    /// Which macropixel; of a block its first.
     pub pixel: PixelAddress,
+    /// Whether it is one pixel, or a block.
+    pub level: BlockLevel,
     /// The laser cycle of the depth event that moved the mean.
     pub cycle: LaserCycle,
     /// The mean of the last events, to the nearest 1/256 bin.
@@ -155,6 +158,7 @@ impl DynamicDepthEvent {
     #[must_use]
     pub const fn new(
         pixel: PixelAddress,
+        level: BlockLevel,
         cycle: LaserCycle,
         position: BinPosition,
         change: i32,
@@ -165,6 +169,7 @@ impl DynamicDepthEvent {
         }
         Some(Self {
             pixel,
+            level,
             cycle,
             position,
             flags,
@@ -258,6 +263,7 @@ impl<const N: usize> DynamicDepthPixel<N> {
         }
         DynamicDepthEvent::new(
             event.pixel,
+            event.level,
             event.cycle,
             self.recent.mean()?,
             moved / N as i32,

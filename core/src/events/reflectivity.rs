@@ -21,10 +21,14 @@
 //!
 //! ```
 //! use dtof_core::fixed::types::{I24F8, U48F16};
-//! # use dtof_core::{BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, SubBinOffset};
+//! # use dtof_core::{
+//! #     BinIndex, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress,
+//! #     SubBinOffset,
+//! # };
 //! use dtof_core::Reflectivity;
 //! # let event = |cycle, exposure, peak| DepthEvent {
-//! #     pixel: PixelAddress(0), cycle: LaserCycle(cycle), exposure,
+//! #     pixel: PixelAddress(0), level: BlockLevel::PIXEL, echo: EchoNumber::FIRST,
+//! #     cycle: LaserCycle(cycle), exposure,
 //! #     peak_bin: BinIndex::saturating(40), offset: SubBinOffset::CENTRE,
 //! #     peak_count: Count::saturating(peak), background: Count::saturating(4),
 //! #     flags: Flags::NONE,

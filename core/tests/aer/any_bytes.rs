@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use dtof_core::{
-    AerDecoder, AerEncoder, AerError, AerRecord, AerWord, BinPosition, DynamicDepthEvent, Flags,
-    LaserCycle, PixelAddress,
+    AerDecoder, AerEncoder, AerError, AerRecord, AerWord, BinPosition, BlockLevel,
+    DynamicDepthEvent, Flags, LaserCycle, PixelAddress,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -15,7 +15,7 @@ use crate::document::{bit_table, pack, pack_time};
 fn check_any_bytes(bytes: [u8; 16]) {
     let number = u128::from_le_bytes(bytes);
     let mut decoder = AerDecoder::new();
-    decoder.decode(AerWord::time(LaserCycle(3 << 20))).unwrap();
+    decoder.decode(AerWord::time(LaserCycle(3 << 16))).unwrap();
     let word = AerWord::from_le_bytes(bytes);
     assert_eq!(word.to_le_bytes(), bytes);
     let decoded = decoder.decode(word);
@@ -25,13 +25,13 @@ fn check_any_bytes(bytes: [u8; 16]) {
             let Ok(AerRecord::Event(event)) = decoded else {
                 panic!("{decoded:?}");
             };
-            assert_eq!(event.cycle.0 >> 20, 3);
+            assert_eq!(event.cycle.0 >> 16, 3);
             // Sent on, it is the same.
             assert_eq!(AerWord::depth_event(&event).to_le_bytes(), bytes);
         }
         (0, 1) => {
-            let valid = number << 76 == 0 && number >> 108 == 0;
-            let time = AerRecord::Time(LaserCycle(((number >> 64) << 20) as u64));
+            let valid = number << 76 == 0 && number >> 112 == 0;
+            let time = AerRecord::Time(LaserCycle(((number >> 64) << 16) as u64));
             assert_eq!(decoded, valid.then_some(time).ok_or(AerError::ReservedBits));
         }
         (0, 2) => {
@@ -47,11 +47,11 @@ fn check_any_bytes(bytes: [u8; 16]) {
             let in_range = (-512..=262_399).contains(&position)
                 && (-262_911..=262_911).contains(&change)
                 && change != 0;
-            let reserved = number >> 16 & 0xffff | number >> 58 & 0xf;
+            let reserved = number >> 16 & 0xffff | number >> 50 & 3 | number >> 58 & 0xf;
             match decoded {
                 Ok(AerRecord::DynamicDepth(event)) => {
                     assert!(in_range && reserved == 0);
-                    assert_eq!(event.cycle.0 >> 20, 3);
+                    assert_eq!(event.cycle.0 >> 16, 3);
                     // Sent on, it is the same.
                     assert_eq!(AerWord::dynamic_depth(&event).to_le_bytes(), bytes);
                 }
@@ -83,7 +83,7 @@ fn random_bytes_decode_as_documented_or_not_at_all() {
         // A tenth dynamic depth events, most of them with a position and a change that
         // can be.
         if number % 10 == 1 {
-            let word = u128::from_le_bytes(bytes) & !(0xf << 58 | 0xffff << 16);
+            let word = u128::from_le_bytes(bytes) & !(0xf << 58 | 3 << 50 | 0xffff << 16);
             let small = word >> 64 & 0x3_ffff | (word >> 96 & 0x3_ffff) << 32;
             let few = 1 << (rng.next_u32() % 128);
             let few = if rng.next_u32() % 4 == 0 { few } else { 0 };
@@ -99,12 +99,19 @@ fn all_combinations_of_the_boundaries_of_a_dynamic_depth_event() {
     let tables = ["### Dynamic depth event", "### Time word"].map(bit_table);
     let two = |number: i32| u128::from(number.cast_unsigned());
     for pixel in [0, 1, u16::MAX] {
-        for cycle in [0, 1, (1 << 20) - 1, 1 << 20, u64::MAX] {
+        for (level, cycle) in [
+            (0, 0),
+            (1, 1),
+            (2, (1 << 16) - 1),
+            (3, 1 << 16),
+            (0, u64::MAX),
+        ] {
             for position in [-512, -1, 0, 1, 262_399] {
                 for change in [-262_911, -1, 1, 262_911] {
                     for flags in 0..64 {
                         let event = DynamicDepthEvent::new(
                             PixelAddress(pixel),
+                            BlockLevel::new(level).unwrap(),
                             LaserCycle(cycle),
                             BinPosition::new(position).unwrap(),
                             change,
@@ -116,7 +123,8 @@ fn all_combinations_of_the_boundaries_of_a_dynamic_depth_event() {
                         assert_eq!(time.to_le_bytes(), pack_time(&tables[1], event.cycle));
                         let values = BTreeMap::from([
                             ("pixel", pixel.into()),
-                            ("cycle_low", u128::from(cycle % (1 << 20))),
+                            ("level", level.into()),
+                            ("cycle_low", u128::from(cycle % (1 << 16))),
                             ("flags", flags.into()),
                             ("position", two(position)),
                             ("change", two(change)),
@@ -133,8 +141,10 @@ fn all_combinations_of_the_boundaries_of_a_dynamic_depth_event() {
     }
     for (position, change) in [(0, 0), (0, 262_912), (0, -262_912)] {
         let position = BinPosition::new(position).unwrap();
-        let (pixel, cycle) = (PixelAddress(0), LaserCycle(0));
-        assert!(DynamicDepthEvent::new(pixel, cycle, position, change, Flags::NONE).is_none());
+        let (pixel, level) = (PixelAddress(0), BlockLevel::PIXEL);
+        let event =
+            DynamicDepthEvent::new(pixel, level, LaserCycle(0), position, change, Flags::NONE);
+        assert_eq!(event, None);
     }
 }
 

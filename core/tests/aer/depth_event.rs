@@ -21,7 +21,7 @@ fn check_event(tables: &[Vec<Field>; 2], event: &DepthEvent) {
     assert_eq!(bytes, pack_event(&tables[0], event), "{event:?}");
 
     let mut decoder = AerDecoder::new();
-    let start = LaserCycle(event.cycle.0 / (1 << 20) * (1 << 20));
+    let start = LaserCycle(event.cycle.0 / (1 << 16) * (1 << 16));
     let decoded = decoder.decode(AerWord::from_le_bytes(time));
     assert_eq!(decoded, Ok(AerRecord::Time(start)));
     let decoded = decoder.decode(AerWord::from_le_bytes(bytes));
@@ -35,9 +35,11 @@ fn all_combinations_of_field_boundaries_round_trip() {
         let max = u64::MAX >> (64 - bits);
         [0, 1, max - 1, max]
     };
-    let cycles = [bits(20), bits(64)].concat();
-    let fields: [&[u64]; 8] = [
+    let cycles = [bits(16), bits(64)].concat();
+    let fields: [&[u64]; 10] = [
         &bits(16),
+        &[0, 3],
+        &[0, 1, 3],
         &cycles,
         &bits(16),
         &bits(10),
@@ -69,22 +71,22 @@ fn all_combinations_of_field_boundaries_round_trip() {
 #[test]
 fn each_field_alone_at_each_of_its_bits() {
     let tables = tables();
-    let widths = [16, 64, 16, 10, 10, 24, 24, 6];
+    let widths = [16, 2, 2, 64, 16, 10, 10, 24, 24, 6];
     for (field, width) in widths.into_iter().enumerate() {
         for bit in 0..width {
-            let mut numbers = [0; 8];
+            let mut numbers = [0; 10];
             numbers[field] = 1 << bit;
             check_event(&tables, &event(numbers));
             let mut numbers = numbers.map(|number: u64| !number);
             check_event(&tables, &event(numbers));
-            numbers[4] = 512; // offset 0
+            numbers[6] = 512; // offset 0
             check_event(&tables, &event(numbers));
         }
     }
 }
 
 fn random_event(rng: &mut Pcg32) -> DepthEvent {
-    event([0; 8].map(|_| rng.next_u64()))
+    event([0; 10].map(|_| rng.next_u64()))
 }
 
 #[test]
@@ -96,7 +98,7 @@ fn a_million_random_events_round_trip() {
     for number in 0..1_000_000 {
         let mut event = random_event(&mut rng);
         if number % 2 == 0 {
-            event.cycle.0 %= 1 << 22; // few time words
+            event.cycle.0 %= 1 << 18; // few time words
         }
         let (time, word) = encoder.encode(&event);
         if let Some(time) = time {
@@ -125,7 +127,7 @@ fn end_words_are_those_of_the_document() {
 
 #[test]
 fn time_words_come_before_the_first_event_and_at_every_change_of_the_upper_bits() {
-    const TURN: u64 = 1 << 20;
+    const TURN: u64 = 1 << 16;
     const HALF: u64 = 1 << 63;
     let mut encoder = AerEncoder::new();
     let mut decoder = AerDecoder::new();
@@ -147,7 +149,7 @@ fn time_words_come_before_the_first_event_and_at_every_change_of_the_upper_bits(
         (u64::MAX - TURN + 1, false),
         (0, true),
     ] {
-        let event = event([3, cycle, 1, 2, 600, 9, 4, 0]);
+        let event = event([3, 1, 2, cycle, 1, 2, 600, 9, 4, 0]);
         let (time, word) = encoder.encode(&event);
         assert_eq!(time.is_some(), due, "{cycle}");
         if let Some(time) = time {
@@ -162,8 +164,8 @@ fn time_words_come_before_the_first_event_and_at_every_change_of_the_upper_bits(
 fn a_late_receiver_is_right_from_the_first_time_word_on() {
     let mut encoder = AerEncoder::new();
     let mut late = AerDecoder::new();
-    for (cycle, expected) in [(70, false), (80, false), (1 << 20, true), (90, true)] {
-        let event = event([0, cycle, 0, 0, 0, 0, 0, 0]);
+    for (cycle, expected) in [(70, false), (80, false), (1 << 16, true), (90, true)] {
+        let event = event([0, 0, 0, cycle, 0, 0, 0, 0, 0, 0]);
         let (time, word) = encoder.encode(&event);
         // The first time word is missed.
         if let Some(time) = time.filter(|_| cycle != 70) {
@@ -177,7 +179,7 @@ fn a_late_receiver_is_right_from_the_first_time_word_on() {
 #[test]
 fn an_error_leaves_the_decoder_as_it_was() {
     let mut decoder = AerDecoder::new();
-    let event = event([1, 12_345_678, 1, 1, 1, 1, 1, 1]);
+    let event = event([1, 1, 1, 12_345_678, 1, 1, 1, 1, 1, 1]);
     let (time, word) = AerEncoder::new().encode(&event);
     decoder.decode(time.unwrap()).unwrap();
     for (byte, bit, error) in [
@@ -195,15 +197,16 @@ fn an_error_leaves_the_decoder_as_it_was() {
 
 proptest! {
     #[test]
-    fn any_stream(numbers in prop::collection::vec(any::<([u64; 8], u32)>(), 0..50)) {
+    fn any_stream(numbers in prop::collection::vec(any::<([u64; 10], u32)>(), 0..50)) {
         let mut encoder = AerEncoder::new();
         let mut decoder = AerDecoder::new();
         let mut high = None;
         for (mut numbers, shift) in numbers {
-            numbers[1] >>= 20 + shift % 44; // often the same upper bits
+            numbers[3] >>= 16 + shift % 48; // often the same upper bits
             let event = event(numbers);
             let change = DynamicDepthEvent::new(
                 event.pixel,
+                event.level,
                 event.cycle,
                 event.position(),
                 1 + i32::from(event.offset.raw()).abs(),
@@ -218,8 +221,8 @@ proptest! {
                 None => AerRecord::Event(event),
                 Some(change) => AerRecord::DynamicDepth(change),
             };
-            prop_assert_eq!(time.is_some(), high != Some(event.cycle.0 >> 20));
-            high = Some(event.cycle.0 >> 20);
+            prop_assert_eq!(time.is_some(), high != Some(event.cycle.0 >> 16));
+            high = Some(event.cycle.0 >> 16);
             if let Some(time) = time {
                 decoder.decode(time).unwrap();
             }

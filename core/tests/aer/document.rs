@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 
 use dtof_core::{
-    BinIndex, BinPosition, Count, DepthEvent, DynamicDepthEvent, Flags, LaserCycle, PixelAddress,
-    SubBinOffset,
+    BinIndex, BinPosition, BlockLevel, Count, DepthEvent, DynamicDepthEvent, EchoNumber, Flags,
+    LaserCycle, PixelAddress, SubBinOffset,
 };
 
 pub const DOCUMENT: &str = include_str!("../../../docs/aer-format.md");
@@ -82,7 +82,9 @@ pub fn pack_event(table: &[Field], event: &DepthEvent) -> [u8; 16] {
     let values = BTreeMap::from([
         ("pixel", event.pixel.0.into()),
         ("exposure", event.exposure.into()),
-        ("cycle_low", u128::from(event.cycle.0 % (1 << 20))),
+        ("cycle_low", u128::from(event.cycle.0 % (1 << 16))),
+        ("level", event.level.raw().into()),
+        ("echo", u128::from(event.echo.raw()) - 1),
         ("peak_bin", event.peak_bin.raw().into()),
         ("peak_count", event.peak_count.raw().into()),
         ("background", event.background.raw().into()),
@@ -96,7 +98,7 @@ pub fn pack_event(table: &[Field], event: &DepthEvent) -> [u8; 16] {
 pub fn pack_time(table: &[Field], cycle: LaserCycle) -> [u8; 16] {
     pack(
         table,
-        &BTreeMap::from([("cycle_high", u128::from(cycle.0 / (1 << 20)))]),
+        &BTreeMap::from([("cycle_high", u128::from(cycle.0 / (1 << 16)))]),
     )
 }
 
@@ -110,10 +112,12 @@ pub fn named_values(text: &'static str) -> BTreeMap<&'static str, i128> {
 }
 
 pub fn event_of(values: &BTreeMap<&str, i128>) -> DepthEvent {
-    assert_eq!(values.len(), 8);
+    assert_eq!(values.len(), 10);
     let count = |name| Count::new(values[name].try_into().unwrap()).unwrap();
     DepthEvent {
         pixel: PixelAddress(values["pixel"].try_into().unwrap()),
+        level: level_of(values),
+        echo: EchoNumber::new(values["echo"].try_into().unwrap()).unwrap(),
         cycle: LaserCycle(values["cycle"].try_into().unwrap()),
         exposure: values["exposure"].try_into().unwrap(),
         peak_bin: BinIndex::new(values["peak_bin"].try_into().unwrap()).unwrap(),
@@ -124,10 +128,15 @@ pub fn event_of(values: &BTreeMap<&str, i128>) -> DepthEvent {
     }
 }
 
+fn level_of(values: &BTreeMap<&str, i128>) -> BlockLevel {
+    BlockLevel::new(values["level"].try_into().unwrap()).unwrap()
+}
+
 pub fn change_of(values: &BTreeMap<&str, i128>) -> DynamicDepthEvent {
-    assert_eq!(values.len(), 5);
+    assert_eq!(values.len(), 6);
     DynamicDepthEvent::new(
         PixelAddress(values["pixel"].try_into().unwrap()),
+        level_of(values),
         LaserCycle(values["cycle"].try_into().unwrap()),
         BinPosition::new(values["position"].try_into().unwrap()).unwrap(),
         values["change"].try_into().unwrap(),
@@ -164,11 +173,13 @@ pub fn crc32(bytes: &[u8]) -> u32 {
 }
 
 /// An event of any numbers, in the order of its fields.
-pub fn event(numbers: [u64; 8]) -> DepthEvent {
+pub fn event(numbers: [u64; 10]) -> DepthEvent {
     let mut numbers = numbers.into_iter();
     let mut next = || numbers.next().unwrap();
     DepthEvent {
         pixel: PixelAddress(next() as u16),
+        level: BlockLevel::new(next() as u8 % 4).unwrap(),
+        echo: EchoNumber::new(next() as u8 % 4 + 1).unwrap(),
         cycle: LaserCycle(next()),
         exposure: next() as u16,
         peak_bin: BinIndex::new(next() as u16 % 1024).unwrap(),

@@ -19,9 +19,9 @@ fn the_golden_file_is_what_encoder_and_decoder_make_of_it() {
     let (_, header) = DOCUMENT.split_once("```header\n").unwrap();
     let (header, _) = header.split_once("```").unwrap();
     let mut bytes = hex(header);
-    assert_eq!(bytes.len(), 64);
+    assert_eq!(bytes.len(), 80);
     assert_eq!(&bytes[..8], b"DTOF-AER");
-    assert_eq!(bytes[8..12], [AER_VERSION as u8, 0, 64, 0]);
+    assert_eq!(bytes[8..12], [AER_VERSION as u8, 0, 80, 0]);
     assert_eq!(crc32(b"123456789"), 0xcbf4_3926);
 
     let in_header = |at: usize| i32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
@@ -107,6 +107,7 @@ fn the_flags_are_those_of_the_document() {
         ("clipped", Flags::CLIPPED),
         ("deferred", Flags::DEFERRED),
         ("pile-up", Flags::PILE_UP),
+        ("tail", Flags::TAIL),
     ] {
         let rows = rows(&section("### Flags"));
         let row = rows.iter().find(|row| row[1] == name).unwrap();

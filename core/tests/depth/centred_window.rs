@@ -263,7 +263,7 @@ fn the_background_outside_is_the_mean_of_the_bins_not_reached() {
         for half_width in [256, 257, 512, 640, 1024] {
             for bin in 0..BINS {
                 let window = window(half_width);
-                let found = window.background_outside(&histogram, &gate, peak(&counts, bin));
+                let found = window.background_outside(&histogram, &gate, peak(&counts, bin), 0);
                 let reach = usize::from(half_width.div_ceil(256));
                 let gated = usize::from(first)..=usize::from(last);
                 let outside = gated.clone().filter(|other| other.abs_diff(bin) > reach);

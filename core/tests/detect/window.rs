@@ -3,40 +3,44 @@
 
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
 use dtof_core::{
-    Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DetectionRule, Histogram,
-    RangeGate, WindowRule, WindowWidthError, detect,
+    BinIndex, Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DetectionRule,
+    Histogram, RangeGate, WindowRule, WindowWidthError, detect,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-/// The most photons of all gated windows of `width` bins that hold the peak, the
-/// photons outside it, and how many bins these are in.
+/// The most photons of all gated windows of `width` bins that hold the bin `peak`, the
+/// photons outside it, and how many bins these are in, of which `left_out` do not count.
 fn window<const BINS: usize, W: CounterWidth>(
     histogram: &Histogram<BINS, W>,
     gate: &RangeGate<BINS>,
     width: usize,
+    peak: BinIndex,
+    left_out: usize,
 ) -> (u64, u64, u64) {
     let counts: Vec<u64> = (gate.first()..=gate.last())
         .map(|bin| histogram.count(bin.into()).unwrap().into())
         .collect();
-    let peak = usize::from(histogram.peak().bin.raw() - gate.first());
+    let peak = usize::from(peak.raw() - gate.first());
     let most = (0..=counts.len() - width)
         .filter(|&start| (start..start + width).contains(&peak))
         .map(|start| counts[start..start + width].iter().sum())
         .max();
     let (most, all): (u64, u64) = (most.unwrap(), counts.iter().sum());
-    (most, all - most, (counts.len() - width) as u64)
+    (most, all - most, (counts.len() - left_out - width) as u64)
 }
 
 /// The background in 1/256 of a detection, the rule in whole numbers that cannot
 /// overflow, and checked against the rule in real ones.
-fn as_written<const BINS: usize, W: CounterWidth>(
+pub fn as_written<const BINS: usize, W: CounterWidth>(
     rule: &WindowRule,
     histogram: &Histogram<BINS, W>,
     gate: &RangeGate<BINS>,
+    peak: BinIndex,
+    left_out: usize,
 ) -> Option<U24F8> {
     let width = rule.width();
-    let (inside, outside, bins) = window(histogram, gate, width.into());
+    let (inside, outside, bins) = window(histogram, gate, width.into(), peak, left_out);
     // 1/4096 squared; z²/6 and z²/36·B² from 1/16, and z² in 1/256, rounded down.
     let z_squared = i128::from(rule.z().to_bits()).pow(2);
     let (skew, sixteenths) = ((z_squared / 6) >> 20, z_squared >> 20);
@@ -99,7 +103,7 @@ fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) {
         let minimum = rng.next_u32() % (2 * most) * (round % 2);
         let width = 1 + (rng.next_u32() % 7) as u8;
         let rule = WindowRule::new(width, z, Count::saturating(minimum)).unwrap();
-        let expected = as_written(&rule, &histogram, &gate);
+        let expected = as_written(&rule, &histogram, &gate, histogram.peak().bin, 0);
         let fires = crate::common::gives(&rule, &histogram, &gate, expected);
         fired += u32::from(fires);
     }
@@ -138,8 +142,9 @@ fn it_decides_as_it_is_written_at_the_extremes() {
                                 let z = U4F12::from_bits(z);
                                 let rule = WindowRule::new(width, z, Count::default()).unwrap();
                                 let found = rule.detect(&histogram, &gate, histogram.peak());
+                                let bin = histogram.peak().bin;
                                 let expected = (histogram.total() > 0)
-                                    .then(|| as_written(&rule, &histogram, &gate));
+                                    .then(|| as_written(&rule, &histogram, &gate, bin, 0));
                                 assert_eq!(found, expected.flatten());
                             }
                         }

@@ -4,8 +4,9 @@
 
 use dtof_core::fixed::types::{I24F8, U16F16, U24F8};
 use dtof_core::{
-    BinIndex, Count, DepthEvent, DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Flags,
-    LaserCycle, PixelAddress, Polarity, RangeScale, Reference, SubBinOffset, ZeroThresholdError,
+    BinIndex, BlockLevel, Count, DepthEvent, DynamicDepthConfig, DynamicDepthEvent,
+    DynamicDepthPixel, EchoNumber, Flags, LaserCycle, PixelAddress, Polarity, RangeScale,
+    Reference, SubBinOffset, ZeroThresholdError,
 };
 use proptest::prelude::*;
 
@@ -23,6 +24,8 @@ fn event(cycle: u64, position: i32) -> DepthEvent {
     let bin = (position.max(0) >> 8).min(1023);
     DepthEvent {
         pixel: PixelAddress(7),
+        level: BlockLevel::PIXEL,
+        echo: EchoNumber::FIRST,
         cycle: LaserCycle(cycle),
         exposure: 44,
         peak_bin: BinIndex::new(bin.try_into().unwrap()).unwrap(),

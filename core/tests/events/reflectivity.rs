@@ -2,8 +2,9 @@
 
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8};
 use dtof_core::{
-    AsyncPixel, BinIndex, Count, DepthEvent, DetectionRule, Flags, LaserCycle, PaperRule,
-    PixelAddress, PixelConfig, Reflectivity, Statistics, SubBinOffset, WindowRule,
+    AsyncPixel, BinIndex, BlockLevel, Count, DepthEvent, DetectionRule, EchoNumber, Flags,
+    LaserCycle, PaperRule, PixelAddress, PixelConfig, Reflectivity, Statistics, SubBinOffset,
+    WindowRule,
 };
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
@@ -12,6 +13,8 @@ use rand_pcg::Pcg32;
 fn event(peak: u32, background: u32, exposure: u16) -> DepthEvent {
     DepthEvent {
         pixel: PixelAddress(0),
+        level: BlockLevel::PIXEL,
+        echo: EchoNumber::FIRST,
         cycle: LaserCycle(0),
         exposure,
         peak_bin: BinIndex::saturating(4),

@@ -7,6 +7,8 @@
 )]
 
 mod config;
+mod echoes;
 mod flow_chart;
 mod model;
 mod pile_up;
+mod whole;

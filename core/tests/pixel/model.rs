@@ -2,8 +2,8 @@
 
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AsyncPixel, BinIndex, Count, DepthEvent, DetectionRule, Flags, LaserCycle, Look, PaperRule,
-    PixelAddress, PixelConfig, RangeGate, Statistics, SubBinOffset,
+    AsyncPixel, BinIndex, BlockLevel, Count, DepthEvent, DetectionRule, EchoNumber, Flags,
+    LaserCycle, Look, PaperRule, PixelAddress, PixelConfig, RangeGate, Statistics, SubBinOffset,
 };
 use proptest::prelude::*;
 use rand_core::Rng;
@@ -177,6 +177,8 @@ impl Model {
         let shift = 256.0 * (right - left) / (left + above(Some(&peak)) + right);
         Some(DepthEvent {
             pixel: PixelAddress(77),
+            level: BlockLevel::PIXEL,
+            echo: EchoNumber::FIRST,
             cycle: LaserCycle(cycle),
             exposure: self.exposure as u16,
             peak_bin: BinIndex::new((first + at) as u16).unwrap(),

@@ -10,7 +10,7 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use dtof_firmware::board::{mps2_an386::Mps2An386, turn};
-use dtof_firmware::sidecar::{Pixel, Sidecar};
+use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_sensors::Sensor;
 use dtof_sensors::simulated;
 use heapless::Vec;
@@ -18,6 +18,8 @@ use static_cell::ConstStaticCell;
 
 /// As many macropixels as the memory of the STM32F405 has room for.
 static PIXELS: ConstStaticCell<Vec<Pixel, 256>> = ConstStaticCell::new(Vec::new());
+/// The blocks of 16 x 8 macropixels in three levels.
+static BLOCKS: ConstStaticCell<Vec<Block, 42>> = ConstStaticCell::new(Vec::new());
 
 #[entry]
 fn main() -> ! {
@@ -25,7 +27,7 @@ fn main() -> ! {
     defmt::info!("mps2-an386 started");
     board.obey_command_line();
     let mut sensor = simulated::scene();
-    let mut sidecar = Sidecar::new(PIXELS.take(), Some(sensor.about()));
+    let mut sidecar = Sidecar::new(PIXELS.take(), BLOCKS.take(), Some(sensor.about()));
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
             let lost = serial.lost();

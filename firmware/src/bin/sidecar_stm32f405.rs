@@ -10,7 +10,7 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use dtof_firmware::board::{stm32f405::Stm32F405, turn};
-use dtof_firmware::sidecar::{Pixel, Sidecar};
+use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_sensors::Sensor;
 #[cfg(not(any(feature = "sensor-tdc7200", feature = "sensor-tmf882x")))]
 use dtof_sensors::simulated;
@@ -19,6 +19,8 @@ use static_cell::ConstStaticCell;
 
 /// As many macropixels as the memory of the STM32F405 has room for.
 static PIXELS: ConstStaticCell<Vec<Pixel, 256>> = ConstStaticCell::new(Vec::new());
+/// The blocks of 16 x 8 macropixels in three levels.
+static BLOCKS: ConstStaticCell<Vec<Block, 42>> = ConstStaticCell::new(Vec::new());
 
 #[entry]
 fn main() -> ! {
@@ -31,7 +33,7 @@ fn main() -> ! {
     let mut sensor = port.tmf882x(include_bytes!(concat!(env!("OUT_DIR"), "/tmf882x.bin")));
     #[cfg(not(any(feature = "sensor-tdc7200", feature = "sensor-tmf882x")))]
     let mut sensor = simulated::scene();
-    let mut sidecar = Sidecar::new(PIXELS.take(), Some(sensor.about()));
+    let mut sidecar = Sidecar::new(PIXELS.take(), BLOCKS.take(), Some(sensor.about()));
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
             let lost = serial.lost();

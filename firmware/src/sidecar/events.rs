@@ -1,6 +1,6 @@
 //! Events on their way from the pixels' slots into messages.
 
-use dtof_core::{AerWord, DepthEvent};
+use dtof_core::{AerWord, BlockLevel, DepthEvent, EchoNumber};
 use dtof_link::Source;
 use dtof_link::endpoint::BODY_BYTES;
 use dtof_link::message;
@@ -37,19 +37,16 @@ impl Sidecar<'_> {
         }
         // From where there was no room for more, so that each pixel has its turn.
         let turn = core::mem::take(&mut self.turn);
-        let pixels = self.pixels.len();
-        for index in (turn..pixels).chain(0..turn) {
-            let Some(pixel) = self.pixels.get_mut(index) else {
-                break;
-            };
-            if !pixel.detector.request() {
+        let slots = self.pixels.len() + self.blocks.len();
+        for index in (turn..slots).chain(0..turn) {
+            if !self.is_waiting(index) {
                 continue;
             }
-            if !has_room_for_event(&self.words) {
+            if !has_room_for_events(&self.words, 1) {
                 self.turn = index;
                 break;
             }
-            if let Some(event) = pixel.detector.acknowledge() {
+            if let Some(event) = self.acknowledge(index) {
                 self.enqueue(&event);
             }
         }
@@ -61,8 +58,17 @@ impl Sidecar<'_> {
         let (time, word) = match &self.dynamic_depth {
             None => self.encoder.encode(event),
             Some(config) => {
-                let pixel = self.pixels.get_mut(usize::from(event.pixel.0));
-                let change = pixel.and_then(|pixel| pixel.dynamic_depth.observe(config, event));
+                let followed = if event.level == BlockLevel::PIXEL {
+                    let pixel = self.pixels.get_mut(usize::from(event.pixel.0));
+                    pixel.map(|pixel| &mut pixel.dynamic_depth)
+                } else {
+                    let mut blocks = self.blocks.iter_mut();
+                    let block = blocks.find(|block| block.is_of(event));
+                    block.map(|block| &mut block.dynamic_depth)
+                };
+                // Of several echoes the first is followed.
+                let followed = followed.filter(|_| event.echo == EchoNumber::FIRST);
+                let change = followed.and_then(|followed| followed.observe(config, event));
                 let Some(change) = change else {
                     return;
                 };
@@ -92,17 +98,40 @@ impl Sidecar<'_> {
 
     /// Whether every event before a question has become a message.
     pub(super) fn is_drained(&self) -> bool {
-        self.words.is_empty() && (self.holds_slots() || self.waiting() == 0)
+        self.words.is_empty() && (self.holds_slots() || !self.waiting())
     }
 
-    /// Events that have not left their slots.
-    pub(super) fn waiting(&self) -> u64 {
-        let waiting = self.pixels.iter().filter(|pixel| pixel.detector.request());
-        waiting.map(|_| 1).sum()
+    /// Whether an event has not left its slot.
+    pub(super) fn waiting(&self) -> bool {
+        self.pixels.iter().any(|pixel| pixel.detector.request())
+            || self.blocks.iter().any(|block| block.detector.request())
+    }
+
+    /// Whether the slot of a pixel, or behind them of a block, is full.
+    fn is_waiting(&self, index: usize) -> bool {
+        match self.pixels.get(index) {
+            Some(pixel) => pixel.detector.request(),
+            None => {
+                let block = self.blocks.get(index - self.pixels.len());
+                block.is_some_and(|block| block.detector.request())
+            }
+        }
+    }
+
+    /// Takes the event out of such a slot.
+    fn acknowledge(&mut self, index: usize) -> Option<DepthEvent> {
+        let pixels = self.pixels.len();
+        match self.pixels.get_mut(index) {
+            Some(pixel) => pixel.detector.acknowledge(),
+            None => {
+                let block = self.blocks.get_mut(index - pixels)?;
+                block.detector.acknowledge()
+            }
+        }
     }
 }
 
-/// An event may need a time word before it.
-pub(super) fn has_room_for_event(words: &Queue<AerWord, QUEUE>) -> bool {
-    words.capacity() - words.len() >= 2
+/// Events at the same time may need one time word before them.
+pub(super) fn has_room_for_events(words: &Queue<AerWord, QUEUE>, events: usize) -> bool {
+    words.capacity() - words.len() > events
 }

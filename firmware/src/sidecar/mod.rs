@@ -20,8 +20,8 @@ mod sensor;
 
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{
-    AerEncoder, AerWord, AnyRule, AsyncPixel, DynamicDepthConfig, DynamicDepthPixel, PixelAddress,
-    PixelConfig, Statistics,
+    AerEncoder, AerWord, AnyRule, AsyncPixel, BlockPlace, DepthEvent, DynamicDepthConfig,
+    DynamicDepthPixel, Feed, PixelAddress, PixelConfig, Statistics,
 };
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, Message};
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
@@ -50,15 +50,48 @@ type Answer = (u8, Vec<u8, BODY_BYTES>);
 #[derive(Debug)]
 pub struct Pixel {
     detector: AsyncPixel<BINS>,
+    feed: Feed,
     dynamic_depth: DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>,
 }
 
 impl Pixel {
-    const fn new(address: PixelAddress) -> Self {
+    const fn new(address: PixelAddress, feed: Feed) -> Self {
         Self {
             detector: AsyncPixel::new(address),
+            feed,
             dynamic_depth: DynamicDepthPixel::new(),
         }
+    }
+}
+
+/// The same for a block of pixels.
+#[derive(Debug)]
+pub struct Block {
+    detector: dtof_core::Block<BINS>,
+    dynamic_depth: DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>,
+}
+
+impl Block {
+    const fn new(place: BlockPlace) -> Self {
+        Self {
+            detector: dtof_core::Block::new(place),
+            dynamic_depth: DynamicDepthPixel::new(),
+        }
+    }
+
+    /// Whether an event is one of this block.
+    fn is_of(&self, event: &DepthEvent) -> bool {
+        let place = (
+            self.detector.pixel().address(),
+            self.detector.pixel().level(),
+        );
+        place == (event.pixel, event.level)
+    }
+}
+
+impl AsMut<dtof_core::Block<BINS>> for Block {
+    fn as_mut(&mut self) -> &mut dtof_core::Block<BINS> {
+        &mut self.detector
     }
 }
 
@@ -71,7 +104,11 @@ pub struct Sidecar<'a> {
     wire_length: usize,
     wire_sent: usize,
     pixels: &'a mut VecView<Pixel>,
+    /// None without adaptive binning.
+    blocks: &'a mut VecView<Block>,
     config: Option<PixelConfig<BINS, AnyRule>>,
+    /// That of the blocks, and laser cycles between ticks.
+    binning: Option<(PixelConfig<BINS, AnyRule>, u16)>,
     /// Of the configuration in force: changes of depth are sent, not depth events.
     dynamic_depth: Option<DynamicDepthConfig>,
     /// Of the configuration in force, for sensors that measure times.
@@ -90,10 +127,14 @@ pub struct Sidecar<'a> {
     cycle: u64,
     /// Laser cycles since the pixels looked last: all look at once.
     since_look: u16,
+    /// Laser cycles from the last tick of the blocks to the last look.
+    since_tick: u16,
     /// What was done by all pixels, and with histograms that came whole. Photons of
     /// exposures that have not ended are not among them.
     statistics: Statistics,
-    /// The pixel whose slot is emptied next.
+    /// The same of all blocks.
+    block_statistics: Statistics,
+    /// The pixel, or behind them the block, whose slot is emptied next.
     turn: usize,
     unaddressed: u64,
     unknown: u32,
@@ -102,11 +143,16 @@ pub struct Sidecar<'a> {
 }
 
 impl<'a> Sidecar<'a> {
-    /// Waits for a host. `pixels` is the room for them, `sensor` what is to be known
-    /// of the sensor if photons may come from anywhere but the link.
+    /// Waits for a host. `pixels` and `blocks` are the room for them, `sensor` what is to be
+    /// known of the sensor if photons may come from anywhere but the link.
     #[must_use]
-    pub fn new(pixels: &'a mut VecView<Pixel>, sensor: Option<About>) -> Self {
+    pub fn new(
+        pixels: &'a mut VecView<Pixel>,
+        blocks: &'a mut VecView<Block>,
+        sensor: Option<About>,
+    ) -> Self {
         pixels.clear();
+        blocks.clear();
         let room = u16::try_from(pixels.capacity()).unwrap_or(u16::MAX);
         #[allow(clippy::cast_possible_truncation, reason = "128")]
         let greeting = greeting(BINS as u16, room);
@@ -117,7 +163,9 @@ impl<'a> Sidecar<'a> {
             wire_length: 0,
             wire_sent: 0,
             pixels,
+            blocks,
             config: None,
+            binning: None,
             dynamic_depth: None,
             bin_width: U16F16::ZERO,
             source: Source::Link,
@@ -130,7 +178,9 @@ impl<'a> Sidecar<'a> {
             words: Queue::new(),
             cycle: 0,
             since_look: 0,
+            since_tick: 0,
             statistics: Statistics::default(),
+            block_statistics: Statistics::default(),
             turn: 0,
             unaddressed: 0,
             unknown: 0,
@@ -269,7 +319,9 @@ impl<'a> Sidecar<'a> {
     /// A new session: nothing is left of the one before.
     fn start_over(&mut self) {
         self.pixels.clear();
+        self.blocks.clear();
         self.config = None;
+        self.binning = None;
         self.dynamic_depth = None;
         self.source = Source::Link;
         self.photons = None;
@@ -282,21 +334,28 @@ impl<'a> Sidecar<'a> {
     fn restart_counts(&mut self) {
         self.cycle = 0;
         self.since_look = 0;
+        self.since_tick = 0;
         self.statistics = Statistics::default();
+        self.block_statistics = Statistics::default();
         self.turn = 0;
         self.unaddressed = 0;
     }
 
     fn report(&self, overrun: u32) -> Report {
-        let mut statistics = self.statistics;
+        let (mut statistics, mut blocks) = (self.statistics, self.block_statistics);
         for pixel in self.pixels.iter() {
             pixel.detector.add_photons_to(&mut statistics);
+            // Those that were sent before the report.
+            statistics.events -= u64::from(pixel.detector.request());
         }
-        // Those that were sent before the report.
-        statistics.events -= self.waiting();
+        for block in self.blocks.iter() {
+            block.detector.pixel().add_photons_to(&mut blocks);
+            blocks.events -= u64::from(block.detector.request());
+        }
         Report {
             cycles: self.cycle,
             statistics,
+            blocks,
             unaddressed: self.unaddressed,
             overrun,
             unknown: self.unknown,

@@ -1,6 +1,6 @@
 //! Photons into pixels, and those that come over the link.
 
-use dtof_core::{LaserCycle, Look};
+use dtof_core::{LaserCycle, Look, count_in_blocks, end_laser_cycles_of_blocks};
 use heapless::vec::Vec;
 
 use super::Sidecar;
@@ -37,7 +37,7 @@ impl Sidecar<'_> {
         };
         loop {
             while photons.cycles > 0 {
-                if *looks == 0 || self.pixels.iter().any(|pixel| pixel.detector.request()) {
+                if *looks == 0 || self.waiting() {
                     self.photons = Some(photons);
                     return;
                 }
@@ -63,9 +63,13 @@ impl Sidecar<'_> {
     }
 
     pub(super) fn count(&mut self, pixel: usize, code: u16) {
-        match (self.pixels.get_mut(pixel), &self.config) {
-            (Some(pixel), Some(config)) => pixel.detector.count(config, code),
-            _ => self.unaddressed += 1,
+        let (Some(pixel), Some(config)) = (self.pixels.get_mut(pixel), &self.config) else {
+            self.unaddressed += 1;
+            return;
+        };
+        pixel.detector.count(config, code);
+        if let Some((config, _)) = &self.binning {
+            count_in_blocks(self.blocks, &pixel.feed, config, code);
         }
     }
 
@@ -87,8 +91,26 @@ impl Sidecar<'_> {
         let last = LaserCycle(self.cycle.saturating_sub(1));
         let mut fired = false;
         for pixel in self.pixels.iter_mut() {
-            let (pixel, statistics) = (&mut pixel.detector, &mut self.statistics);
-            fired |= pixel.end_laser_cycles(config, statistics, last, ended) == Look::Event;
+            let (detector, statistics) = (&mut pixel.detector, &mut self.statistics);
+            if detector.end_laser_cycles(config, statistics, last, ended) == Look::Event {
+                pixel.feed.reported();
+                fired = true;
+            }
+        }
+        if let Some((config, patience)) = &self.binning {
+            let statistics = &mut self.block_statistics;
+            fired |= end_laser_cycles_of_blocks(self.blocks, config, statistics, last, ended);
+            if self.since_look == 0 {
+                self.since_tick = self.since_tick.saturating_add(config.x());
+            }
+            if self.since_tick >= *patience {
+                self.since_tick = 0;
+                for pixel in self.pixels.iter_mut() {
+                    pixel.feed.tick(pixel.detector.has_reported());
+                }
+                let blocks = self.blocks.iter_mut();
+                blocks.for_each(|block| block.detector.tick());
+            }
         }
         if fired {
             self.drain();

@@ -1,9 +1,9 @@
 //! Photons and histograms of a sensor, which does not wait.
 
-use dtof_core::{Count24, Histogram, LaserCycle, PixelAddress, PixelConfig};
+use dtof_core::{Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, PixelConfig};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
-use super::events::has_room_for_event;
+use super::events::has_room_for_events;
 use super::{BINS, Sidecar};
 use dtof_link::Source;
 use dtof_link::message;
@@ -40,6 +40,10 @@ impl Sidecar<'_> {
             sensor.start(self.bin_width);
             if sensor.is_one_hit() {
                 self.config = self.config.map(PixelConfig::with_one_hit_tdc);
+                let one_hit = |(config, patience): (PixelConfig<_, _>, _)| {
+                    (config.with_one_hit_tdc(), patience)
+                };
+                self.binning = self.binning.map(one_hit);
             }
             (self.started, self.running) = (true, true);
         } else if !wanted && self.running {
@@ -98,7 +102,8 @@ impl PhotonSink for Sidecar<'_> {
 
     /// Decides once, whatever L1, L2 and X are. The histogram stands for a laser
     /// cycle of its own, and the event's exposure is 1. Without room for an event
-    /// it is counted as deferred and not looked at: the next one is as good.
+    /// it is counted as deferred and not looked at: the next one is as good. Blocks have
+    /// no part in it, and nothing is tracked.
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; BINS]) {
         let (true, Some(config)) = (self.takes_sensor(), self.config) else {
             return;
@@ -113,13 +118,17 @@ impl PhotonSink for Sidecar<'_> {
         let mut histogram = Histogram::<BINS, Count24>::new();
         let gated_out = histogram.add_frame(counts, config.gate());
         self.statistics.add_photons_of(&histogram, gated_out);
-        if !has_room_for_event(&self.words) {
-            self.statistics.deferred += 1;
-        } else if let Some(detection) = config.detect(&histogram) {
-            self.enqueue(&detection.event(pixel, cycle, 1));
-            self.statistics.events += 1;
+        if has_room_for_events(&self.words, config.echoes().raw().into()) {
+            let mut events = 0;
+            config.detect_echoes(&mut histogram, |echo, detection| {
+                let event = detection.event(pixel, cycle, 1);
+                self.enqueue(&DepthEvent { echo, ..event });
+                events += 1;
+            });
+            self.statistics.events += events;
+            self.statistics.expired += u64::from(events == 0);
         } else {
-            self.statistics.expired += 1;
+            self.statistics.deferred += 1;
         }
         self.drain();
     }

@@ -5,9 +5,9 @@ use std::ops::Range;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
     AerDecoder, AerRecord, AerWord, AnyRule, Count, DepthEstimator, DepthEvent, DynamicDepthEvent,
-    PaperRule, PixelAddress,
+    EchoNumber, PaperRule, PixelAddress,
 };
-use dtof_firmware::sidecar::{Pixel, Sidecar};
+use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
@@ -24,16 +24,29 @@ pub const CONFIGURATION: Configuration = Configuration {
     gate: (0, 127),
     one_hit_tdc: false,
     pixels: 8,
+    columns: 8,
+    binning: None,
+    tracking: false,
+    echoes: EchoNumber::FIRST,
+    peel_reach: 0,
     bin_width_ps: U16F16::lit("250"),
     offset_mm: I24F8::ZERO,
     source: Source::Sensor,
     dynamic_depth: None,
 };
 
-/// A device with room for so many pixels, which stays until the tests have ended.
+/// A device with room for so many pixels and no block.
 pub fn device<const PIXELS: usize>(sensor: Option<About>) -> Sidecar<'static> {
+    device_with_blocks::<PIXELS, 0>(sensor)
+}
+
+/// A device with room for so many pixels and blocks, which stays until the tests have ended.
+pub fn device_with_blocks<const PIXELS: usize, const BLOCKS: usize>(
+    sensor: Option<About>,
+) -> Sidecar<'static> {
     Sidecar::new(
         Box::leak(Box::new(heapless::Vec::<Pixel, PIXELS>::new())),
+        Box::leak(Box::new(heapless::Vec::<Block, BLOCKS>::new())),
         sensor,
     )
 }

@@ -8,3 +8,4 @@ pub mod host;
 pub mod mocks;
 pub mod scene;
 pub mod script;
+pub mod sharing;

@@ -1,9 +1,10 @@
-//! Photons of eight macropixels, and the events that they make.
+//! Photons of eight macropixels, the messages that carry them, and the events that they make.
 
 use dtof_core::{
     AnyRule, AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig, Statistics,
 };
-use dtof_link::Configuration;
+use dtof_link::endpoint::BODY_BYTES;
+use dtof_link::{Configuration, Token};
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
@@ -30,7 +31,35 @@ pub fn script(length: usize, rng: &mut Pcg32) -> Vec<Vec<Call>> {
     (0..length).map(|_| calls(rng)).collect()
 }
 
-/// The same for a pixel.
+/// The same as photons messages.
+pub fn messages(script: &[Vec<Call>]) -> Vec<Vec<u8>> {
+    let mut messages = vec![Vec::new()];
+    for cycle in script {
+        // One piece, some of them a message.
+        let (mut piece, mut at) = (Vec::new(), 0);
+        for call in cycle {
+            let token = match *call {
+                Call::Photon(pixel, code) => {
+                    for _ in at..pixel {
+                        piece.extend(Token::Advance { pixels: 1 }.to_bytes());
+                    }
+                    at = pixel;
+                    Token::Photon { code }
+                }
+                Call::End(cycles) => Token::EndOfCycles { cycles },
+                Call::Histogram(..) => unreachable!(),
+            };
+            piece.extend(token.to_bytes());
+        }
+        if messages.last().unwrap().len() + piece.len() > BODY_BYTES {
+            messages.push(Vec::new());
+        }
+        messages.last_mut().unwrap().extend(piece);
+    }
+    messages
+}
+
+/// The configuration for a pixel.
 pub fn config(wanted: &Configuration) -> PixelConfig<128, AnyRule> {
     let Configuration { x, l1, l2, .. } = *wanted;
     let config = PixelConfig::with_rule(wanted.rule).x(x).l1(l1).l2(l2);

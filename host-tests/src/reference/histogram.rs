@@ -44,6 +44,15 @@ impl Histogram {
         self.counts.fill(0.0);
     }
 
+    /// Resets the counter of one bin to zero.
+    ///
+    /// # Panics
+    ///
+    /// If the histogram has no such bin.
+    pub fn clear_bin(&mut self, bin: usize) {
+        self.counts[bin] = 0.0;
+    }
+
     /// The sum of all counts (sec. II-A).
     #[must_use]
     pub fn total(&self) -> f64 {

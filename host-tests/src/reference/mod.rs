@@ -15,20 +15,34 @@
 //! | `pixel`        | the asynchronous operation of a pixel          | sec. II-B            |
 //! | `square_root`  | the integer square root of the background      | sec. IV-B, Alg. 1    |
 //!
+//! Beyond the paper, from the description of what was added to it:
+//!
+//! | Module         | What it holds                                  |
+//! |----------------|------------------------------------------------|
+//! | `window`       | the window rule                                |
+//! | `echoes`       | a pixel with echoes and tracking               |
+//! | `blocks`       | adaptive binning                               |
+//!
 //! Windows of bins are inclusive at both ends: `first..=last`.
 
 mod background;
+mod blocks;
 mod depth;
+mod echoes;
 mod histogram;
 mod peak;
 mod pixel;
 mod square_root;
 mod threshold;
+mod window;
 
 pub use background::{average_background, quadrant_background};
+pub use blocks::{BinnedArray, Reporter};
 pub use depth::{centroid, range_mm};
+pub use echoes::{Echo, EchoConfig, EchoPixel};
 pub use histogram::Histogram;
 pub use peak::peak;
 pub use pixel::{Background, Config, Event, Look, Pixel};
 pub use square_root::floor_square_root;
 pub use threshold::{stands_clear, threshold};
+pub use window::Window;

@@ -19,8 +19,8 @@ use dtof::engine::settings::Settings;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::scene;
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{Count, PaperRule, WindowRule};
-use dtof_link::{FaultRecord, Source};
+use dtof_core::{BlockLevel, Count, EchoNumber, PaperRule, WindowRule};
+use dtof_link::{AdaptiveBinning, FaultRecord, Source};
 
 use crate::emulator::{Board, Emulator, End, QEMU};
 use crate::{dtof, root, skipped, stack, succeed, target_folder, version, wanted};
@@ -42,10 +42,32 @@ fn mps2_an386_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     let mut used = ends(board, &image)?;
     // A million photons of 64 macropixels.
     let array = Geometry::new(8, 8);
-    for (settings, reads_every) in [(settings(), 0), (with_windows(), 150)] {
+    for (settings, cycles, reads_every) in [
+        (settings(), 5300, 0),
+        (with_windows(), 5300, 150),
+        (with_all(), 2000, 0),
+        (with_all(), 500, 150),
+    ] {
         let reads_every = Duration::from_millis(reads_every);
-        used.push(agrees(board, &image, &settings, array, 5300, reads_every)?);
+        used.push(agrees(
+            board,
+            &image,
+            &settings,
+            array,
+            cycles,
+            reads_every,
+        )?);
     }
+    // No side is a multiple of a block's.
+    let array = Geometry::new(5, 3);
+    used.push(agrees(
+        board,
+        &image,
+        &with_all(),
+        array,
+        2000,
+        Duration::ZERO,
+    )?);
     used.push(senses(board, &image)?);
     stack::check(&image, &used)?;
     tests_itself(board)
@@ -72,6 +94,7 @@ fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     let used = [
         agrees(board, &image, &settings(), array, 200, Duration::ZERO)?,
         agrees(board, &image, &with_windows(), array, 200, Duration::ZERO)?,
+        agrees(board, &image, &with_all(), array, 400, Duration::ZERO)?,
         senses(board, &image)?,
     ];
     stack::check(&image, &used)?;
@@ -210,8 +233,24 @@ fn with_windows() -> Settings {
     }
 }
 
+/// Blocks of three levels, tracking and two echoes as well.
+fn with_all() -> Settings {
+    Settings {
+        binning: Some(AdaptiveBinning {
+            levels: BlockLevel::MAX,
+            patience: 50,
+        }),
+        tracking: true,
+        echoes: EchoNumber::new(2).unwrap(),
+        sigma_bins: Some(U8F8::lit("1")),
+        l2: 300,
+        ..with_windows()
+    }
+}
+
 /// The demo's scene on a board and on this computer gives the same events and
-/// the same counts, whatever the rule and however seldom the host reads. Gives the bytes of stack used.
+/// the same counts, whatever the rule and however seldom the host reads. Gives the bytes of
+/// stack used.
 fn agrees(
     board: Board,
     image: &Path,
@@ -244,9 +283,9 @@ fn decides_alike(
     let mut photons = scene::photons(geometry, settings, cycles.into())?;
     let addresses = photons.addresses();
     let slice = photons.next_slice(cycles)?;
-    let mut on_host = host_engine(settings, &addresses)?;
+    let mut on_host = host_engine(settings, geometry, &addresses)?;
     let expected = on_host.run(&slice)?;
-    let mut on_board = DeviceEngine::new(client, settings, &addresses)?;
+    let mut on_board = DeviceEngine::new(client, settings, geometry, &addresses)?;
     let events = on_board.run(&slice)?;
     ensure!(events == expected, "not the events of this computer");
     let statistics = on_board.statistics();
@@ -254,11 +293,19 @@ fn decides_alike(
         statistics == on_host.statistics(),
         "not the counts of this computer"
     );
+    let [pixels, blocks] = statistics;
+    ensure!(
+        settings.binning.is_some() == (blocks.events > 0),
+        "{} events of blocks",
+        blocks.events
+    );
     Ok(format!(
-        "{} photons of {} macropixels, {} events, each as on this computer; {:.0} s, {:?}",
-        statistics.photons(),
+        "{} photons of {} macropixels, {} events, {} of them of blocks, each as on this computer; \
+         {:.0} s, {:?}",
+        pixels.photons(),
         addresses.len(),
         events.len(),
+        blocks.events,
         start.elapsed().as_secs_f64(),
         on_board.report().link,
     ))
@@ -274,6 +321,7 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
         &monitor::Task {
             settings: &settings(),
             pixels: 16,
+            columns: 4,
             dynamic_depth: None,
         },
         |elapsed| elapsed >= Duration::from_secs(3),
@@ -308,7 +356,13 @@ fn says_unplugged(
     if let Some(bin_width) = about.bin_width {
         wanted.bin_width_ps = bin_width;
     }
-    client.configure(&configuration(&wanted, pixels, Source::Sensor, None)?)?;
+    client.configure(&configuration(
+        &wanted,
+        pixels,
+        pixels.into(),
+        Source::Sensor,
+        None,
+    )?)?;
     let since = Instant::now();
     let report = loop {
         let report = client.report()?;

@@ -54,10 +54,12 @@ impl Demo {
         );
         Simulation {
             scene: &scene,
-            file: None,
+            input: None,
+            light: Vec::new(),
             cycles: self.cycles,
             settings: &settings,
             changes: None,
+            echo: None,
             device: self.device.as_deref(),
             image: self.image.as_deref(),
             out: &self.out,

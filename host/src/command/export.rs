@@ -7,6 +7,7 @@ use anyhow::{Result, bail, ensure};
 use clap::Args;
 use dtof::cli::arguments::{path, whole};
 use dtof::events::aer_file::EventKind;
+use dtof::events::echoes::Echo;
 use dtof::export::{Format, LaserClock, Optics, Options, export};
 use dtof::geometry::FieldOfView;
 use dtof::rows::grouped;
@@ -42,6 +43,9 @@ pub struct Export {
     /// The kind of events to export from a file with both
     #[arg(long, value_enum)]
     events: Option<EventKind>,
+    /// Which echo of each exposure of a pixel or block, of depth events
+    #[arg(long, value_enum, default_value_t = Echo::All)]
+    echo: Echo,
     /// MCAP: microseconds of a point cloud [default: 1/100 of the run, 10 to 10,000]
     #[arg(long, value_name = "N", value_parser = whole(1..=1_000_000_000_u64))]
     slice_us: Option<u64>,
@@ -63,6 +67,7 @@ impl Export {
             optics,
             clock: LaserClock::new(self.laser_hz)?,
             kind: self.events,
+            echo: self.echo,
             slice_ns: self.slice_us.map(|us| us * 1000),
             dynamic_depth: self.dynamic_depth.dynamic_depth(),
         };

@@ -10,6 +10,7 @@ mod operation;
 pub mod replay;
 pub mod simulate;
 pub mod tune;
+mod view;
 
 use std::io::{self, Write};
 use std::path::Path;

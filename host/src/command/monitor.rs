@@ -55,8 +55,8 @@ pub struct Monitor {
     /// Write the events into an AER file as well, for `dtof decode` and `dtof export`
     #[arg(long, value_name = "FILE.aer", value_parser = path())]
     record: Option<PathBuf>,
-    /// Columns of the array that is drawn or recorded, pixel = row × columns + column [default: as
-    /// high as wide]
+    /// Columns of the array that is drawn or recorded or has blocks, pixel = row × columns + column
+    /// [default: as high as wide]
     #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX))]
     columns: Option<u16>,
     #[command(flatten)]
@@ -71,8 +71,11 @@ impl Monitor {
             "--map draws on standard error, which is no terminal here"
         );
         ensure!(
-            self.columns.is_none() || self.map || self.record.is_some(),
-            "--columns is of --map and --record"
+            self.columns.is_none()
+                || self.map
+                || self.record.is_some()
+                || self.operation.has_blocks(),
+            "--columns is of --map, --record and --binning"
         );
         let name = || self.device.clone();
         let mut client =
@@ -92,6 +95,7 @@ impl Monitor {
             pixels: client.pixels(),
             bin_width: None,
             offset: I24F8::ZERO,
+            laser_millihertz: 0,
         });
         let pixels = self.pixels.unwrap_or(sensor.pixels.min(client.pixels()));
         let any = const { U16F16::lit("250") };
@@ -139,6 +143,7 @@ impl Monitor {
         let task = Task {
             settings: &settings,
             pixels,
+            columns: geometry.columns,
             dynamic_depth,
         };
         let monitored = monitor(

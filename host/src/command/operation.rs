@@ -5,7 +5,8 @@ use clap::Args;
 use dtof::cli::arguments::whole;
 use dtof::engine::settings::Settings;
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{Count, HIGHEST_Z, RangeGate};
+use dtof_core::{BlockLevel, Count, EchoNumber, HIGHEST_Z, RangeGate, z_for_levels};
+use dtof_link::AdaptiveBinning;
 use dtof_theory::tune::window::one_in;
 
 use super::detection::Detection;
@@ -29,6 +30,22 @@ pub struct Operation {
     /// Laser cycles between looks
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = whole(0..=u16::MAX))]
     x: u16,
+    /// Adaptive binning: pixels that stay silent also count together, in blocks of 2x2 pixels,
+    /// from level 2 on 4x4 and at level 3 8x8
+    #[arg(long, value_name = "LEVELS", default_value_t = 0, value_parser = whole(0..=BlockLevel::MAX.raw()))]
+    binning: u8,
+    /// Adaptive binning: laser cycles without an event after which a pixel counts in its block,
+    /// too
+    #[arg(long, value_name = "N", default_value_t = AdaptiveBinning::PATIENCE, value_parser = whole(1..=u16::MAX))]
+    patience: u16,
+    /// Window rule: expect the next event of a pixel near its last, and spend half of the false
+    /// alarms there
+    #[arg(long)]
+    tracking: bool,
+    /// Echoes that a pixel reports in an exposure, 1 to 4. From 2 on it goes on until it has them
+    /// all or reaches L2
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1..=EchoNumber::LAST.raw()))]
+    echoes: u8,
 }
 
 /// The option of commands that run on this computer: a device reports events.
@@ -37,11 +54,16 @@ pub struct Frames {
     /// Simulate a frame-based sensor for comparison: every N laser cycles each pixel reads its
     /// highest bin, if that stands above the background
     #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX),
-        conflicts_with_all = ["rule", "alpha", "window", "z", "false_alarm", "min_count", "l1", "l2", "x"])]
+        conflicts_with_all = ["rule", "alpha", "window", "z", "false_alarm", "min_count", "l1", "l2", "x", "binning", "patience", "tracking", "echoes"])]
     pub frame: Option<u16>,
 }
 
 impl Operation {
+    /// Whether blocks of pixels decide together.
+    pub const fn has_blocks(&self) -> bool {
+        self.binning > 0
+    }
+
     /// With what the options do not say.
     ///
     /// # Errors
@@ -53,6 +75,7 @@ impl Operation {
         offset_mm: I24F8,
         seed: u64,
     ) -> Result<Settings> {
+        let levels = BlockLevel::saturating(self.binning);
         let z_for = |share| {
             // Only how many bins the gate leaves counts; a number of bins that cannot be is
             // refused by the engine.
@@ -61,7 +84,8 @@ impl Operation {
             let (first, last) = self.gate.unwrap_or((0, last_bin));
             let gate = RangeGate::<1024>::new(first, last)
                 .with_context(|| format!("--gate {first}..{last} with {bins} bins"))?;
-            let z = dtof_core::z_for(one_in(share), &gate, self.x, self.l1, self.l2);
+            let (x, l1, l2) = (self.x, self.l1, self.l2);
+            let z = z_for_levels(one_in(share), &gate, x, l1, l2, levels);
             ensure!(
                 z < HIGHEST_Z,
                 "--false-alarm {share}: there is no z for so few; --z may be up to 15.9998"
@@ -80,6 +104,12 @@ impl Operation {
             l1: self.l1,
             l2: self.l2,
             x: self.x,
+            binning: (levels != BlockLevel::PIXEL).then_some(AdaptiveBinning {
+                levels,
+                patience: self.patience,
+            }),
+            tracking: self.tracking,
+            echoes: EchoNumber::new(self.echoes).unwrap_or(EchoNumber::FIRST),
             one_hit_tdc: false,
             frame: None,
             seed,

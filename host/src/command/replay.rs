@@ -8,6 +8,7 @@ use dtof::cli::arguments::{bins, fixed, path, positive, whole};
 use dtof::engine::host::host_engine;
 use dtof::engine::run::run;
 use dtof::engine::settings::Settings;
+use dtof::events::echoes::Echo;
 use dtof::events::output::Output;
 use dtof::input::photon_csv::PhotonCsv;
 use dtof::input::recorded::{Capture, RecordedHistograms, RecordingLength};
@@ -46,6 +47,10 @@ pub struct Replay {
     frames: Frames,
     #[command(flatten)]
     changes: Shown,
+    /// The echo of each exposure that maps and report show; the files of events hold all
+    /// [default: the strongest in the maps, all in the report]
+    #[arg(long, value_enum)]
+    echo: Option<Echo>,
     /// Histograms: photons a laser cycle in the brightest pixel of each capture [default: 1]
     #[arg(long, value_name = "R", value_parser = positive, conflicts_with = "recorded_cycles")]
     photons_per_cycle: Option<f64>,
@@ -89,9 +94,10 @@ impl Replay {
                 self.seed,
             )?
         };
-        let mut engine = host_engine(&settings, &photons.addresses())?;
+        let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses())?;
         let mut output = Output::create(&self.out, &settings, photons.as_ref(), Some(&self.input))?
-            .with_changes(changes.as_ref())?;
+            .with_changes(changes.as_ref())?
+            .with_echo(self.echo, &settings);
         let mut summary = run(
             photons.as_mut(),
             engine.as_mut(),

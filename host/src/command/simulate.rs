@@ -10,10 +10,12 @@ use dtof::engine::Engine;
 use dtof::engine::host::host_engine;
 use dtof::engine::run::run;
 use dtof::engine::settings::Settings;
+use dtof::events::echoes::Echo;
 use dtof::events::output::Output;
 use dtof::export::LaserClock;
 use dtof::geometry::FieldOfView;
 use dtof::input::source::{Geometry, PhotonSource};
+use dtof::rows::Row;
 use dtof::simulate::scene::Scene;
 use dtof::view::report::Section;
 use dtof_core::PixelAddress;
@@ -23,12 +25,15 @@ use dtof_link::DynamicDepth;
 use super::dynamic_depth::Shown;
 use super::operation::{Frames, Operation};
 use super::print_summary;
+use super::view::View;
 
 #[derive(Args)]
 pub struct Simulate {
     /// The scene, a TOML file; docs/scenes.md lists its keys
-    #[arg(long, value_name = "FILE", value_parser = path())]
-    scene: PathBuf,
+    #[arg(long, value_name = "FILE", value_parser = path(), required_unless_present = "depth")]
+    scene: Option<PathBuf>,
+    #[command(flatten)]
+    view: View,
     /// The folder of the results
     #[arg(long, value_name = "DIR", value_parser = path())]
     out: PathBuf,
@@ -44,6 +49,10 @@ pub struct Simulate {
     frames: Frames,
     #[command(flatten)]
     changes: Shown,
+    /// The echo of each exposure that maps and report show; the files of events hold all
+    /// [default: the strongest in the maps, all in the report]
+    #[arg(long, value_enum)]
+    echo: Option<Echo>,
     /// Decide on a device: tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated
     /// device [default: this computer]
     #[arg(long, value_name = "DEVICE")]
@@ -64,7 +73,7 @@ pub struct Simulate {
 
 impl Simulate {
     pub fn run(&self) -> Result<()> {
-        let mut scene = Scene::read(&self.scene)?;
+        let mut scene = self.view.scene(self.scene.as_deref())?;
         scene.geometry = self.array.unwrap_or(scene.geometry);
         if self.laser_off {
             scene = scene.with_laser_off();
@@ -78,7 +87,7 @@ impl Simulate {
                 .operation
                 .settings(bins, bin_width_ps, I24F8::ZERO, self.seed)?
         };
-        let file = self.scene.display().to_string();
+        let file = self.view.input(self.scene.as_deref());
         let Geometry { columns, rows } = scene.geometry;
         let laser = if self.laser_off {
             ", the laser off"
@@ -88,10 +97,12 @@ impl Simulate {
         let lead = format!("Simulated photons of {file}, {columns}×{rows} macropixels{laser}.");
         Simulation {
             scene: &scene,
-            file: Some(&self.scene),
+            input: self.scene.as_deref().or(self.view.depth.as_deref()),
+            light: self.view.rows(&scene),
             cycles: self.cycles.unwrap_or(scene.cycles),
             settings: &settings,
             changes: self.changes.wanted()?,
+            echo: self.echo,
             device: self.device.as_deref(),
             image: self.image.as_deref(),
             out: &self.out,
@@ -105,12 +116,16 @@ impl Simulate {
 /// One run of a scene.
 pub struct Simulation<'a> {
     pub scene: &'a Scene,
-    /// The scene file, if there is one.
-    pub file: Option<&'a Path>,
+    /// The file the scene comes from, if there is one.
+    pub input: Option<&'a Path>,
+    /// What is to be said of its light, if it is not in a scene file alone.
+    pub light: Vec<Row>,
     pub cycles: u64,
     pub settings: &'a Settings,
     /// Dynamic depth, if the report is to show it.
     pub changes: Option<DynamicDepth>,
+    /// The echo that maps and report show.
+    pub echo: Option<Echo>,
     pub device: Option<&'a str>,
     /// The image of an emulated device.
     pub image: Option<&'a Path>,
@@ -123,13 +138,20 @@ pub struct Simulation<'a> {
 impl Simulation<'_> {
     pub fn run(self) -> Result<()> {
         let photons = self.scene.photons(self.settings.seed, self.cycles);
-        let mut photons = match self.file {
+        let mut photons = match self.input {
             Some(file) => photons.with_context(|| file.display().to_string())?,
             None => photons?,
         };
-        let mut engine = engine(self.device, self.image, self.settings, &photons.addresses())?;
-        let mut output = Output::create(self.out, self.settings, &photons, self.file)?
-            .with_changes(self.changes.as_ref())?;
+        let mut engine = engine(
+            self.device,
+            self.image,
+            self.settings,
+            photons.geometry(),
+            &photons.addresses(),
+        )?;
+        let mut output = Output::create(self.out, self.settings, &photons, self.input)?
+            .with_changes(self.changes.as_ref())?
+            .with_echo(self.echo, self.settings);
         let mut comparison = self.scene.comparison(self.settings, self.cycles)?;
         let mut summary = run(
             &mut photons,
@@ -139,12 +161,13 @@ impl Simulation<'_> {
             self.quiet,
             |events| comparison.add(events),
         )?;
-        summary.input = self.file.map(|file| file.display().to_string());
+        summary.input = self.input.map(|file| file.display().to_string());
         summary.laser_hz = Some(self.scene.laser_hz());
         summary.field_of_view_degrees = Some(self.scene.view().degrees());
         summary.export_with = export_with(self.scene);
         let against_truth = comparison.finish();
-        let surfaces = against_truth.rows(self.settings.reports());
+        let mut surfaces = self.light;
+        surfaces.extend(against_truth.rows(self.settings.reports()));
         summary.against_truth = Some(against_truth);
         let sections = [Section {
             heading: "Surfaces",
@@ -177,17 +200,20 @@ fn engine(
     device: Option<&str>,
     image: Option<&Path>,
     settings: &Settings,
+    array: Geometry,
     addresses: &[PixelAddress],
 ) -> Result<Box<dyn Engine>> {
     let Some(device) = device else {
-        return host_engine(settings, addresses);
+        return host_engine(settings, array, addresses);
     };
     ensure!(
         settings.frame.is_none(),
         "--frame is not for --device: a device reports events"
     );
     let client = Client::new(device::open(device, image)?).with_context(|| device.to_owned())?;
-    Ok(Box::new(DeviceEngine::new(client, settings, addresses)?))
+    Ok(Box::new(DeviceEngine::new(
+        client, settings, array, addresses,
+    )?))
 }
 
 /// As `64x32`.

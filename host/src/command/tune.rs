@@ -10,6 +10,7 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::cli::arguments::{bins, positive, whole};
 use dtof::simulate::MM_PER_PS;
+use dtof_core::BlockLevel;
 use dtof_theory::gaussian;
 use dtof_theory::looks::detections::Detections;
 use dtof_theory::looks::table::Table;
@@ -67,6 +68,10 @@ pub struct Tune {
     /// Photons a reported peak holds at least
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = whole(1..=1023_u16))]
     min_count: u16,
+    /// Window rule: the largest blocks of adaptive binning, which share the false alarms with the
+    /// pixels
+    #[arg(long, value_name = "LEVELS", default_value_t = 0, value_parser = whole(0..=BlockLevel::MAX.raw()))]
+    binning: u8,
     /// Seed of the simulated exposures
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=u64::MAX))]
     seed: u64,
@@ -146,6 +151,10 @@ impl Tune {
             number(sigma),
             self.bins
         );
+        ensure!(
+            self.binning == 0 || self.rule == RuleName::Window,
+            "--binning is for --rule window"
+        );
         let wanted = match (self.false_alarms_per_second, self.laser_hz) {
             (Some(per_second), Some(laser_hz)) => Wanted::PerCycle(per_second / laser_hz),
             _ => Wanted::PerExposure(self.false_alarm.unwrap_or(0.01)),
@@ -160,6 +169,7 @@ impl Tune {
             l1: self.l1,
             l2: self.l2,
             wanted,
+            levels: BlockLevel::saturating(self.binning),
             seed: self.seed,
         })
     }
@@ -212,8 +222,12 @@ impl Tune {
     /// False alarms counted in so many exposures, of which so many have an event.
     #[allow(clippy::cast_precision_loss)]
     fn counted(&self, (exposures, events): (u64, u64)) -> Line {
+        let blocks = match self.binning {
+            0 => "",
+            _ => "; blocks come to a third as many",
+        };
         let source = format!(
-            "simulation: seed {}, {events} events in {exposures} exposures without a target",
+            "simulation: seed {}, {events} events in {exposures} exposures without a target{blocks}",
             self.seed
         );
         Line("false_alarms", events as f64 / exposures as f64, source)

@@ -19,7 +19,7 @@ pub use port::Port;
 use crate::engine::Engine;
 use crate::engine::settings::Settings;
 use crate::events::aer_file::Event;
-use crate::input::source::Slice;
+use crate::input::source::{Geometry, Slice};
 
 /// Photons into a device, events out.
 pub struct DeviceEngine {
@@ -39,6 +39,7 @@ impl DeviceEngine {
     pub fn new(
         mut client: Client,
         settings: &Settings,
+        array: Geometry,
         addresses: &[PixelAddress],
     ) -> Result<Self> {
         let consecutive = addresses
@@ -53,7 +54,8 @@ impl DeviceEngine {
             settings.bins
         );
         let pixels = u16::try_from(addresses.len())?;
-        client.configure(&configuration(settings, pixels, Source::Link, None)?)?;
+        let wanted = configuration(settings, pixels, array.columns, Source::Link, None)?;
+        client.configure(&wanted)?;
         Ok(Self {
             client,
             report: Report::default(),
@@ -77,6 +79,7 @@ impl DeviceEngine {
 pub fn configuration(
     settings: &Settings,
     pixels: u16,
+    columns: u32,
     source: Source,
     dynamic_depth: Option<DynamicDepth>,
 ) -> Result<Configuration> {
@@ -94,6 +97,11 @@ pub fn configuration(
         gate: settings.gate.unwrap_or((0, last_bin)),
         one_hit_tdc: settings.one_hit_tdc,
         pixels,
+        columns: u16::try_from(columns)?,
+        binning: settings.binning,
+        tracking: settings.tracking,
+        echoes: settings.echoes,
+        peel_reach: settings.peel_reach(),
         bin_width_ps: settings.bin_width_ps,
         offset_mm: settings.offset_mm,
         source,
@@ -146,8 +154,8 @@ impl Engine for DeviceEngine {
         Ok(events)
     }
 
-    fn statistics(&self) -> Statistics {
-        self.report.statistics
+    fn statistics(&self) -> [Statistics; 2] {
+        [self.report.statistics, self.report.blocks]
     }
 }
 

@@ -8,7 +8,7 @@ use std::io::{self, ErrorKind, Write};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use dtof_core::{RangeScale, Statistics};
+use dtof_core::RangeScale;
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::{DynamicDepth, FaultRecord, Report, Source};
 
@@ -30,6 +30,8 @@ pub struct Task<'a> {
     pub settings: &'a Settings,
     /// How many, addresses 0 up.
     pub pixels: u16,
+    /// How many of them are a row.
+    pub columns: u32,
     /// It is to send changes of depth in place of depth events.
     pub dynamic_depth: Option<DynamicDepth>,
 }
@@ -149,15 +151,22 @@ fn watch(
     outputs: &mut Outputs,
     readers: &mut Readers,
 ) -> Result<()> {
-    let configuration =
-        |source| configuration(task.settings, task.pixels, source, task.dynamic_depth);
+    let configuration = |source| {
+        configuration(
+            task.settings,
+            task.pixels,
+            task.columns,
+            source,
+            task.dynamic_depth,
+        )
+    };
     client.configure(&configuration(Source::Sensor)?)?;
     let started = Instant::now();
     let mut figures = Figures {
         since: started,
         here: *client.counters(),
         first: client.report()?,
-        last: Statistics::default(),
+        last: [0; 2],
     };
     let columns = match task.dynamic_depth {
         None => events_csv::HEADER,
@@ -228,7 +237,7 @@ struct Figures {
     /// The counts of the device at the beginning.
     first: Report,
     /// Events and photons at the last line.
-    last: Statistics,
+    last: [u64; 2],
 }
 
 impl Figures {
@@ -236,15 +245,17 @@ impl Figures {
     fn line(&mut self, client: &Client, report: &Report) -> String {
         let seconds = self.since.elapsed().as_secs_f64();
         let rate = |now: u64, before: u64| now.saturating_sub(before) as f64 / seconds;
-        let (now, last) = (&report.statistics, &self.last);
+        // Photons of blocks are those of pixels.
+        let (pixels, blocks) = (&report.statistics, &report.blocks);
+        let now = [pixels.events + blocks.events, pixels.photons()];
         let mut line = format!(
             "events/s {:.0}, photons/s {:.0}",
-            rate(now.events, last.events),
-            rate(now.photons(), last.photons()),
+            rate(now[0], self.last[0]),
+            rate(now[1], self.last[1]),
         );
         line += &losses(report, &self.first, &since(client.counters(), &self.here));
         self.since = Instant::now();
-        self.last = *now;
+        self.last = now;
         line
     }
 }
@@ -252,20 +263,24 @@ impl Figures {
 /// The losses and errors since the device had counted `first`, each with a comma before
 /// it. Counts of 0 are left out. `here` is what this end of the link has counted.
 fn losses(report: &Report, first: &Report, here: &LinkCounters) -> String {
-    let counted = &report.statistics;
+    let (pixels, blocks) = (&report.statistics, &report.blocks);
     let there = since(&report.link, &first.link);
     let both = |count: fn(&LinkCounters) -> u32| u64::from(count(&there)) + u64::from(count(here));
     let sensor_errors = report.sensor_errors.wrapping_sub(first.sensor_errors);
     let overrun = report.overrun.wrapping_sub(first.overrun);
     let unknown = report.unknown.wrapping_sub(first.unknown);
     let counts = [
-        ("saturated", counted.saturated),
-        ("rejected", counted.rejected),
-        ("gated out", counted.gated_out),
+        ("saturated", pixels.saturated),
+        ("saturated in blocks", blocks.saturated),
+        ("rejected", pixels.rejected),
+        ("gated out", pixels.gated_out),
         ("unaddressed", report.unaddressed),
-        ("deferred", counted.deferred),
-        ("expired", counted.expired),
-        ("expired and deferred", counted.expired_deferred),
+        ("deferred", pixels.deferred + blocks.deferred),
+        ("expired", pixels.expired),
+        (
+            "expired and deferred",
+            pixels.expired_deferred + blocks.expired_deferred,
+        ),
         ("lost bytes", overrun.into()),
         ("corrupt frames", both(|link| link.corrupt)),
         ("oversized frames", both(|link| link.oversized)),
@@ -325,8 +340,8 @@ mod tests {
     fn every_loss_is_shown_and_only_losses() {
         // A report whose numbers are `number` in one field after the other, little-endian.
         let report = |number: fn(u64) -> u64| {
-            let wide = (0..10).flat_map(|at| number(at).to_le_bytes());
-            let narrow = (10..20).flat_map(|at| u32::try_from(number(at)).unwrap().to_le_bytes());
+            let wide = (0..20).flat_map(|at| number(at).to_le_bytes());
+            let narrow = (20..30).flat_map(|at| u32::try_from(number(at)).unwrap().to_le_bytes());
             let bytes: Vec<u8> = wide.chain(narrow).chain([1]).collect();
             Report::from_le_bytes(&bytes).unwrap()
         };
@@ -335,10 +350,10 @@ mod tests {
         // The counts of the link and of the sensor began before.
         assert_eq!(
             losses(&report(|at| 101 + at), &report(|_| 100), &none),
-            ", saturated 103, rejected 104, gated out 105, unaddressed 110, deferred 107, expired 108, \
-             expired and deferred 109, lost bytes 11, corrupt frames 15, oversized frames 16, \
-             foreign frames 17, out of order 18, duplicates 19, retransmissions 20, \
-             unknown messages 12, sensor errors 13 (last: no answer)"
+            ", saturated 105, saturated in blocks 114, rejected 106, gated out 107, unaddressed 102, \
+             deferred 227, expired 110, expired and deferred 231, lost bytes 21, corrupt frames 25, \
+             oversized frames 26, foreign frames 27, out of order 28, duplicates 29, \
+             retransmissions 30, unknown messages 22, sensor errors 23 (last: no answer)"
         );
         // Errors of before are not this one's.
         assert_eq!(losses(&report(|_| 0), &Report::default(), &none), "");

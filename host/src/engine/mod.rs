@@ -1,6 +1,7 @@
 //! The engine: photons in, depth events out.
 
 pub mod frame;
+pub mod group;
 pub mod host;
 pub mod run;
 pub mod settings;
@@ -14,12 +15,12 @@ use crate::input::source::Slice;
 /// the same events.
 pub trait Engine {
     /// Runs one slice and gives the events of its laser cycles, in order of
-    /// laser cycle and then of pixel address.
+    /// laser cycle, of level and of pixel address.
     ///
     /// # Errors
     /// If the engine could not be reached.
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>>;
 
-    /// The counts of all pixels so far.
-    fn statistics(&self) -> Statistics;
+    /// The counts of all pixels so far, and of all blocks.
+    fn statistics(&self) -> [Statistics; 2];
 }

@@ -50,9 +50,10 @@ pub fn run(
         progress.at(done);
     }
     progress.finish();
+    output.end_events();
     let reporting = output.maps().reporting();
     Ok(Summary::new(
-        &engine.statistics(),
+        engine.statistics(),
         source,
         reporting,
         settings,

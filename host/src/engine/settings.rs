@@ -1,9 +1,12 @@
 //! How the pixels operate, in the units the command line uses.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
-use dtof_core::{AnyRule, DepthEstimator, PixelConfig, RangeGate, RangeScale, Threshold};
+use dtof_core::{
+    AnyRule, BlockLevel, DepthEstimator, EchoNumber, PixelConfig, RangeGate, RangeScale, Threshold,
+};
+pub use dtof_link::AdaptiveBinning;
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
@@ -33,6 +36,14 @@ pub struct Settings {
     pub l2: u16,
     /// Laser cycles between looks.
     pub x: u16,
+    /// Blocks of pixels that decide together.
+    #[serde(flatten, serialize_with = "binning")]
+    pub binning: Option<AdaptiveBinning>,
+    /// Whether pixels expect their next event where the last was.
+    pub tracking: bool,
+    /// The last echo that a pixel reports in an exposure.
+    #[serde(serialize_with = "echo")]
+    pub echoes: EchoNumber,
     /// Whether the TDC takes one photon a laser cycle, so that events say when that
     /// makes for pile-up.
     pub one_hit_tdc: bool,
@@ -89,22 +100,72 @@ fn estimator<S: Serializer>(sigma: &Option<U8F8>, serializer: S) -> Result<S::Ok
     fields.end()
 }
 
+/// The levels of adaptive binning, 0 without, and how patient pixels are.
+fn binning<S: Serializer>(
+    binning: &Option<AdaptiveBinning>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let mut fields = serializer.serialize_map(None)?;
+    let levels = binning.map_or(0, |binning| binning.levels.raw());
+    fields.serialize_entry("binning", &levels)?;
+    if let Some(binning) = binning {
+        fields.serialize_entry("patience", &binning.patience)?;
+    }
+    fields.end()
+}
+
+/// The number of an echo.
+fn echo<S: Serializer>(echo: &EchoNumber, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_u8(echo.raw())
+}
+
 impl Settings {
-    /// As a configuration for `BINS` bins.
+    /// As a configuration of pixels for `BINS` bins.
     ///
     /// # Errors
     /// The constraint the settings break.
     pub fn config<const BINS: usize>(&self) -> Result<PixelConfig<BINS, AnyRule>> {
+        self.config_of(self.rule)
+    }
+
+    /// The same for blocks of pixels.
+    ///
+    /// # Errors
+    /// The constraint the settings break.
+    pub fn block_config<const BINS: usize>(&self) -> Result<PixelConfig<BINS, AnyRule>> {
+        let levels = self
+            .binning
+            .map_or(BlockLevel::PIXEL, |binning| binning.levels);
+        self.config_of(self.rule.of_blocks(levels))
+    }
+
+    fn config_of<const BINS: usize>(&self, rule: AnyRule) -> Result<PixelConfig<BINS, AnyRule>> {
         let gate = self.range_gate()?;
-        PixelConfig::with_rule(self.rule)
+        let tracking = rule.tracking(&gate).filter(|_| self.tracking);
+        ensure!(
+            tracking.is_some() == self.tracking,
+            "--tracking is for --rule window"
+        );
+        PixelConfig::with_rule(rule)
             .x(self.x)
             .l1(self.l1)
             .l2(self.l2)
             .gate(gate)
             .estimator(self.estimator())
             .one_hit_tdc(self.one_hit_tdc)
+            .tracking(tracking)
+            .echoes(self.echoes, self.peel_reach())
             .build()
             .with_context(|| format!("--x {} --l1 {} --l2 {}", self.x, self.l1, self.l2))
+    }
+
+    /// Bins to either side of an echo's peak that are left out once it is reported: four
+    /// standard deviations of the pulse, taken to be a bin unless it is known.
+    #[must_use]
+    pub fn peel_reach(&self) -> u8 {
+        let sigma = self.sigma_bins.unwrap_or(const { U8F8::lit("1") });
+        // At most 7.
+        u8::try_from((4 * u32::from(sigma.to_bits())).div_ceil(256)).unwrap_or(u8::MAX)
     }
 
     /// The estimator of the depth of a peak.

@@ -7,16 +7,15 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
-    AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord, BinPosition, DepthEvent,
-    DynamicDepthEvent, Flags, LaserCycle, PixelAddress,
+    AER_VERSION, AerDecoder, AerEncoder, AerRecord, AerWord, BinPosition, BlockLevel, DepthEvent,
+    DynamicDepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress,
 };
 
 use crate::input::source::Geometry;
 
 pub(crate) const MAGIC: &str = "DTOF-AER";
+/// The header without the settings that may follow it.
 const HEADER_BYTES: u16 = 64;
-/// The oldest version that is read: it has depth events only.
-const OLDEST_VERSION: u16 = 1;
 static CRC_32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// An event of either kind.
@@ -53,6 +52,24 @@ impl Event {
         match self {
             Self::Depth(event) => event.pixel,
             Self::DynamicDepth(event) => event.pixel,
+        }
+    }
+
+    /// Whether it is one macropixel, or a block.
+    #[must_use]
+    pub fn level(&self) -> BlockLevel {
+        match self {
+            Self::Depth(event) => event.level,
+            Self::DynamicDepth(event) => event.level,
+        }
+    }
+
+    /// Which echo of its exposure; the first of a change of depth.
+    #[must_use]
+    pub fn echo(&self) -> EchoNumber {
+        match self {
+            Self::Depth(event) => event.echo,
+            Self::DynamicDepth(_) => EchoNumber::FIRST,
         }
     }
 
@@ -122,11 +139,11 @@ impl Header {
         ensure!(bytes[..8] == *MAGIC.as_bytes(), "not an AER file");
         let version = u16_at(8);
         ensure!(
-            (OLDEST_VERSION..=AER_VERSION).contains(&version),
-            "AER version {version}; this program reads {OLDEST_VERSION} to {AER_VERSION}"
+            version == AER_VERSION,
+            "AER version {version}; this program reads {AER_VERSION}"
         );
         ensure!(
-            u16_at(10) == HEADER_BYTES && bytes[32..].iter().all(|&byte| byte == 0),
+            header_length(bytes).is_some() && bytes[48..].iter().all(|&byte| byte == 0),
             "the header is damaged"
         );
         let geometry = Geometry::new(u32_at(16), u32_at(20));
@@ -148,6 +165,12 @@ impl Header {
     fn check(&self, event: &Event) -> Result<()> {
         let (pixel, pixels) = (event.pixel().0, addresses(self.geometry));
         ensure!(u64::from(pixel) < pixels, "pixel {pixel} of {pixels}");
+        let mut block = self.geometry.block(event.pixel(), event.level());
+        ensure!(
+            block.next().is_some(),
+            "pixel {pixel} is not the first of a block of level {}",
+            event.level()
+        );
         let (bin, beyond) = match event {
             Event::Depth(event) => (event.peak_bin.raw().into(), self.bins.into()),
             // A position lies up to one bin beyond that of the peak.
@@ -159,6 +182,12 @@ impl Header {
         ensure!(bin < beyond, "bin {bin} of {}", self.bins);
         Ok(())
     }
+}
+
+/// Bytes of a header that begins so, with its settings; `None` if it cannot be.
+fn header_length(bytes: &[u8; HEADER_BYTES as usize]) -> Option<u16> {
+    let length = u16::from_le_bytes([bytes[10], bytes[11]]);
+    (length >= HEADER_BYTES && length.is_multiple_of(16)).then_some(length)
 }
 
 /// Pixels of an array of any size.
@@ -225,7 +254,6 @@ impl<W: Write> Writer<W> {
 /// Reads a file, event by event.
 pub struct Reader<R: Read> {
     input: R,
-    version: u16,
     digest: Digest<'static, u32>,
     decoder: AerDecoder,
     header: Header,
@@ -249,13 +277,20 @@ impl<R: Read> Reader<R> {
             })?;
         let mut digest = CRC_32.digest();
         digest.update(&bytes);
+        let header = Header::from_bytes(&bytes)?;
+        // The settings of the run, which no event needs.
+        let length = header_length(&bytes).unwrap_or(HEADER_BYTES);
+        let mut settings = vec![0; usize::from(length - HEADER_BYTES)];
+        input
+            .read_exact(&mut settings)
+            .context("the file ends inside its header")?;
+        digest.update(&settings);
         Ok(Self {
             input,
             digest,
             decoder: AerDecoder::new(),
-            version: u16::from_le_bytes([bytes[8], bytes[9]]),
-            header: Header::from_bytes(&bytes)?,
-            offset: HEADER_BYTES.into(),
+            header,
+            offset: length.into(),
             events: 0,
             ended: false,
         })
@@ -294,7 +329,6 @@ impl<R: Read> Reader<R> {
         match self.decoder.decode(AerWord::from_le_bytes(bytes))? {
             AerRecord::Event(event) => self.counted(&bytes, Event::Depth(event)).map(Some),
             AerRecord::DynamicDepth(event) => {
-                ensure!(self.version > OLDEST_VERSION, AerError::UnknownKind);
                 self.counted(&bytes, Event::DynamicDepth(event)).map(Some)
             }
             AerRecord::Time(_) => {

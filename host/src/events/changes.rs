@@ -3,8 +3,13 @@
 //! The events are those of depth; what a pixel would send in their place (section III-E of
 //! the paper) is drawn over time, as in its Fig. 17 and 18.
 
+use std::collections::HashMap;
+
 use anyhow::{Context, Result};
-use dtof_core::{DepthEvent, DynamicDepthConfig, DynamicDepthPixel, Polarity, RangeScale};
+use dtof_core::{
+    BlockLevel, DepthEvent, DynamicDepthConfig, DynamicDepthPixel, EchoNumber, PixelAddress,
+    Polarity, RangeScale,
+};
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::{Colour, Mark, Pen};
 use dtof_link::DynamicDepth;
@@ -29,7 +34,7 @@ const fn pen(colour: Colour, mark: Mark) -> Pen {
 pub struct Changes {
     config: DynamicDepthConfig,
     scale: RangeScale,
-    pixels: Vec<DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>>,
+    pixels: HashMap<(PixelAddress, BlockLevel), DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>>,
     /// Depth events.
     events: u64,
     /// Of either side, as [`SIDES`].
@@ -37,25 +42,30 @@ pub struct Changes {
 }
 
 impl Changes {
-    /// Of an array with so many addresses; none yet.
+    /// None yet.
     ///
     /// # Errors
     /// If the threshold is too low.
-    pub fn new(options: &DynamicDepth, scale: RangeScale, addresses: usize) -> Result<Self> {
+    pub fn new(options: &DynamicDepth, scale: RangeScale) -> Result<Self> {
         let config = options.config(&scale);
         Ok(Self {
             config: config.with_context(|| format!("--threshold-mm {}", options.threshold_mm))?,
             scale,
-            pixels: vec![DynamicDepthPixel::new(); addresses],
+            pixels: HashMap::new(),
             events: 0,
             sides: [Sample::new(DRAWN), Sample::new(DRAWN)],
         })
     }
 
-    /// Takes the next depth event into account.
+    /// Takes the next depth event into account: of a pixel or a block, and of its echoes the
+    /// first.
     pub fn add(&mut self, event: &DepthEvent) {
         self.events += 1;
-        let pixel = &mut self.pixels[usize::from(event.pixel.0)];
+        if event.echo > EchoNumber::FIRST {
+            return;
+        }
+        let pixel = self.pixels.entry((event.pixel, event.level));
+        let pixel = pixel.or_default();
         let Some(change) = pixel.observe(&self.config, event) else {
             return;
         };
@@ -136,7 +146,7 @@ mod tests {
     /// A pixel that sees bin 40, then bin 10 from laser cycle 1000 on, then 40 again; one that
     /// stays.
     fn stepped(cycles: u64) -> Changes {
-        let mut changes = Changes::new(&DynamicDepth::default(), scale(), 2).unwrap();
+        let mut changes = Changes::new(&DynamicDepth::default(), scale()).unwrap();
         for cycle in (0..cycles).step_by(50) {
             let bin = if (cycle / 1000).is_multiple_of(2) {
                 40

@@ -9,15 +9,16 @@ use crate::events::aer_file::{Event, EventKind};
 /// The columns of depth events.
 ///
 /// `depth_bins` is measured from the start of bin 0, `flags` is the sum of the
-/// flag bits of `docs/aer-format.md`.
+/// flag bits of `docs/aer-format.md`. A `level` above 0 is a block of pixels, the first of
+/// which is `pixel`; `echo` counts from 1.
 pub const HEADER: &str =
-    "cycle,pixel,exposure,peak_bin,depth_bins,range_mm,peak_count,background,flags";
+    "cycle,pixel,exposure,peak_bin,depth_bins,range_mm,peak_count,background,flags,level,echo";
 
 /// The columns of dynamic depth events.
 ///
 /// `polarity` is 1 if the depth has become more and -1 if less, `range_mm` the mean after
 /// the change, `change_mm` by how much it has changed.
-pub const DYNAMIC_DEPTH_HEADER: &str = "cycle,pixel,polarity,range_mm,change_mm,flags";
+pub const DYNAMIC_DEPTH_HEADER: &str = "cycle,pixel,polarity,range_mm,change_mm,flags,level";
 
 /// The columns of events of this kind.
 #[must_use]
@@ -61,7 +62,7 @@ pub fn write(
     let depth_bins = f64::from(event.position().raw()) / 256.0;
     writeln!(
         out,
-        "{},{},{},{},{depth_bins:.4},{:.3},{},{},{}",
+        "{},{},{},{},{depth_bins:.4},{:.3},{},{},{},{},{}",
         event.cycle.0,
         event.pixel.0,
         event.exposure,
@@ -70,6 +71,8 @@ pub fn write(
         event.peak_count,
         event.background,
         event.flags,
+        event.level,
+        event.echo,
     )
 }
 
@@ -88,11 +91,12 @@ pub fn write_dynamic_depth(
     };
     writeln!(
         out,
-        "{},{},{polarity},{:.3},{:.3},{}",
+        "{},{},{polarity},{:.3},{:.3},{},{}",
         event.cycle.0,
         event.pixel.0,
         scale.range(event.position).to_num::<f64>(),
         scale.distance(event.change()).to_num::<f64>(),
         event.flags,
+        event.level,
     )
 }

@@ -2,13 +2,16 @@
 
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
-    BinIndex, Count, DepthEvent, Flags, LaserCycle, PixelAddress, RangeScale, SubBinOffset,
+    BinIndex, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress,
+    RangeScale, SubBinOffset,
 };
 
 /// An event in the middle of a bin.
 pub fn event(pixel: u16, cycle: u64, bin: u16) -> DepthEvent {
     DepthEvent {
         pixel: PixelAddress(pixel),
+        level: BlockLevel::PIXEL,
+        echo: EchoNumber::FIRST,
         cycle: LaserCycle(cycle),
         exposure: 40,
         peak_bin: BinIndex::saturating(bin),

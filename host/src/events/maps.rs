@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use dtof_core::fixed::types::I24F8;
-use dtof_core::{DepthEvent, PixelAddress, RangeScale, Reflectivity};
+use dtof_core::{BlockLevel, DepthEvent, PixelAddress, RangeScale, Reflectivity};
 
 use crate::events::events_csv::range_mm;
 use crate::input::source::{Geometry, Slice};
@@ -16,10 +16,12 @@ pub const MEAN_OF: usize = 10;
 pub struct PixelHistory {
     /// Millimetres of the last [`MEAN_OF`] events, or fewer, oldest first.
     recent: VecDeque<f64>,
-    /// How bright the surface is.
+    /// How bright the surface is, by the pixel's own events.
     reflectivity: Reflectivity,
-    /// All events.
+    /// All events, those of blocks that stand for the pixel included.
     pub events: u64,
+    /// One more than the laser cycle of the last event of each level, 0 before it.
+    last: [u64; 4],
     /// All photons, whatever became of them.
     pub photons: u64,
 }
@@ -30,6 +32,13 @@ impl PixelHistory {
             self.recent.pop_front();
         }
         self.recent.push_back(range_mm);
+    }
+
+    /// Whether an event of a smaller block, or of the pixel itself, has come since laser
+    /// cycle `first`: it says more of the pixel.
+    fn has_reported_finer(&self, level: BlockLevel, first: u64) -> bool {
+        let finer = self.last.iter().take(level.raw().into());
+        finer.max().is_some_and(|&last| last > first)
     }
 
     /// The range of the last event.
@@ -81,12 +90,26 @@ impl Maps {
         }
     }
 
-    /// Takes one event into account.
+    /// Takes one event into account. That of a block holds for those of its pixels that have
+    /// not reported by themselves, or in a smaller block, within its exposure.
     pub fn add(&mut self, event: &DepthEvent, scale: &RangeScale) {
-        let pixel = &mut self.pixels[usize::from(event.pixel.0)];
-        pixel.push(range_mm(event, scale));
-        pixel.reflectivity.add(event);
-        pixel.events += 1;
+        let range_mm = range_mm(event, scale);
+        let end = event.cycle.0.saturating_add(1);
+        let first = end.saturating_sub(event.exposure.into());
+        for address in self.geometry.block(event.pixel, event.level) {
+            let pixel = &mut self.pixels[usize::from(address.0)];
+            if pixel.has_reported_finer(event.level, first) {
+                continue;
+            }
+            pixel.push(range_mm);
+            pixel.events += 1;
+            pixel.last[usize::from(event.level.raw())] = end;
+        }
+        if event.level == BlockLevel::PIXEL {
+            self.pixels[usize::from(event.pixel.0)]
+                .reflectivity
+                .add(event);
+        }
     }
 
     /// Takes the photons of `pixels` into account.
@@ -122,6 +145,7 @@ impl Maps {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::events::fixtures;
     use crate::input::source::{Photon, PixelPhotons};
 
     #[test]
@@ -133,6 +157,29 @@ mod tests {
         }
         assert_eq!(pixel.last_mm(), Some(12.0));
         assert_eq!(pixel.mean_mm(), Some(7.5)); // of 3 to 12
+    }
+
+    #[test]
+    fn a_block_stands_for_its_pixels_that_have_not_reported_since() {
+        let mut maps = Maps::new(Geometry::new(3, 3));
+        let scale = fixtures::scale();
+        let of_block = |pixel, cycle, bin, level| DepthEvent {
+            level: BlockLevel::new(level).unwrap(),
+            ..fixtures::event(pixel, cycle, bin) // over 40 laser cycles
+        };
+        maps.add(&of_block(4, 100, 10, 0), &scale);
+        maps.add(&of_block(0, 140, 20, 1), &scale); // from 101 on
+        maps.add(&of_block(1, 150, 30, 0), &scale);
+        maps.add(&of_block(0, 189, 40, 2), &scale); // from 150 on
+        maps.add(&of_block(0, 190, 50, 1), &scale); // from 151 on
+        let last = maps.pixels.iter().map(|pixel| {
+            let range = pixel.last_mm().unwrap();
+            (range / 37.474 - 0.5).round()
+        });
+        assert!(last.eq([50.0, 50.0, 40.0, 50.0, 50.0, 40.0, 40.0, 40.0, 40.0]));
+        let events = maps.pixels.iter().map(|pixel| pixel.events);
+        assert!(events.eq([3, 3, 1, 3, 4, 1, 1, 1, 1]));
+        assert_eq!(maps.reporting(), 9);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 pub mod aer_file;
 pub mod changes;
+pub mod echoes;
 pub mod events_csv;
 #[cfg(test)]
 pub(crate) mod fixtures;

@@ -11,18 +11,20 @@ use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use dtof_core::{DepthEvent, PixelAddress, RangeScale};
+use dtof_core::{DepthEvent, EchoNumber, PixelAddress, RangeScale};
 use tempfile::NamedTempFile;
 
 use super::aer_file;
 use crate::engine::settings::Settings;
 use crate::events::changes::Changes;
+use crate::events::echoes::{Echo, Selection};
 use crate::events::events_csv::{self, range_mm};
 use crate::events::maps::Maps;
 use crate::events::sample::Sample;
 use crate::events::summary::{self, Summary};
 use crate::files::{ASIDE, are_same, aside, flushed, may_replace};
 use crate::input::source::{PhotonSource, Slice};
+use crate::rows::Row;
 use crate::view::report::{self, Cloud, Figure, Section};
 use dtof_draw::svg;
 use dtof_link::DynamicDepth;
@@ -47,6 +49,10 @@ pub struct Output {
     maps: Maps,
     sides: [&'static str; 2],
     sample: Sample,
+    /// The echo asked for, and the choice of it where pixels report several: for the maps, and
+    /// for the events of the report unless it shows all.
+    echo: Option<Echo>,
+    selection: Option<Selection>,
     /// If they are asked for.
     changes: Option<Changes>,
 }
@@ -88,6 +94,8 @@ impl Output {
             maps: Maps::new(geometry),
             sides: source.sides(),
             sample: Sample::new(Sample::LIMIT),
+            echo: None,
+            selection: selection(None, settings),
             changes: None,
         })
     }
@@ -97,10 +105,18 @@ impl Output {
     /// # Errors
     /// If the threshold is too low.
     pub fn with_changes(mut self, options: Option<&DynamicDepth>) -> Result<Self> {
-        let addresses = self.maps.geometry.addresses();
-        let changes = options.map(|options| Changes::new(options, self.scale, addresses));
+        let changes = options.map(|options| Changes::new(options, self.scale));
         self.changes = changes.transpose()?;
         Ok(self)
+    }
+
+    /// Maps and report show this echo of each exposure. Without, maps show the strongest and
+    /// the events of the report are all.
+    #[must_use]
+    pub fn with_echo(mut self, echo: Option<Echo>, settings: &Settings) -> Self {
+        self.echo = echo;
+        self.selection = selection(echo, settings);
+        self
     }
 
     /// Writes events in the order they come.
@@ -112,13 +128,41 @@ impl Output {
             events_csv::write(&mut self.csv, event, &self.scale)
                 .and_then(|()| self.aer.write(&aer_file::Event::Depth(*event)))
                 .with_context(|| self.folder.display().to_string())?;
-            self.maps.add(event, &self.scale);
-            self.sample.add(event, range_mm(event, &self.scale));
             if let Some(changes) = &mut self.changes {
                 changes.add(event);
             }
+            if self.echo.is_none() {
+                self.sample.add(event, range_mm(event, &self.scale));
+            }
+            match &mut self.selection {
+                Some(selection) => selection.push(*event),
+                None => self.show(event),
+            }
+            self.show_decided();
         }
         Ok(())
+    }
+
+    /// There are no more events: none waits for another echo of its exposure.
+    pub fn end_events(&mut self) {
+        if let Some(selection) = &mut self.selection {
+            selection.finish();
+        }
+        self.show_decided();
+    }
+
+    fn show_decided(&mut self) {
+        while let Some(event) = self.selection.as_mut().and_then(Selection::next) {
+            self.show(&event);
+        }
+    }
+
+    /// An event that has been chosen.
+    fn show(&mut self, event: &DepthEvent) {
+        self.maps.add(event, &self.scale);
+        if self.echo.is_some() {
+            self.sample.add(event, range_mm(event, &self.scale));
+        }
     }
 
     /// Takes the photons of `pixels` into account.
@@ -130,6 +174,19 @@ impl Output {
     #[must_use]
     pub fn maps(&self) -> &Maps {
         &self.maps
+    }
+
+    /// Which echoes maps and report show, if pixels report several.
+    fn echo_row(&self, settings: &Settings) -> Option<Row> {
+        let text = match self.echo {
+            None => "all as events, the strongest of an exposure in the maps",
+            Some(Echo::First) => "the nearest of an exposure",
+            Some(Echo::Last) => "the farthest of an exposure",
+            Some(Echo::Strongest) => "the strongest of an exposure",
+            Some(Echo::All) => "all",
+        };
+        let several = settings.echoes > EchoNumber::FIRST;
+        several.then(|| ("echoes shown".to_owned(), text.to_owned()))
     }
 
     /// Draws the maps and puts every file in its place. `sections` stand in the
@@ -161,7 +218,8 @@ impl Output {
         let bytes = figures.iter().map(|figure| figure.svg.len()).sum();
         self.sample.limit(report::room_for_events(bytes));
         let totals = summary.rows();
-        let settings = summary.settings.rows();
+        let mut settings = summary.settings.rows();
+        settings.extend(self.echo_row(&summary.settings));
         let section = |heading, rows| Section { heading, rows };
         let mut all = vec![section("Totals", &totals[..])];
         all.extend(sections);
@@ -213,6 +271,13 @@ impl Output {
         }
         Ok(())
     }
+}
+
+/// What chooses the echo of each exposure, if a pixel reports several and not all are shown.
+fn selection(echo: Option<Echo>, settings: &Settings) -> Option<Selection> {
+    let echo = echo.unwrap_or(Echo::Strongest);
+    let several = settings.echoes > EchoNumber::FIRST && echo != Echo::All;
+    several.then(|| Selection::new(echo, settings.echoes, settings.l2))
 }
 
 /// Names of results, and what stands near the start of each.

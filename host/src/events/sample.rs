@@ -8,15 +8,19 @@
 //! in a row one is kept, or two, or none), but not in step with the columns of an array,
 //! which a plain k-th would show as stripes.
 
-use dtof_core::{DepthEvent, PixelAddress};
+use dtof_core::{BlockLevel, DepthEvent, EchoNumber, PixelAddress};
 
 /// The part of an event that is kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledEvent {
     /// The laser cycle whose end brought it.
     pub cycle: u64,
-    /// Its pixel.
+    /// Its pixel, the first of its block.
     pub pixel: PixelAddress,
+    /// Whether it is one pixel that reports, or a block.
+    pub level: BlockLevel,
+    /// Which echo of its exposure.
+    pub echo: EchoNumber,
     /// Its range in millimetres.
     pub range_mm: f32,
 }
@@ -32,7 +36,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Most events of a report: 3.5 MB of it, and 6 MB of memory.
+    /// Most events of a report: 3.8 MB of it, and 8 MB of memory.
     pub const LIMIT: usize = 1 << 18;
 
     /// Keeps at most `limit` events.
@@ -64,6 +68,8 @@ impl Sample {
         let event = SampledEvent {
             cycle: event.cycle.0,
             pixel: event.pixel,
+            level: event.level,
+            echo: event.echo,
             range_mm: range_mm as f32,
         };
         self.kept.push((place, event));

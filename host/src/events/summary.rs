@@ -3,7 +3,7 @@
 
 pub mod truth;
 
-use dtof_core::{AnyRule, DepthEstimator, Statistics, Threshold};
+use dtof_core::{AnyRule, DepthEstimator, EchoNumber, Statistics, Threshold};
 use serde::Serialize;
 
 use crate::engine::settings::Settings;
@@ -36,14 +36,20 @@ pub struct Summary {
     pub photons: u64,
     /// Depth events.
     pub events: u64,
+    /// Of these, those of blocks of pixels.
+    pub events_of_blocks: u64,
     /// Pixels that were there.
     pub pixels: usize,
     /// Pixels with at least one event.
     pub pixels_reporting: usize,
+    /// Photons in the bins around an echo that was reported.
+    pub held: u64,
     /// Photons with a TDC code past the last bin.
     pub rejected: u64,
     /// Photons that met a full counter.
     pub saturated: u64,
+    /// Photons that met a full counter of a block; pixels have counted them.
+    pub saturated_in_blocks: u64,
     /// Photons outside the range gate.
     pub gated_out: u64,
     /// Decisions put off because the event before was not taken yet.
@@ -65,7 +71,7 @@ impl Summary {
     /// Puts together what the pixels counted and where it came from.
     #[must_use]
     pub fn new(
-        statistics: &Statistics,
+        [statistics, blocks]: [Statistics; 2],
         source: &dyn PhotonSource,
         pixels_reporting: usize,
         settings: &Settings,
@@ -79,13 +85,16 @@ impl Summary {
             recorded_cycles: source.recorded_cycles(),
             cycles: source.cycles(),
             photons: statistics.photons(),
-            events: statistics.events,
+            events: statistics.events + blocks.events,
+            events_of_blocks: blocks.events,
             pixels: source.addresses().len(),
             pixels_reporting,
+            held: statistics.held,
             rejected: statistics.rejected,
             saturated: statistics.saturated,
+            saturated_in_blocks: blocks.saturated,
             gated_out: statistics.gated_out,
-            deferred: statistics.deferred,
+            deferred: statistics.deferred + blocks.deferred,
             expired: statistics.expired,
             expired_deferred: statistics.expired_deferred,
             not_replayed: source.not_replayed(),
@@ -125,6 +134,9 @@ impl Summary {
                 format!("{} of {}", self.pixels_reporting, self.pixels),
             ),
         ]);
+        if self.settings.binning.is_some() {
+            rows.push(row("of these, of blocks", self.events_of_blocks));
+        }
         if self.settings.frame.is_none() {
             rows.push(row("exposures without an event", self.expired));
         }
@@ -139,6 +151,10 @@ impl Summary {
         let losses = [
             ("photons outside the range gate", self.gated_out),
             ("photons lost to full counters", self.saturated),
+            (
+                "photons lost to full counters of blocks",
+                self.saturated_in_blocks,
+            ),
             ("photons with a code past the last bin", self.rejected),
             ("decisions put off", self.deferred),
             ("recorded photons not replayed", self.not_replayed),
@@ -170,6 +186,25 @@ impl Settings {
             row("range gate", gate),
         ];
         rows.extend(self.detection_rows());
+        if let Some(binning) = self.binning {
+            let side = 1 << binning.levels.raw();
+            rows.push(row(
+                "adaptive binning",
+                format!(
+                    "blocks of up to {side}x{side} pixels that have been silent for {} laser cycles",
+                    binning.patience
+                ),
+            ));
+        }
+        if self.tracking {
+            let text = "half of the false alarms near the last event of a pixel";
+            rows.push(row("tracking", text.to_owned()));
+        }
+        if self.echoes > EchoNumber::FIRST {
+            let reach = self.peel_reach();
+            let text = format!("up to {} an exposure, ±{reach} bins left out", self.echoes);
+            rows.push(row("echoes", text));
+        }
         if self.frame.is_none() {
             rows.push(row(
                 "decisions",

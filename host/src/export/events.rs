@@ -5,9 +5,11 @@ use std::io::BufReader;
 use std::path::Path;
 
 use anyhow::{Result, bail, ensure};
+use dtof_core::EchoNumber;
 
 use super::{Format, LaserClock};
-use crate::events::aer_file::{EventKind, Header, Reader};
+use crate::events::aer_file::{Event, EventKind, Header, Reader};
+use crate::events::echoes::{Echo, Selection};
 use crate::progress::Progress;
 
 /// The events of a file.
@@ -15,11 +17,19 @@ pub fn open(path: &Path) -> Result<Reader<BufReader<File>>> {
     Reader::new(BufReader::new(File::open(path)?))
 }
 
+/// What chooses the echo of each exposure: a file does not say how long one may last, or how
+/// many echoes it may have.
+pub fn chosen(echo: Echo) -> Selection {
+    Selection::new(echo, EchoNumber::LAST, u16::MAX)
+}
+
 /// The contents of a file.
 pub struct Survey {
     pub header: Header,
     /// Depth events and dynamic depth events.
     counts: [u64; 2],
+    /// Depth events of the echo that is wanted.
+    chosen: u64,
     /// The laser cycle of the latest event.
     pub latest: u64,
     /// Damage that ends the file too early: the byte, and what is wrong there.
@@ -32,17 +42,25 @@ impl Survey {
     ///
     /// # Errors
     /// Of a file that is not damaged, such an event is an error.
-    pub fn of(path: &Path, format: Format, clock: LaserClock, quiet: bool) -> Result<Self> {
+    pub fn of(
+        path: &Path,
+        format: Format,
+        clock: LaserClock,
+        echo: Echo,
+        quiet: bool,
+    ) -> Result<Self> {
         let file = path.metadata()?;
         ensure!(file.is_file(), "not a file that can be read twice");
         let mut reader = open(path)?;
         let mut survey = Self {
             header: *reader.header(),
             counts: [0; 2],
+            chosen: 0,
             latest: 0,
             damage: None,
         };
         let progress = Progress::new(file.len(), "bytes counted", quiet);
+        let mut selection = chosen(echo);
         let mut beyond = None;
         loop {
             let begin = reader.offset();
@@ -69,11 +87,17 @@ impl Survey {
                 continue;
             }
             survey.counts[event.kind() as usize] += 1;
+            if let Event::Depth(event) = event {
+                selection.push(event);
+                survey.chosen += selection.by_ref().count() as u64;
+            }
             survey.latest = survey.latest.max(event.cycle().0);
             if survey.all().is_multiple_of(4096) {
                 progress.at(reader.offset());
             }
         }
+        selection.finish();
+        survey.chosen += selection.count() as u64;
         progress.finish();
         Ok(survey)
     }
@@ -85,6 +109,14 @@ impl Survey {
 
     pub fn events(&self, kind: EventKind) -> u64 {
         self.counts[kind as usize]
+    }
+
+    /// How many events of a kind are written, if depth events are of one echo.
+    pub fn chosen(&self, kind: EventKind) -> u64 {
+        match kind {
+            EventKind::Depth => self.chosen,
+            EventKind::DynamicDepth => self.events(kind),
+        }
     }
 
     /// The one kind there is, unless one is wanted.

@@ -13,15 +13,20 @@
 //! Time is in microseconds. A time word comes before the first event and before each
 //! whose upper bits differ from those of the event before it.
 
+use std::collections::HashMap;
 use std::io::{self, Write};
 
-use anyhow::{Context, Result, ensure};
-use dtof_core::{DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Polarity};
+use anyhow::{Result, ensure};
+use dtof_core::{
+    BlockLevel, DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, EchoNumber, PixelAddress,
+    Polarity,
+};
 use dtof_link::DynamicDepth;
 
 use super::reorder::{Reorder, WAITING};
 use super::{Finished, LaserClock, Out, Sink};
 use crate::events::aer_file::Event;
+use crate::events::echoes::Echo;
 use crate::input::source::Geometry;
 
 /// Columns and rows are sent in 11 bits.
@@ -91,10 +96,12 @@ pub struct Evt2 {
     encoder: Encoder<Out>,
     order: Reorder<Change>,
     clock: LaserClock,
-    columns: u32,
+    array: Geometry,
     config: DynamicDepthConfig,
-    /// The last depths of each pixel, three as in the paper.
-    pixels: Vec<DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>>,
+    /// The one echo of each exposure that comes, if not all.
+    echo: Echo,
+    /// The last depths of each pixel or block, three as in the paper.
+    pixels: HashMap<(PixelAddress, BlockLevel), DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>>,
     written: u64,
 }
 
@@ -104,6 +111,7 @@ impl Evt2 {
         array: Geometry,
         clock: LaserClock,
         config: DynamicDepthConfig,
+        echo: Echo,
     ) -> Result<Self> {
         let Geometry { columns, rows } = array;
         ensure!(
@@ -114,23 +122,25 @@ impl Evt2 {
             encoder: Encoder::new(out, array)?,
             order: Reorder::new(WAITING),
             clock,
-            columns,
+            array,
             config,
-            pixels: vec![DynamicDepthPixel::new(); array.addresses()],
+            echo,
+            pixels: HashMap::new(),
             written: 0,
         })
     }
 
-    /// Each pixel sends its events in order, so that they are looked at as they come.
-    fn change(&mut self, event: &Event) -> Result<Option<DynamicDepthEvent>> {
-        Ok(match event {
+    /// Each pixel and block sends its events in order, so that they are looked at as they
+    /// come. Of all echoes the first is followed, else the one that is wanted.
+    fn change(&mut self, event: &Event) -> Option<DynamicDepthEvent> {
+        match event {
             Event::DynamicDepth(event) => Some(*event),
-            Event::Depth(event) => {
-                let pixel = self.pixels.get_mut(usize::from(event.pixel.0));
-                let pixel = pixel.context("an event of no pixel")?;
-                pixel.observe(&self.config, event)
+            Event::Depth(event) if self.echo != Echo::All || event.echo == EchoNumber::FIRST => {
+                let pixel = self.pixels.entry((event.pixel, event.level));
+                pixel.or_default().observe(&self.config, event)
             }
-        })
+            Event::Depth(_) => None,
+        }
     }
 
     fn put(&mut self, change: Option<Change>) -> Result<()> {
@@ -144,19 +154,23 @@ impl Evt2 {
 
 impl Sink for Evt2 {
     fn write(&mut self, event: &Event) -> Result<()> {
-        let Some(change) = self.change(event)? else {
+        let Some(change) = self.change(event) else {
             return Ok(());
         };
         let time = u64::try_from(self.clock.microseconds(change.cycle.0))?;
-        let pixel = u32::from(change.pixel.0);
-        let change = Change {
-            time,
-            column: pixel % self.columns,
-            row: pixel / self.columns,
-            polarity: change.polarity(),
-        };
-        let next = self.order.push(time, change);
-        self.put(next)
+        // The change of a block is one of each of its pixels.
+        for pixel in self.array.block(change.pixel, change.level) {
+            let pixel = u32::from(pixel.0);
+            let change = Change {
+                time,
+                column: pixel % self.array.columns,
+                row: pixel / self.array.columns,
+                polarity: change.polarity(),
+            };
+            let next = self.order.push(time, change);
+            self.put(next)?;
+        }
+        Ok(())
     }
 
     fn finish(mut self: Box<Self>) -> Result<Finished> {

@@ -6,7 +6,7 @@ use std::io::Write;
 
 use ::mcap::records::MessageHeader;
 use anyhow::{Context, Result};
-use dtof_core::Flags;
+use dtof_core::{BlockLevel, Flags};
 use foxglove::Encode;
 use foxglove::messages::{PackedElementField, PointCloud, Pose, Quaternion, Timestamp, Vector3};
 use serde::Serialize;
@@ -48,6 +48,10 @@ struct Statistics {
     deferred: u64,
     /// Events of exposures with so many photons that the TDC missed some.
     pile_up: u64,
+    /// Echoes on the tail of another.
+    tail: u64,
+    /// Events of blocks of pixels.
+    blocks: u64,
     /// Events from the start of the file to the end of the slice.
     events_so_far: u64,
 }
@@ -78,7 +82,8 @@ fn schema() -> String {
         "title": "time",
         "properties": { "sec": kind("integer"), "nsec": kind("integer") },
     });
-    let whole = "events pixels flagged saturated clipped deferred pile_up events_so_far";
+    let whole =
+        "events pixels flagged saturated clipped deferred pile_up tail blocks events_so_far";
     let whole = whole.split(' ').map(|name| (name, kind("integer")));
     let reals = ["duration_s", "events_per_s"].map(|name| (name, kind("number")));
     let all = whole.chain(reals).chain([("timestamp", time)]);
@@ -192,9 +197,11 @@ impl Mcap {
             (&mut statistics.clipped, Flags::CLIPPED),
             (&mut statistics.deferred, Flags::DEFERRED),
             (&mut statistics.pile_up, Flags::PILE_UP),
+            (&mut statistics.tail, Flags::TAIL),
         ] {
             *count += u64::from(flags.contains(flag));
         }
+        statistics.blocks += u64::from(event.level() != BlockLevel::PIXEL);
         statistics.flagged += u64::from(flags != Flags::NONE);
         if self.points.len() >= MOST_POINTS * BYTES {
             self.write_points()?;

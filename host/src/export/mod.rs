@@ -20,13 +20,14 @@ use std::fmt::Write;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::ValueEnum;
 use dtof_core::RangeScale;
 use dtof_link::DynamicDepth;
 use tempfile::NamedTempFile;
 
 use crate::events::aer_file::{Event, EventKind};
+use crate::events::echoes::Echo;
 use crate::files::{aside, flushed, place_of};
 use crate::geometry::{FieldOfView, Rays};
 use crate::input::source::Geometry;
@@ -83,6 +84,8 @@ pub struct Options {
     pub clock: LaserClock,
     /// Which events of a file that holds both kinds.
     pub kind: Option<EventKind>,
+    /// Which echo of each exposure, of depth events.
+    pub echo: Echo,
     /// MCAP: nanoseconds of a slice, not 0; 1/100 of the run unless given, see docs/export.md.
     pub slice_ns: Option<u64>,
     /// EVT2: what is made of depth events.
@@ -97,6 +100,7 @@ impl Default for Options {
             optics: Optics::Pinhole(None),
             clock: LaserClock::default(),
             kind: None,
+            echo: Echo::All,
             slice_ns: None,
             dynamic_depth: DynamicDepth::default(),
         }
@@ -151,8 +155,13 @@ pub fn export(
         Optics::Calibration(calibration) => vec![input, calibration],
     };
     let place = place_of(out, &inputs)?;
-    let survey = Survey::of(input, format, options.clock, quiet).with_context(name)?;
+    let survey =
+        Survey::of(input, format, options.clock, options.echo, quiet).with_context(name)?;
     let kind = survey.kind(options.kind).with_context(name)?;
+    ensure!(
+        kind == EventKind::Depth || options.echo == Echo::All,
+        "--echo: only for depth events"
+    );
     let header = survey.header;
     let array = header.geometry;
     let (rays, mut assumed) = options.optics.rays(array)?;
@@ -168,7 +177,7 @@ pub fn export(
     let end_ns = options.clock.end_ns(survey.latest);
     let slice_ns = options.slice_ns.unwrap_or_else(|| mcap::slice_of(end_ns));
     let file = BufWriter::new(aside(&place.folder, ".dtof-export-")?);
-    let points = survey.events(kind);
+    let points = survey.chosen(kind);
     let to = || out.display().to_string();
     let sink: Result<Box<dyn Sink>> = match format {
         Format::Csv => csv::begin(file, projection, kind).map(boxed),
@@ -183,22 +192,32 @@ pub fn export(
             let config = changes
                 .config(&projection.scale)
                 .with_context(|| format!("--threshold-mm {}", changes.threshold_mm))?;
-            evt2::Evt2::new(file, array, options.clock, config).map(boxed)
+            evt2::Evt2::new(file, array, options.clock, config, options.echo).map(boxed)
         }
     };
     let mut sink = sink.with_context(to)?;
 
     let progress = Progress::new(survey.all(), "events", quiet);
     let mut events = events::open(input).with_context(name)?;
+    let mut selection = events::chosen(options.echo);
     for done in 1..=survey.all() {
         let event = events.next_event().with_context(name)?;
         let event = event.with_context(|| format!("{} changed while it was read", name()))?;
-        if event.kind() == kind {
-            sink.write(&event).with_context(to)?;
+        match event {
+            _ if event.kind() != kind => {}
+            Event::Depth(event) => selection.push(event),
+            Event::DynamicDepth(_) => sink.write(&event).with_context(to)?,
+        }
+        for event in selection.by_ref() {
+            sink.write(&Event::Depth(event)).with_context(to)?;
         }
         if done.is_multiple_of(4096) {
             progress.at(done);
         }
+    }
+    selection.finish();
+    for event in selection {
+        sink.write(&Event::Depth(event)).with_context(to)?;
     }
     progress.finish();
     let finished = sink.finish().with_context(to)?;

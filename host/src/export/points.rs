@@ -45,7 +45,7 @@ const fn field(name: &'static str, number: Number) -> Field {
 }
 
 /// The fields of the points of an event, in this order, without gaps.
-pub fn fields(kind: EventKind) -> [Field; 7] {
+pub fn fields(kind: EventKind) -> [Field; 9] {
     let value = match kind {
         // What viewers look for to give points their brightness: the peak count.
         EventKind::Depth => "intensity",
@@ -59,12 +59,15 @@ pub fn fields(kind: EventKind) -> [Field; 7] {
         // More than an address needs: Open3D leaves out 16 bits of a PLY file.
         field("pixel", U32),
         field("flags", U8),
+        // The point stands for 2^level pixels a side.
+        field("level", U8),
+        field("echo", U8),
         field("t_ns", F64),
     ]
 }
 
 /// Bytes of a record.
-pub const BYTES: usize = 5 * 4 + 1 + 8;
+pub const BYTES: usize = 5 * 4 + 3 + 8;
 
 /// The record of an event.
 #[allow(
@@ -86,8 +89,10 @@ pub fn record(event: &Event, projection: &Projection) -> Result<[u8; BYTES]> {
     }
     record[16..20].copy_from_slice(&u32::from(event.pixel().0).to_le_bytes());
     record[20] = event.flags().bits();
+    record[21] = event.level().raw();
+    record[22] = event.echo().raw();
     let time = projection.nanoseconds(event) as f64;
-    record[21..].copy_from_slice(&time.to_le_bytes());
+    record[23..].copy_from_slice(&time.to_le_bytes());
     Ok(record)
 }
 

@@ -22,7 +22,7 @@ impl Projection {
     )]
     pub fn point(&self, event: &Event) -> Result<[f32; 3]> {
         let range_mm = self.scale.range(event.position()).to_num();
-        let point = self.rays.point(event.pixel(), range_mm);
+        let point = self.rays.point(event.pixel(), event.level(), range_mm);
         let point = point.with_context(|| format!("pixel {} has no ray", event.pixel().0))?;
         // No negative zeros.
         Ok(point.map(|side| side as f32 + 0.0))

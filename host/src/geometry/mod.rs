@@ -16,7 +16,7 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
-use dtof_core::PixelAddress;
+use dtof_core::{BlockLevel, PixelAddress};
 
 use crate::cli::arguments::real;
 use crate::input::source::Geometry;
@@ -121,7 +121,11 @@ pub struct Ray {
 
 /// Where each pixel of an array looks.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rays(Vec<Ray>);
+pub struct Rays {
+    array: Geometry,
+    /// Row by row.
+    rays: Vec<Ray>,
+}
 
 impl Rays {
     /// Those of a pinhole camera, through the middle of each pixel.
@@ -133,7 +137,10 @@ impl Rays {
             bias_mm: 0.0,
         };
         let row = |row: u32| (0..array.columns).map(move |column| ray(row, column));
-        Self((0..array.rows).flat_map(row).collect())
+        Self {
+            array,
+            rays: (0..array.rows).flat_map(row).collect(),
+        }
     }
 
     /// Those of a calibration file, as `docs/export.md` describes it.
@@ -141,16 +148,39 @@ impl Rays {
     /// # Errors
     /// One line with the name of the file and the line that is wrong.
     pub fn read(path: &Path, array: Geometry) -> anyhow::Result<Self> {
-        calibration::read(path, array).map(Self)
+        let rays = calibration::read(path, array)?;
+        Ok(Self { array, rays })
     }
 
     /// The point that a pixel sees at a range, in metres; `None` if there is no such
-    /// pixel.
+    /// pixel. That of a block, whose first pixel is `pixel`, lies on the mean of its rays.
     #[must_use]
-    pub fn point(&self, pixel: PixelAddress, range_mm: f64) -> Option<[f64; 3]> {
-        let ray = self.0.get(usize::from(pixel.0))?;
+    pub fn point(&self, pixel: PixelAddress, level: BlockLevel, range_mm: f64) -> Option<[f64; 3]> {
+        let ray = if level == BlockLevel::PIXEL {
+            *self.rays.get(usize::from(pixel.0))?
+        } else {
+            self.mean_ray(pixel, level)?
+        };
         let metres = (range_mm - ray.bias_mm) / 1000.0;
         Some(ray.direction.map(|side| side * metres))
+    }
+
+    /// The mean ray of a block; `None` if there is no such block, or its rays cancel.
+    fn mean_ray(&self, pixel: PixelAddress, level: BlockLevel) -> Option<Ray> {
+        let (mut direction, mut bias_mm, mut pixels) = ([0.0; 3], 0.0, 0.0);
+        for pixel in self.array.block(pixel, level) {
+            let ray = self.rays.get(usize::from(pixel.0))?;
+            for (sum, side) in direction.iter_mut().zip(ray.direction) {
+                *sum += side;
+            }
+            bias_mm += ray.bias_mm;
+            pixels += 1.0;
+        }
+        let has_length = direction.iter().any(|&side| side != 0.0);
+        (pixels > 0.0 && has_length).then(|| Ray {
+            direction: unit(direction),
+            bias_mm: bias_mm / pixels,
+        })
     }
 }
 

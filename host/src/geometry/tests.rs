@@ -49,20 +49,23 @@ fn corners_are_exact() {
     }
     // The middle of the corner pixel of 4×4 is 3/4 of the way from the middle.
     let rays = Rays::pinhole(array(4, 4), view);
-    let [x, y, z] = rays.0[0].direction;
+    let [x, y, z] = rays.rays[0].direction;
     assert!((x / z + 0.75).abs() < 1e-15 && (y / z + 0.75).abs() < 1e-15);
 }
 
 #[test]
 fn x_is_to_the_right_and_y_down() {
     let rays = Rays::pinhole(array(4, 2), FieldOfView::of(array(4, 2)));
-    let point = |pixel| rays.point(PixelAddress(pixel), 2000.0).unwrap();
+    let point = |pixel| {
+        rays.point(PixelAddress(pixel), BlockLevel::PIXEL, 2000.0)
+            .unwrap()
+    };
     let [upper_left, upper_right, lower_left] = [point(0), point(3), point(4)];
     assert!(upper_left[0] < 0.0 && upper_left[1] < 0.0 && upper_left[2] > 0.0);
     assert!(upper_right[0] > 0.0 && upper_right[1] < 0.0);
     assert!(lower_left[0] < 0.0 && lower_left[1] > 0.0);
     assert!((length(upper_left) - 2.0).abs() < 1e-15); // range along the ray, in metres
-    assert_eq!(rays.point(PixelAddress(8), 1.0), None);
+    assert_eq!(rays.point(PixelAddress(8), BlockLevel::PIXEL, 1.0), None);
 }
 
 #[test]
@@ -100,9 +103,16 @@ fn a_field_of_view_is_printed_as_it_is_read() {
 #[test]
 fn a_calibration_gives_directions_and_takes_the_bias_off() {
     let text = "columns = 2\nrows = 1\npixels = [\n  [0, 0, 1, 0],\n  [3, 0.0, 4, 12.5],\n]\n";
-    let rays = Rays(calibration::parse(text, array(2, 1)).unwrap());
-    assert_eq!(rays.point(PixelAddress(0), 1500.0), Some([0.0, 0.0, 1.5]));
-    let [x, y, z] = rays.point(PixelAddress(1), 2012.5).unwrap();
+    let array = array(2, 1);
+    let rays = calibration::parse(text, array).unwrap();
+    let rays = Rays { array, rays };
+    assert_eq!(
+        rays.point(PixelAddress(0), BlockLevel::PIXEL, 1500.0),
+        Some([0.0, 0.0, 1.5])
+    );
+    let [x, y, z] = rays
+        .point(PixelAddress(1), BlockLevel::PIXEL, 2012.5)
+        .unwrap();
     assert!((x - 1.2).abs() < 1e-12 && y == 0.0 && (z - 1.6).abs() < 1e-12);
 }
 
@@ -163,7 +173,7 @@ proptest! {
         columns in 1u32..80, rows in 1u32..80, horizontal in 0.01..179.0, vertical in 0.01..179.0,
     ) {
         let view = FieldOfView::new([horizontal, vertical]).unwrap();
-        let rays = Rays::pinhole(array(columns, rows), view).0;
+        let rays = Rays::pinhole(array(columns, rows), view).rays;
         prop_assert_eq!(rays.len(), (columns * rows) as usize);
         for (index, ray) in rays.iter().enumerate() {
             prop_assert!((length(ray.direction) - 1.0).abs() < 1e-15);
@@ -179,7 +189,7 @@ proptest! {
     #[test]
     fn rays_along_a_row_are_evenly_spaced_at_distance_1(columns in 2u32..80, degrees in 1.0..170.0) {
         let view = FieldOfView::new([degrees, 10.0]).unwrap();
-        let rays = Rays::pinhole(array(columns, 1), view).0;
+        let rays = Rays::pinhole(array(columns, 1), view).rays;
         let step = 2.0 * (f64::from(columns)).recip() * (degrees / 2.0f64).to_radians().tan();
         for two in rays.windows(2) {
             let [a, b] = [two[0].direction, two[1].direction];

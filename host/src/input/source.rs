@@ -1,7 +1,7 @@
 //! Where photons come from: a simulation, recorded histograms, a photon list.
 
 use anyhow::Result;
-use dtof_core::PixelAddress;
+use dtof_core::{Array, BlockLevel, PixelAddress};
 
 /// How pixel addresses lie in the array: `address = row * columns + column`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +17,19 @@ impl Geometry {
     #[must_use]
     pub const fn new(columns: u32, rows: u32) -> Self {
         Self { columns, rows }
+    }
+
+    /// The pixels of the block of `level` whose first is `first`, `first` itself at level 0.
+    /// None if no such block begins there.
+    pub fn block(
+        &self,
+        first: PixelAddress,
+        level: BlockLevel,
+    ) -> impl Iterator<Item = PixelAddress> + use<> {
+        let array = Array::new(self.columns, self.rows);
+        array
+            .into_iter()
+            .flat_map(move |array| array.pixels_of(first, level))
     }
 
     /// How many addresses the array has.

@@ -5,12 +5,15 @@
 //! same everywhere. `docs/scenes.md` lists all keys.
 
 mod comparison;
+mod depth_map;
 mod file;
+mod of_depth_map;
+mod sight;
 mod surface;
 
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
-use dtof_core::{Count, PaperRule, PixelAddress};
+use dtof_core::{Count, EchoNumber, PaperRule, PixelAddress};
 
 use crate::engine::settings::Settings;
 use crate::geometry::FieldOfView;
@@ -21,6 +24,8 @@ use crate::simulate::{MM_PER_PS, RatesAt, SimulatedArray, SimulatedPixel};
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 
+pub use depth_map::{Along, DepthMap};
+use sight::Sight;
 pub use surface::{Ball, Fan, Light, Plane, Rectangle, Shape, Surface};
 
 /// Signal photons a laser cycle that a pixel may have.
@@ -69,6 +74,8 @@ pub struct View {
     pub surface: usize,
     /// How far away it is.
     pub range_mm: f64,
+    /// How many photons come back from there.
+    pub light: Light,
 }
 
 impl Scene {
@@ -94,17 +101,18 @@ impl Scene {
     /// compared with. None if there is nothing at its place.
     #[must_use]
     pub fn truth(&self, pixel: PixelAddress, cycle: u64) -> Option<View> {
-        let (place, ray) = (self.place(pixel), self.ray(pixel));
+        let sight = self.sight(pixel);
         let seconds = self.seconds(cycle);
         let mut nearest: Option<View> = None;
         for (index, surface) in self.surfaces.iter().enumerate() {
-            let Some(range_mm) = surface.range_mm(place, ray, seconds, self.layout) else {
+            let Some(range_mm) = surface.range_mm(&sight, seconds, self.layout) else {
                 continue;
             };
             if nearest.is_none_or(|other| range_mm < other.range_mm) {
                 nearest = Some(View {
                     surface: index,
                     range_mm,
+                    light: surface.light(&sight),
                 });
             }
         }
@@ -117,9 +125,7 @@ impl Scene {
         let view = self.truth(pixel, cycle);
         Rates {
             background: self.background,
-            signal: view.map_or(0.0, |view| {
-                self.signal(self.surfaces[view.surface].light, view.range_mm)
-            }),
+            signal: view.map_or(0.0, |view| self.signal(view.light, view.range_mm)),
             position: view.map_or(0.0, |view| view.range_mm / self.mm_per_bin()),
             sigma: self.pulse_sigma_bins,
         }
@@ -185,15 +191,6 @@ impl Scene {
         Ok((0..=u16::MAX).take(pixels).map(PixelAddress))
     }
 
-    /// Column and row in the layout.
-    fn place(&self, pixel: PixelAddress) -> [f64; 2] {
-        let Geometry { columns, rows } = self.geometry;
-        let across = f64::from(self.layout.columns) / f64::from(columns);
-        let down = f64::from(self.layout.rows) / f64::from(rows);
-        let [column, row] = self.column_and_row(pixel);
-        [column * across, row * down]
-    }
-
     /// The field of view: the one given, or the default.
     #[must_use]
     pub fn view(&self) -> FieldOfView {
@@ -201,21 +198,23 @@ impl Scene {
         view.unwrap_or_else(|| FieldOfView::of(self.layout))
     }
 
-    /// The unit ray through the middle of a pixel, as `dtof export` has it.
-    fn ray(&self, pixel: PixelAddress) -> [f64; 3] {
-        let view = self.view();
-        let Geometry { columns, rows } = self.geometry;
-        let [column, row] = self.column_and_row(pixel);
-        view.ray(
-            (column + 0.5) / f64::from(columns),
-            (row + 0.5) / f64::from(rows),
-        )
-    }
-
-    fn column_and_row(&self, pixel: PixelAddress) -> [f64; 2] {
-        let columns = self.geometry.columns;
+    /// Where a pixel looks, along the ray that `dtof export` has.
+    fn sight(&self, pixel: PixelAddress) -> Sight {
+        let array = self.geometry;
         let pixel = u32::from(pixel.0);
-        [f64::from(pixel % columns), f64::from(pixel / columns)]
+        let pixel = [pixel % array.columns, pixel / array.columns];
+        let [column, row] = pixel.map(f64::from);
+        let (columns, rows) = (f64::from(array.columns), f64::from(array.rows));
+        let view = self.view();
+        Sight {
+            pixel,
+            array,
+            place: [
+                column * (f64::from(self.layout.columns) / columns),
+                row * (f64::from(self.layout.rows) / rows),
+            ],
+            ray: view.ray((column + 0.5) / columns, (row + 0.5) / rows),
+        }
     }
 
     fn seconds(&self, cycle: u64) -> f64 {
@@ -260,10 +259,11 @@ impl Scene {
                 "{}: comes as near as {nearest:.1} mm; must stay {NEAREST_MM} mm away",
                 surface.name
             );
-            let signal = self.signal(surface.light, nearest);
+            let (light, from_mm) = surface.brightest(nearest);
+            let signal = self.signal(light, from_mm);
             ensure!(
                 signal <= MOST_SIGNAL,
-                "{}: {signal:.0} signal photons a laser cycle from {nearest:.1} mm; must be at most \
+                "{}: {signal:.0} signal photons a laser cycle from {from_mm:.1} mm; must be at most \
                  {MOST_SIGNAL:.0}",
                 surface.name
             );
@@ -286,6 +286,9 @@ pub fn settings(seed: u64) -> Settings {
         l1: 100,
         l2: 2000,
         x: 10,
+        binning: None,
+        tracking: false,
+        echoes: EchoNumber::FIRST,
         one_hit_tdc: false,
         frame: None,
         seed,

@@ -8,7 +8,6 @@ use dtof::events::output::Output;
 use dtof::events::summary::Summary;
 use dtof::input::photon_csv::PhotonCsv;
 use dtof::simulate::scene;
-use dtof_core::Statistics;
 
 const PHOTONS: &str = "pixel,cycle,bin\n0,0,0\n";
 const SCENE: &str = "cycles = 100\n[[surface]]\nrange_mm = 1000\nsignal = 1\n";
@@ -137,7 +136,7 @@ fn a_folder_that_cannot_be_completed_is_left_as_it_was() {
     let source = PhotonCsv::open(&photons, 128, None, 1).unwrap();
     let settings = scene::settings(1);
     let out = scratch.path("out");
-    let summary = Summary::new(&Statistics::default(), &source, 0, &settings);
+    let summary = Summary::new(Default::default(), &source, 0, &settings);
     let before = scratch.read("out/summary.json");
     let finish = |come: &dyn Fn()| {
         let output = Output::create(&out, &settings, &source, None).unwrap();

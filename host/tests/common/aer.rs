@@ -5,8 +5,8 @@ use dtof::export::{Exported, Format, Options, export};
 use dtof::input::source::Geometry;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
-    BinIndex, BinPosition, Count, DepthEvent, DynamicDepthEvent, Flags, LaserCycle, PixelAddress,
-    SubBinOffset,
+    BinIndex, BinPosition, BlockLevel, Count, DepthEvent, DynamicDepthEvent, EchoNumber, Flags,
+    LaserCycle, PixelAddress, SubBinOffset,
 };
 
 use super::{Scratch, names};
@@ -33,6 +33,8 @@ pub fn depth(pixel: u16, cycle: u64, bin: u16) -> Event {
 pub fn depth_event(pixel: u16, cycle: u64, bin: u16) -> DepthEvent {
     DepthEvent {
         pixel: PixelAddress(pixel),
+        level: BlockLevel::PIXEL,
+        echo: EchoNumber::FIRST,
         cycle: LaserCycle(cycle),
         exposure: 44,
         peak_bin: BinIndex::saturating(bin),
@@ -48,6 +50,7 @@ pub fn dynamic(pixel: u16, cycle: u64, bin: i32, change: i32) -> Event {
     Event::DynamicDepth(
         DynamicDepthEvent::new(
             PixelAddress(pixel),
+            BlockLevel::PIXEL,
             LaserCycle(cycle),
             BinPosition::new(bin * 256).unwrap(),
             change * 256,

@@ -15,10 +15,14 @@ use dtof::engine::settings::Settings;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::scene;
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{Count, DepthEvent, PixelAddress, WindowRule};
+use dtof_core::{BlockLevel, Count, DepthEvent, EchoNumber, PixelAddress, WindowRule};
 use dtof_firmware::sidecar::Sidecar;
+use dtof_link::AdaptiveBinning;
 
 const PIXELS: usize = 64;
+/// As many as an array of 8x8 pixels has in three levels.
+const BLOCKS: usize = 21;
+const ARRAY: Geometry = Geometry::new(8, 8);
 
 fn settings() -> Settings {
     scene::settings(1)
@@ -41,8 +45,9 @@ fn device(lives: Option<Duration>) -> String {
     let mut lives = lives.unwrap_or(Duration::MAX);
     listen(move |stream| {
         let mut pixels = heapless::Vec::<_, PIXELS>::new();
+        let mut blocks = heapless::Vec::<_, BLOCKS>::new();
         let mut on = |lives| {
-            let mut sidecar = Sidecar::new(&mut pixels, None);
+            let mut sidecar = Sidecar::new(&mut pixels, &mut blocks, None);
             serve(stream, &mut sidecar, lives, |_, _| {})
         };
         while let Ok(true) = on(lives) {
@@ -64,6 +69,21 @@ fn events(engine: &mut dyn Engine, cycles: u64) -> anyhow::Result<Vec<DepthEvent
     Ok(events)
 }
 
+/// Blocks of three levels, tracking and two echoes as well.
+fn with_all() -> Settings {
+    Settings {
+        binning: Some(AdaptiveBinning {
+            levels: BlockLevel::saturating(3),
+            patience: 50,
+        }),
+        tracking: true,
+        echoes: EchoNumber::new(2).unwrap(),
+        sigma_bins: Some(U8F8::lit("1")),
+        l2: 300,
+        ..with_windows()
+    }
+}
+
 fn addresses(pixels: u16) -> Vec<PixelAddress> {
     (0..pixels).map(PixelAddress).collect()
 }
@@ -79,14 +99,14 @@ fn same_events(
     let mut client = client(&device(None));
     assert_eq!((client.bins(), client.pixels()), (128, 64));
     client.reads_every = reads_every;
-    let mut on_device = DeviceEngine::new(client, settings, &addresses(64)).unwrap();
-    let mut on_host = host_engine(settings, &addresses(64)).unwrap();
+    let mut on_device = DeviceEngine::new(client, settings, ARRAY, &addresses(64)).unwrap();
+    let mut on_host = host_engine(settings, ARRAY, &addresses(64)).unwrap();
     let expected = events(on_host.as_mut(), cycles).unwrap();
     let actual = events(&mut on_device, cycles).unwrap();
     assert!(!expected.is_empty() && actual == expected);
     assert_eq!(on_device.statistics(), on_host.statistics());
     assert_eq!(on_device.report().cycles, cycles);
-    assert!(on_device.statistics().counted >= at_least);
+    assert!(on_device.statistics()[0].counted >= at_least);
     actual
 }
 
@@ -121,10 +141,23 @@ fn every_rule_and_estimator_gives_the_same_events_on_a_device() {
 }
 
 #[test]
+fn blocks_tracking_and_echoes_are_the_same_on_a_device() {
+    for (cycles, reads_every) in [(1_500, 0), (500, 20)] {
+        let reads_every = Duration::from_millis(reads_every);
+        let events = same_events(&with_all(), cycles, reads_every, 10_000);
+        let of_level = |level| events.iter().filter(move |of| of.level.raw() == level);
+        for level in 0..=3 {
+            assert!(of_level(level).count() > 0, "level {level}");
+        }
+        assert!(events.iter().any(|event| event.echo.raw() == 2));
+    }
+}
+
+#[test]
 fn a_configuration_the_device_cannot_take_is_refused_with_its_reason() {
     let name = device(None);
     let refused = |settings: &Settings, pixels: u16| {
-        let engine = DeviceEngine::new(client(&name), settings, &addresses(pixels));
+        let engine = DeviceEngine::new(client(&name), settings, ARRAY, &addresses(pixels));
         format!("{:#}", engine.err().expect("refused"))
     };
     let mut settings = settings();
@@ -133,12 +166,26 @@ fn a_configuration_the_device_cannot_take_is_refused_with_its_reason() {
     let reason = refused(&settings, 64);
     says(&reason, "refuses");
     says(&reason, "L2 must be greater than L1");
+    settings.l2 = 2_000;
+    settings.tracking = true;
+    says(&refused(&settings, 64), "tracking needs the window rule");
+    settings.tracking = false;
+    // One column of 64 pixels has 32, 16 and 8 blocks.
+    settings.binning = with_all().binning;
+    let column = DeviceEngine::new(
+        client(&name),
+        &settings,
+        Geometry::new(1, 64),
+        &addresses(64),
+    );
+    let reason = format!("{:#}", column.err().expect("refused"));
+    says(&reason, "no room for the blocks of pixels");
 }
 
 #[test]
 fn a_device_that_restarts_is_noticed() {
     let name = device(Some(Duration::from_millis(200)));
-    let mut engine = DeviceEngine::new(client(&name), &settings(), &addresses(64)).unwrap();
+    let mut engine = DeviceEngine::new(client(&name), &settings(), ARRAY, &addresses(64)).unwrap();
     let error = loop {
         if let Err(error) = events(&mut engine, 250) {
             break error;

@@ -15,7 +15,7 @@ use dtof::device::Client;
 use dtof::device::monitor::{Outputs, Task, monitor};
 use dtof::engine::host::host_engine;
 use dtof::events::events_csv;
-use dtof::input::source::{Photon, PixelPhotons, Slice};
+use dtof::input::source::{Geometry, Photon, PixelPhotons, Slice};
 use dtof_core::fixed::types::{U0F32, U8F24, U16F16, U24F8};
 use dtof_core::{DepthEvent, DynamicDepthPixel, PixelAddress, Reference};
 use dtof_firmware::sidecar::Sidecar;
@@ -93,7 +93,9 @@ fn device_of(
     };
     let name = listen(move |stream| {
         let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
-        let mut sidecar = Sidecar::new(&mut pixels, has_sensor.then(|| sensor.about()));
+        let mut blocks = heapless::Vec::<_, 1>::new();
+        let about = has_sensor.then(|| sensor.about());
+        let mut sidecar = Sidecar::new(&mut pixels, &mut blocks, about);
         let poll = |sidecar: &mut Sidecar<'_>, now| {
             sensor.asked = false;
             sidecar.poll_sensor(&mut sensor, now);
@@ -133,7 +135,7 @@ fn reference_events() -> Vec<DepthEvent> {
         let Ok(_) = sensor.poll(now_ms, &mut photons);
         now_ms += 10;
     }
-    let mut engine = host_engine(&settings(), &addresses).unwrap();
+    let mut engine = host_engine(&settings(), Geometry::new(4, 1), &addresses).unwrap();
     let slice = Slice {
         first_cycle: 0,
         pixels: photons.0,
@@ -174,6 +176,7 @@ fn watch(
     let task = Task {
         settings: &settings(),
         pixels: PIXELS,
+        columns: 2,
         dynamic_depth,
     };
     let mut outputs = Outputs {
@@ -294,7 +297,7 @@ fn ctrl_c_stops_the_sensor() {
         assert!(sent.success());
         // What comes until then is whole.
         for row in events {
-            assert_eq!(row.unwrap().split(',').count(), 9);
+            assert_eq!(row.unwrap().split(',').count(), 11);
         }
         assert!(monitor.wait().unwrap().success());
         assert!(rests.recv_timeout(LONG).unwrap());

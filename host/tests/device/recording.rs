@@ -15,10 +15,10 @@ use dtof::device::monitor::map::LiveMap;
 use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::device::{Client, Port};
 use dtof::events::aer_file::{Event, Header, Reader};
-use dtof_core::AerEncoder;
+use dtof_core::{AER_VERSION, AerEncoder};
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
-use dtof_link::message::greeting;
+use dtof_link::message::{LINK_VERSION, greeting};
 use dtof_link::{Configuration, Report, Source, message};
 
 const PIXELS: u16 = 4;
@@ -128,6 +128,24 @@ struct Monitored {
     error: Option<String>,
 }
 
+/// A device of these versions that sends events from `pixel`.
+fn device(versions: [u16; 2], pixel: u16, lives: u64) -> Device {
+    let mut greeting = greeting(128, PIXELS);
+    for (place, version) in greeting.chunks_exact_mut(2).zip(versions) {
+        place.copy_from_slice(&version.to_le_bytes());
+    }
+    Device {
+        endpoint: Endpoint::device(greeting),
+        deframer: Deframer::new(),
+        encoder: AerEncoder::new(),
+        pixel,
+        lives,
+        answers: VecDeque::new(),
+        now_ms: 0,
+        sent: Rc::default(),
+    }
+}
+
 fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("events.aer");
@@ -135,18 +153,9 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
         geometry: array(PIXELS, None),
         ..HEADER
     };
-    let sent = Rc::default();
-    let mut client = Client::new(Box::new(Device {
-        endpoint: Endpoint::device(greeting(128, PIXELS)),
-        deframer: Deframer::new(),
-        encoder: AerEncoder::new(),
-        pixel,
-        lives,
-        answers: VecDeque::new(),
-        now_ms: 0,
-        sent: Rc::clone(&sent),
-    }))
-    .unwrap();
+    let device = device([LINK_VERSION, AER_VERSION], pixel, lives);
+    let sent = Rc::clone(&device.sent);
+    let mut client = Client::new(Box::new(device)).unwrap();
     let mut recording = Recording::new(&path, &[], &header).unwrap();
     let screen = Screen::default();
     let room = Box::new(|| (24, 80));
@@ -154,6 +163,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
     let task = Task {
         settings: &settings(),
         pixels: PIXELS,
+        columns: 2,
         dynamic_depth: None,
     };
     let ended = monitor(
@@ -215,4 +225,17 @@ fn a_pixel_the_device_was_not_configured_for_ends_it() {
         "the device sends an event of pixel 4, and has 4 pixels"
     );
     assert_eq!(run.recorded, []);
+}
+
+#[test]
+fn a_device_of_another_version_is_refused_by_both_versions() {
+    for versions in [[3, AER_VERSION], [LINK_VERSION, 2], [3, 2], [5, 4]] {
+        let client = Client::new(Box::new(device(versions, 0, 1)));
+        let [link, aer] = versions;
+        let expected = format!(
+            "the device speaks link version {link} and AER version {aer}, \
+             this program {LINK_VERSION} and {AER_VERSION}"
+        );
+        assert_eq!(client.err().expect("refused").to_string(), expected);
+    }
 }

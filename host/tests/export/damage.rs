@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::event_camera::{changes, evt2, mcap};
+use super::event_camera::{evt2, mcap};
 use crate::common::aer::{HEADER, below, byte_of, depth, dynamic, events, exported, file};
 use crate::common::{Scratch, names, says};
 use dtof::events::aer_file::{Event, Header};
@@ -17,7 +17,7 @@ fn points(format: Format, bytes: &[u8]) -> u64 {
         line.unwrap().parse::<usize>().unwrap()
     };
     let records = |end: &str, said: usize| {
-        assert_eq!(below(bytes, end).len(), said * 29);
+        assert_eq!(below(bytes, end).len(), said * 31);
         said
     };
     let points = match format {
@@ -60,7 +60,9 @@ fn what_comes_before_the_end_of_a_cut_file_is_exported_whole() {
         Format::Evt2 => evt2(out).len() as u64,
         _ => mcap(out).0,
     };
-    cut_anywhere(&changes(), &[Format::Evt2, Format::Mcap], count);
+    let near = (0..9).map(|index| dynamic(index * 200, u64::from(index) * 5000, 40, 1));
+    let changes: Vec<Event> = near.chain([dynamic(2047, 1 << 20, 60, -1)]).collect();
+    cut_anywhere(&changes, &[Format::Evt2, Format::Mcap], count);
 }
 
 #[test]
@@ -139,7 +141,7 @@ fn what_comes_before_a_time_that_is_damaged_is_exported_whole() {
     events.push(dynamic(7, 1 << 21, 40, 1));
     let mut bytes = file(&HEADER, &events);
     // A time word, 1,000 events, a time word: 2^60 laser cycles.
-    bytes[byte_of(1001) + 13] = 1;
+    bytes[byte_of(1001) + 13] = 0x10;
     let formats = [Format::Pcd, Format::Ply, Format::Mcap, Format::Evt2];
     for (format, name) in formats.into_iter().zip(["PCD", "PLY", "MCAP", "EVT2"]) {
         // The rest may be there, or not.

@@ -61,7 +61,7 @@ fn statistics(bytes: &[u8]) -> Vec<serde_json::Value> {
     messages(bytes, "/statistics").iter().map(parse).collect()
 }
 
-/// Ten changes, one of them in the laser cycle of another time word.
+/// Ten changes, far apart.
 pub fn changes() -> Vec<Event> {
     let near = (0..9).map(|index| dynamic(index * 200, u64::from(index) * 50_000, 40, 1));
     near.chain([dynamic(2047, 1 << 20, 60, -1)]).collect()

@@ -4,6 +4,7 @@
 mod common;
 
 mod damage;
+mod echoes;
 mod event_camera;
 #[cfg(target_os = "linux")]
 mod memory;

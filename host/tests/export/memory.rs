@@ -10,7 +10,7 @@ use crate::common::Scratch;
 use crate::common::aer::{HEADER, depth};
 use dtof::events::aer_file::Writer;
 
-const FORMATS: [&str; 5] = ["csv", "pcd", "ply", "mcap", "evt2"];
+const FORMATS: [&str; 6] = ["csv", "csv --echo strongest", "pcd", "ply", "mcap", "evt2"];
 
 /// A file of so many events from all pixels, a change of depth each now and then.
 fn write(path: &Path, events: u64) {

@@ -5,14 +5,14 @@ use crate::common::{Scratch, says, table};
 use dtof::events::aer_file::EventKind;
 use dtof::export::{Format, Options};
 
-/// A record: x, y, z, value, pixel, flags, time.
-fn record(bytes: &[u8]) -> ([f32; 4], u32, u8, f64) {
+/// A record: x, y, z, value, pixel; flags, level, echo; time.
+fn record(bytes: &[u8]) -> ([f32; 4], u32, [u8; 3], f64) {
     let four = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
     (
         [four(0), four(4), four(8), four(12)],
         u32::from_le_bytes(bytes[16..20].try_into().unwrap()),
-        bytes[20],
-        f64::from_le_bytes(bytes[21..29].try_into().unwrap()),
+        [bytes[20], bytes[21], bytes[22]],
+        f64::from_le_bytes(bytes[23..31].try_into().unwrap()),
     )
 }
 
@@ -55,10 +55,10 @@ fn pcd_and_ply_hold_the_same_records() {
     let pcd_header = "\
 # .PCD v0.7 - Point Cloud Data file format
 VERSION 0.7
-FIELDS x y z intensity pixel flags t_ns
-SIZE 4 4 4 4 4 1 8
-TYPE F F F F U U F
-COUNT 1 1 1 1 1 1 1
+FIELDS x y z intensity pixel flags level echo t_ns
+SIZE 4 4 4 4 4 1 1 1 8
+TYPE F F F F U U U U F
+COUNT 1 1 1 1 1 1 1 1 1
 WIDTH 12
 HEIGHT 1
 VIEWPOINT 0 0 0 1 0 0 0
@@ -76,20 +76,25 @@ property float z
 property float intensity
 property uint pixel
 property uchar flags
+property uchar level
+property uchar echo
 property double t_ns
 end_header
 ";
     let pcd = pcd.strip_prefix(pcd_header.as_bytes()).unwrap();
     let ply = ply.strip_prefix(ply_header.as_bytes()).unwrap();
     assert_eq!(pcd, ply);
-    assert_eq!(pcd.len(), 12 * 29);
+    assert_eq!(pcd.len(), 12 * 31);
     let csv = String::from_utf8(csv).unwrap();
-    for ((bytes, event), line) in pcd.chunks(29).zip(events()).zip(csv.lines().skip(1)) {
+    for ((bytes, event), line) in pcd.chunks(31).zip(events()).zip(csv.lines().skip(1)) {
         let ([x, y, z, intensity], pixel, flags, time) = record(bytes);
         let columns: Vec<&str> = line.split(',').collect();
         let point = [1, 2, 3].map(|index| columns[index].parse::<f32>().unwrap());
         assert_eq!([x, y, z], point);
-        assert_eq!((intensity, pixel, flags), (37.0, event.pixel().0.into(), 4));
+        assert_eq!(
+            (intensity, pixel, flags),
+            (37.0, event.pixel().0.into(), [4, 0, 1])
+        );
         assert_eq!(time, event.cycle().0 as f64 * 100.0);
     }
 }
@@ -100,12 +105,12 @@ fn changes_of_depth_are_points_at_the_mean() {
     let (_, pcd) = exported(&file(&HEADER, &events), Format::Pcd, &Options::default());
     let (_, csv) = exported(&file(&HEADER, &events), Format::Csv, &Options::default());
     let header = String::from_utf8_lossy(&pcd);
-    says(&header, "FIELDS x y z change pixel flags t_ns");
-    let ([x, y, z, change], pixel, ..) = record(&pcd[pcd.len() - 58..]);
+    says(&header, "FIELDS x y z change pixel flags level echo t_ns");
+    let ([x, y, z, change], pixel, ..) = record(&pcd[pcd.len() - 62..]);
     let metres = (40.0 * 250.0 * 0.149_896_229 - 12.5) / 1000.0;
     assert!((f64::from(x.hypot(y).hypot(z)) - metres).abs() < 1e-5);
     assert!((change + 0.112_422).abs() < 1e-5 && pixel == 5, "{change}");
-    let columns = b"time_us,x_m,y_m,z_m,cycle,pixel,polarity,range_mm,change_mm,flags\n";
+    let columns = b"time_us,x_m,y_m,z_m,cycle,pixel,polarity,range_mm,change_mm,flags,level\n";
     assert!(csv.starts_with(columns));
 }
 

@@ -3,10 +3,10 @@
 use std::fmt::Write;
 use std::process::Output;
 
-use crate::common::{Scratch, says, succeeded};
+use crate::common::{Scratch, npy, says, succeeded};
 
 const HEADER: &str =
-    "cycle,pixel,exposure,peak_bin,depth_bins,range_mm,peak_count,background,flags\n";
+    "cycle,pixel,exposure,peak_bin,depth_bins,range_mm,peak_count,background,flags,level,echo\n";
 
 /// One photon a laser cycle, all in the same bin.
 fn steady(pixel: u16, bin: u16, cycles: u64) -> String {
@@ -24,7 +24,8 @@ fn a_steady_pixel_reports_when_the_flow_chart_says() {
     let summary = scratch.replayed(&input, "--alpha 8 --x 4 --l1 40 --l2 2000");
     // N = 44 is the first multiple of 4 above 40; cycles count from 0. All in
     // bin 60 puts the centroid at 60.5 bins of 37.474 mm.
-    let expected = "43,7,44,60,60.5000,2267.180,44,0,0\n87,7,44,60,60.5000,2267.180,44,0,0\n";
+    let expected =
+        "43,7,44,60,60.5000,2267.180,44,0,0,0,1\n87,7,44,60,60.5000,2267.180,44,0,0,0,1\n";
     assert_eq!(
         scratch.read("out/events.csv"),
         format!("{HEADER}{expected}")
@@ -92,15 +93,6 @@ fn only_the_first_cycles_are_replayed_and_the_rest_is_counted() {
     let summary = scratch.replayed(&input, "--cycles 100");
     assert_eq!([&summary["cycles"], &summary["photons"]], [100, 100]);
     assert_eq!(summary["not_replayed"], 400);
-}
-
-/// Histograms as NumPy writes them.
-fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
-    let mut header =
-        format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}").into_bytes();
-    header.resize(117, b' ');
-    header.push(b'\n');
-    [b"\x93NUMPY\x01\x00\x76\x00", &header[..], data].concat()
 }
 
 #[test]
@@ -278,7 +270,7 @@ fn replay_takes_the_stated_defaults_and_keeps_quiet() {
     let summary = scratch.summary();
     let settings = serde_json::json!({
         "bins": 128, "bin_width_ps": 250.0, "offset_mm": 0.0, "gate": null, "rule": "paper", "alpha": 4.0, "estimator": "centroid",
-        "min_count": 5, "l1": 40, "l2": 2000, "x": 4, "one_hit_tdc": false, "seed": 1
+        "min_count": 5, "l1": 40, "l2": 2000, "x": 4, "binning": 0, "tracking": false, "echoes": 1, "one_hit_tdc": false, "seed": 1
     });
     assert_eq!(summary["settings"], settings);
     let histogram = npy("<u4", "(8,)", &10_000u32.to_le_bytes().repeat(8));

@@ -3,6 +3,8 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod depth;
+mod echoes;
 mod files;
 mod refused;
 mod truth;

@@ -46,7 +46,7 @@ struct Flash {
 pub fn demo() -> Result<String> {
     let (scene, settings) = (Scene::demo()?, scene::settings(1));
     let mut photons = scene.photons(settings.seed, CYCLES.into())?;
-    let mut engine = host_engine(&settings, &photons.addresses())?;
+    let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses())?;
     let slice = photons.next_slice(CYCLES)?;
     let events = engine.run(&slice)?;
     let scale: RangeScale = settings.range_scale()?;

@@ -12,7 +12,7 @@ use dtof_softcore::{golden, io::Printer, program};
 const WRONG: [u8; golden::EXPECTED.len()] = {
     let mut wrong = [0; golden::EXPECTED.len()];
     wrong.copy_from_slice(golden::EXPECTED);
-    wrong[165] ^= 1;
+    wrong[195] ^= 1;
     wrong
 };
 

@@ -1,20 +1,20 @@
 //! Settings of the window rule for a wanted rate of false alarms.
 //!
-//! Window and estimator are those that suit the pulse, z is that of [`z_for`]. Of all L1
+//! Window and estimator are those that suit the pulse, z is that of [`z_for_levels`]. Of all L1
 //! the one with the shortest mean time to an event is taken, of those whose first look
-//! has a background that [`z_for`] holds for if there are any. False alarms are counted
+//! has a background that it holds for if there are any. False alarms are counted
 //! in simulated exposures without a target.
 
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{Count, DepthEstimator, HIGHEST_Z, RangeGate, WindowRule, z_for};
+use dtof_core::{Count, DepthEstimator, HIGHEST_Z, RangeGate, WindowRule, z_for_levels};
 
 use super::shortest::{false_alarms, shortest};
 use super::{Request, candidates, check};
 use crate::looks::detections::{Decisions, Detections};
 use crate::looks::exposure::Looks;
 
-/// Background counts a bin at the first look that [`z_for`] holds for.
+/// Background counts a bin at the first look that [`z_for_levels`] holds for.
 const BACKGROUND: std::ops::RangeInclusive<f64> = 0.4..=200.0;
 
 /// The settings and what to expect of them.
@@ -32,13 +32,14 @@ pub struct Tuned {
     pub l1: u16,
     /// How the depth is found.
     pub estimator: DepthEstimator,
-    /// Exposures without a target that were simulated, and those with an event.
+    /// Exposures of a pixel without a target that were simulated, and those with an event. Of
+    /// blocks come a third as many.
     pub false_alarms: (u64, u64),
     /// Exposures simulated with the target.
     pub detections: Detections,
 }
 
-/// The exposures of which `share` is one, rounded up: what [`z_for`] takes. Limited to what
+/// The exposures of which `share` is one, rounded up: what [`z_for_levels`] takes. Limited to what
 /// a `u32` holds.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
@@ -76,7 +77,7 @@ pub fn tune(request: &Request) -> Result<Tuned> {
             one_in >= 10,
             "a false alarm in {one_in} exposures: there is a z for one in 10 or fewer"
         );
-        let z = z_for(one_in, &gate, request.x, l1, request.l2);
+        let z = z_for_levels(one_in, &gate, request.x, l1, request.l2, request.levels);
         ensure!(
             z < HIGHEST_Z,
             "a false alarm in {one_in} exposures: there is no z for so few"

@@ -26,16 +26,18 @@ use core::panic::PanicInfo;
 use core::ptr;
 
 use dtof_core::{
-    AerDecoder, AerEncoder, AerWord, AnyRule, AsyncPixel, BinIndex, BinPosition, ComparatorTree,
-    Count, Count10, Count16, Count24, CounterWidth, DetectionRule, DynamicDepthConfig,
-    DynamicDepthPixel, Flags, Histogram, Peak, RangeGate, Reference, Reflectivity, RunningMean,
-    Statistics, SubBinOffset, Threshold, centroid, detect, isqrt, quadrant_background, z_for,
+    AerDecoder, AerEncoder, AerWord, AnyRule, Array, AsyncPixel, BinIndex, BinPosition, Binning,
+    Block, BlockLevel, ComparatorTree, Count, Count10, Count16, Count24, CounterWidth,
+    DetectionRule, DynamicDepthConfig, DynamicDepthPixel, EchoNumber, Feed, Flags, Histogram, Peak,
+    PeeledBins, RangeGate, Reference, Reflectivity, RunningMean, Statistics, SubBinOffset,
+    Threshold, centroid, count_in_blocks, detect, end_laser_cycles_of_blocks, isqrt,
+    quadrant_background, z_for, z_for_levels,
 };
 
 use values::{
     Link, address, alpha, average_rule, background_level, bin, byte, change, count, cycle,
-    distance, double, estimator, event, flags, gate, half, keep, millimetres, more, or_text,
-    position, rule, scale, settings, some, values, window_rule, word,
+    distance, double, echo, estimator, event, flags, gate, half, keep, level, millimetres, more,
+    or_text, position, rule, scale, settings, some, values, window_rule, word,
 };
 
 #[allow(unsafe_code, reason = "the linker knows the entry by this name")]
@@ -56,6 +58,7 @@ extern "C" fn _start() -> ! {
 fn for_bins<const BINS: usize>() {
     gates::<BINS>();
     trees::<BINS>();
+    blocks::<BINS>();
     for_width::<BINS, Count10>();
     for_width::<BINS, Count16>();
     for_width::<BINS, Count24>();
@@ -64,6 +67,7 @@ fn for_bins<const BINS: usize>() {
 fn for_width<const BINS: usize, W: CounterWidth>() {
     thresholds::<W>();
     histograms::<BINS, W>();
+    peels::<BINS, W>();
     pixels::<BINS, W>();
 }
 
@@ -73,6 +77,8 @@ fn units() {
     keep((BinIndex::new(half()), bin()));
     keep(SubBinOffset::new(half().cast_signed()));
     keep(Flags::from_bits(byte()));
+    keep((EchoNumber::new(byte()), echo(), echo().raw()));
+    keep((BlockLevel::new(byte()), level(), level().pixels()));
     keep(flags().contains(flags()));
     keep(position().raw());
     keep(BinPosition::new(word().cast_signed()));
@@ -222,8 +228,85 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
 }
 
 #[inline(never)]
+fn peels<const BINS: usize, W: CounterWidth>() {
+    let gate = gate::<BINS>();
+    let mut histogram = Histogram::<BINS, W>::new();
+    let mut peeled = PeeledBins::new(byte());
+    while more() {
+        histogram.add_batch(some(&values::<u16, 16>(half)));
+        peeled.push(bin());
+        keep((
+            peeled.echoes(),
+            peeled.contains(half()),
+            peeled.is_tail(bin()),
+        ));
+        keep((peeled.touches(half(), half()), peeled.bins_left(&gate)));
+        keep(peeled.empty(&mut histogram));
+        let (bin, count) = (bin(), count());
+        let peak = Peak { bin, count };
+        keep(rule().detect_without(&histogram, &gate, peak, &peeled));
+        keep(average_rule().detect_without(&histogram, &gate, peak, &peeled));
+        if let Some(rule) = window_rule() {
+            keep(rule.detect_without(&histogram, &gate, peak, &peeled));
+        }
+    }
+    keep(histogram);
+}
+
+/// Arrays of any shape, pixels and first pixels of blocks that may lie in none.
+#[inline(never)]
+fn blocks<const BINS: usize>() {
+    let Some(array) = Array::new(word(), word()) else {
+        return;
+    };
+    keep((array.columns(), array.rows(), array.pixels()));
+    keep((array.blocks(level()), array.block_of(address(), level())));
+    let first = array.first_of(word(), level());
+    array.pixels_of(first, level()).for_each(keep);
+    array.pixels_of(address(), level()).for_each(keep);
+    let Some(binning) = Binning::new(array, level()) else {
+        return;
+    };
+    keep((binning.number_of_blocks(), Feed::NONE));
+    let mut feed = binning.feed_of(address());
+    let rule = window_rule().map_or(AnyRule::from(rule()), AnyRule::from);
+    let rule = rule.of_blocks(level());
+    let tracking = rule.tracking(&gate::<BINS>());
+    let Some(config) = or_text(settings::<BINS, _>(rule).tracking(tracking).build()) else {
+        return;
+    };
+    for place in binning.blocks() {
+        let mut blocks = [Block::new(place)];
+        let mut statistics = Statistics::default();
+        while more() {
+            count_in_blocks(&mut blocks, &feed, &config, half());
+            let (cycle, cycles) = (cycle(), half());
+            let look =
+                end_laser_cycles_of_blocks(&mut blocks, &config, &mut statistics, cycle, cycles);
+            keep(look);
+            feed.tick(more());
+            feed.reported();
+            keep(feed.block());
+            let [block] = &mut blocks;
+            block.tick();
+            keep((block.request(), block.acknowledge()));
+            keep((block.pixel().level(), block.pixel().address()));
+        }
+        keep(statistics);
+    }
+}
+
+#[inline(never)]
 fn pixels<const BINS: usize, W: CounterWidth>() {
     keep(z_for::<BINS>(word(), &gate(), half(), half(), half()));
+    keep(z_for_levels::<BINS>(
+        word(),
+        &gate(),
+        half(),
+        half(),
+        half(),
+        level(),
+    ));
     pixels_with::<BINS, W, _>(rule());
     pixels_with::<BINS, W, _>(average_rule());
     if let Some(rule) = window_rule() {
@@ -245,7 +328,15 @@ fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(rule: R) {
     }
     keep((config.x(), config.l1(), config.l2()));
     keep((*config.gate(), *config.rule(), *config.estimator()));
-    keep(config.is_one_hit());
+    keep((config.is_one_hit(), config.echoes(), config.peel_reach()));
+    keep(
+        config
+            .tracking()
+            .map(|tracking| (*tracking.near(), *tracking.far())),
+    );
+    let mut histogram = Histogram::<BINS, W>::new();
+    histogram.add_batch(some(&values::<u16, 16>(half)));
+    config.detect_echoes(&mut histogram, |echo, detection| keep((echo, *detection)));
     let config = &config;
     let mut statistics = Statistics::default();
     let mut pixel = AsyncPixel::<BINS, W>::new(address());

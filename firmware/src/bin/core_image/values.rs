@@ -7,9 +7,10 @@ use core::sync::atomic::AtomicU32;
 
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
-    AverageRule, BinIndex, BinPosition, CentredWindow, Count, DepthEstimator, DepthEvent,
-    DetectionRule, DynamicDepthEvent, Flags, LaserCycle, PaperRule, PixelAddress, PixelConfig,
-    PixelConfigBuilder, RangeGate, RangeScale, SubBinOffset, WindowRule, whole_background,
+    AverageRule, BinIndex, BinPosition, BlockLevel, CentredWindow, Count, DepthEstimator,
+    DepthEvent, DetectionRule, DynamicDepthEvent, EchoNumber, Flags, LaserCycle, PaperRule,
+    PixelAddress, PixelConfig, PixelConfigBuilder, RangeGate, RangeScale, SubBinOffset, Tracking,
+    WindowRule, whole_background,
 };
 
 /// Valid or not.
@@ -21,6 +22,8 @@ pub fn settings<const BINS: usize, R: DetectionRule>(rule: R) -> PixelConfigBuil
         .gate(gate())
         .estimator(estimator())
         .one_hit_tdc(more())
+        .tracking(more().then(|| Tracking::new(rule, rule, half())))
+        .echoes(echo(), byte())
 }
 
 pub fn gate<const BINS: usize>() -> RangeGate<BINS> {
@@ -70,6 +73,8 @@ pub fn background_level() -> U24F8 {
 pub fn event() -> DepthEvent {
     DepthEvent {
         pixel: address(),
+        level: level(),
+        echo: echo(),
         cycle: cycle(),
         exposure: half(),
         peak_bin: bin(),
@@ -83,7 +88,14 @@ pub fn event() -> DepthEvent {
 /// Out of range as often as not.
 pub fn change() -> Option<DynamicDepthEvent> {
     let position = BinPosition::new(word().cast_signed())?;
-    DynamicDepthEvent::new(address(), cycle(), position, word().cast_signed(), flags())
+    DynamicDepthEvent::new(
+        address(),
+        level(),
+        cycle(),
+        position,
+        word().cast_signed(),
+        flags(),
+    )
 }
 
 pub fn distance() -> U24F8 {
@@ -138,6 +150,14 @@ pub fn some<T>(all: &[T]) -> &[T] {
 
 pub fn values<T, const N: usize>(one: fn() -> T) -> [T; N] {
     array::from_fn(|_| one())
+}
+
+pub fn level() -> BlockLevel {
+    BlockLevel::saturating(byte())
+}
+
+pub fn echo() -> EchoNumber {
+    EchoNumber::new(byte()).unwrap_or(EchoNumber::FIRST)
 }
 
 pub fn byte() -> u8 {

@@ -36,8 +36,12 @@ impl Tune {
         ]);
         lines.extend(self.expected(request, &tuned.detections));
         // All digits: fewer may be another multiple of the smallest step.
+        let binning = match self.binning {
+            0 => String::new(),
+            levels => format!(" --binning {levels}"),
+        };
         let options = format!(
-            "--rule window --sigma-bins {} --z {} --l1 {}",
+            "--rule window --sigma-bins {} --z {} --l1 {}{binning}",
             tuned.sigma.to_num::<f64>(),
             tuned.z.to_num::<f64>(),
             tuned.l1

@@ -6,9 +6,10 @@
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-use dtof_core::RangeScale;
+use dtof_core::{BlockLevel, EchoNumber, RangeScale};
 
 use crate::events::aer_file::Event;
+use crate::input::source::Geometry;
 use dtof_draw::palette;
 use dtof_draw::picture::{levels, span};
 
@@ -30,8 +31,10 @@ pub type Room = Box<dyn Fn() -> (usize, usize)>;
 pub struct LiveMap {
     out: Box<dyn Write>,
     room: Room,
-    columns: usize,
+    array: Geometry,
     ranges: Vec<Option<f64>>,
+    /// For each pixel the level of the event it shows, and the laser cycle after it.
+    shown: Vec<(BlockLevel, u64)>,
     /// The text below the picture.
     line: String,
     /// Lines that are there from the last time, and the room there was.
@@ -45,11 +48,15 @@ impl LiveMap {
     #[must_use]
     pub fn new(out: Box<dyn Write>, room: Room, pixels: u16, columns: usize) -> Self {
         let pixels = usize::from(pixels);
+        let columns = columns.max(1);
+        let rows = pixels.div_ceil(columns);
+        let side = |count| u32::try_from(count).unwrap_or(u32::MAX);
         Self {
             out,
             room,
-            columns,
+            array: Geometry::new(side(columns), side(rows)),
             ranges: vec![None; pixels],
+            shown: vec![(BlockLevel::PIXEL, 0); pixels],
             line: String::new(),
             lines: 0,
             before: (0, 0),
@@ -57,11 +64,32 @@ impl LiveMap {
         }
     }
 
-    /// Takes events in.
+    /// Takes events in. That of a block fills its pixels, but for those that have reported by
+    /// themselves, or in a smaller block, within its exposure. Of several echoes the first is
+    /// shown.
     pub fn add(&mut self, events: &[Event], scale: &RangeScale) {
         for event in events {
-            if let Some(range) = self.ranges.get_mut(usize::from(event.pixel().0)) {
-                *range = Some(scale.range(event.position()).to_num());
+            if event.echo() > EchoNumber::FIRST {
+                continue;
+            }
+            let range_mm = scale.range(event.position()).to_num();
+            let exposure = match event {
+                Event::Depth(event) => event.exposure.into(),
+                Event::DynamicDepth(_) => 0,
+            };
+            let (level, end) = (event.level(), event.cycle().0.saturating_add(1));
+            for pixel in self.array.block(event.pixel(), level) {
+                let pixel = usize::from(pixel.0);
+                let (Some(range), Some(shown)) =
+                    (self.ranges.get_mut(pixel), self.shown.get_mut(pixel))
+                else {
+                    continue;
+                };
+                let (finest, last) = *shown;
+                if finest >= level || last <= end.saturating_sub(exposure) {
+                    *range = Some(range_mm);
+                    *shown = (level, end);
+                }
             }
         }
     }
@@ -91,7 +119,7 @@ impl LiveMap {
         // Two lines below the picture, and the one of the cursor. The last column stays free:
         // a line that fills it would clear it, or go on in the next.
         let (lines, columns) = (room.0.saturating_sub(3), room.1.saturating_sub(1));
-        let mut text = picture(&self.ranges, self.columns, lines, columns);
+        let mut text = picture(&self.ranges, self.array.columns as usize, lines, columns);
         text.push(legend(&self.ranges));
         text.push(self.line.clone());
         let back = match self.lines {

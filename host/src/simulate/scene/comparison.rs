@@ -1,7 +1,7 @@
 //! Compares the events of a run, or the readings of frames, with the scene: each with what
 //! its pixel saw in its laser cycle. Memory does not grow with their number.
 
-use dtof_core::{DepthEvent, PixelAddress, RangeScale};
+use dtof_core::{DepthEvent, EchoNumber, PixelAddress, RangeScale};
 
 use super::Scene;
 use crate::engine::settings::Settings;
@@ -30,6 +30,8 @@ pub struct Comparison<'a> {
     scale: RangeScale,
     /// Laser cycles of the run.
     cycles: u64,
+    /// How far behind the first surface there is a second, where pixels report several echoes.
+    behind_mm: Option<f64>,
     /// The first bin that may hold the peak, and the last.
     first_bin: usize,
     last_bin: usize,
@@ -60,10 +62,13 @@ impl Scene {
     /// If the settings give no range.
     pub fn comparison(&self, settings: &Settings, cycles: u64) -> anyhow::Result<Comparison<'_>> {
         let bins = usize::from(self.bins);
+        let second_echo = self.effects.second_echo.as_ref();
+        let behind_mm = second_echo.map(|echo| echo.behind_mm);
         Ok(Comparison {
             scene: self,
             scale: settings.range_scale()?,
             cycles,
+            behind_mm: behind_mm.filter(|_| settings.echoes > EchoNumber::FIRST),
             first_bin: settings.gate.map_or(0, |(first, _)| first.into()),
             last_bin: settings.gate.map_or(bins - 1, |(_, last)| last.into()),
             tallies: vec![Tally::new(self.geometry.addresses()); self.surfaces.len() + 1],
@@ -72,7 +77,7 @@ impl Scene {
     }
 
     /// Where the last bin ends.
-    fn end_mm(&self) -> f64 {
+    pub(super) fn end_mm(&self) -> f64 {
         f64::from(self.bins) * self.mm_per_bin()
     }
 
@@ -95,17 +100,44 @@ impl Comparison<'_> {
     /// Takes events into account.
     pub fn add(&mut self, events: &[DepthEvent]) {
         for event in events {
-            let view = self.scene.truth(event.pixel, event.cycle.0);
-            let error_mm = view.map(|view| range_mm(event, &self.scale) - view.range_mm);
             let limit_mm = FALSE_BEYOND_BINS * self.scene.mm_per_bin();
-            let right = error_mm.filter(|error| error.abs() <= limit_mm);
-            let surface = view.map_or(self.scene.surfaces.len(), |view| view.surface);
+            let (surface, right) = match self.found(event, limit_mm) {
+                Some((surface, error)) => (surface, Some(error)),
+                None => {
+                    let view = self.scene.truth(event.pixel, event.cycle.0);
+                    let surface = view.map_or(self.scene.surfaces.len(), |view| view.surface);
+                    self.tallies[surface].has_sent[usize::from(event.pixel.0)] = true;
+                    (surface, None)
+                }
+            };
             self.tallies[surface].add(event, right.map(|error| (error, error.abs() / limit_mm)));
             let bin = usize::from(event.peak_bin.raw());
             if let (None, Some(count)) = (right, self.false_peaks.get_mut(bin)) {
                 *count += 1;
             }
         }
+    }
+
+    /// The surface that an event has found, and its error, at most `limit_mm`. That of a block
+    /// is the mean over those of its pixels that see a surface there.
+    fn found(&mut self, event: &DepthEvent, limit_mm: f64) -> Option<(usize, f64)> {
+        let range_mm = range_mm(event, &self.scale);
+        let (mut surface, mut sum, mut pixels) = (None, 0.0, 0.0);
+        for pixel in self.scene.geometry.block(event.pixel, event.level) {
+            let Some(view) = self.scene.truth(pixel, event.cycle.0) else {
+                continue;
+            };
+            let error = range_mm - view.range_mm;
+            let errors = [Some(error), self.behind_mm.map(|behind| error - behind)];
+            let mut errors = errors.into_iter().flatten();
+            if let Some(error) = errors.find(|error| error.abs() <= limit_mm) {
+                surface.get_or_insert(view.surface);
+                sum += error;
+                pixels += 1.0;
+                self.tallies[view.surface].has_sent[usize::from(pixel.0)] = true;
+            }
+        }
+        Some((surface?, sum / pixels))
     }
 
     /// How they compare.
@@ -196,7 +228,6 @@ impl Tally {
         reason = "0 to STEPS"
     )]
     fn add(&mut self, event: &DepthEvent, error: Option<(f64, f64)>) {
-        self.has_sent[usize::from(event.pixel.0)] = true;
         self.first_cycle.get_or_insert(event.cycle.0);
         self.events += 1;
         if let Some((error, size)) = error {

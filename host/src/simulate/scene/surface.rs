@@ -4,6 +4,8 @@ use std::f64::consts::TAU;
 
 use serde::Deserialize;
 
+use super::depth_map::DepthMap;
+use super::sight::Sight;
 use crate::input::source::Geometry;
 
 /// Nothing is farther away.
@@ -51,6 +53,8 @@ pub enum Shape {
     Fan(Fan),
     /// A plane, wherever a ray meets it.
     Plane(Plane),
+    /// All samples of a depth map that show something.
+    DepthMap(DepthMap),
 }
 
 /// From the first column (row) up to the second, which is not covered.
@@ -109,16 +113,10 @@ impl Surface {
         turns || self.velocity_m_per_s != 0.0 || self.drift_per_s != [0.0; 2]
     }
 
-    /// How far away it is at a place (column and row of the layout), which the unit ray
-    /// `ray` goes to, after `seconds`. None if it does not cover the place.
-    pub(super) fn range_mm(
-        &self,
-        place: [f64; 2],
-        ray: [f64; 3],
-        seconds: f64,
-        layout: Geometry,
-    ) -> Option<f64> {
-        let [column, row] = self.at_start(place, seconds);
+    /// How far away it is where a pixel looks, after `seconds`. None if it does not cover
+    /// the place.
+    pub(super) fn range_mm(&self, sight: &Sight, seconds: f64, layout: Geometry) -> Option<f64> {
+        let [column, row] = self.at_start(sight.place, seconds);
         let nearer_mm = match &self.shape {
             Shape::Everywhere => 0.0,
             Shape::Rectangle(Rectangle { columns, rows }) => {
@@ -132,18 +130,41 @@ impl Surface {
                 (from_centre < 1.0).then(|| ball.radius_mm * (1.0 - from_centre.powi(2)).sqrt())?
             }
             Shape::Fan(fan) => fan.covers([column, row], seconds).then_some(0.0)?,
-            Shape::Plane(plane) => return plane.along(ray, self.plane_mm(0.0, seconds, layout)),
+            Shape::Plane(plane) => {
+                return plane.along(sight.ray, self.plane_mm(0.0, seconds, layout));
+            }
+            Shape::DepthMap(map) => return map.range_mm(sight),
         };
         Some(self.plane_mm(column, seconds, layout) - nearer_mm)
+    }
+
+    /// How many photons come back from where a pixel looks.
+    pub(super) fn light(&self, sight: &Sight) -> Light {
+        match (&self.shape, self.light) {
+            (Shape::DepthMap(map), Light::Reflectivity(share)) => {
+                Light::Reflectivity(share * map.reflectivity(sight))
+            }
+            (_, light) => light,
+        }
+    }
+
+    /// What the most photons come back from, and how far away it is, if all of it is
+    /// `nearest_mm` away or farther.
+    pub(super) fn brightest(&self, nearest_mm: f64) -> (Light, f64) {
+        if let (Shape::DepthMap(map), Light::Reflectivity(share)) = (&self.shape, self.light)
+            && let Some((reflectivity, depth_mm)) = map.brightest()
+        {
+            return (Light::Reflectivity(share * reflectivity), depth_mm);
+        }
+        (self.light, nearest_mm)
     }
 
     /// The least it can be at any place of the layout after `seconds`; of a plane the
     /// least it is anywhere.
     pub(super) fn nearest_mm(&self, seconds: f64, layout: Geometry) -> f64 {
-        if let Shape::Plane(plane) = &self.shape {
-            return plane.distance(self.plane_mm(0.0, seconds, layout));
-        }
         let nearer_mm = match &self.shape {
+            Shape::Plane(plane) => return plane.distance(self.plane_mm(0.0, seconds, layout)),
+            Shape::DepthMap(map) => return map.nearest_mm(),
             Shape::Ball(ball) => ball.radius_mm,
             _ => 0.0,
         };

@@ -16,21 +16,23 @@ function drawCloud() {
   lines.drawImage(points, 0, 0, width, height);
   drawAxes(lines, sides, eye, { ink, soft });
   if (picked >= shown.first && picked < shown.last) {
-    const mark = (event, x, y) => {
+    const mark = (event, x, y, depth, wide, high) => {
       lines.strokeStyle = ink;
       lines.lineWidth = 2;
-      lines.strokeRect(x - 7, y - 7, 14, 14);
+      const [right, below] = [wide, high].map((count) =>
+        count > 1 ? Math.max(7, pointSize(sides, eye, count) / 2 + 2) : 7);
+      lines.strokeRect(x - right, y - below, 2 * right, 2 * below);
     };
     eachPlace(sides, eye, mark, picked, picked + 1);
   }
 }
 
-/** The side of an event's square on the screen. */
-function pointSize(sides, eye) {
+/** The side of an event's rectangle on the screen that stands for so many pixels. */
+function pointSize(sides, eye, count = 1) {
   const cell = (eye.scale * sides[0].length) / data.columns;
   // Surfaces are closed where the third axis is the range.
   const part = view.third === "range" ? 0.9 : 0.55;
-  return Math.min(10, Math.max(2, part * cell));
+  return count * Math.min(10, Math.max(2, part * cell));
 }
 
 function drawPoints(sides, eye, ratio) {
@@ -40,11 +42,11 @@ function drawPoints(sides, eye, ratio) {
   const colour = new Uint32Array(image.data.buffer);
   const depths = new Float32Array(colour.length).fill(Infinity);
   const size = Math.max(1, Math.round(pointSize(sides, eye) * ratio));
-  eachPlace(sides, eye, (event, x, y, depth) => {
-    const left = Math.round(x * ratio - size / 2);
-    const top = Math.round(y * ratio - size / 2);
-    const right = Math.min(width, left + size);
-    const bottom = Math.min(height, top + size);
+  eachPlace(sides, eye, (event, x, y, depth, wide, high) => {
+    const left = Math.round(x * ratio - (wide * size) / 2);
+    const top = Math.round(y * ratio - (high * size) / 2);
+    const right = Math.min(width, left + wide * size);
+    const bottom = Math.min(height, top + high * size);
     for (let row = Math.max(0, top); row < bottom; row++) {
       for (let at = row * width + Math.max(0, left); at < row * width + right; at++) {
         if (depth < depths[at]) {
@@ -169,8 +171,11 @@ function eventAt(x, y) {
   const eye = camera(sides, cloud.clientWidth, cloud.clientHeight);
   const reach = Math.max(6, pointSize(sides, eye));
   let [found, best] = [-1, Infinity];
-  eachPlace(sides, eye, (event, atX, atY, depth) => {
-    const away = Math.max(Math.abs(atX - x), Math.abs(atY - y));
+  const size = pointSize(sides, eye);
+  eachPlace(sides, eye, (event, atX, atY, depth, wide, high) => {
+    // From the nearest pixel of a block.
+    const beyond = (off, count) => Math.max(0, Math.abs(off) - ((count - 1) * size) / 2);
+    const away = Math.max(beyond(atX - x, wide), beyond(atY - y, high));
     // The nearer of two, unless the pointer is closer to the other.
     const cost = away + 10 * depth;
     if (away <= reach && cost < best) [found, best] = [event, cost];

@@ -93,6 +93,7 @@ impl Cloud<'_> {
             records.extend(((event.cycle / unit) as u32).to_le_bytes());
             records.extend(event.range_mm.to_le_bytes());
             records.extend(event.pixel.0.to_le_bytes());
+            records.push(event.level.raw() << 4 | event.echo.raw());
         }
         let colours: String = (0..=u8::MAX)
             .map(|level| {
@@ -131,5 +132,6 @@ fn capital(word: &str) -> String {
     first.into_iter().chain(letters).collect()
 }
 
-/// Bytes of an event: laser cycle, range in millimetres, pixel, all little-endian.
-pub(super) const RECORD: usize = 4 + 4 + 2;
+/// Bytes of an event: laser cycle, range in millimetres, pixel, all little-endian, then four
+/// bits each for level and echo.
+pub(super) const RECORD: usize = 4 + 4 + 2 + 1;

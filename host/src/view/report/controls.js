@@ -50,7 +50,7 @@ function showSpikes(pixel) {
 function pickedText() {
   if (picked < 0) return "";
   const [range, cycle] = [number(events.range[picked], 1), number(events.cycle[picked])];
-  return `Chosen: ${pixelName(events.pixel[picked])}, ${range} mm at laser cycle ${cycle}.`;
+  return `Chosen: ${kindName(picked)}, ${range} mm at laser cycle ${cycle}.`;
 }
 
 // The window of time.

@@ -6,6 +6,7 @@ const events = decode(data.records, data.unit);
 const levels = Uint8Array.from(events.range, (range) =>
   data.high > data.low ? (255 * Math.min(1, Math.max(0, share(range, data.low, data.high)))) + 0.5 : 127,
 );
+const manyEchoes = events.echo.some((echo) => echo > 1);
 // All ranges, beyond the colours too.
 const [nearest, farthest] = events.range.reduce(
   ([low, high], range) => [Math.min(low, range), Math.max(high, range)], [Infinity, -Infinity]);
@@ -21,22 +22,28 @@ function element(id) {
   return document.getElementById(id);
 }
 
-/** Columns of equal length, from records of ten little-endian bytes in base64. */
+/** Columns of equal length, from records of eleven little-endian bytes in base64. */
 function decode(base64, unit) {
   const text = atob(base64);
   const bytes = new DataView(new ArrayBuffer(text.length));
   for (let at = 0; at < text.length; at++) bytes.setUint8(at, text.charCodeAt(at));
-  const count = text.length / 10;
+  const record = 11;
+  const count = text.length / record;
   const columns = {
     count,
     cycle: new Float64Array(count),
     range: new Float32Array(count),
     pixel: new Uint16Array(count),
+    level: new Uint8Array(count), // a block of 2^level pixels a side begins at its pixel
+    echo: new Uint8Array(count),
   };
   for (let index = 0; index < count; index++) {
-    columns.cycle[index] = bytes.getUint32(10 * index, true) * unit;
-    columns.range[index] = bytes.getFloat32(10 * index + 4, true);
-    columns.pixel[index] = bytes.getUint16(10 * index + 8, true);
+    columns.cycle[index] = bytes.getUint32(record * index, true) * unit;
+    columns.range[index] = bytes.getFloat32(record * index + 4, true);
+    columns.pixel[index] = bytes.getUint16(record * index + 8, true);
+    const levelAndEcho = bytes.getUint8(record * index + 10);
+    columns.level[index] = levelAndEcho >> 4;
+    columns.echo[index] = levelAndEcho & 15;
   }
   return columns;
 }
@@ -85,6 +92,25 @@ function capital(word) {
 function pixelName(pixel) {
   const [column, row] = data.sides;
   return `${column} ${pixel % data.columns}, ${row} ${Math.floor(pixel / data.columns)}`;
+}
+
+/** Whether an event is of the pixel, or of a block with it. */
+function isOf(event, pixel) {
+  const level = events.level[event];
+  const of = (address) => {
+    const row = Math.floor(address / data.columns);
+    return [(address - row * data.columns) >> level, row >> level];
+  };
+  const [[column, row], [x, y]] = [of(events.pixel[event]), of(pixel)];
+  return column === x && row === y;
+}
+
+/** Which block it is of, and which echo, as far as there is something to say. */
+function kindName(event) {
+  const side = 1 << events.level[event];
+  const block = side > 1 ? `${side}x${side} block from ` : "";
+  const echo = manyEchoes ? `, echo ${events.echo[event]}` : "";
+  return `${block}${pixelName(events.pixel[event])}${echo}`;
 }
 
 /** The context of a canvas that has as many pixels as the screen shows of it. */

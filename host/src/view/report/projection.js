@@ -67,7 +67,10 @@ function camera([across, down, along], width, height) {
   };
 }
 
-/** Calls visit(event, x, y, depth) for those from first to before last that are shown. */
+/**
+ * Calls visit(event, x, y, depth, wide, high) for those from first to before last that are
+ * shown: the middle of what each stands for, and how many columns and rows that has.
+ */
 function eachPlace(sides, { rows }, visit, first = shown.first, last = shown.last) {
   const [across, down, along] = sides;
   const [toX, toY, toDepth] = rows;
@@ -77,14 +80,19 @@ function eachPlace(sides, { rows }, visit, first = shown.first, last = shown.las
     const pixel = events.pixel[event];
     const row = Math.floor(pixel / data.columns);
     const column = pixel - row * data.columns;
-    const x = ((column + 0.5) / data.columns - 0.5) * across.length;
-    const y = ((row + 0.5) / data.rows - 0.5) * down.length;
+    const side = 1 << events.level[event];
+    const wide = Math.min(side, data.columns - column);
+    const high = Math.min(side, data.rows - row);
+    const x = ((column + 0.5 * wide) / data.columns - 0.5) * across.length;
+    const y = ((row + 0.5 * high) / data.rows - 0.5) * down.length;
     const z = (share(third[event], along.low, along.high) - 0.5) * along.length;
     visit(
       event,
       toX[0] * x + toX[1] * y + toX[2] * z + toX[3],
       toY[0] * x + toY[1] * y + toY[2] * z + toY[3],
       toDepth[0] * x + toDepth[1] * y + toDepth[2] * z,
+      wide,
+      high,
     );
   }
 }

@@ -9,12 +9,14 @@ function addLane(pixel, prepend = false) {
   const lane = document.createElement("li");
   const spikes = [];
   for (let event = 0; event < events.count; event++) {
-    if (events.pixel[event] === pixel) spikes.push(event);
+    if (isOf(event, pixel)) spikes.push(event);
   }
   const name = pixelName(pixel);
   const label = document.createElement("span");
   const thinned = data.oneOf > 1 ? ` (1 of ${number(data.oneOf)})` : "";
-  label.textContent = `${name}: ${number(spikes.length)} ${data.events}${thinned}`;
+  const ofBlocks = spikes.filter((event) => events.level[event] > 0).length;
+  const blocks = ofBlocks > 0 ? ` (${number(ofBlocks)} of blocks)` : "";
+  label.textContent = `${name}: ${number(spikes.length)} ${data.events}${thinned}${blocks}`;
   const canvas = document.createElement("canvas");
   canvas.setAttribute("role", "img");
   canvas.setAttribute("aria-label", label.textContent);
@@ -62,14 +64,15 @@ function drawLanes() {
   for (const lane of lanes.children) lane.draw();
 }
 
-/** A line for each event of the part of the run that is shown. */
+/** A line for each event of the part of the run that is shown, a shorter one for a block's. */
 function drawLane(canvas, spikes) {
   const { context: lines, width, height, ink } = context(canvas);
   lines.fillStyle = ink;
   for (const event of spikes) {
     if (event < shown.first || event >= shown.last) continue;
     const at = width * share(events.cycle[event], shown.start, shown.end);
-    lines.fillRect(at - 0.6, 3, 1.2, height - 6);
+    const gap = events.level[event] > 0 ? height / 3 : 3;
+    lines.fillRect(at - 0.6, gap, 1.2, height - 2 * gap);
   }
 }
 

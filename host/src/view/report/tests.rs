@@ -1,5 +1,5 @@
 use super::*;
-use dtof_core::PixelAddress;
+use dtof_core::{BlockLevel, DepthEvent, EchoNumber, PixelAddress};
 
 use crate::events::events_csv::range_mm;
 use crate::events::fixtures::{event, scale};
@@ -118,16 +118,39 @@ fn the_script_is_given_every_event() {
     assert_eq!(data["spikes"], serde_json::json!([2, 0]));
     assert_eq!(data["colours"].as_str().unwrap().len(), 256 * 6);
     let records = BASE64.decode(data["records"].as_str().unwrap()).unwrap();
-    assert_eq!(records.len(), 10 * 10);
-    for (index, record) in (0u16..).zip(records.chunks(10)) {
+    assert_eq!(records.len(), 10 * 11);
+    for (index, record) in (0u16..).zip(records.chunks(11)) {
         let cycle = u32::from_le_bytes(record[..4].try_into().unwrap());
         let range = f32::from_le_bytes(record[4..8].try_into().unwrap());
-        let pixel = u16::from_le_bytes(record[8..].try_into().unwrap());
+        let pixel = u16::from_le_bytes(record[8..10].try_into().unwrap());
         assert_eq!((cycle, pixel), (index.into(), index % 4));
+        assert_eq!(record[10], 0x01, "a pixel's first echo");
         // The middle of a bin of 37.47 mm.
         let expected = (f32::from(10 + index % 4) + 0.5) * 37.474;
         assert!((range - expected).abs() < 0.1, "{range} {expected}");
     }
+}
+
+#[test]
+fn the_script_is_given_level_and_echo_of_each_event() {
+    let mut sample = Sample::new(100);
+    for level in 0..4u8 {
+        for echo in 1..=4u8 {
+            let event = DepthEvent {
+                level: BlockLevel::new(level).unwrap(),
+                echo: EchoNumber::new(echo).unwrap(),
+                ..event(0, 9, 10)
+            };
+            sample.add(&event, 1.0);
+        }
+    }
+    let data = data(&page(&sample, 10, &[], &[]));
+    let records = BASE64.decode(data["records"].as_str().unwrap()).unwrap();
+    let last: Vec<u8> = records.chunks(11).map(|record| record[10]).collect();
+    let expected: Vec<u8> = (0..4)
+        .flat_map(|level| (1..=4).map(move |echo| 16 * level + echo))
+        .collect();
+    assert_eq!(last, expected);
 }
 
 #[test]
@@ -164,8 +187,8 @@ fn a_report_on_frames_speaks_of_readings() {
 #[test]
 fn events_and_figures_stay_below_the_documented_size() {
     assert_eq!(Sample::LIMIT, 262_144);
-    let base64 = base64::encoded_len(10 * Sample::LIMIT, true).unwrap();
-    assert!((3_450_000..3_550_000).contains(&base64)); // 3.5 MB
+    let base64 = base64::encoded_len(11 * Sample::LIMIT, true).unwrap();
+    assert!((3_800_000..3_900_000).contains(&base64)); // 3.8 MB
     for figures in [0, 1_000_000, 2_000_000, 3_000_000, 4_500_000] {
         let mut sample = sample(Sample::LIMIT, 1 << 18);
         sample.limit(room_for_events(figures));

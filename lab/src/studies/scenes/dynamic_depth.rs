@@ -145,7 +145,11 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             let watched = Watched::new(config, THRESHOLD_MM.into());
             ways.push((name, vec![watched; addresses.len()]));
         }
-        rules.push((background, host_engine(&settings, &addresses)?, ways));
+        rules.push((
+            background,
+            host_engine(&settings, photons.geometry(), &addresses)?,
+            ways,
+        ));
     }
     let mut tally = Tally::new();
     for _ in 0..cycles / u64::from(SLICE) {

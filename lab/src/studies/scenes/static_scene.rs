@@ -150,7 +150,7 @@ fn watched<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let settings = system.settings(background, l1, rng.next_u64());
     let mut photons = scene.photons(settings.seed, CYCLES)?;
     let addresses = photons.addresses();
-    let mut engine = host_engine(&settings, &addresses)?;
+    let mut engine = host_engine(&settings, photons.geometry(), &addresses)?;
     let mut pixels: Vec<Pixel> = addresses.iter().map(|_| Pixel::default()).collect();
     let mut frames: Vec<_> = addresses
         .iter()

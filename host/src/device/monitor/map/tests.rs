@@ -1,8 +1,10 @@
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
+use dtof_core::DepthEvent;
+
 use super::*;
-use crate::events::fixtures::{event, scale};
+use crate::events::fixtures::{self, event, scale};
 
 /// `text` without colours.
 fn characters(text: &str) -> String {
@@ -94,6 +96,46 @@ fn it_is_drawn_in_place_and_gives_the_cursor_back() {
 
     drop(map);
     assert_eq!(screen.taken(), format!("{PLAIN}{SHOW_CURSOR}"));
+}
+
+/// 5x3 pixels, the last two of which are not there.
+#[test]
+fn a_block_fills_its_pixels_that_have_not_reported_since() {
+    let mut map = LiveMap::new(Box::new(io::sink()), Box::new(|| (24, 40)), 13, 5);
+    let of = |pixel, level, cycle, bin| {
+        let level = BlockLevel::new(level).unwrap();
+        let event = event(pixel, cycle, bin); // over 40 laser cycles
+        Event::Depth(DepthEvent { level, ..event })
+    };
+    let shown = |map: &LiveMap| -> Vec<u16> {
+        let bins = map.ranges.iter().map(|range| {
+            range.map_or(0, |range| {
+                (1..128)
+                    .find(|bin| (f64::from(*bin) + 0.5) * 37.474 > range - 1.0)
+                    .unwrap()
+            })
+        });
+        bins.collect()
+    };
+    map.add(&[of(6, 0, 100, 10), of(0, 1, 139, 20)], &scale());
+    // The pixel's event lies in the block's exposure, laser cycles 100 to 139.
+    assert_eq!(shown(&map), [20, 20, 0, 0, 0, 20, 10, 0, 0, 0, 0, 0, 0]);
+    map.add(&[of(0, 1, 141, 21)], &scale());
+    assert_eq!(shown(&map), [21, 21, 0, 0, 0, 21, 21, 0, 0, 0, 0, 0, 0]);
+    // At the edges only those that are there.
+    map.add(
+        &[of(0, 2, 180, 30), of(4, 3, 200, 40), of(14, 1, 200, 50)],
+        &scale(),
+    );
+    let second = Event::Depth(DepthEvent {
+        echo: EchoNumber::new(2).unwrap(),
+        ..fixtures::event(12, 300, 60)
+    });
+    map.add(&[second, of(10, 1, 300, 70), of(3, 0, 300, 9)], &scale());
+    assert_eq!(
+        shown(&map),
+        [21, 21, 30, 9, 0, 21, 21, 30, 30, 0, 70, 70, 30]
+    );
 }
 
 #[test]

@@ -166,7 +166,10 @@ fn early(steps: &[(u64, i8)], index: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use dtof_core::fixed::types::{I24F8, U16F16, U24F8};
-    use dtof_core::{BinIndex, Count, Flags, LaserCycle, PixelAddress, RangeScale, SubBinOffset};
+    use dtof_core::{
+        BinIndex, BlockLevel, Count, EchoNumber, Flags, LaserCycle, PixelAddress, RangeScale,
+        SubBinOffset,
+    };
 
     use super::*;
 
@@ -179,6 +182,8 @@ mod tests {
         for (cycle, (&bin, &truth)) in (1..).zip(bins.iter().zip(truth)) {
             let event = DepthEvent {
                 pixel: PixelAddress(0),
+                level: BlockLevel::PIXEL,
+                echo: EchoNumber::FIRST,
                 cycle: LaserCycle(cycle * 100),
                 exposure: 44,
                 peak_bin: BinIndex::saturating(bin),

@@ -30,12 +30,17 @@
 //! Source: the saturating 10-bit counters of the paper's FPGA (section IV-B). Its
 //! search for the highest bin is [`ComparatorTree`](crate::ComparatorTree).
 
+pub mod counter;
+pub mod gate;
+pub mod peeled;
+
+use core::ops::RangeInclusive;
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use fixed::types::U24F8;
 
-use crate::counter::{Count10, CounterWidth, PhotonCount};
-use crate::gate::RangeGate;
+use self::counter::{Count10, CounterWidth, PhotonCount};
+use self::gate::RangeGate;
 use crate::units::{BinIndex, Count};
 
 /// A bin and its count.
@@ -241,10 +246,15 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
             compiler_fence(Ordering::Release);
         }
         self.total = total;
-        let bin = C::first_reaching(frame, highest).unwrap_or_default();
+        self.peak_key = Self::key_of(frame, highest);
+    }
+
+    /// The key of the first of the bins with the highest count.
+    #[inline(always)]
+    fn key_of<C: PhotonCount>(counts: &[C; BINS], highest: u32) -> u32 {
+        let bin = C::first_reaching(counts, highest).unwrap_or_default();
         #[allow(clippy::cast_possible_truncation)] // less than 1024
-        let key = (highest << Self::LOG2_BINS).wrapping_sub(bin as u32);
-        self.peak_key = key;
+        Self::key(highest, bin as u32)
     }
 
     /// Adds the photons of the gated bins.
@@ -325,6 +335,26 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     #[must_use]
     pub const fn saturated(&self) -> u32 {
         self.saturated
+    }
+
+    /// Empties the bins of some ranges: how many photons they held. The photons are no
+    /// longer in [`Self::total`], and the peak is the highest of the other bins.
+    pub(crate) fn empty(&mut self, ranges: impl Iterator<Item = RangeInclusive<u16>>) -> u32 {
+        let mut emptied = 0u32;
+        for range in ranges {
+            let (first, last) = (usize::from(*range.start()), usize::from(*range.end()));
+            let counters = self.counts.iter_mut().take(last + 1).skip(first);
+            for counter in counters {
+                emptied = emptied.wrapping_add((*counter).into());
+                *counter = W::ZERO;
+            }
+        }
+        if emptied > 0 {
+            self.total = self.total.wrapping_sub(emptied);
+            let highest = W::Counter::highest(&self.counts);
+            self.peak_key = Self::key_of(&self.counts, highest);
+        }
+        emptied
     }
 
     /// Empties the histogram for the next exposure.

@@ -28,53 +28,50 @@
 //! assert_eq!((event.exposure, event.peak_bin.raw(), event.peak_count.raw()), (44, 60, 44));
 //! ```
 //!
-//! Cost: 64 bytes beside the counters (a compile-time check). On a Cortex-M4 and 128
+//! With [`PixelConfigBuilder::echoes`](crate::PixelConfigBuilder::echoes) above 1 an event
+//! does not end the exposure: the bins around its peak are emptied and left out, and the
+//! pixel goes on until L2 or until it has all its echoes. With
+//! [`tracking`](crate::PixelConfigBuilder::tracking) it expects the next event where the
+//! last was.
+//!
+//! Cost: 72 bytes beside the counters (a compile-time check). On a Cortex-M4 and 128
 //! bins 10 instructions a photon in a batch, 130 a look, 110 to clear and re-arm.
 //!
 //! Source: the flow chart of the paper's section II-B. The slot is its REQ (section IV-A);
 //! ACK is ours, as is what happens while the link is busy.
 
+mod look;
+
+pub use self::look::Look;
+use self::look::State;
 use crate::config::PixelConfig;
-use crate::counter::{Count10, CounterWidth, PhotonCount};
-use crate::detect::DetectionRule;
+use crate::detect::{Detection, DetectionRule};
 use crate::event::DepthEvent;
 use crate::flags::Flags;
 use crate::histogram::Histogram;
+use crate::histogram::counter::{Count10, CounterWidth, PhotonCount};
+use crate::histogram::peeled::PeeledBins;
 use crate::statistics::Statistics;
-use crate::units::{BinIndex, Count, LaserCycle, PixelAddress, SubBinOffset};
-
-/// What the end of a laser cycle brought.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Look {
-    /// Fewer than X laser cycles since the last look: none was taken.
-    NotDue,
-    /// N has not exceeded L1.
-    TooEarly,
-    /// The peak does not stand clear of the background; the exposure goes on.
-    NoPeak,
-    /// The slot still holds an event, so the decision is put off by X laser
-    /// cycles.
-    Deferred,
-    /// The peak stands clear: the event is in the slot, a new exposure begins.
-    Event,
-    /// N reached L2 without an event: a new exposure begins.
-    Expired,
-}
+use crate::units::{
+    BinIndex, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,
+};
 
 /// One macropixel: histogram, exposure and event slot.
 #[derive(Clone, Debug)]
 pub struct AsyncPixel<const BINS: usize, W: CounterWidth = Count10> {
-    address: PixelAddress,
     exposure: u16,
     since_look: u16,
-    /// Whether a decision of this exposure was put off.
-    deferred: bool,
-    /// Whether `event` waits for the link. Apart from it, where it takes no room.
-    is_requesting: bool,
+    state: State,
+    /// The bin of the last event, of exposures before this one.
+    expected: BinIndex,
+    /// The echoes of this exposure, but for its last.
+    peeled: PeeledBins,
+    /// The slot. Its pixel and level are there before the first event.
     event: DepthEvent,
     /// Photons of this exposure that the gate left out, fewer than 2³².
     gated_out: u32,
+    /// Photons of this exposure that were in the bins around its echoes, fewer than 2³².
+    held: u32,
     histogram: Histogram<BINS, W>,
 }
 
@@ -85,15 +82,17 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// An empty pixel at the beginning of its first exposure.
     #[must_use]
     pub const fn new(address: PixelAddress) -> Self {
-        const { assert!(Self::OVERHEAD <= 64) };
+        const { assert!(Self::OVERHEAD <= 72) };
         Self {
-            address,
             exposure: 0,
             since_look: 0,
-            deferred: false,
-            is_requesting: false,
+            state: State::NONE,
+            expected: BinIndex::saturating(0),
+            peeled: PeeledBins::NONE,
             event: DepthEvent {
                 pixel: address,
+                level: BlockLevel::PIXEL,
+                echo: EchoNumber::FIRST,
                 cycle: LaserCycle(0),
                 exposure: 0,
                 peak_bin: BinIndex::saturating(0),
@@ -103,8 +102,16 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
                 flags: Flags::NONE,
             },
             gated_out: 0,
+            held: 0,
             histogram: Histogram::new(),
         }
+    }
+
+    /// One that counts for a block of `level` and the first pixel `first`.
+    pub(crate) const fn of_block(first: PixelAddress, level: BlockLevel) -> Self {
+        let mut pixel = Self::new(first);
+        pixel.event.level = level;
+        pixel
     }
 
     /// Counts one photon with the TDC code `code` in the present laser cycle.
@@ -179,55 +186,172 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         if self.exposure <= config.l1() {
             return Look::TooEarly;
         }
+        if self.state != State::NONE {
+            return self.look_further(config, statistics, cycle);
+        }
         if self.exposure >= config.l2() {
             statistics.expired += 1;
-            statistics.expired_deferred += u64::from(self.deferred);
             self.restart(statistics);
             return Look::Expired;
-        }
-        if self.is_requesting {
-            statistics.deferred += 1;
-            self.deferred = true;
-            return Look::Deferred;
         }
         let Some(detection) = config.detect(&self.histogram) else {
             return Look::NoPeak;
         };
-        self.event = detection.event(self.address, cycle, self.exposure);
-        self.is_requesting = true;
-        if self.deferred {
+        self.report(config, statistics, cycle, &detection)
+    }
+
+    /// A look at a pixel whose event waits, that has reported an echo or expects one, or
+    /// whose decision was put off.
+    #[inline(never)]
+    fn look_further<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+        cycle: LaserCycle,
+    ) -> Look {
+        if self.state.contains(State::PEELED) {
+            // Photons that have come since the last look.
+            self.peel(statistics);
+        }
+        if self.exposure >= config.l2() {
+            return self.end(config, statistics);
+        }
+        if self.state.contains(State::REQUESTING) {
+            statistics.deferred += 1;
+            self.state.set(State::DEFERRED);
+            return Look::Deferred;
+        }
+        let expected = self.state.contains(State::EXPECTING);
+        let expected = expected.then_some(self.expected);
+        let Some(detection) = config.detect_further(&self.histogram, expected, &self.peeled) else {
+            return Look::NoPeak;
+        };
+        self.report(config, statistics, cycle, &detection)
+    }
+
+    /// Puts the event of `detection` into the slot. The exposure ends, or goes on for the
+    /// next echo.
+    // Not behind a call, which would cost each look an instruction.
+    #[inline(always)]
+    fn report<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+        cycle: LaserCycle,
+        detection: &Detection,
+    ) -> Look {
+        let DepthEvent { pixel, level, .. } = self.event;
+        self.event = detection.event(pixel, cycle, self.exposure);
+        self.event.level = level;
+        if self.state.contains(State::DEFERRED) {
             self.event.flags |= Flags::DEFERRED;
         }
-        if config.is_one_hit() && 2 * self.photons() > u64::from(self.exposure) {
+        if config.is_one_hit() && 2 * self.photons() > u64::from(self.exposure) * level.pixels() {
             self.event.flags |= Flags::PILE_UP;
         }
         statistics.events += 1;
+        self.state.set(State::REQUESTING);
+        if config.echoes() > EchoNumber::FIRST {
+            if self.goes_on(config) {
+                self.peel(statistics);
+            } else {
+                self.end(config, statistics);
+            }
+            return Look::Event;
+        }
         self.restart(statistics);
+        if config.tracking().is_some() {
+            self.expect();
+        }
         Look::Event
+    }
+
+    /// Numbers the echo in the slot, and says whether the exposure goes on after it.
+    #[inline(never)]
+    fn goes_on<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>) -> bool {
+        if !self.state.contains(State::PEELED) {
+            self.peeled = PeeledBins::new(config.peel_reach());
+            self.state.set(State::PEELED);
+        }
+        let echo = EchoNumber::new(self.peeled.echoes() + 1).unwrap_or(EchoNumber::LAST);
+        self.event.echo = echo;
+        self.state.clear(State::DEFERRED);
+        let next = config.echo_after(echo, &mut self.peeled, self.event.peak_bin);
+        next.is_some()
+    }
+
+    /// Empties the bins around the echoes of this exposure.
+    fn peel(&mut self, statistics: &mut Statistics) {
+        let held = self.peeled.empty(&mut self.histogram);
+        self.held = self.held.wrapping_add(held);
+        statistics.held += u64::from(held);
+    }
+
+    /// Ends an exposure that may have had an event.
+    fn end<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+    ) -> Look {
+        let has_reported = self.state.contains(State::PEELED);
+        if !has_reported {
+            statistics.expired += 1;
+            statistics.expired_deferred += u64::from(self.state.contains(State::DEFERRED));
+        }
+        self.peeled = PeeledBins::NONE;
+        self.held = 0;
+        self.restart(statistics);
+        if !has_reported {
+            return Look::Expired;
+        }
+        if config.tracking().is_some() {
+            self.expect();
+        }
+        Look::Ended
+    }
+
+    /// The next event is expected where the last was.
+    const fn expect(&mut self) {
+        self.expected = self.event.peak_bin;
+        self.state.set(State::EXPECTING);
     }
 
     /// REQ: whether an event waits for the link.
     #[inline]
     #[must_use]
     pub const fn request(&self) -> bool {
-        self.is_requesting
+        self.state.contains(State::REQUESTING)
     }
 
     /// ACK: takes the event that waits, so that the pixel may fire again.
     #[inline]
     #[must_use = "the event is taken from the slot"]
     pub const fn acknowledge(&mut self) -> Option<DepthEvent> {
-        if !self.is_requesting {
+        if !self.state.contains(State::REQUESTING) {
             return None;
         }
-        self.is_requesting = false;
+        self.state.clear(State::REQUESTING);
         Some(self.event)
+    }
+
+    /// Whether an event waits for the link, or one of this exposure was followed by no other
+    /// exposure yet: not a pixel that sees nothing.
+    #[inline]
+    #[must_use]
+    pub const fn has_reported(&self) -> bool {
+        self.state.contains(State::REQUESTING) || self.state.contains(State::PEELED)
     }
 
     /// Which macropixel this is.
     #[must_use]
     pub const fn address(&self) -> PixelAddress {
-        self.address
+        self.event.pixel
+    }
+
+    /// Whether it counts for one pixel, or for a block.
+    #[must_use]
+    pub const fn level(&self) -> BlockLevel {
+        self.event.level
     }
 
     /// N: laser cycles since the histogram was cleared.
@@ -243,7 +367,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     }
 
     /// Adds the photons of the present exposure to `statistics`. Those of exposures that
-    /// have ended are there already.
+    /// have ended are there already, and those that are held.
     #[inline(always)]
     pub fn add_photons_to(&self, statistics: &mut Statistics) {
         statistics.add_photons_of(&self.histogram, self.gated_out);
@@ -253,7 +377,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     fn photons(&self) -> u64 {
         let histogram = &self.histogram;
         let counted = u64::from(histogram.total()) + u64::from(histogram.saturated());
-        counted + u64::from(self.gated_out)
+        counted + u64::from(self.gated_out) + u64::from(self.held)
     }
 
     /// Counts photons that the gate left out.
@@ -268,10 +392,10 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// Begins a new exposure.
     fn restart(&mut self, statistics: &mut Statistics) {
         self.add_photons_to(statistics);
+        self.state.end_exposure();
         // Not behind what `clear` ends with: together they would be a call of `memset`.
         self.gated_out = 0;
         self.histogram.clear();
         self.exposure = 0;
-        self.deferred = false;
     }
 }

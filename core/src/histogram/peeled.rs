@@ -1,0 +1,142 @@
+//! Bins that are left out because their echo was reported: peel and hold.
+//!
+//! A pixel that reports several echoes empties the bins around each, and leaves them out
+//! for the rest of the exposure. What is left is decided upon as before. Four times the
+//! standard deviation of the pulse is a reach that suits: less leaves parts of a bright
+//! pulse behind, more swallows a second surface close by (`docs/results/figures.md`).
+//!
+//! ```
+//! use dtof_core::{BinIndex, Histogram, PeeledBins, RangeGate};
+//!
+//! let mut histogram = Histogram::<128>::new();
+//! histogram.add_batch(&[40, 40, 40, 41, 44, 90, 90]);
+//! let mut peeled = PeeledBins::new(4);
+//! peeled.push(histogram.peak().bin);
+//! assert_eq!(peeled.empty(&mut histogram), 5); // bins 36 to 44
+//! assert_eq!((histogram.peak().bin.raw(), histogram.total()), (90, 2));
+//! assert_eq!(peeled.bins_left(&RangeGate::<128>::new(40, 119)?), Some(75));
+//! assert!(peeled.is_tail(BinIndex::saturating(46)));
+//! # Ok::<(), dtof_core::GateError>(())
+//! ```
+//!
+//! Cost: 8 bytes a pixel.
+
+use core::ops::RangeInclusive;
+
+use super::Histogram;
+use super::counter::CounterWidth;
+use super::gate::RangeGate;
+use crate::units::{BinIndex, EchoNumber};
+
+/// Echoes that have been peeled, at most: the last one ends the exposure.
+const MOST: usize = EchoNumber::LAST.raw() as usize - 1;
+
+/// The bins around the echoes that were reported in an exposure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PeeledBins {
+    peaks: [u16; MOST],
+    number: u8,
+    reach: u8,
+}
+
+impl PeeledBins {
+    /// None, and none to come.
+    pub const NONE: Self = Self::new(0);
+
+    /// None yet; around each echo `reach` bins to either side of its peak.
+    #[must_use]
+    pub const fn new(reach: u8) -> Self {
+        Self {
+            peaks: [0; MOST],
+            number: 0,
+            reach,
+        }
+    }
+
+    /// Leaves out the bins around an echo, too. Nothing after the third.
+    pub fn push(&mut self, peak: BinIndex) {
+        if let Some(place) = self.peaks.get_mut(usize::from(self.number)) {
+            *place = peak.raw();
+            self.number += 1;
+        }
+    }
+
+    /// Around how many echoes.
+    #[inline]
+    #[must_use]
+    pub const fn echoes(&self) -> u8 {
+        self.number
+    }
+
+    /// Whether `bin` is left out.
+    #[must_use]
+    pub fn contains(&self, bin: u16) -> bool {
+        self.touches(bin, 0)
+    }
+
+    /// Whether one of the bins up to `beside` from `bin` is left out.
+    #[must_use]
+    pub fn touches(&self, bin: u16, beside: u16) -> bool {
+        let reach = u16::from(self.reach).saturating_add(beside);
+        self.peaks().iter().any(|peak| peak.abs_diff(bin) <= reach)
+    }
+
+    /// Whether `bin` is one of the `reach` bins right behind one of these ranges: a peak there
+    /// may be the tail of the echo.
+    #[must_use]
+    pub fn is_tail(&self, bin: BinIndex) -> bool {
+        let reach = u16::from(self.reach);
+        let behind = |&peak: &u16| bin.raw().checked_sub(peak.saturating_add(reach));
+        let mut behind = self.peaks().iter().filter_map(behind);
+        behind.any(|behind| (1..=reach).contains(&behind))
+    }
+
+    /// How many of the gated bins are not left out. `None` if they are fewer than
+    /// [`RangeGate::MIN_BINS`], too few to decide.
+    #[inline(always)]
+    #[must_use]
+    pub fn bins_left<const BINS: usize>(&self, gate: &RangeGate<BINS>) -> Option<u32> {
+        let bins = u32::from(gate.last() + 1 - gate.first());
+        if self.number == 0 {
+            return Some(bins);
+        }
+        let left = bins.saturating_sub(self.bins_among(gate.first()..=gate.last()));
+        (left >= u32::from(RangeGate::<BINS>::MIN_BINS)).then_some(left)
+    }
+
+    /// How many of these bins are left out.
+    #[inline(never)]
+    #[must_use]
+    pub(crate) fn bins_among(&self, bins: RangeInclusive<u16>) -> u32 {
+        let mut count = 0;
+        let mut before = Self::new(self.reach);
+        for &peak in self.peaks() {
+            for bin in self.around(peak) {
+                count += u32::from(bins.contains(&bin) && !before.contains(bin));
+            }
+            before.push(BinIndex::saturating(peak));
+        }
+        count
+    }
+
+    /// Empties the bins of `histogram`: how many photons they held.
+    pub fn empty<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &mut Histogram<BINS, W>,
+    ) -> u32 {
+        let ranges = self.peaks().iter().map(|&peak| self.around(peak));
+        histogram.empty(ranges)
+    }
+
+    fn peaks(&self) -> &[u16] {
+        self.peaks
+            .get(..usize::from(self.number))
+            .unwrap_or_default()
+    }
+
+    fn around(&self, peak: u16) -> RangeInclusive<u16> {
+        let reach = u16::from(self.reach);
+        peak.saturating_sub(reach)..=peak.saturating_add(reach)
+    }
+}

@@ -1,0 +1,55 @@
+//! What a look brings, and what it has to mind.
+
+/// What the end of a laser cycle brought.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Look {
+    /// Fewer than X laser cycles since the last look: none was taken.
+    NotDue,
+    /// N has not exceeded L1.
+    TooEarly,
+    /// The peak does not stand clear of the background; the exposure goes on.
+    NoPeak,
+    /// The slot still holds an event, so the decision is put off by X laser
+    /// cycles.
+    Deferred,
+    /// The peak stands clear: the event is in the slot, a new exposure begins.
+    Event,
+    /// N reached L2 without an event: a new exposure begins.
+    Expired,
+    /// N reached L2 after an event, before the last echo: a new exposure begins.
+    Ended,
+}
+
+/// What a look has to mind. Most often nothing, which is one comparison.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct State(u8);
+
+impl State {
+    pub(super) const NONE: Self = Self(0);
+    /// `event` waits for the link.
+    pub(super) const REQUESTING: Self = Self(1);
+    /// A decision was put off, since the exposure began or its last echo was reported.
+    pub(super) const DEFERRED: Self = Self(1 << 1);
+    /// An echo of this exposure was reported.
+    pub(super) const PEELED: Self = Self(1 << 2);
+    /// The exposure before this one had an event, and the pixel tracks.
+    pub(super) const EXPECTING: Self = Self(1 << 3);
+
+    pub(super) const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 != 0
+    }
+
+    pub(super) const fn set(&mut self, other: Self) {
+        self.0 |= other.0;
+    }
+
+    pub(super) const fn clear(&mut self, other: Self) {
+        self.0 &= !other.0;
+    }
+
+    /// Forgets what was of the exposure. An event that waits still does.
+    pub(super) const fn end_exposure(&mut self) {
+        self.0 &= Self::REQUESTING.0;
+    }
+}

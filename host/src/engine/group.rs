@@ -1,0 +1,205 @@
+//! Pixels that decide together: one by itself, or those of one block of the highest level
+//! with all the blocks in it. Groups know nothing of each other, so that each runs on a thread
+//! of its own.
+
+use anyhow::{Context, Result};
+use dtof_core::{
+    AnyRule, Array, AsyncPixel, Binning, Block, BlockLevel, BlockPlace, DepthEvent, Feed,
+    LaserCycle, PixelAddress, PixelConfig, Statistics, count_in_blocks, end_laser_cycles_of_blocks,
+};
+use dtof_link::AdaptiveBinning;
+
+use crate::input::source::{Geometry, PixelPhotons};
+
+/// The configurations of pixels and blocks.
+#[derive(Clone, Copy, Debug)]
+pub struct Configs<const BINS: usize> {
+    /// Of pixels.
+    pub pixels: PixelConfig<BINS, AnyRule>,
+    /// Of blocks.
+    pub blocks: PixelConfig<BINS, AnyRule>,
+    /// Laser cycles between ticks.
+    pub patience: u16,
+}
+
+/// A pixel of a group.
+#[derive(Clone, Debug)]
+struct Member<const BINS: usize> {
+    /// Its number among the pixels of the source.
+    number: usize,
+    pixel: AsyncPixel<BINS>,
+    feed: Option<Feed>,
+}
+
+/// Pixels and blocks in the order in which they report.
+#[derive(Clone, Debug)]
+pub struct Group<const BINS: usize> {
+    members: Vec<Member<BINS>>,
+    blocks: Vec<Block<BINS>>,
+    /// Laser cycles since the blocks looked, and since the last tick.
+    since_look: u16,
+    since_tick: u16,
+}
+
+/// What a group has done: its pixels, and its blocks.
+#[derive(Clone, Debug, Default)]
+pub struct Done {
+    /// In no particular order.
+    pub events: Vec<DepthEvent>,
+    /// What its pixels have done.
+    pub pixels: Statistics,
+    /// What its blocks have done.
+    pub blocks: Statistics,
+}
+
+impl<const BINS: usize> Group<BINS> {
+    /// One pixel by itself, which has a number among the pixels of the source.
+    #[must_use]
+    pub fn of_pixel(number: usize, address: PixelAddress) -> Self {
+        let member = Member {
+            number,
+            pixel: AsyncPixel::new(address),
+            feed: None,
+        };
+        Self {
+            members: vec![member],
+            blocks: Vec::new(),
+            since_look: 0,
+            since_tick: 0,
+        }
+    }
+
+    /// The groups of an array, of which the pixels `addresses` are there, ascending.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn of_array(
+        array: Geometry,
+        binning: AdaptiveBinning,
+        addresses: &[PixelAddress],
+    ) -> Result<Vec<Self>> {
+        let whole = Array::new(array.columns, array.rows).context("an array without pixels")?;
+        let top = binning.levels;
+        let groups = (0..whole.blocks(top)).map(|block| {
+            let pixels: Vec<PixelAddress> =
+                whole.pixels_of(whole.first_of(block, top), top).collect();
+            Self::of_block(whole, top, &pixels, addresses)
+        });
+        groups.collect()
+    }
+
+    /// The pixels of one block of the highest level, row by row.
+    fn of_block(
+        whole: Array,
+        top: BlockLevel,
+        pixels: &[PixelAddress],
+        addresses: &[PixelAddress],
+    ) -> Result<Self> {
+        // As if it were an array by itself.
+        let row = |pixel: &PixelAddress| u32::from(pixel.0) / whole.columns();
+        let rows = match pixels {
+            [first, .., last] => row(last) - row(first) + 1,
+            _ => 1,
+        };
+        let columns = u32::try_from(pixels.len())? / rows;
+        let part = Array::new(columns, rows).context("a block without pixels")?;
+        let binning = Binning::new(part, top).context("an array without blocks")?;
+        let local = (0..=u16::MAX).map(PixelAddress);
+        let members = local.zip(pixels).filter_map(|(local, &address)| {
+            let number = addresses.binary_search(&address).ok()?;
+            Some(Member {
+                number,
+                pixel: AsyncPixel::new(address),
+                feed: Some(binning.feed_of(local)),
+            })
+        });
+        let blocks = binning.blocks().map(|place| {
+            Block::new(BlockPlace {
+                first: pixels[usize::from(place.first.0)],
+                ..place
+            })
+        });
+        Ok(Self {
+            members: members.collect(),
+            blocks: blocks.collect(),
+            since_look: 0,
+            since_tick: 0,
+        })
+    }
+
+    /// Runs one slice that begins with laser cycle `first`. The link takes each event at once.
+    pub fn run(&mut self, configs: &Configs<BINS>, first: u64, photons: &[PixelPhotons]) -> Done {
+        let mut done = Done::default();
+        let of_member = |member: &Member<BINS>| &photons[member.number];
+        let cycles = self.members.iter().map(|member| of_member(member).cycles);
+        let cycles = cycles.max().unwrap_or(0);
+        let mut next = vec![0; self.members.len()];
+        for cycle in 0..cycles {
+            let now = LaserCycle(first + u64::from(cycle));
+            for (member, next) in self.members.iter_mut().zip(&mut next) {
+                let received = &photons[member.number];
+                while let Some(photon) = received.photons.get(*next)
+                    && photon.cycle == cycle
+                {
+                    *next += 1;
+                    member.pixel.count(&configs.pixels, photon.code);
+                    if let Some(feed) = &member.feed {
+                        count_in_blocks(&mut self.blocks, feed, &configs.blocks, photon.code);
+                    }
+                }
+                if cycle < received.cycles {
+                    let pixel = &mut member.pixel;
+                    pixel.end_laser_cycle(&configs.pixels, &mut done.pixels, now);
+                    if let Some(event) = pixel.acknowledge() {
+                        done.events.push(event);
+                        if let Some(feed) = &mut member.feed {
+                            feed.reported();
+                        }
+                    }
+                }
+            }
+            if !self.blocks.is_empty() {
+                self.end_laser_cycle_of_blocks(configs, now, &mut done);
+            }
+        }
+        done
+    }
+
+    fn end_laser_cycle_of_blocks(
+        &mut self,
+        configs: &Configs<BINS>,
+        now: LaserCycle,
+        done: &mut Done,
+    ) {
+        let (blocks, statistics) = (&mut self.blocks, &mut done.blocks);
+        if end_laser_cycles_of_blocks(blocks, &configs.blocks, statistics, now, 1) {
+            done.events
+                .extend(blocks.iter_mut().filter_map(Block::acknowledge));
+        }
+        self.since_look += 1;
+        if self.since_look < configs.pixels.x() {
+            return;
+        }
+        self.since_tick = self.since_tick.saturating_add(self.since_look);
+        self.since_look = 0;
+        if self.since_tick >= configs.patience {
+            self.since_tick = 0;
+            for member in &mut self.members {
+                if let Some(feed) = &mut member.feed {
+                    feed.tick(member.pixel.has_reported());
+                }
+            }
+            self.blocks.iter_mut().for_each(Block::tick);
+        }
+    }
+
+    /// Adds the photons of exposures that have not ended.
+    pub fn add_photons_to(&self, pixels: &mut Statistics, blocks: &mut Statistics) {
+        for member in &self.members {
+            member.pixel.add_photons_to(pixels);
+        }
+        for block in &self.blocks {
+            block.pixel().add_photons_to(blocks);
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! What blocks report where their pixels do not see the same: edges, slants, and an object of
+//! a single pixel.
+
+use super::field::{Field, Reports, SIGMA, Setting, is_right, level};
+use crate::sweep::mean::Measured;
+use crate::sweep::results::{Figure, Results};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
+use anyhow::Result;
+use dtof::input::source::Geometry;
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
+use dtof_draw::palette::{Pen, STEPS};
+use dtof_theory::rates::Rates;
+use rand_distr::{Distribution, Uniform};
+use rand_pcg::Pcg64;
+use std::fmt::Write as _;
+
+const BACKGROUND: f64 = 0.05;
+/// Of the dim surface, and of what is brighter.
+const DIM: f64 = 0.05;
+const BRIGHT: f64 = 0.145;
+const LEVELS: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
+const PATIENCES: [f64; 3] = [40.0, 64.0, 250.0];
+const PENS: [Pen; 3] = [STEPS[2], STEPS[4], STEPS[6]];
+const ONE_IN: u32 = 100;
+const ARRAY: Geometry = Geometry::new(32, 32);
+/// Bins between two surfaces.
+const STEP: f64 = 30.0;
+const BEFORE: u64 = 1000;
+const CYCLES: u64 = 2000;
+/// The scenes, by number.
+const SCENES: [&str; 6] = [
+    "edge, both dim",
+    "edge, one brighter",
+    "slant of 0.3 bins",
+    "slant of 0.6 bins",
+    "slant of 1 bin",
+    "objects of one pixel",
+];
+const OBJECTS: usize = 5;
+
+/// Wrong reports of blocks.
+pub const STUDY: Study = Study {
+    name: "binning-edges",
+    about: "wrong reports of blocks at edges and on slants, and objects of one pixel",
+    revision: 1,
+    few_seeds: 1,
+    all_seeds: 16,
+    points,
+    trial,
+    results,
+};
+
+fn points() -> Vec<Point> {
+    let scenes: Vec<f64> = (0u8..).take(SCENES.len()).map(f64::from).collect();
+    let mut points = grid([
+        ("scene", &scenes),
+        ("levels", &LEVELS),
+        ("patience", &PATIENCES),
+    ]);
+    // Pixels alone are of interest for the objects.
+    points.retain(|point| {
+        let alone = point["scene"] == OBJECTS as f64 && point["patience"] == PATIENCES[0];
+        point["levels"] > 0.0 || alone
+    });
+    points
+}
+
+/// What the pixels see: signal and place of each. The scene lies differently for each seed.
+fn scene(number: usize, rng: &mut Pcg64) -> Result<Vec<(f64, f64)>> {
+    let unit = Uniform::new(0.0, 1.0)?;
+    let near = 30.0 + unit.sample(rng);
+    let shift = 12.0 + 8.0 * unit.sample(rng);
+    let pixel = |pixel: usize| {
+        let (column, row) = ((pixel % 32) as f64, (pixel / 32) as f64);
+        // An edge that is tilted by 20 degrees.
+        let is_left = column + row * 20f64.to_radians().tan() < shift + 6.0;
+        match number {
+            0 | 1 if is_left => (if number == 1 { BRIGHT } else { DIM }, near),
+            0 | 1 => (DIM, near + STEP),
+            2 => (DIM, near + 0.3 * column),
+            3 => (DIM, near + 0.6 * column),
+            4 => (DIM, near + column),
+            // One pixel of 8 x 8, in another place of each block.
+            _ if pixel % 8 == (pixel / 256) % 8 && (pixel / 32) % 8 == (pixel / 8) % 4 + 2 => {
+                (BRIGHT, near)
+            }
+            _ => (DIM, near + STEP),
+        }
+    };
+    Ok((0..ARRAY.addresses()).map(pixel).collect())
+}
+
+fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+    let setting = Setting {
+        levels: level(point["levels"])?,
+        patience: whole(point, "patience"),
+        tracking: false,
+        one_in: ONE_IN,
+    };
+    let number = usize::from(whole(point, "scene"));
+    let seen = scene(number, rng)?;
+    let rates: Vec<Rates> = seen
+        .iter()
+        .map(|&(signal, position)| Rates {
+            background: BACKGROUND,
+            signal,
+            position,
+            sigma: SIGMA,
+        })
+        .collect();
+    let settings = setting.settings(setting.z())?;
+    let mut field = Field::new(ARRAY, &rates, &settings)?;
+    let mut reports = Reports::new(ARRAY);
+    let mut events = Vec::new();
+    field.run(BEFORE + CYCLES, rng, |event| events.push(*event))?;
+    let mut tally = Tally::new();
+    for event in &events {
+        let covered: Vec<usize> = field.covered(event, &reports).collect();
+        for &pixel in &covered {
+            reports.note(pixel, event);
+            if event.cycle.0 < BEFORE {
+                continue;
+            }
+            let (signal, position) = seen[pixel];
+            let verdict = if is_right(event, position) {
+                "right"
+            } else {
+                "wrong"
+            };
+            let who = if number == OBJECTS && signal == BRIGHT {
+                "object "
+            } else {
+                ""
+            };
+            *tally
+                .entry(format!("{who}{verdict} {}", event.level))
+                .or_default() += 1;
+        }
+    }
+    tally.insert("runs".to_owned(), 1);
+    Ok(tally)
+}
+
+/// The share of wrong ones among the pixels that blocks of the levels cover.
+fn wrong(point: &PointTally) -> Measured {
+    let sum = |verdict: &str| -> u64 {
+        [1, 2, 3]
+            .map(|level| point.count(&format!("{verdict} {level}")))
+            .iter()
+            .sum()
+    };
+    Measured::share(sum("wrong"), sum("wrong") + sum("right"))
+}
+
+fn results(part: &Part) -> Result<Results> {
+    let mut csv = "scene,levels,patience,right 0,right 1,right 2,right 3,wrong 0,wrong 1,wrong 2,wrong 3,object right 0\n".to_owned();
+    for point in part.points() {
+        let counts = ["right", "wrong"].map(|verdict| {
+            [0, 1, 2, 3]
+                .map(|level| point.count(&format!("{verdict} {level}")).to_string())
+                .join(",")
+        });
+        writeln!(
+            csv,
+            "{},{},{},{},{}",
+            SCENES[usize::from(whole(&point.parameters, "scene"))],
+            point.parameter("levels"),
+            point.parameter("patience"),
+            counts.join(","),
+            point.count("object right 0")
+        )?;
+    }
+    let mut panels = Vec::new();
+    for (number, name) in SCENES.iter().enumerate().take(OBJECTS) {
+        let mut series = Vec::new();
+        for (&levels, pen) in LEVELS[1..].iter().zip(PENS) {
+            let at = [("scene", number as f64), ("levels", levels)];
+            let dots = part
+                .at(at)
+                .map(|point| wrong(point).at(point.parameter("patience")));
+            series.push(Series::unnamed(pen, Style::JoinedDots, dots.collect()));
+        }
+        panels.push(Panel {
+            title: (*name).to_owned(),
+            series,
+        });
+    }
+    let at = |scene: usize, levels| {
+        part.one([
+            ("scene", scene as f64),
+            ("levels", levels),
+            ("patience", PATIENCES[1]),
+        ])
+    };
+    let most = |levels| -> Result<f64> {
+        let mut most = 0.0f64;
+        for scene in 0..OBJECTS - 1 {
+            most = most.max(wrong(at(scene, levels)?).value);
+        }
+        Ok(most)
+    };
+    let alone = part.one([("scene", OBJECTS as f64), ("levels", 0.0)])?;
+    let seen = |levels| -> Result<f64> {
+        let with = at(OBJECTS, levels)?.count("object right 0");
+        Ok(with as f64 / alone.count("object right 0") as f64)
+    };
+    let percent = |share: f64| format!("{:.1}", 100.0 * share);
+    let chart = Chart {
+        finding: format!(
+            "Of what two levels of blocks report at edges and on slants up to {} % is wrong, of \
+             three levels {} %",
+            percent(most(2.0)?),
+            percent(most(3.0)?)
+        ),
+        holds: true,
+        note:
+            "Slants are from pixel to pixel. Wrong by more than 3 bins, of all pixels that a block's event stands for; bars hold \
+               99 % as if they were independent."
+                .to_owned(),
+        x: Axis::logarithmic("patience, laser cycles"),
+        y: Axis::linear("wrong, %").percent(),
+        key: LEVELS[1..]
+            .iter()
+            .zip(PENS)
+            .map(|(levels, pen)| Key::new(pen, Style::JoinedDots, format!("up to level {levels}")))
+            .collect(),
+        columns: 3,
+        panels,
+    };
+    Ok(Results {
+        figures: vec![Figure::new("binning-edges", &chart)?],
+        values: [
+            ("two", percent(most(2.0)?)),
+            ("three", percent(most(3.0)?)),
+            ("objects one", format!("{:.0}", 100.0 * seen(1.0)?)),
+            ("objects two", format!("{:.0}", 100.0 * seen(2.0)?)),
+            ("objects three", format!("{:.0}", 100.0 * seen(3.0)?)),
+        ]
+        .into(),
+        tables: vec![("results/data/binning_edges.csv", csv)],
+        ..Results::default()
+    })
+}

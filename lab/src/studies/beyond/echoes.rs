@@ -1,0 +1,238 @@
+//! Several echoes of one exposure: two surfaces of one pixel, a glass before a wall.
+
+use super::field::{BINS, L1, L2, SIGMA, X};
+use crate::sweep::results::{Figure, Results};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
+use anyhow::{Context, Result};
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{
+    AsyncPixel, Count, DepthEstimator, EchoNumber, Histogram, LaserCycle, Look, PixelAddress,
+    PixelConfig, RangeGate, Statistics, WindowRule, z_for,
+};
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
+use dtof_draw::palette::{Pen, STEPS};
+use rand_core::Rng;
+use rand_distr::{Distribution, Normal, Poisson, Uniform};
+use rand_pcg::Pcg64;
+use std::fmt::Write as _;
+
+/// Bins between two surfaces.
+const DISTANCES: [f64; 8] = [4.0, 5.0, 6.0, 8.0, 12.0, 16.0, 24.0, 48.0];
+/// The brighter over the other.
+const RATIOS: [f64; 4] = [1.0, 2.0, 4.0, 10.0];
+const PENS: [Pen; 4] = [STEPS[0], STEPS[2], STEPS[4], STEPS[6]];
+/// Signal photons of each echo of equal brightness in a whole histogram, and the background
+/// of a bin.
+const WHOLE: (f64, f64) = (60.0, 1.0);
+/// Signal photons of the target a laser cycle where a pixel counts, and backgrounds a bin.
+const TARGET: f64 = 0.1;
+const BACKGROUNDS: [f64; 2] = [0.01, 0.05];
+const REACH: u8 = 4;
+/// Exposures of a trial.
+const EXPOSURES: u64 = 50;
+
+/// Both echoes over distance and ratio.
+pub const STUDY: Study = Study {
+    name: "echoes",
+    about: "two surfaces of one pixel: both echoes over their distance and ratio",
+    revision: 1,
+    few_seeds: 2,
+    all_seeds: 40,
+    points,
+    trial,
+    results,
+};
+
+fn points() -> Vec<Point> {
+    // A background of 0 stands for the whole histogram.
+    grid([
+        ("background", &[0.0, BACKGROUNDS[0], BACKGROUNDS[1]]),
+        ("ratio", &RATIOS),
+        ("distance", &DISTANCES),
+    ])
+}
+
+fn config() -> Result<PixelConfig<BINS, WindowRule>> {
+    let gate = RangeGate::<BINS>::full();
+    let rule = WindowRule::new(3, z_for(100, &gate, X, L1, L2), Count::saturating(5))?;
+    let two = EchoNumber::new(2).context("two")?;
+    let estimator = DepthEstimator::for_pulse(U8F8::from_num(SIGMA));
+    let config = PixelConfig::with_rule(rule).x(X).l1(L1).l2(L2);
+    Ok(config.estimator(estimator).echoes(two, REACH).build()?)
+}
+
+/// The photons of a background and some surfaces.
+struct Light {
+    background: Poisson<f64>,
+    surfaces: Vec<(Poisson<f64>, Normal<f64>)>,
+}
+
+impl Light {
+    fn new(background: f64, surfaces: &[(f64, f64)]) -> Result<Self> {
+        let surface = |&(photons, position): &(f64, f64)| {
+            Ok((Poisson::new(photons)?, Normal::new(position, SIGMA)?))
+        };
+        Ok(Self {
+            background: Poisson::new(background * BINS as f64)?,
+            surfaces: surfaces.iter().map(surface).collect::<Result<_>>()?,
+        })
+    }
+
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "bins"
+    )]
+    fn draw(&self, rng: &mut Pcg64) -> Vec<u16> {
+        let number = self.background.sample(rng) as u64;
+        let mut codes: Vec<u16> = (0..number)
+            .map(|_| rng.next_u32() as u16 % BINS as u16)
+            .collect();
+        for (number, place) in &self.surfaces {
+            for _ in 0..number.sample(rng) as u64 {
+                let bin = place.sample(rng).floor();
+                if (0.0..BINS as f64).contains(&bin) {
+                    codes.push(bin as u16);
+                }
+            }
+        }
+        codes
+    }
+}
+
+fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+    let config = config()?;
+    let (background, ratio) = (point["background"], point["ratio"]);
+    let mut tally = Tally::new();
+    let mut add = |what: &str| *tally.entry(what.to_owned()).or_default() += 1;
+    for _ in 0..EXPOSURES {
+        let near = 20.0 + Uniform::new(0.0, 1.0)?.sample(rng);
+        let far = near + point["distance"];
+        let mut found = Vec::new();
+        if background == 0.0 {
+            let light = Light::new(WHOLE.1, &[(WHOLE.0 * ratio, near), (WHOLE.0, far)])?;
+            let mut histogram = Histogram::<BINS>::new();
+            histogram.add_batch(&light.draw(rng));
+            config.detect_echoes(&mut histogram, |_, detection| {
+                found.push(detection.position());
+            });
+        } else {
+            let cycles = f64::from(X);
+            let surfaces = [(TARGET * ratio * cycles, near), (TARGET * cycles, far)];
+            let light = Light::new(background * cycles, &surfaces)?;
+            let (mut pixel, mut statistics) =
+                (AsyncPixel::<BINS>::new(PixelAddress(0)), Statistics::new());
+            for step in 1..=u64::from(L2 / X) {
+                pixel.count_batch(&config, &light.draw(rng));
+                let now = LaserCycle(step * u64::from(X));
+                let look = pixel.end_laser_cycles(&config, &mut statistics, now, X);
+                found.extend(pixel.acknowledge().map(|event| event.position()));
+                if found.len() == 2 || matches!(look, Look::Ended | Look::Expired) {
+                    break;
+                }
+            }
+        }
+        let is_at = |place: f64| {
+            let near = |position: &dtof_core::BinPosition| {
+                (f64::from(position.raw()) / 256.0 - place).abs() <= 3.0
+            };
+            found.iter().any(near)
+        };
+        let both = is_at(near) && is_at(far) && found.len() == 2;
+        add("exposures");
+        if both {
+            add("both");
+        }
+        if found.iter().any(|position| {
+            let position = f64::from(position.raw()) / 256.0;
+            (position - near).abs() > 3.0 && (position - far).abs() > 3.0
+        }) {
+            add("false");
+        }
+    }
+    Ok(tally)
+}
+
+fn results(part: &Part) -> Result<Results> {
+    let mut csv = "background,ratio,distance,both,low,high,false,exposures\n".to_owned();
+    for point in part.points() {
+        writeln!(
+            csv,
+            "{},{},{},{},{},{}",
+            point.parameter("background"),
+            point.parameter("ratio"),
+            point.parameter("distance"),
+            point.share("both", "exposures").cells(4),
+            point.count("false"),
+            point.count("exposures"),
+        )?;
+    }
+    let mut panels = Vec::new();
+    for background in [0.0, BACKGROUNDS[0], BACKGROUNDS[1]] {
+        let mut series = Vec::new();
+        for (ratio, pen) in RATIOS.into_iter().zip(PENS) {
+            let at = [("background", background), ("ratio", ratio)];
+            let dots = part.at(at).map(|point| {
+                point
+                    .share("both", "exposures")
+                    .at(point.parameter("distance"))
+            });
+            series.push(Series::unnamed(pen, Style::JoinedDots, dots.collect()));
+        }
+        panels.push(Panel {
+            title: if background == 0.0 {
+                "whole histogram".to_owned()
+            } else {
+                format!("counting, {background}")
+            },
+            series,
+        });
+    }
+    let least = |background, ratio, from: f64| -> f64 {
+        let at = [("background", background), ("ratio", ratio)];
+        let points = part
+            .at(at)
+            .filter(|point| point.parameter("distance") >= from);
+        let share = |point: &PointTally| point.share("both", "exposures").value;
+        points.map(share).fold(1.0, f64::min)
+    };
+    let equal = least(0.0, 1.0, 6.0);
+    let glass = least(BACKGROUNDS[0], 10.0, 12.0).min(least(BACKGROUNDS[1], 10.0, 12.0));
+    let percent = |share: f64| format!("{:.0}", (100.0 * share).floor());
+    let chart = Chart {
+        finding: format!(
+            "Two equal echoes 6 bins or more apart are both found in {} % of histograms, a target \
+             12 bins behind a glass ten times as bright in {} % of exposures",
+            percent(equal),
+            percent(glass)
+        ),
+        holds: equal >= 0.9 && glass >= 0.95,
+        note: format!(
+            "σ {SIGMA} bin, ±{REACH} bins left out. Whole histograms hold {} signal photons of the dimmer \
+             echo; pixels count {TARGET} of it a laser cycle, up to {L2} cycles, with the background a bin that the panel names (whole: 1).",
+            WHOLE.0
+        ),
+        x: Axis::logarithmic("bins between the two"),
+        y: Axis::linear("exposures with both, %")
+            .percent()
+            .within(0.0, 1.0),
+        key: RATIOS
+            .into_iter()
+            .zip(PENS)
+            .map(|(ratio, pen)| Key::new(pen, Style::JoinedDots, format!("{ratio} : 1")))
+            .collect(),
+        columns: 3,
+        panels,
+    };
+    Ok(Results {
+        figures: vec![Figure::new("echoes", &chart)?],
+        values: [
+            ("equal", percent(equal)),
+            ("glass", percent(glass)),
+            ("reach", REACH.to_string()),
+        ]
+        .into(),
+        tables: vec![("results/data/echoes.csv", csv)],
+        ..Results::default()
+    })
+}

@@ -1,0 +1,280 @@
+//! What tracking gains where the target stays, and what it costs where it does not.
+
+use super::field::{Field, L2, SIGMA, Setting, is_right};
+use crate::sweep::mean::{Measured, Z_99, add_value};
+use crate::sweep::results::{Figure, Results};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
+use anyhow::Result;
+use dtof::input::source::Geometry;
+use dtof_core::{BlockLevel, DepthEvent};
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::{EVENTS, PAPER, REFERENCE};
+use dtof_theory::rates::Rates;
+use rand_distr::{Distribution, Uniform};
+use rand_pcg::Pcg64;
+use std::fmt::Write as _;
+
+const BACKGROUNDS: [f64; 2] = [0.01, 0.05];
+const SIGNALS: [f64; 3] = [0.1, 0.145, 0.3];
+/// What the target does, by number.
+const STEADY: u16 = 0;
+const DRIFTS: u16 = 1;
+const JUMPS: u16 = 2;
+const VANISHES: u16 = 3;
+/// A drift, in bins each 100 laser cycles.
+const DRIFT: f64 = 0.1;
+/// A jump, in bins.
+const JUMP: f64 = 30.0;
+const ONE_IN: u32 = 100;
+const ARRAY: Geometry = Geometry::new(8, 8);
+/// Laser cycles with the target in its first place, and after that.
+const BEFORE: u64 = 3000;
+const AFTER: u64 = 3000;
+/// Of the question and of the answer: signal and background.
+const ASKED: (f64, f64) = (0.145, 0.05);
+
+/// Tracking with steady, drifting, jumping and vanishing targets.
+pub const STUDY: Study = Study {
+    name: "tracking",
+    about: "laser cycles an event with tracking and without: steady, drifting, jumping, vanishing targets",
+    revision: 1,
+    few_seeds: 2,
+    all_seeds: 60,
+    points,
+    trial,
+    results,
+};
+
+fn points() -> Vec<Point> {
+    grid([
+        ("target", &[0.0, 1.0, 2.0, 3.0]),
+        ("background", &BACKGROUNDS),
+        ("signal", &SIGNALS),
+        ("tracking", &[0.0, 1.0]),
+    ])
+}
+
+fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+    let setting = Setting {
+        levels: BlockLevel::PIXEL,
+        patience: 0,
+        tracking: point["tracking"] > 0.0,
+        one_in: ONE_IN,
+    };
+    let target = whole(point, "target");
+    let start = 40.0 + Uniform::new(0.0, 1.0)?.sample(rng);
+    let rates = |position: f64, signal: f64| {
+        let rates = Rates {
+            background: point["background"],
+            signal,
+            position,
+            sigma: SIGMA,
+        };
+        vec![rates; ARRAY.addresses()]
+    };
+    let signal = point["signal"];
+    let settings = setting.settings(setting.z())?;
+    let mut field = Field::new(ARRAY, &rates(start, signal), &settings)?;
+    let mut events: Vec<DepthEvent> = Vec::new();
+    let mut tally = Tally::new();
+    if target == DRIFTS {
+        let mut position = start;
+        while field.cycle() < BEFORE + AFTER {
+            field.set(&rates(position, signal))?;
+            field.run(100, rng, |event| events.push(*event))?;
+            position += DRIFT;
+        }
+        // The target moves while an event's photons come: half of what it has moved.
+        let at = |event: &DepthEvent| start + DRIFT * event.cycle.0 as f64 / 100.0;
+        for event in events.iter().filter(|event| event.cycle.0 >= u64::from(L2)) {
+            let verdict = if is_right(event, at(event)) {
+                "right"
+            } else {
+                "wrong"
+            };
+            *tally.entry(verdict.to_owned()).or_default() += 1;
+        }
+        tally.insert("cycles".to_owned(), (BEFORE + AFTER - u64::from(L2)) * 64);
+        return Ok(tally);
+    }
+    field.run(BEFORE, rng, |event| events.push(*event))?;
+    match target {
+        JUMPS => field.set(&rates(start + JUMP, signal))?,
+        VANISHES => field.set(&rates(start, 0.0))?,
+        _ => {}
+    }
+    field.run(AFTER, rng, |event| events.push(*event))?;
+    let mut first = vec![None; ARRAY.addresses()];
+    for event in &events {
+        let pixel = usize::from(event.pixel.0);
+        if event.cycle.0 < BEFORE {
+            if event.cycle.0 >= u64::from(L2) && target == STEADY {
+                count(&mut tally, event, start);
+            }
+            continue;
+        }
+        match target {
+            JUMPS if is_right(event, start + JUMP) => {
+                first[pixel].get_or_insert(event.cycle.0 - BEFORE + 1);
+            }
+            VANISHES => {
+                // Of a ghost: the thousand laser cycles in which it is still reported.
+                let later = (event.cycle.0 - BEFORE) / u64::from(L2);
+                let who = if is_right(event, start) {
+                    "ghost"
+                } else {
+                    "elsewhere"
+                };
+                *tally.entry(format!("{who} {later}")).or_default() += 1;
+            }
+            STEADY => count(&mut tally, event, start),
+            _ => {}
+        }
+    }
+    match target {
+        JUMPS => {
+            for cycles in first {
+                add_value(&mut tally, "noticed", cycles.unwrap_or(AFTER).cast_signed());
+            }
+        }
+        VANISHES => {
+            tally.insert("pixels".to_owned(), ARRAY.addresses() as u64);
+        }
+        _ => {
+            let cycles = (BEFORE + AFTER - u64::from(L2)) * ARRAY.addresses() as u64;
+            tally.insert("cycles".to_owned(), cycles);
+        }
+    }
+    Ok(tally)
+}
+
+/// Right or wrong, and how far off.
+fn count(tally: &mut Tally, event: &DepthEvent, position: f64) {
+    if is_right(event, position) {
+        *tally.entry("right".to_owned()).or_default() += 1;
+        #[allow(clippy::cast_possible_truncation, reason = "a few bins in 1/256")]
+        let error = (f64::from(event.position().raw()) - 256.0 * position).round() as i64;
+        add_value(tally, "error", error);
+    } else {
+        *tally.entry("wrong".to_owned()).or_default() += 1;
+    }
+}
+
+/// Laser cycles a right event, with the 99 % interval of a count.
+fn cycles_an_event(point: &PointTally) -> Measured {
+    let (cycles, right) = (point.count("cycles") as f64, point.count("right") as f64);
+    let half = Z_99 * right.sqrt();
+    Measured {
+        value: cycles / right,
+        interval: (cycles / (right + half), cycles / (right - half).max(1.0)),
+    }
+}
+
+fn results(part: &Part) -> Result<Results> {
+    let one = |target: u16, (signal, background): (f64, f64), tracking| {
+        part.one([
+            ("target", f64::from(target)),
+            ("background", background),
+            ("signal", signal),
+            ("tracking", tracking),
+        ])
+    };
+    // With tracking over without.
+    let gain = |target, scene| -> Result<f64> {
+        let of = |tracking| -> Result<f64> {
+            let point = one(target, scene, tracking)?;
+            Ok(if target == JUMPS {
+                Measured::mean(point, "noticed").value
+            } else {
+                cycles_an_event(point).value
+            })
+        };
+        Ok(of(1.0)? / of(0.0)?)
+    };
+    let ghost = |scene, tracking, later: u64| -> Result<Measured> {
+        let point = one(VANISHES, scene, tracking)?;
+        Ok(point.share(&format!("ghost {later}"), "pixels"))
+    };
+    let mut csv = "target,background,signal,tracking,right,wrong,cycles,cycles to notice,ghost 0,ghost 1,ghost 2,pixels\n".to_owned();
+    for point in part.points() {
+        let noticed = if point.parameter("target") == f64::from(JUMPS) {
+            format!("{:.1}", Measured::mean(point, "noticed").value)
+        } else {
+            String::new()
+        };
+        writeln!(
+            csv,
+            "{},{},{},{},{},{},{},{noticed},{},{},{},{}",
+            point.parameter("target"),
+            point.parameter("background"),
+            point.parameter("signal"),
+            point.parameter("tracking"),
+            point.count("right"),
+            point.count("wrong"),
+            point.count("cycles"),
+            point.count("ghost 0"),
+            point.count("ghost 1"),
+            point.count("ghost 2"),
+            point.count("pixels"),
+        )?;
+    }
+    let mut panels = Vec::new();
+    for (target, title) in [
+        (STEADY, "steady"),
+        (DRIFTS, "drifting"),
+        (JUMPS, "jump of 30 bins"),
+    ] {
+        let mut series = Vec::new();
+        let line = [SIGNALS[0], SIGNALS[2]].map(|x| Dot::exact(x, 1.0));
+        series.push(Series::unnamed(REFERENCE, Style::Dashed, line.into()));
+        for (background, pen) in BACKGROUNDS.into_iter().zip([PAPER, EVENTS]) {
+            let mut dots = Vec::new();
+            for signal in SIGNALS {
+                dots.push(Dot::exact(signal, gain(target, (signal, background))?));
+            }
+            series.push(Series::unnamed(pen, Style::JoinedDots, dots));
+        }
+        panels.push(Panel {
+            title: title.to_owned(),
+            series,
+        });
+    }
+    let (steady, jump) = (gain(STEADY, ASKED)?, gain(JUMPS, ASKED)?);
+    let chart = Chart {
+        finding: format!(
+            "A target that stays is reported in {steady:.2} times the laser cycles, one that jumps \
+             is noticed in {jump:.2} times as many"
+        ),
+        holds: steady <= 0.7 && jump <= 1.1,
+        note: format!(
+            "With tracking over without, both with 1 % false alarms in {L2} laser cycles; the title \
+             is of {} signal photons a cycle and a background of {} a bin.",
+            ASKED.0, ASKED.1
+        ),
+        x: Axis::logarithmic("signal photons a laser cycle"),
+        y: Axis::linear("cycles an event, or to notice a jump, over those without")
+            .within(0.0, 1.4),
+        key: vec![
+            Key::new(PAPER, Style::JoinedDots, "background 0.01".to_owned()),
+            Key::new(EVENTS, Style::JoinedDots, "background 0.05".to_owned()),
+        ],
+        columns: 3,
+        panels,
+    };
+    let percent = |share: Measured| format!("{:.2}", 100.0 * share.value);
+    Ok(Results {
+        figures: vec![Figure::new("tracking", &chart)?],
+        values: [
+            ("steady", format!("{steady:.2}")),
+            ("jump", format!("{jump:.2}")),
+            ("drift", format!("{:.2}", gain(DRIFTS, ASKED)?)),
+            ("few", format!("{:.2}", gain(STEADY, (0.145, 0.01))?)),
+            ("ghost with", percent(ghost(ASKED, 1.0, 1)?)),
+            ("ghost without", percent(ghost(ASKED, 0.0, 1)?)),
+            ("ghost later", percent(ghost(ASKED, 1.0, 2)?)),
+        ]
+        .into(),
+        tables: vec![("results/data/tracking.csv", csv)],
+        ..Results::default()
+    })
+}

@@ -1,0 +1,103 @@
+//! The tables of `docs/link-format.md`: every byte of the records, every refusal and every
+//! fault of a sensor.
+
+use std::fmt::Display;
+
+use dtof_core::Statistics;
+use dtof_link::endpoint::LinkCounters;
+use dtof_link::{Configuration, FaultRecord, Refusal, Report, SensorRecord};
+
+/// The table of the document under this heading describes each of so many bytes once, in
+/// order.
+#[track_caller]
+fn describes_all_bytes(heading: &str, bytes: usize) {
+    let document = include_str!("../../docs/link-format.md");
+    let (_, rest) = document.split_once(&format!("\n### {heading}\n")).unwrap();
+    let (_, rest) = rest.split_once("\n|---|").unwrap();
+    let (table, _) = rest.split_once("\n\n").unwrap();
+    let mut next = 0;
+    for line in table.lines().skip(1) {
+        let field = line.split('|').nth(1).unwrap().trim();
+        let (first, last) = field.split_once('-').unwrap_or((field, field));
+        assert_eq!(first.parse(), Ok(next), "{line}");
+        next = last.parse::<usize>().unwrap() + 1;
+    }
+    assert_eq!(next, bytes, "{heading}");
+}
+
+#[test]
+fn the_tables_describe_every_byte_of_the_records() {
+    describes_all_bytes("Configuration", Configuration::BYTES);
+    describes_all_bytes("Sensor", SensorRecord::BYTES);
+    describes_all_bytes("Report", Report::BYTES);
+}
+
+#[test]
+fn a_report_lies_as_the_document_says() {
+    let statistics = |first| Statistics {
+        counted: first,
+        held: first + 1,
+        saturated: first + 2,
+        rejected: first + 3,
+        gated_out: first + 4,
+        events: first + 5,
+        deferred: first + 6,
+        expired: first + 7,
+        expired_deferred: first + 8,
+    };
+    let report = Report {
+        cycles: 1,
+        unaddressed: 2,
+        statistics: statistics(3),
+        blocks: statistics(12),
+        overrun: 21,
+        unknown: 22,
+        sensor_errors: 23,
+        link: LinkCounters {
+            frames: 24,
+            corrupt: 25,
+            oversized: 26,
+            foreign: 27,
+            out_of_order: 28,
+            duplicate: 29,
+            retransmitted: 30,
+        },
+        last_sensor_error: 31,
+    };
+    let wide = (1u64..=20).flat_map(u64::to_le_bytes);
+    let narrow = (21u32..=30).flat_map(u32::to_le_bytes);
+    let expected: Vec<u8> = wide.chain(narrow).chain([31]).collect();
+    assert_eq!(report.to_le_bytes(), expected[..]);
+}
+
+/// Each of them has a number from 1 on, a line in the document's table that begins
+/// so, and words of its own.
+#[track_caller]
+fn are_documented<T: Display>(all: &[T], number: impl Fn(&T) -> u8, table: &str) {
+    let document = include_str!("../../docs/link-format.md");
+    let (_, rest) = document.split_once(table).unwrap();
+    let (table, _) = rest.split_once("\n\n").unwrap();
+    for (expected, item) in (1..).zip(all) {
+        assert_eq!(number(item), expected);
+        assert!(table.contains(&format!("\n| {expected} | ")), "{expected}");
+    }
+    assert!(!table.contains(&format!("\n| {} | ", all.len() + 1)));
+    let mut words: Vec<String> = all.iter().map(ToString::to_string).collect();
+    words.sort();
+    words.dedup();
+    assert_eq!(words.len(), all.len());
+}
+
+#[test]
+fn every_refusal_has_its_own_number_and_reason() {
+    let all: Vec<Refusal> = (0..=255).filter_map(Refusal::from_number).collect();
+    assert_eq!(all.len(), 18);
+    are_documented(&all, |&refusal| refusal as u8, "\n| reason | |\n");
+}
+
+#[test]
+fn every_sensor_fault_has_its_own_number_and_words() {
+    let all: Vec<FaultRecord> = (0..=255).filter_map(FaultRecord::from_number).collect();
+    assert_eq!(all.len(), 9);
+    are_documented(&all, |&fault| fault as u8, "\n| last sensor error | |\n");
+}
