@@ -8,5 +8,6 @@ pub mod events_csv;
 pub(crate) mod fixtures;
 pub mod maps;
 pub mod output;
+pub mod reports;
 pub mod sample;
 pub mod summary;
