@@ -1,6 +1,8 @@
 //! `cargo xtask bench`: how many instructions the operations of the core take on
 //! the target, counted by the emulator.
 
+mod laser_rates;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -20,6 +22,9 @@ const COUNT_INSTRUCTIONS: [&str; 2] = ["-icount", "shift=8"];
 /// A figure may grow or fall by one fiftieth before [`check`] fails.
 const TOLERANCE: u64 = 50;
 
+/// Of the names when printed.
+const WIDTH: usize = 62;
+
 /// One figure.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Row {
@@ -32,7 +37,7 @@ struct Row {
 /// Counts and writes the file.
 pub fn run(root: &Path) -> Result<()> {
     let rows = count(root)?;
-    print(&rows);
+    print(&rows)?;
     fs::write(root.join(FILE), text(&rows)).context(FILE)?;
     println!("{FILE}: written");
     Ok(())
@@ -42,7 +47,7 @@ pub fn run(root: &Path) -> Result<()> {
 pub fn check(root: &Path) -> Result<()> {
     let committed = parse(&fs::read_to_string(root.join(FILE)).context(FILE)?).context(FILE)?;
     let rows = count(root)?;
-    print(&rows);
+    print(&rows)?;
     let differences = differences(&committed, &rows);
     for line in &differences {
         println!("{line}");
@@ -132,9 +137,9 @@ fn decimal(hundredths: u64) -> String {
     format!("{}.{:02}", hundredths / 100, hundredths % 100)
 }
 
-/// One line an operation, the levels beside each other.
-fn print(rows: &[Row]) {
-    println!("{:<48} {:>10} {:>10}", "instructions", "O3", "Os");
+/// One line an operation, the levels beside each other; and the table of `README.md`.
+fn print(rows: &[Row]) -> Result<()> {
+    println!("{:<WIDTH$} {:>10} {:>10}", "instructions", "O3", "Os");
     for row in rows {
         let Some(name) = row.name.strip_suffix(",3") else {
             continue;
@@ -142,8 +147,10 @@ fn print(rows: &[Row]) {
         let small = rows.iter().find(|row| row.name == format!("{name},s"));
         let small = small.map_or_else(String::new, |row| decimal(row.hundredths));
         let name = name.replacen(',', ": ", 1);
-        println!("{name:<48} {:>10} {small:>10}", decimal(row.hundredths));
+        println!("{name:<WIDTH$} {:>10} {small:>10}", decimal(row.hundredths));
     }
+    println!("\n{}", laser_rates::table(rows)?);
+    Ok(())
 }
 
 #[cfg(test)]

@@ -10,8 +10,19 @@ use object::{Object, ObjectSymbol};
 
 use crate::firmware::{Board, Build, Sensor};
 
-/// Macropixels the sidecar has room for.
+/// Macropixels and blocks of them the sidecar has room for.
 const MOST_PIXELS: u64 = 256;
+const MOST_BLOCKS: u64 = 42;
+/// Macropixels, and blocks: none, those of 8 x 8 and of 16 x 8 in two levels, all.
+const ARRAYS: [(u64, u64); 7] = [
+    (64, 0),
+    (64, 20),
+    (64, MOST_BLOCKS),
+    (128, 0),
+    (128, 40),
+    (128, MOST_BLOCKS),
+    (MOST_PIXELS, MOST_BLOCKS),
+];
 /// What the sidecar may take of the real board: 64 KiB of its flash, 16 KiB more with
 /// the driver of a sensor, and of its 128 KiB of RAM what leaves the stack its reserve.
 /// Decisions take most of it. They are there for the 10-bit counters of pixels, for the
@@ -57,7 +68,9 @@ pub fn print(root: &Path) -> Result<()> {
                 };
                 ensure!(flash <= most, "more than {most} bytes of flash");
                 ensure!(ram <= MOST_RAM, "more than {MOST_RAM} bytes of RAM");
-                of_pixels = of_pixels.or(Some((ram, pixels(&path)?)));
+                if of_pixels.is_none() {
+                    of_pixels = Some((ram, memory(&path, "PIXELS")?, memory(&path, "BLOCKS")?));
+                }
             }
         }
         let name = format!("self-test {}", board.name());
@@ -67,25 +80,26 @@ pub fn print(root: &Path) -> Result<()> {
     }
     println!("bytes; RAM without the stack, which has what is left; of it the most that the");
     println!("machine code can need, interrupts included, up to a panic");
-    let (ram, pixels) = of_pixels.context("no image of the real board")?;
-    let others = ram - pixels;
-    println!("sidecar stm32f405, by macropixels of 128 bins, with all its blocks:");
-    for count in [64, 128, MOST_PIXELS] {
-        let ram = others + count * pixels / MOST_PIXELS;
-        println!("{count:>4} {ram:>8} bytes of RAM");
+    let (ram, pixels, blocks) = of_pixels.context("no image of the real board")?;
+    let [pixel, block] = [pixels / MOST_PIXELS, blocks / MOST_BLOCKS];
+    let others = ram - MOST_PIXELS * pixel - MOST_BLOCKS * block;
+    println!("sidecar stm32f405: a macropixel of 128 bins {pixel} bytes, a block of them {block},");
+    println!("whether they track or have several echoes or not");
+    for (pixels, blocks) in ARRAYS {
+        let ram = others + pixels * pixel + blocks * block;
+        println!("{pixels:>4} macropixels, {blocks:>2} blocks {ram:>8} bytes of RAM");
     }
     Ok(())
 }
 
-/// Bytes of the sidecar's macropixels.
-fn pixels(path: &Path) -> Result<u64> {
+/// Bytes of the sidecar's memory of such a name.
+fn memory(path: &Path, name: &str) -> Result<u64> {
     let bytes = fs::read(path).with_context(|| path.display().to_string())?;
     let file = object::File::parse(&*bytes)?;
     let mut symbols = file.symbols();
-    let pixels = symbols.find(|symbol| symbol.name().is_ok_and(|name| name.contains("PIXELS")));
-    Ok(pixels
-        .context("no memory called PIXELS in the image")?
-        .size())
+    let memory = symbols.find(|symbol| symbol.name().is_ok_and(|found| found.contains(name)));
+    let memory = memory.with_context(|| format!("no memory called {name} in the image"))?;
+    Ok(memory.size())
 }
 
 /// Bytes an image takes.

@@ -5,12 +5,11 @@
 //! (strict, as printed) the detection rule decides. After an event, or once N
 //! has reached L2, the histogram is cleared and N starts from 0.
 //!
-//! An event goes into the pixel's slot; the pixel clears and counts on at once.
-//! While the link has not taken it the pixel does not fire again. It keeps
-//! counting and looks again X laser cycles later. Each look put off is
-//! counted as deferred. Back-pressure lengthens exposures; it loses no event
-//! that was made. An exposure that reaches L2 meanwhile ends without one, and is
-//! counted apart.
+//! An event goes into the pixel's slot; the pixel clears and counts on at once. While the
+//! link has not taken it the pixel does not fire again. It keeps counting and looks again X
+//! laser cycles later. Each look put off is counted as deferred. Back-pressure lengthens
+//! exposures; it loses no event that was made. An exposure that reaches L2 meanwhile ends
+//! without one, and is counted apart.
 //!
 //! ```
 //! use dtof_core::*;
@@ -270,9 +269,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             return Look::Event;
         }
         self.restart(statistics);
-        if config.tracking().is_some() {
-            self.expect();
-        }
+        self.track(config);
         Look::Event
     }
 
@@ -314,16 +311,17 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         if !has_reported {
             return Look::Expired;
         }
-        if config.tracking().is_some() {
-            self.expect();
-        }
+        self.track(config);
         Look::Ended
     }
 
-    /// The next event is expected where the last was.
-    const fn expect(&mut self) {
-        self.expected = self.event.peak_bin;
-        self.state.set(State::EXPECTING);
+    /// A pixel that tracks expects its next event where the last was.
+    #[inline(always)]
+    fn track<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>) {
+        if config.tracking().is_some() {
+            self.expected = self.event.peak_bin;
+            self.state.set(State::EXPECTING);
+        }
     }
 
     /// REQ: whether an event waits for the link.

@@ -33,7 +33,7 @@ fn compare<const BINS: usize>(settings: Settings, cycles: &[Cycle], seen: &mut S
         let mut frame = [0u32; BINS];
         for &(code, times) in &cycle.photons {
             offered += u64::from(times);
-            (0..times).for_each(|_| model.count(code.into()));
+            (0..times).for_each(|_| model.now.count(code.into()));
             match frame.get_mut(usize::from(code)).filter(|_| number % 3 == 0) {
                 Some(photons) => *photons += u32::from(times),
                 None => (0..times).for_each(|_| lone.pixel.count(&config, code)),
@@ -46,13 +46,13 @@ fn compare<const BINS: usize>(settings: Settings, cycles: &[Cycle], seen: &mut S
         assert!(!(was_waiting && look == Look::Event));
         seen.ended += u32::from(look == Look::Ended);
         seen.expired += u32::from(look == Look::Expired);
-        assert_eq!(u32::from(lone.pixel.exposure()), model.exposure);
+        assert_eq!(u32::from(lone.pixel.exposure()), model.now.exposure);
         assert_eq!(
             lone.pixel.histogram().counts().map(u32::from),
-            *model.counts
+            *model.now.counts
         );
         assert_eq!(lone.pixel.request(), model.waiting.is_some());
-        assert_eq!(lone.statistics(), model.statistics);
+        assert_eq!(lone.statistics(), model.now.statistics);
         assert_eq!(lone.statistics().photons(), offered);
         if cycle.acknowledge {
             let event = lone.pixel.acknowledge();
@@ -68,7 +68,7 @@ fn compare<const BINS: usize>(settings: Settings, cycles: &[Cycle], seen: &mut S
     assert_eq!(lone.pixel.acknowledge(), model.waiting);
     seen.near += model.near;
     seen.cramped += model.cramped;
-    seen.held += model.statistics.held;
+    seen.held += model.now.statistics.held;
 }
 
 fn random_settings(rng: &mut Pcg32, bins: usize) -> Settings {
@@ -196,7 +196,7 @@ proptest! {
         histogram.add_frame(&frame, config.gate());
         let mut model = Pixel::new::<32>(settings);
         for (bin, &photons) in frame.iter().enumerate() {
-            (0..photons).for_each(|_| model.count(bin));
+            (0..photons).for_each(|_| model.now.count(bin));
         }
         let mut expected = Vec::new();
         while let Some(found) = model.decide() {
@@ -213,7 +213,7 @@ proptest! {
         });
         prop_assert_eq!(echoes, expected);
         // The last is not emptied.
-        prop_assert_eq!(histogram.counts().map(u32::from).to_vec(), model.counts);
+        prop_assert_eq!(histogram.counts().map(u32::from).to_vec(), model.now.counts);
     }
 }
 

@@ -91,11 +91,11 @@ proptest! {
             batched.pixel.count_batch(&config, &codes);
             for code in codes {
                 single.pixel.count(&config, code);
-                model.count(code.into());
+                model.now.count(code.into());
             }
             for pixel in [&single, &batched] {
-                prop_assert_eq!(pixel.statistics(), model.statistics);
-                prop_assert_eq!(&pixel.pixel.histogram().counts().map(u32::from)[..], &model.counts[..]);
+                prop_assert_eq!(pixel.statistics(), model.now.statistics);
+                prop_assert_eq!(&pixel.pixel.histogram().counts().map(u32::from)[..], &model.now.counts[..]);
             }
             prop_assert_eq!(batched.pixel.histogram().peak(), single.pixel.histogram().peak());
         }
@@ -116,7 +116,7 @@ proptest! {
             pixel.pixel.count_frame(&config, &frame);
             for (code, &photons) in frame.iter().enumerate() {
                 for _ in 0..photons {
-                    model.count(code);
+                    model.now.count(code);
                 }
             }
             cycles += u64::from(length);
@@ -125,7 +125,7 @@ proptest! {
             if acknowledge {
                 prop_assert_eq!(pixel.pixel.acknowledge(), model.waiting.take());
             }
-            prop_assert_eq!(pixel.statistics(), model.statistics);
+            prop_assert_eq!(pixel.statistics(), model.now.statistics);
         }
     }
 }

@@ -7,6 +7,7 @@
 )]
 
 mod config;
+mod counted;
 mod echoes;
 mod flow_chart;
 mod model;

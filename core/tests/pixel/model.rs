@@ -9,6 +9,8 @@ use proptest::prelude::*;
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
+use crate::counted::Counted;
+
 /// What a pixel is set to.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
@@ -71,85 +73,47 @@ impl<const BINS: usize> Lone<BINS> {
 /// The flow chart. Its arithmetic is f64, exact for 10-bit counts.
 pub struct Model {
     pub settings: Settings,
-    pub counts: Vec<u32>,
-    /// N.
-    pub exposure: u32,
-    pub since_look: u32,
-    /// Photons of the exposure with the code of a bin.
-    pub in_bins: u32,
-    pub put_off: bool,
+    pub now: Counted,
     pub waiting: Option<DepthEvent>,
-    pub statistics: Statistics,
 }
 
 impl Model {
     pub fn new(bins: usize, settings: Settings) -> Self {
         Self {
             settings,
-            counts: vec![0; bins],
-            exposure: 0,
-            since_look: 0,
-            in_bins: 0,
-            put_off: false,
+            now: Counted::new(bins, settings.first..=settings.last),
             waiting: None,
-            statistics: Statistics::default(),
-        }
-    }
-
-    pub fn count(&mut self, code: usize) {
-        self.in_bins += u32::from(code < self.counts.len());
-        if code >= self.counts.len() {
-            self.statistics.rejected += 1;
-        } else if code < self.settings.first || code > self.settings.last {
-            self.statistics.gated_out += 1;
-        } else if self.counts[code] == 1023 {
-            self.statistics.saturated += 1;
-        } else {
-            self.counts[code] += 1;
-            self.statistics.counted += 1;
         }
     }
 
     pub fn end(&mut self, last_cycle: u64, cycles: u32) -> Look {
-        self.exposure += cycles;
-        self.since_look += cycles;
-        if self.since_look < u32::from(self.settings.x) {
-            return Look::NotDue;
+        let Settings { x, l1, l2, .. } = self.settings;
+        if let Some(look) = self.now.end(cycles, x, l1) {
+            return look;
         }
-        self.since_look = 0;
-        if self.exposure >= u32::from(self.settings.l2) {
-            self.statistics.expired += 1;
-            self.statistics.expired_deferred += u64::from(self.put_off);
-            self.reset();
+        if self.now.exposure >= u32::from(l2) {
+            self.now.statistics.expired += 1;
+            self.now.statistics.expired_deferred += u64::from(self.now.put_off);
+            self.now.begin();
             return Look::Expired;
         }
-        if self.exposure <= u32::from(self.settings.l1) {
-            return Look::TooEarly;
-        }
         if self.waiting.is_some() {
-            self.statistics.deferred += 1;
-            self.put_off = true;
+            self.now.statistics.deferred += 1;
+            self.now.put_off = true;
             return Look::Deferred;
         }
         self.waiting = self.decide(last_cycle);
         if self.waiting.is_none() {
             return Look::NoPeak;
         }
-        self.statistics.events += 1;
-        self.reset();
+        self.now.statistics.events += 1;
+        self.now.begin();
         Look::Event
-    }
-
-    pub fn reset(&mut self) {
-        self.counts.fill(0);
-        self.exposure = 0;
-        self.in_bins = 0;
-        self.put_off = false;
     }
 
     pub fn decide(&self, cycle: u64) -> Option<DepthEvent> {
         let Settings { first, last, .. } = self.settings;
-        let gated = &self.counts[first..=last];
+        let gated = &self.now.counts[first..=last];
         let n = gated.len();
         let peak = *gated.iter().max().unwrap();
         let at = gated.iter().position(|&count| count == peak).unwrap();
@@ -164,9 +128,14 @@ impl Model {
             return None;
         }
 
-        let many = f64::from(self.in_bins) > 0.5 * f64::from(self.exposure);
+        let many = f64::from(self.now.in_bins) > 0.5 * f64::from(self.now.exposure);
         let piles_up = self.settings.is_one_hit && many;
-        let flags = [peak == 1023, at == 0 || at == n - 1, self.put_off, piles_up];
+        let flags = [
+            peak == 1023,
+            at == 0 || at == n - 1,
+            self.now.put_off,
+            piles_up,
+        ];
         let flags = (0..)
             .zip(flags)
             .map(|(bit, is_set)| u8::from(is_set) << bit);
@@ -180,7 +149,7 @@ impl Model {
             level: BlockLevel::PIXEL,
             echo: EchoNumber::FIRST,
             cycle: LaserCycle(cycle),
-            exposure: self.exposure as u16,
+            exposure: self.now.exposure as u16,
             peak_bin: BinIndex::new((first + at) as u16).unwrap(),
             offset: SubBinOffset::new(128 + shift.round() as i16).unwrap(),
             peak_count: Count::new(peak).unwrap(),
@@ -210,7 +179,7 @@ pub fn compare<const BINS: usize>(settings: Settings, cycles: &[Cycle]) -> Stati
         for &(code, times) in &cycle.photons {
             for _ in 0..times {
                 lone.pixel.count(&config, code);
-                model.count(code.into());
+                model.now.count(code.into());
                 offered += 1;
             }
         }
@@ -219,9 +188,9 @@ pub fn compare<const BINS: usize>(settings: Settings, cycles: &[Cycle]) -> Stati
         assert_eq!(look, model.end(number, 1), "laser cycle {number}");
         // An event that waits is never replaced.
         assert!(!(waiting_before && look == Look::Event));
-        assert_eq!(u32::from(lone.pixel.exposure()), model.exposure);
+        assert_eq!(u32::from(lone.pixel.exposure()), model.now.exposure);
         let counts = lone.pixel.histogram().counts().map(u32::from);
-        assert_eq!(counts, *model.counts);
+        assert_eq!(counts, *model.now.counts);
         assert_eq!(lone.pixel.request(), model.waiting.is_some());
         if cycle.acknowledge {
             let event = lone.pixel.acknowledge();
@@ -229,7 +198,7 @@ pub fn compare<const BINS: usize>(settings: Settings, cycles: &[Cycle]) -> Stati
             acknowledged += u64::from(event.is_some());
         }
         let statistics = lone.statistics();
-        assert_eq!(statistics, model.statistics);
+        assert_eq!(statistics, model.now.statistics);
         assert_eq!(offered, statistics.photons());
         let waiting = u64::from(lone.pixel.request());
         assert_eq!(statistics.events, acknowledged + waiting);

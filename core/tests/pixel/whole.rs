@@ -6,8 +6,10 @@ use std::collections::BTreeSet;
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
     AnyRule, AverageRule, BinIndex, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle,
-    Look, PaperRule, PixelAddress, PixelConfig, RangeGate, Statistics, SubBinOffset, WindowRule,
+    Look, PaperRule, PixelAddress, PixelConfig, RangeGate, SubBinOffset, WindowRule,
 };
+
+use crate::counted::Counted;
 
 /// A rule and its number: α in 1/256, or width and z in 1/4096.
 #[derive(Clone, Copy, Debug)]
@@ -82,12 +84,7 @@ pub struct Found {
 pub struct Pixel {
     settings: Settings,
     shares: Option<(u16, u16)>,
-    pub counts: Vec<u32>,
-    /// N.
-    pub exposure: u32,
-    since_look: u32,
-    in_bins: u32,
-    put_off: bool,
+    pub now: Counted,
     /// The peaks of the echoes of this exposure, but for its last.
     pub peaks: Vec<usize>,
     /// The bins around them.
@@ -97,7 +94,6 @@ pub struct Pixel {
     /// Where the last event was, if the last exposure had one.
     expected: Option<usize>,
     pub waiting: Option<DepthEvent>,
-    pub statistics: Statistics,
     /// Events of the rule near the last event; exposures that ended with too few bins left.
     pub near: u32,
     pub cramped: u32,
@@ -108,52 +104,28 @@ impl Pixel {
         Self {
             settings,
             shares: settings.shares::<BINS>(),
-            counts: vec![0; BINS],
-            exposure: 0,
-            since_look: 0,
-            in_bins: 0,
-            put_off: false,
+            now: Counted::new(BINS, settings.first..=settings.last),
             peaks: Vec::new(),
             held: BTreeSet::new(),
             echo_at: 0,
             expected: None,
             waiting: None,
-            statistics: Statistics::default(),
             near: 0,
             cramped: 0,
         }
     }
 
-    pub fn count(&mut self, code: usize) {
-        self.in_bins += u32::from(code < self.counts.len());
-        if code >= self.counts.len() {
-            self.statistics.rejected += 1;
-        } else if code < self.settings.first || code > self.settings.last {
-            self.statistics.gated_out += 1;
-        } else if self.counts[code] == 1023 {
-            self.statistics.saturated += 1;
-        } else {
-            self.counts[code] += 1;
-            self.statistics.counted += 1;
-        }
-    }
-
     pub fn end(&mut self, last_cycle: u64, cycles: u32) -> Look {
-        self.exposure += cycles;
-        self.since_look += cycles;
-        if self.since_look < u32::from(self.settings.x) {
-            return Look::NotDue;
-        }
-        self.since_look = 0;
-        if self.exposure <= u32::from(self.settings.l1) {
-            return Look::TooEarly;
+        let Settings { x, l1, l2, .. } = self.settings;
+        if let Some(look) = self.now.end(cycles, x, l1) {
+            return look;
         }
         self.empty_held();
         let had_event = !self.peaks.is_empty();
-        let has_waited = self.exposure >= self.echo_at * u32::from(self.settings.wait);
-        if self.exposure >= u32::from(self.settings.l2) || had_event && has_waited {
-            self.statistics.expired += u64::from(!had_event);
-            self.statistics.expired_deferred += u64::from(!had_event && self.put_off);
+        let has_waited = self.now.exposure >= self.echo_at * u32::from(self.settings.wait);
+        if self.now.exposure >= u32::from(l2) || had_event && has_waited {
+            self.now.statistics.expired += u64::from(!had_event);
+            self.now.statistics.expired_deferred += u64::from(!had_event && self.now.put_off);
             self.begin(self.peaks.last().copied());
             return if had_event {
                 Look::Ended
@@ -162,8 +134,8 @@ impl Pixel {
             };
         }
         if self.waiting.is_some() {
-            self.statistics.deferred += 1;
-            self.put_off = true;
+            self.now.statistics.deferred += 1;
+            self.now.put_off = true;
             return Look::Deferred;
         }
         let Some(found) = self.decide() else {
@@ -171,14 +143,14 @@ impl Pixel {
         };
         self.waiting = Some(self.event(found, last_cycle));
         self.near += u32::from(found.is_expected);
-        self.statistics.events += 1;
-        self.echo_at = self.exposure;
+        self.now.statistics.events += 1;
+        self.echo_at = self.now.exposure;
         let is_last = self.peaks.len() + 1 == usize::from(self.settings.echoes);
         if is_last || !self.hold(found.bin) {
             self.cramped += u32::from(!is_last);
             self.begin(Some(found.bin));
         } else {
-            self.put_off = false;
+            self.now.put_off = false;
             self.empty_held();
         }
         Look::Event
@@ -193,10 +165,10 @@ impl Pixel {
     }
 
     pub fn empty_held(&mut self) {
-        for (bin, count) in self.counts.iter_mut().enumerate() {
+        for (bin, count) in self.now.counts.iter_mut().enumerate() {
             if self.held.contains(&bin) {
-                self.statistics.counted -= u64::from(*count);
-                self.statistics.held += u64::from(*count);
+                self.now.statistics.counted -= u64::from(*count);
+                self.now.statistics.held += u64::from(*count);
                 *count = 0;
             }
         }
@@ -204,10 +176,7 @@ impl Pixel {
 
     /// A new exposure.
     fn begin(&mut self, last_event: Option<usize>) {
-        self.counts.fill(0);
-        self.exposure = 0;
-        self.in_bins = 0;
-        self.put_off = false;
+        self.now.begin();
         self.peaks.clear();
         self.held.clear();
         self.expected = last_event.filter(|_| self.shares.is_some());
@@ -221,14 +190,14 @@ impl Pixel {
 
     /// The first of the highest of these bins.
     fn highest(&self, bins: impl Iterator<Item = usize>) -> usize {
-        bins.min_by_key(|&bin| (std::cmp::Reverse(self.counts[bin]), bin))
+        bins.min_by_key(|&bin| (std::cmp::Reverse(self.now.counts[bin]), bin))
             .unwrap()
     }
 
     pub fn decide(&self) -> Option<Found> {
         let Settings { first, last, .. } = self.settings;
         let bin = self.highest(first..=last);
-        let peak = self.counts[bin];
+        let peak = self.now.counts[bin];
         let elsewhere = |background| Found {
             bin,
             background,
@@ -272,7 +241,7 @@ impl Pixel {
     }
 
     fn total(&self) -> u32 {
-        self.counts.iter().sum()
+        self.now.counts.iter().sum()
     }
 
     /// The smaller of the maxima of the two quadrants without the peak, of those of which at
@@ -289,7 +258,7 @@ impl Pixel {
                 .count();
             2 * held <= quadrant.len()
         });
-        kept.map(|quadrant| self.counts[quadrant].iter().copied().max().unwrap())
+        kept.map(|quadrant| self.now.counts[quadrant].iter().copied().max().unwrap())
             .min()
     }
 
@@ -297,7 +266,7 @@ impl Pixel {
     fn window(&self, bin: usize, width: usize, z: u16) -> Option<u32> {
         let Settings { first, last, .. } = self.settings;
         let starts = first.max((bin + 1).saturating_sub(width))..=bin.min(last + 1 - width);
-        let sums = starts.map(|start| self.counts[start..start + width].iter().sum::<u32>());
+        let sums = starts.map(|start| self.now.counts[start..start + width].iter().sum::<u32>());
         let inside = sums.max().unwrap();
         let z = i128::from(z).pow(2); // in 1/2²⁴
         let (b, w) = (self.left().len() as i128, width as i128);
@@ -320,22 +289,22 @@ impl Pixel {
             bin, background, ..
         } = found;
         let (first, last) = (self.settings.first, self.settings.last);
-        let peak = self.counts[bin];
+        let peak = self.now.counts[bin];
         let reach = usize::from(self.settings.reach);
         let beside_held = (bin.saturating_sub(1)..=bin + 1).any(|bin| self.held.contains(&bin));
         let behind = |&echo: &usize| (echo + reach + 1..=echo + 2 * reach).contains(&bin);
         let flags = [
             peak == 1023,
             bin == first || bin == last || beside_held,
-            self.put_off,
-            self.settings.is_one_hit && 2 * self.in_bins > self.exposure,
+            self.now.put_off,
+            self.settings.is_one_hit && 2 * self.now.in_bins > self.now.exposure,
             self.peaks.iter().any(behind),
         ];
         let flags = (0..)
             .zip(flags)
             .map(|(bit, is_set)| u8::from(is_set) << bit);
         let above =
-            |bin: usize| (256.0 * f64::from(self.counts[bin]) - f64::from(background)).max(0.0);
+            |bin: usize| (256.0 * f64::from(self.now.counts[bin]) - f64::from(background)).max(0.0);
         let left = if bin > first { above(bin - 1) } else { 0.0 };
         let right = if bin < last { above(bin + 1) } else { 0.0 };
         // 0 of 0 is none.
@@ -345,7 +314,7 @@ impl Pixel {
             level: BlockLevel::PIXEL,
             echo: EchoNumber::new(self.peaks.len() as u8 + 1).unwrap(),
             cycle: LaserCycle(cycle),
-            exposure: self.exposure as u16,
+            exposure: self.now.exposure as u16,
             peak_bin: BinIndex::new(bin as u16).unwrap(),
             offset: SubBinOffset::new(128 + shift.round() as i16).unwrap(),
             peak_count: Count::new(peak).unwrap(),

@@ -12,7 +12,7 @@ use crate::State;
 
 /// An operation to measure. It takes a state and a number and returns something, so
 /// that nothing is optimised away.
-pub type Operation = extern "C" fn(&mut State, u32) -> u32;
+pub type Operation<S = State> = extern "C" fn(&mut S, u32) -> u32;
 
 /// A running counter, and what measuring itself takes.
 pub struct Counter {
@@ -26,14 +26,18 @@ impl Counter {
         let mut counter = Self { overhead: 0 };
         // The return belongs to the operation, the call does not.
         counter.overhead = counter.measure(only_return, state, 0).checked_sub(1)?;
-        let hundred = counter.measure(hundred, state, 0);
-        hardware::is_right(hundred).then_some(counter)
+        counter.is_right_for(state).then_some(counter)
+    }
+
+    /// Whether an operation on such a state measures as what it takes.
+    pub fn is_right_for<S>(&self, state: &mut S) -> bool {
+        hardware::is_right(self.measure(hundred, state, 0))
     }
 
     /// Instructions (on a board clock cycles) from the first of `operation` up to
     /// its return and including it.
     #[inline(never)]
-    pub fn measure(&self, operation: Operation, state: &mut State, number: u32) -> u32 {
+    pub fn measure<S>(&self, operation: Operation<S>, state: &mut S, number: u32) -> u32 {
         let before = hardware::now();
         core::hint::black_box(operation(state, number));
         let after = hardware::now();
@@ -51,7 +55,7 @@ extern "C" fn only_return(_: &mut State, _: u32) -> u32 {
 #[allow(unsafe_code, reason = "a known number of instructions")]
 #[allow(improper_ctypes_definitions, reason = "only Rust calls it")]
 #[unsafe(naked)]
-extern "C" fn hundred(_: &mut State, _: u32) -> u32 {
+extern "C" fn hundred<S>(_: &mut S, _: u32) -> u32 {
     core::arch::naked_asm!(".rept 99", "nop", ".endr", "bx lr")
 }
 

@@ -12,6 +12,8 @@ compile_error!("an image for a board: cargo xtask bench");
 
 mod counter;
 mod decisions;
+mod further;
+mod looks;
 mod operations;
 mod products;
 mod report;
@@ -44,6 +46,10 @@ fn main() -> ! {
     windows::run(&counter, &mut state);
     products::run(&counter, &mut state);
     roots::run(&counter, &mut state);
+    if !looks::run(&counter, &mut state) {
+        println!("blocks, tracking and echoes were not counted");
+        ExitCode::FAILURE.exit_process()
+    }
     ExitCode::SUCCESS.exit_process()
 }
 

@@ -1,130 +1,15 @@
-//! Adaptive binning: where blocks lie and who feeds them, and a whole array against a model
-//! written from the description of pixels, ticks and feeding.
-
-#![allow(clippy::cast_possible_truncation, reason = "small numbers")]
+//! A whole array against a model written from the description of pixels, ticks and feeding.
 
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    Array, AsyncPixel, Binning, Block, BlockLevel, Count, Count16, DepthEvent, EchoNumber, Feed,
-    LaserCycle, PaperRule, PixelAddress, PixelConfig, Statistics, count_in_blocks,
-    end_laser_cycles_of_blocks,
+    Array, AsyncPixel, Binning, Block, Count, Count16, DepthEvent, EchoNumber, LaserCycle,
+    PaperRule, PixelAddress, PixelConfig, Statistics, count_in_blocks, end_laser_cycles_of_blocks,
 };
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-fn level(raw: u8) -> BlockLevel {
-    BlockLevel::new(raw).unwrap()
-}
-
-/// The number of the block that a feed is into. It is on from the first tick.
-fn into(mut feed: Feed) -> Option<usize> {
-    assert_eq!(feed.block(), None);
-    feed.tick(false);
-    feed.block()
-}
-
-/// Every pixel feeds the block of level 1 that it lies in, and every block that of the next.
-fn check(columns: u32, rows: u32) {
-    let array = Array::new(columns, rows).unwrap();
-    let place = |pixel: PixelAddress| (u32::from(pixel.0) % columns, u32::from(pixel.0) / columns);
-    for top in 1..=3 {
-        let binning = Binning::new(array, level(top)).unwrap();
-        let blocks: Vec<_> = binning.blocks().collect();
-        assert_eq!(blocks.len() as u32, binning.number_of_blocks());
-        let number_of = (1..=top).map(|level| {
-            let side = 1 << level;
-            columns.div_ceil(side) * rows.div_ceil(side)
-        });
-        assert_eq!(number_of.sum::<u32>(), binning.number_of_blocks());
-        assert!(blocks.is_sorted_by_key(|block| (block.level, block.first)));
-        let parent = |pixel: PixelAddress, of: u8| {
-            let (column, row) = place(pixel);
-            let (left, top) = (column >> of << of, row >> of << of);
-            let first = PixelAddress((top * columns + left) as u16);
-            let found = blocks
-                .iter()
-                .position(|block| (block.first, block.level.raw()) == (first, of));
-            found.unwrap()
-        };
-        for pixel in (0..array.pixels()).map(|pixel| PixelAddress(pixel as u16)) {
-            assert_eq!(into(binning.feed_of(pixel)), Some(parent(pixel, 1)));
-        }
-        for block in &blocks {
-            let next = block.level.raw() + 1;
-            let expected = (next <= top).then(|| parent(block.first, next));
-            assert_eq!(into(block.feed), expected);
-        }
-        // No other pixel feeds a block.
-        for beyond in [array.pixels(), array.pixels() + 1, 65_535] {
-            if (array.pixels()..1 << 16).contains(&beyond) {
-                assert_eq!(into(binning.feed_of(PixelAddress(beyond as u16))), None);
-            }
-        }
-    }
-    assert_eq!(Binning::new(array, BlockLevel::PIXEL), None);
-}
-
-#[test]
-fn all_small_arrays() {
-    for columns in 1..=18 {
-        for rows in 1..=18 {
-            check(columns, rows);
-        }
-    }
-}
-
-/// Every number of a block fits, however an array lies.
-#[test]
-fn the_most_blocks_are_those_of_one_row() {
-    let blocks = |columns, rows| {
-        let array = Array::new(columns, rows).unwrap();
-        Binning::new(array, level(3)).unwrap().number_of_blocks()
-    };
-    let most = (1..=1 << 16)
-        .map(|columns| blocks(columns, (1 << 16) / columns))
-        .max();
-    assert_eq!((most, blocks(1 << 16, 1)), (Some(57_344), 57_344));
-    let binning = Binning::new(Array::new(1, 1 << 16).unwrap(), level(3)).unwrap();
-    let last = binning.blocks().last().unwrap();
-    assert_eq!((last.first, into(last.feed)), (PixelAddress(65_528), None));
-    assert_eq!(into(binning.feed_of(PixelAddress(65_535))), Some(32_767));
-}
-
-#[test]
-fn a_feed_is_on_from_a_tick_to_an_event_and_past_the_tick_after_it() {
-    let binning = Binning::new(Array::new(4, 1).unwrap(), level(1)).unwrap();
-    let mut feed = binning.feed_of(PixelAddress(2));
-    // An event, a tick, or neither; what the feed is into then.
-    for (step, expected) in [
-        (' ', None),
-        ('t', Some(1)),
-        ('t', Some(1)),
-        ('e', None),
-        (' ', None),
-        ('t', None), // an event since the last tick
-        ('t', Some(1)),
-        ('e', None),
-        ('e', None),
-        ('t', None),
-        ('e', None),
-        ('t', None),
-        ('t', Some(1)),
-        ('w', None), // an event that waits, or an exposure that goes on after one
-        ('t', Some(1)),
-    ] {
-        match step {
-            'e' => feed.reported(),
-            't' => feed.tick(false),
-            'w' => feed.tick(true),
-            _ => {}
-        }
-        assert_eq!(feed.block(), expected);
-    }
-    let mut none = Feed::NONE;
-    none.tick(false);
-    assert_eq!(none.block(), None);
-}
+use crate::level;
 
 const BINS: usize = 16;
 

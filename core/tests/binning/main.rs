@@ -1,0 +1,12 @@
+//! Adaptive binning.
+
+#![allow(clippy::cast_possible_truncation, reason = "small numbers")]
+
+mod places;
+mod whole;
+
+use dtof_core::BlockLevel;
+
+fn level(raw: u8) -> BlockLevel {
+    BlockLevel::new(raw).unwrap()
+}

@@ -1,0 +1,204 @@
+//! A pixel that tracks, has echoes or feeds blocks, and what it does. The photons are those
+//! of [`State`], and in some exposures those of a second target.
+
+use dtof_core::fixed::types::U4F12;
+use dtof_core::{
+    Array, AsyncPixel, Binning, Block, BlockLevel, Count, EchoNumber, Feed, Histogram, LaserCycle,
+    Look, PixelAddress, PixelConfig, RangeGate, Statistics, WindowRule, count_in_blocks,
+    end_laser_cycles_of_blocks,
+};
+
+use crate::scene::{BINS, CYCLES, PHOTONS, State};
+
+/// Photons of the four laser cycles from a look to the next.
+const PHOTONS_A_LOOK: usize = 24;
+/// Laser cycles from a look to the next.
+const X: u16 = 4;
+/// The exposure at the second look.
+const SECOND_LOOK: u16 = CYCLES + X;
+
+/// What a pixel is configured for.
+#[derive(Clone, Copy)]
+pub struct Features {
+    pub tracks: bool,
+    /// 1 or 2.
+    pub echoes: u8,
+    pub l2: u16,
+}
+
+impl Features {
+    pub const NONE: Self = Self {
+        tracks: false,
+        echoes: 1,
+        l2: 2000,
+    };
+    pub const TRACKING: Self = Self {
+        tracks: true,
+        ..Self::NONE
+    };
+    pub const TWO_ECHOES: Self = Self {
+        echoes: 2,
+        ..Self::NONE
+    };
+
+    /// Exposures end at the second look.
+    pub const fn short(self) -> Self {
+        Self {
+            l2: SECOND_LOOK,
+            ..self
+        }
+    }
+}
+
+/// All that operations read and change. The array has one pixel, so a block of each level.
+#[derive(Clone)]
+pub struct Further {
+    pub pixel: AsyncPixel<BINS>,
+    blocks: [Block<BINS>; 3],
+    feed: Feed,
+    /// A window of 3 bins, X = 4, L1 = 40.
+    config: PixelConfig<BINS, WindowRule>,
+    statistics: Statistics,
+    codes: [u16; PHOTONS as usize],
+    histogram: Histogram<BINS>,
+    /// The histogram as another sensor would send it.
+    foreign: [u16; BINS],
+}
+
+impl Further {
+    pub fn new() -> Option<Self> {
+        let binning = Binning::new(Array::new(1, 1)?, BlockLevel::MAX)?;
+        let mut blocks = binning.blocks().map(Block::new);
+        Some(Self {
+            pixel: AsyncPixel::new(PixelAddress(7)),
+            blocks: [blocks.next()?, blocks.next()?, blocks.next()?],
+            feed: binning.feed_of(PixelAddress(0)),
+            config: Self::config(Features::NONE)?,
+            statistics: Statistics::default(),
+            codes: [0; PHOTONS as usize],
+            histogram: Histogram::new(),
+            foreign: [0; BINS],
+        })
+    }
+
+    fn config(features: Features) -> Option<PixelConfig<BINS, WindowRule>> {
+        let rule = WindowRule::new(3, const { U4F12::lit("4.4") }, Count::saturating(5)).ok()?;
+        let tracking = rule.tracking(&RangeGate::<BINS>::full());
+        let config = PixelConfig::with_rule(rule).x(X).l1(40).l2(features.l2);
+        let config = config.tracking(features.tracks.then_some(tracking));
+        // Four standard deviations of a pulse of 0.5 bins.
+        let config = config.echoes(EchoNumber::new(features.echoes)?, 2);
+        config.build().ok()
+    }
+
+    /// An empty pixel and empty blocks, of which so many levels are fed.
+    pub fn empty(&mut self, features: Features, levels: usize) -> Option<()> {
+        let codes = self.codes;
+        *self = Self::new()?;
+        self.codes = codes;
+        self.config = Self::config(features)?;
+        self.feed.tick(levels == 0);
+        let feeding = self.blocks.iter_mut().take(levels.saturating_sub(1));
+        feeding.for_each(Block::tick);
+        Some(())
+    }
+
+    /// The photons of exposure `number`, of a second target as well if there are two.
+    pub fn photons(&mut self, state: &mut State, number: u32, targets: u8) {
+        state.empty(number, targets > 0);
+        self.codes = state.codes;
+        let first = self.codes.first().copied().unwrap_or_default();
+        let second = if first < 64 { first + 40 } else { first - 40 };
+        if targets == 2 {
+            let photons = self.codes.iter_mut().skip(3).step_by(6);
+            photons.for_each(|code| *code = second);
+        }
+    }
+
+    /// The histogram of these photons, as it comes from elsewhere.
+    pub fn arrive(&mut self) {
+        self.histogram.clear();
+        self.histogram.add_batch(&self.codes);
+        self.foreign = *self.histogram.counts();
+        self.histogram.clear();
+    }
+
+    /// Counts all photons, in the blocks as well, and lets the laser cycles up to the first
+    /// look pass but the last.
+    pub fn until_first_look(&mut self) {
+        self.pixel.count_batch(&self.config, &self.codes);
+        for &code in &self.codes {
+            count_in_blocks(&mut self.blocks, &self.feed, &self.config, code);
+        }
+        self.pass(0..CYCLES - 1);
+    }
+
+    /// The first look, whose event the link takes. Whether there was one.
+    pub fn reports(&mut self) -> bool {
+        let _ = self.end_laser_cycle(u32::from(CYCLES) - 1);
+        self.pixel.acknowledge().is_some()
+    }
+
+    /// The same of the block of level 1.
+    pub fn block_reports(&mut self) -> bool {
+        self.end_laser_cycle_of_block(u32::from(CYCLES) - 1)
+    }
+
+    /// Some photons more, and the laser cycles up to the second look but its last.
+    pub fn until_second_look(&mut self) {
+        let codes = self.codes.get(..PHOTONS_A_LOOK).unwrap_or_default();
+        self.pixel.count_batch(&self.config, codes);
+        self.pass(CYCLES..SECOND_LOOK - 1);
+    }
+
+    fn pass(&mut self, cycles: core::ops::Range<u16>) {
+        for cycle in cycles {
+            let _ = self.end_laser_cycle(cycle.into());
+            let _ = self.end_laser_cycle_of_block(cycle.into());
+        }
+    }
+
+    #[inline(always)]
+    fn end_laser_cycle(&mut self, cycle: u32) -> Look {
+        let cycle = LaserCycle(cycle.into());
+        (self.pixel).end_laser_cycle(&self.config, &mut self.statistics, cycle)
+    }
+
+    #[inline(always)]
+    fn end_laser_cycle_of_block(&mut self, cycle: u32) -> bool {
+        let (blocks, statistics) = (self.blocks.get_mut(..1), &mut self.statistics);
+        let (blocks, cycle) = (blocks.unwrap_or_default(), LaserCycle(cycle.into()));
+        end_laser_cycles_of_blocks(blocks, &self.config, statistics, cycle, 1)
+    }
+}
+
+/// A photon of a pixel that feeds blocks.
+pub extern "C" fn count(further: &mut Further, index: u32) -> u32 {
+    if let Some(&code) = further.codes.get(index as usize) {
+        further.pixel.count(&further.config, code);
+        count_in_blocks(&mut further.blocks, &further.feed, &further.config, code);
+    }
+    0
+}
+
+pub extern "C" fn look(further: &mut Further, cycle: u32) -> u32 {
+    further.end_laser_cycle(cycle) as u32
+}
+
+pub extern "C" fn look_of_block(further: &mut Further, cycle: u32) -> u32 {
+    further.end_laser_cycle_of_block(cycle).into()
+}
+
+/// How many echoes there are among counts that come from elsewhere.
+pub extern "C" fn echoes(further: &mut Further, _: u32) -> u32 {
+    let gate = further.config.gate();
+    further.histogram.add_frame(&further.foreign, gate);
+    let mut echoes = 0;
+    further
+        .config
+        .detect_echoes(&mut further.histogram, |_, detection| {
+            core::hint::black_box(detection.depth.offset);
+            echoes += 1;
+        });
+    echoes
+}
