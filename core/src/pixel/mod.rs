@@ -7,9 +7,8 @@
 //!
 //! An event goes into the pixel's slot; the pixel clears and counts on at once. While the
 //! link has not taken it the pixel does not fire again. It keeps counting and looks again X
-//! laser cycles later. Each look put off is counted as deferred. Back-pressure lengthens
-//! exposures; it loses no event that was made. An exposure that reaches L2 meanwhile ends
-//! without one, and is counted apart.
+//! laser cycles later. Each look put off is counted as deferred. No event that was made is
+//! lost. An exposure that reaches L2 meanwhile ends without one, and is counted apart.
 //!
 //! ```
 //! use dtof_core::*;
@@ -27,12 +26,10 @@
 //! assert_eq!((event.exposure, event.peak_bin.raw(), event.peak_count.raw()), (44, 60, 44));
 //! ```
 //!
-//! With [`PixelConfigBuilder::echoes`](crate::PixelConfigBuilder::echoes) above 1 an event
-//! does not end the exposure: the bins around its peak are emptied and left out, and the
-//! pixel goes on until it has all its echoes, or has
-//! [waited](crate::PixelConfigBuilder::echo_wait) for the next one. With
-//! [`tracking`](crate::PixelConfigBuilder::tracking) it expects the next event where the
-//! last was.
+//! With several [echoes](crate::PixelConfigBuilder::echoes) an event does not end the
+//! exposure: the pixel leaves out the bins around its peak, and [waits](
+//! crate::PixelConfigBuilder::echo_wait) for the next. With
+//! [tracking](crate::PixelConfigBuilder::tracking) it expects an event where the last was.
 //!
 //! Cost: 72 bytes beside the counters (a compile-time check). On a Cortex-M4 and 128
 //! bins 10 instructions a photon in a batch, 130 a look, 110 to clear and re-arm.
@@ -209,11 +206,14 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         statistics: &mut Statistics,
         cycle: LaserCycle,
     ) -> Look {
+        let mut longest = config.l2();
         if self.state.contains(State::PEELED) {
             // Photons that have come since the last look.
             self.peel(statistics);
+            // The slot has the last echo, whether or not that was taken.
+            longest = config.end_after_echo(self.event.exposure);
         }
-        if self.exposure >= self.longest(config) {
+        if self.exposure >= longest {
             return self.end(config, statistics);
         }
         if self.state.contains(State::REQUESTING) {
@@ -227,15 +227,6 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             return Look::NoPeak;
         };
         self.report(config, statistics, cycle, &detection)
-    }
-
-    /// The exposure at which this one ends.
-    const fn longest<R: DetectionRule>(&self, config: &PixelConfig<BINS, R>) -> u16 {
-        if self.state.contains(State::PEELED) {
-            // The slot has its last echo, whether or not that was taken.
-            return config.end_after_echo(self.event.exposure);
-        }
-        config.l2()
     }
 
     /// Puts the event of `detection` into the slot. The exposure ends, or goes on for the
