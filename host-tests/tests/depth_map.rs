@@ -1,13 +1,16 @@
 //! A rendered depth map with a picture, `../shared/data/vgroove` beside the workspace: two
-//! walls that meet in a valley.
+//! walls that meet in a valley. Alone pixels see them, and in blocks.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use dtof::engine::host::host_engine;
+use dtof::engine::settings::{AdaptiveBinning, Settings};
+use dtof::events::reports::LastReports;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::simulate::scene::{self, Along, DepthMap, Scene};
-use dtof_core::PixelAddress;
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{BlockLevel, Count, DepthEvent, PixelAddress, RangeGate, WindowRule, z_for_levels};
 
 /// Where it is; says so if it is nowhere.
 fn vgroove() -> Option<PathBuf> {
@@ -85,5 +88,74 @@ fn events_lie_on_its_walls() {
     assert!(
         bias.abs() < 2.0 && rms < 10.0,
         "bias {bias} mm, rms {rms} mm"
+    );
+}
+
+/// The events of a dim view of it, laser cycles `1..=3000`.
+fn events(scene: &Scene, settings: &Settings) -> Vec<DepthEvent> {
+    let mut photons = scene.photons(settings.seed, 3000).unwrap();
+    let mut engine = host_engine(settings, scene.geometry, &photons.addresses()).unwrap();
+    let slices = (0..30).map(|_| engine.run(&photons.next_slice(100).unwrap()).unwrap());
+    slices.collect::<Vec<_>>().concat()
+}
+
+/// A block may cover pixels of both walls, or of different depth. Wrong is more than three bins.
+#[test]
+fn blocks_report_its_walls_and_leave_pixels_their_events() {
+    let Some(folder) = vgroove() else { return };
+    let array = Geometry::new(80, 60);
+    let mut scene = scene_of(&folder, Along::Ray, Some(array));
+    scene.background = 0.05;
+    // Around 0.08 signal photons a laser cycle.
+    scene.signal_at_one_metre *= 0.005;
+    // One false alarm in a hundred exposures, with the blocks and without.
+    let settings = |levels| {
+        let gate = RangeGate::<128>::full();
+        let z = z_for_levels(100, &gate, 4, 40, 2000, levels);
+        let patience = AdaptiveBinning::PATIENCE;
+        let is_alone = levels == BlockLevel::PIXEL;
+        Settings {
+            rule: WindowRule::new(3, z, Count::saturating(5)).unwrap().into(),
+            sigma_bins: Some(U8F8::ONE),
+            x: 4,
+            l1: 40,
+            binning: (!is_alone).then_some(AdaptiveBinning { levels, patience }),
+            ..scene::settings(1)
+        }
+    };
+    let (alone, with_blocks) = (BlockLevel::PIXEL, BlockLevel::saturating(2));
+    let (alone, with_blocks) = (settings(alone), settings(with_blocks));
+    let of_pixels = |events: &[DepthEvent]| {
+        let own = events
+            .iter()
+            .filter(|event| event.level == BlockLevel::PIXEL);
+        own.count()
+    };
+    let own = of_pixels(&events(&scene, &alone));
+    let events = events(&scene, &with_blocks);
+    let mut reports = vec![LastReports::default(); array.addresses()];
+    let (mut right, mut wrong) = (0, 0);
+    for event in &events {
+        for pixel in array.block(event.pixel, event.level) {
+            let report = &mut reports[usize::from(pixel.0)];
+            let stands = report.take(event.level, event.cycle, event.exposure.into());
+            if !stands || event.level == BlockLevel::PIXEL {
+                continue;
+            }
+            let truth = scene.truth(pixel, 0).unwrap().range_mm / scene.mm_per_bin();
+            let position = f64::from(event.position().raw()) / 256.0;
+            let count = match (position - truth).abs() <= 3.0 {
+                true => &mut right,
+                false => &mut wrong,
+            };
+            *count += 1;
+        }
+    }
+    let kept = of_pixels(&events) as f64 / own as f64;
+    println!("{own} events alone, {kept} kept; of blocks {right} right, {wrong} wrong");
+    assert!(own > 1000 && kept >= 0.95, "{own}, {kept}");
+    assert!(
+        right > 10_000 && wrong * 50 <= right + wrong,
+        "{right}, {wrong}"
     );
 }

@@ -37,9 +37,9 @@ pub struct Export {
     /// A direction and a range bias for each pixel, a TOML file; docs/export.md has its keys
     #[arg(long, value_name = "FILE", value_parser = path())]
     calibration: Option<PathBuf>,
-    /// Laser cycles a second
-    #[arg(long, value_name = "HZ", default_value_t = LaserClock::PAPER_HZ, value_parser = whole(1..=u64::MAX))]
-    laser_hz: u64,
+    /// Laser cycles a second [default: what the file says, else 10000000]
+    #[arg(long, value_name = "HZ", value_parser = whole(1..=u64::MAX))]
+    laser_hz: Option<u64>,
     /// The kind of events to export from a file with both
     #[arg(long, value_enum)]
     events: Option<EventKind>,
@@ -65,7 +65,7 @@ impl Export {
         };
         let options = Options {
             optics,
-            clock: LaserClock::new(self.laser_hz)?,
+            clock: self.laser_hz.map(LaserClock::new).transpose()?,
             kind: self.events,
             echo: self.echo,
             slice_ns: self.slice_us.map(|us| us * 1000),

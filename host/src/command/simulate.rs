@@ -12,7 +12,6 @@ use dtof::engine::run::run;
 use dtof::engine::settings::Settings;
 use dtof::events::echoes::Echo;
 use dtof::events::output::Output;
-use dtof::export::LaserClock;
 use dtof::geometry::FieldOfView;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::rows::Row;
@@ -183,16 +182,9 @@ impl Simulation<'_> {
 
 /// The options without which `dtof export` takes the scene for another, if any.
 fn export_with(scene: &Scene) -> Option<String> {
-    let mut options = Vec::new();
-    let hz = scene.laser_hz();
-    if hz != LaserClock::PAPER_HZ {
-        options.push(format!("--laser-hz {hz}"));
-    }
     let view = format!("{:.6}", scene.view());
-    if view != format!("{:.6}", FieldOfView::of(scene.geometry)) {
-        options.push(format!("--fov {view}"));
-    }
-    (!options.is_empty()).then(|| options.join(" "))
+    let is_default = view == format!("{:.6}", FieldOfView::of(scene.geometry));
+    (!is_default).then(|| format!("--fov {view}"))
 }
 
 /// The engine of this computer, or that of a device.

@@ -112,6 +112,8 @@ pub struct Header {
     pub bin_width_ps: U16F16,
     /// Millimetres added to every range.
     pub offset_mm: I24F8,
+    /// Laser cycles in a thousand seconds; 0 if that is not known.
+    pub laser_millihertz: u64,
 }
 
 impl Header {
@@ -126,6 +128,7 @@ impl Header {
             &self.geometry.rows.to_le_bytes(),
             &self.bin_width_ps.to_le_bytes(),
             &self.offset_mm.to_le_bytes(),
+            &self.laser_millihertz.to_le_bytes(),
         ]
         .concat();
         bytes[..fields.len()].copy_from_slice(&fields);
@@ -158,6 +161,7 @@ impl Header {
             geometry,
             bin_width_ps: U16F16::from_le_bytes(four_at(24)),
             offset_mm: I24F8::from_le_bytes(four_at(28)),
+            laser_millihertz: u64::from(u32_at(32)) | u64::from(u32_at(36)) << 32,
         })
     }
 

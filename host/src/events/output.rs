@@ -83,6 +83,7 @@ impl Output {
             geometry,
             bin_width_ps: settings.bin_width_ps,
             offset_mm: settings.offset_mm,
+            laser_millihertz: source.laser_hz().map_or(0, |hz| hz.saturating_mul(1000)),
         };
         let aer = aer_file::Writer::new(BufWriter::new(aside(folder, OF_A_RUN)?), &header)?;
         Ok(Self {

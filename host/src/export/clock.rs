@@ -5,17 +5,20 @@ use std::fmt;
 use anyhow::{Result, ensure};
 
 use super::{Format, evt2};
+use crate::events::aer_file::Header;
 
 /// How many laser cycles a second has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LaserClock {
-    /// Not 0.
-    hz: u64,
+    /// Laser cycles in a thousand seconds, not 0.
+    millihertz: u128,
 }
 
 impl Default for LaserClock {
     fn default() -> Self {
-        Self { hz: Self::PAPER_HZ }
+        Self {
+            millihertz: 1000 * u128::from(Self::PAPER_HZ),
+        }
     }
 }
 
@@ -29,19 +32,27 @@ impl LaserClock {
     /// If `hz` is 0.
     pub fn new(hz: u64) -> Result<Self> {
         ensure!(hz > 0, "the laser has 0 cycles a second");
-        Ok(Self { hz })
+        Ok(Self {
+            millihertz: 1000 * u128::from(hz),
+        })
+    }
+
+    /// That of a file which says so.
+    pub(super) fn of(header: &Header) -> Option<Self> {
+        let millihertz = u128::from(header.laser_millihertz);
+        (millihertz > 0).then_some(Self { millihertz })
     }
 
     /// Nanoseconds from the start of laser cycle 0 to that of `cycle`, rounded down.
     #[must_use]
     pub fn nanoseconds(&self, cycle: u64) -> u128 {
-        u128::from(cycle) * 1_000_000_000 / u128::from(self.hz)
+        u128::from(cycle) * 1_000_000_000_000 / self.millihertz
     }
 
     /// The same in microseconds.
     #[must_use]
     pub fn microseconds(&self, cycle: u64) -> u128 {
-        u128::from(cycle) * 1_000_000 / u128::from(self.hz)
+        u128::from(cycle) * 1_000_000_000 / self.millihertz
     }
 
     /// The nanosecond in which laser cycle `cycle` ends, as far as 64 bits go; not 0.
@@ -62,7 +73,7 @@ impl LaserClock {
             "laser cycle {cycle} lies beyond, {} s after the start: {name} holds {} s of time (--laser-hz {})",
             time / 1_000_000_000,
             end_ns / 1_000_000_000,
-            self.hz
+            self.millihertz as f64 / 1e3
         );
         Ok(())
     }
@@ -71,7 +82,7 @@ impl LaserClock {
 /// "10 MHz".
 impl fmt::Display for LaserClock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} MHz", self.hz as f64 / 1e6)
+        write!(f, "{} MHz", self.millihertz as f64 / 1e9)
     }
 }
 

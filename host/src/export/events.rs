@@ -30,6 +30,8 @@ pub struct Survey {
     counts: [u64; 2],
     /// Depth events of the echo that is wanted.
     chosen: u64,
+    /// How long a laser cycle is.
+    pub clock: LaserClock,
     /// The laser cycle of the latest event.
     pub latest: u64,
     /// Damage that ends the file too early: the byte, and what is wrong there.
@@ -45,15 +47,20 @@ impl Survey {
     pub fn of(
         path: &Path,
         format: Format,
-        clock: LaserClock,
+        clock: Option<LaserClock>,
         echo: Echo,
         quiet: bool,
     ) -> Result<Self> {
         let file = path.metadata()?;
         ensure!(file.is_file(), "not a file that can be read twice");
         let mut reader = open(path)?;
+        let header = *reader.header();
+        let clock = clock
+            .or_else(|| LaserClock::of(&header))
+            .unwrap_or_default();
         let mut survey = Self {
-            header: *reader.header(),
+            header,
+            clock,
             counts: [0; 2],
             chosen: 0,
             latest: 0,

@@ -80,8 +80,9 @@ impl Optics {
 pub struct Options {
     /// Where pixels look.
     pub optics: Optics,
-    /// How long a laser cycle is.
-    pub clock: LaserClock,
+    /// How long a laser cycle is; what the file says unless given, and if it does not the
+    /// paper's 10 MHz.
+    pub clock: Option<LaserClock>,
     /// Which events of a file that holds both kinds.
     pub kind: Option<EventKind>,
     /// Which echo of each exposure, of depth events.
@@ -93,12 +94,12 @@ pub struct Options {
 }
 
 impl Default for Options {
-    /// A pinhole camera at the paper's 10 MHz, and the paper's dynamic depth: 0.1 m
+    /// A pinhole camera, the laser rate of the file, and the paper's dynamic depth: 0.1 m
     /// between the means of adjacent events (section III-E).
     fn default() -> Self {
         Self {
             optics: Optics::Pinhole(None),
-            clock: LaserClock::default(),
+            clock: None,
             kind: None,
             echo: Echo::All,
             slice_ns: None,
@@ -162,19 +163,19 @@ pub fn export(
         kind == EventKind::Depth || options.echo == Echo::All,
         "--echo: only for depth events"
     );
-    let header = survey.header;
+    let (header, clock) = (survey.header, survey.clock);
     let array = header.geometry;
     let (rays, mut assumed) = options.optics.rays(array)?;
     let projection = Projection {
         rays,
         scale: RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?,
-        clock: options.clock,
+        clock,
     };
     if format == Format::Evt2 {
         assumed.clear();
     }
-    assumed += &options.clock.to_string();
-    let end_ns = options.clock.end_ns(survey.latest);
+    assumed += &clock.to_string();
+    let end_ns = clock.end_ns(survey.latest);
     let slice_ns = options.slice_ns.unwrap_or_else(|| mcap::slice_of(end_ns));
     let file = BufWriter::new(aside(&place.folder, ".dtof-export-")?);
     let points = survey.chosen(kind);
@@ -192,7 +193,7 @@ pub fn export(
             let config = changes
                 .config(&projection.scale)
                 .with_context(|| format!("--threshold-mm {}", changes.threshold_mm))?;
-            evt2::Evt2::new(file, array, options.clock, config, options.echo).map(boxed)
+            evt2::Evt2::new(file, array, clock, config, options.echo).map(boxed)
         }
     };
     let mut sink = sink.with_context(to)?;

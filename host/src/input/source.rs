@@ -105,6 +105,11 @@ pub trait PhotonSource {
         None
     }
 
+    /// Laser cycles a second, if that is known.
+    fn laser_hz(&self) -> Option<u64> {
+        None
+    }
+
     /// The photons of the next `cycles` laser cycles.
     ///
     /// # Errors

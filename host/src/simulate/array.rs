@@ -19,6 +19,7 @@ pub struct SimulatedArray {
     next_cycle: u64,
     pixels: Vec<SimulatedPixel>,
     rates_at: Option<RatesAt>,
+    laser_hz: Option<u64>,
 }
 
 impl SimulatedArray {
@@ -38,6 +39,16 @@ impl SimulatedArray {
             next_cycle: 0,
             pixels,
             rates_at,
+            laser_hz: None,
+        }
+    }
+
+    /// The same with a laser of `hz` cycles a second.
+    #[must_use]
+    pub fn with_laser_hz(self, hz: u64) -> Self {
+        Self {
+            laser_hz: Some(hz),
+            ..self
         }
     }
 }
@@ -56,6 +67,10 @@ impl PhotonSource for SimulatedArray {
             .iter()
             .map(SimulatedPixel::photons_per_cycle)
             .sum()
+    }
+
+    fn laser_hz(&self) -> Option<u64> {
+        self.laser_hz
     }
 
     fn next_slice(&mut self, cycles: u16) -> Result<Slice> {

@@ -172,7 +172,8 @@ impl Scene {
             Box::new(move |pixel, cycle| scene.views(pixel, cycle).map(|view| scene.rates_of(view)))
                 as RatesAt
         });
-        let photons = SimulatedArray::new(self.geometry, pixels, cycles, rates_at);
+        let photons = SimulatedArray::new(self.geometry, pixels, cycles, rates_at)
+            .with_laser_hz(self.laser_hz());
         let each_cycle = photons.photons_per_cycle();
         ensure!(
             each_cycle <= MOST_PHOTONS,

@@ -189,7 +189,7 @@ fn slices_have_a_cloud_and_statistics_each() {
     // A message holds 65,536 points at most.
     let events: Vec<Event> = (0..70_000).map(|index| depth(7, index, 40)).collect();
     let mut options = sliced(Some(10_000_000));
-    options.clock = LaserClock::new(1_000_000_000).unwrap();
+    options.clock = Some(LaserClock::new(1_000_000_000).unwrap());
     let (_, out) = exported(&file(&HEADER, &events), Format::Mcap, &options);
     assert_eq!(mcap(&out), (70_000, 2, 1));
     // Each has a time of its own: the beginning of the slice, its first point.

@@ -210,7 +210,7 @@ fn the_options_that_export_needs_are_said() {
     let keys = "columns = 8\nrows = 4\nbins = 128\ncycles = 200\n";
     let slow = "laser_rate_mhz = 1.25\nfield_of_view_degrees = [60, 32]\n";
     let natural = [60.0, 2.0 * (0.5 / 3f64.sqrt()).atan().to_degrees()];
-    let of_slow = Some("--laser-hz 1250000 --fov 60x32");
+    let of_slow = Some("--fov 60x32");
     for (more, array, hz, degrees, options) in [
         ("", "8x4", 10_000_000, natural, None),
         ("", "16x8", 10_000_000, natural, None),

@@ -95,6 +95,7 @@ mod tests {
         geometry: Geometry::new(2, 2),
         bin_width_ps: U16F16::lit("250"),
         offset_mm: I24F8::ZERO,
+        laser_millihertz: 0,
     };
 
     #[test]
