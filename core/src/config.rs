@@ -55,6 +55,7 @@ pub struct PixelConfig<const BINS: usize, R: DetectionRule = PaperRule> {
     tracking: Option<Tracking<R>>,
     echoes: EchoNumber,
     peel_reach: u8,
+    echo_wait: u8,
 }
 
 /// Settings of pixels that are not checked yet.
@@ -104,6 +105,9 @@ impl<const BINS: usize> PixelConfig<BINS> {
 }
 
 impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
+    /// [`PixelConfigBuilder::echo_wait`] unless set otherwise.
+    pub const ECHO_WAIT: u8 = 4;
+
     /// With another rule. Unless set otherwise X is 4, L1 is 40, L2 is 2000, there is no
     /// gate, the depth is the paper's, and the TDC takes every photon.
     pub const fn with_rule(rule: R) -> PixelConfigBuilder<BINS, R> {
@@ -118,6 +122,7 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
             tracking: None,
             echoes: EchoNumber::FIRST,
             peel_reach: 0,
+            echo_wait: Self::ECHO_WAIT,
         })
     }
 
@@ -251,6 +256,18 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
         self.peel_reach
     }
 
+    /// An exposure ends once it is so many times as long as it was at its last echo.
+    #[must_use]
+    pub const fn echo_wait(&self) -> u8 {
+        self.echo_wait
+    }
+
+    /// The exposure at which one ends that was `exposure` laser cycles long at its last echo.
+    pub(crate) const fn end_after_echo(&self, exposure: u16) -> u16 {
+        let end = exposure.saturating_mul(self.echo_wait as u16);
+        if end < self.l2 { end } else { self.l2 }
+    }
+
     /// Whether the TDC takes one photon a laser cycle.
     #[must_use]
     pub const fn is_one_hit(&self) -> bool {
@@ -295,12 +312,21 @@ impl<const BINS: usize, R: DetectionRule> PixelConfigBuilder<BINS, R> {
         self
     }
 
-    /// Pixels report up to the echo number `last` in an exposure, which goes on until then
-    /// or until L2. Once an echo is reported the bins up to `reach` from its peak are empty
+    /// Pixels report up to the echo number `last` in an exposure, which goes on until then,
+    /// or until [`Self::echo_wait`] or L2 ends it. Once an echo is reported the bins up to `reach` from its peak are empty
     /// and left out for the rest of the exposure: see [`PeeledBins`].
     pub const fn echoes(mut self, last: EchoNumber, reach: u8) -> Self {
         self.0.echoes = last;
         self.0.peel_reach = reach;
+        self
+    }
+
+    /// An exposure with an echo waits for the next until it is `times` as long as it was at
+    /// that echo, but not beyond L2. So a bright pixel does not wait long, and a weaker echo
+    /// is found if it is bright enough to stand clear in that time. With 1 or less it ends at
+    /// the next look, and with 255 most often at L2.
+    pub const fn echo_wait(mut self, times: u8) -> Self {
+        self.0.echo_wait = times;
         self
     }
 

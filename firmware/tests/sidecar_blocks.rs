@@ -38,6 +38,7 @@ fn wanted(columns: u16, rows: u16) -> Configuration {
         tracking: true,
         echoes: EchoNumber::new(2).unwrap(),
         peel_reach: 4,
+        echo_wait: 8,
         source: Source::Link,
         ..CONFIGURATION
     }
@@ -141,6 +142,10 @@ fn each_of_the_three_makes_other_events() {
         },
         Configuration {
             peel_reach: 5,
+            ..all
+        },
+        Configuration {
+            echo_wait: 2,
             ..all
         },
         // Three rows of five lie otherwise.

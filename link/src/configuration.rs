@@ -51,6 +51,8 @@ pub struct Configuration {
     pub echoes: EchoNumber,
     /// Bins to either side of an echo's peak that are left out once it is reported.
     pub peel_reach: u8,
+    /// An exposure ends once it is so many times as long as it was at its last echo.
+    pub echo_wait: u8,
     /// Picoseconds a bin.
     pub bin_width_ps: U16F16,
     /// Millimetres added to every range.
@@ -80,7 +82,7 @@ const TRACKING: u8 = 1;
 
 impl Configuration {
     /// Bytes of the record.
-    pub const BYTES: usize = 47;
+    pub const BYTES: usize = 48;
     /// What a minimum count may be: photons that a counter of 10 bits holds.
     const MINIMUM_COUNTS: core::ops::RangeInclusive<u16> = 1..=1023;
 
@@ -154,7 +156,7 @@ impl Configuration {
             .chain(self.columns.to_le_bytes())
             .chain([binning.levels.raw()])
             .chain(binning.patience.to_le_bytes())
-            .chain([tracking, self.echoes.raw(), self.peel_reach]);
+            .chain([tracking, self.echoes.raw(), self.peel_reach, self.echo_wait]);
         let mut bytes = [0; Self::BYTES];
         for (place, byte) in bytes.iter_mut().zip(fields) {
             *place = byte;
@@ -189,7 +191,7 @@ impl Configuration {
         let columns = u16::from_le_bytes(fields.next()?);
         let [levels] = fields.next()?;
         let patience = u16::from_le_bytes(fields.next()?);
-        let [tracking, echoes, peel_reach] = fields.next()?;
+        let [tracking, echoes, peel_reach, echo_wait] = fields.next()?;
 
         let changes = |reference| DynamicDepth {
             threshold_mm,
@@ -236,6 +238,7 @@ impl Configuration {
             },
             echoes: EchoNumber::new(echoes).ok_or(Refusal::Unknown)?,
             peel_reach,
+            echo_wait,
             bin_width_ps,
             offset_mm,
             source: match source {

@@ -98,6 +98,7 @@ fn a_host_configures_with_the_golden_frame() {
         tracking: true,
         echoes: EchoNumber::new(2).unwrap(),
         peel_reach: 4,
+        echo_wait: 8,
         bin_width_ps: U16F16::lit("250"),
         offset_mm: I24F8::lit("-179.5"),
         source: Source::Link,
@@ -176,14 +177,14 @@ fn configuration() -> impl Strategy<Value = Configuration> {
         source,
         prop::option::of(binning),
         echoes,
-        any::<(bool, bool, u8)>(),
+        any::<(bool, bool, [u8; 2])>(),
         any::<[u16; 7]>(),
         any::<(u32, i32)>(),
     )
         .prop_map(
             |(rule, estimator, dynamic_depth, source, binning, echoes, plain, words, range)| {
                 let [x, l1, l2, first, last, pixels, columns] = words;
-                let (one_hit_tdc, tracking, peel_reach) = plain;
+                let (one_hit_tdc, tracking, [peel_reach, echo_wait]) = plain;
                 let (width, offset) = range;
                 Configuration {
                     rule,
@@ -199,6 +200,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                     tracking,
                     echoes,
                     peel_reach,
+                    echo_wait,
                     bin_width_ps: U16F16::from_bits(width),
                     offset_mm: I24F8::from_bits(offset),
                     source,

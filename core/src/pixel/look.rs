@@ -17,7 +17,7 @@ pub enum Look {
     Event,
     /// N reached L2 without an event: a new exposure begins.
     Expired,
-    /// N reached L2 after an event, before the last echo: a new exposure begins.
+    /// The pixel has waited for another echo long enough: a new exposure begins.
     Ended,
 }
 

@@ -30,7 +30,8 @@
 //!
 //! With [`PixelConfigBuilder::echoes`](crate::PixelConfigBuilder::echoes) above 1 an event
 //! does not end the exposure: the bins around its peak are emptied and left out, and the
-//! pixel goes on until L2 or until it has all its echoes. With
+//! pixel goes on until it has all its echoes, or has
+//! [waited](crate::PixelConfigBuilder::echo_wait) for the next one. With
 //! [`tracking`](crate::PixelConfigBuilder::tracking) it expects the next event where the
 //! last was.
 //!
@@ -213,7 +214,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             // Photons that have come since the last look.
             self.peel(statistics);
         }
-        if self.exposure >= config.l2() {
+        if self.exposure >= self.longest(config) {
             return self.end(config, statistics);
         }
         if self.state.contains(State::REQUESTING) {
@@ -227,6 +228,15 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             return Look::NoPeak;
         };
         self.report(config, statistics, cycle, &detection)
+    }
+
+    /// The exposure at which this one ends.
+    const fn longest<R: DetectionRule>(&self, config: &PixelConfig<BINS, R>) -> u16 {
+        if self.state.contains(State::PEELED) {
+            // The slot has its last echo, whether or not that was taken.
+            return config.end_after_echo(self.event.exposure);
+        }
+        config.l2()
     }
 
     /// Puts the event of `detection` into the slot. The exposure ends, or goes on for the

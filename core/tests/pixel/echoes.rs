@@ -94,6 +94,7 @@ fn random_settings(rng: &mut Pcg32, bins: usize) -> Settings {
         is_one_hit: rng.next_u32().is_multiple_of(2),
         echoes: 1 + (rng.next_u32() % 4) as u8,
         reach: (rng.next_u32() % 5) as u8,
+        wait: (rng.next_u32() % 12) as u8,
         tracks: rng.next_u32().is_multiple_of(2),
     }
 }
@@ -142,7 +143,7 @@ fn settings() -> impl Strategy<Value = Settings> {
     let further = (
         1u8..=4,
         prop_oneof![4 => 0u8..6, 1 => any::<u8>()],
-        any::<bool>(),
+        any::<(u8, bool)>(),
     );
     (exposures, gate, rule, 0u32..6, any::<bool>(), further)
         .prop_map(
@@ -152,7 +153,7 @@ fn settings() -> impl Strategy<Value = Settings> {
                 rule,
                 minimum,
                 is_one_hit,
-                (echoes, reach, tracks),
+                (echoes, reach, (wait, tracks)),
             )| {
                 Settings {
                     x,
@@ -165,6 +166,7 @@ fn settings() -> impl Strategy<Value = Settings> {
                     is_one_hit,
                     echoes,
                     reach,
+                    wait,
                     tracks,
                 }
             },
@@ -230,17 +232,18 @@ fn three_echoes_by_hand() {
         is_one_hit: false,
         echoes: 4,
         reach: 4,
+        wait: 2,
         tracks: false,
     };
     let config = settings.config::<64>();
     let mut lone = Lone::<64>::new(0);
     let mut events = Vec::new();
-    for cycle in 0..40 {
+    for cycle in 0..32 {
         for (code, times) in [(20, 5), (26, 1), (32, 3)] {
             (0..times).for_each(|_| lone.pixel.count(&config, code));
         }
         let look = lone.end(&config, cycle, 1);
-        assert_eq!(look == Look::Ended, cycle == 39);
+        assert_eq!(look == Look::Ended, cycle == 31);
         if let Some(event) = lone.pixel.acknowledge() {
             let (bin, count) = (event.peak_bin.raw(), event.peak_count.raw());
             events.push((cycle, event.echo.raw(), bin, count, event.flags));
@@ -252,8 +255,8 @@ fn three_echoes_by_hand() {
         (15, 3, 26, 16, Flags::TAIL),
     ];
     assert_eq!(events, expected);
-    // All but those of the third echo are around the others. Bin 26 is 6 bins from either.
+    // The third took 16 laser cycles, and the exposure ended after 32. All but its photons are around the others. Bin 26 is 6 bins from either.
     let statistics = lone.statistics();
-    assert_eq!((statistics.held, statistics.counted), (9 * 40, 0));
+    assert_eq!((statistics.held, statistics.counted), (9 * 32, 0));
     assert_eq!((statistics.events, statistics.expired), (3, 0));
 }

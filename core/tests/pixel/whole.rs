@@ -29,6 +29,7 @@ pub struct Settings {
     pub is_one_hit: bool,
     pub echoes: u8,
     pub reach: u8,
+    pub wait: u8,
     /// z near the last event and elsewhere, for a window rule.
     pub tracks: bool,
 }
@@ -53,7 +54,8 @@ impl Settings {
             .l2(self.l2)
             .one_hit_tdc(self.is_one_hit)
             .tracking(tracking);
-        let config = config.echoes(EchoNumber::new(self.echoes).unwrap(), self.reach);
+        let echoes = EchoNumber::new(self.echoes).unwrap();
+        let config = config.echoes(echoes, self.reach).echo_wait(self.wait);
         config.build().unwrap()
     }
 
@@ -90,6 +92,8 @@ pub struct Pixel {
     pub peaks: Vec<usize>,
     /// The bins around them.
     pub held: BTreeSet<usize>,
+    /// N at the last of them.
+    echo_at: u32,
     /// Where the last event was, if the last exposure had one.
     expected: Option<usize>,
     pub waiting: Option<DepthEvent>,
@@ -111,6 +115,7 @@ impl Pixel {
             put_off: false,
             peaks: Vec::new(),
             held: BTreeSet::new(),
+            echo_at: 0,
             expected: None,
             waiting: None,
             statistics: Statistics::default(),
@@ -144,8 +149,9 @@ impl Pixel {
             return Look::TooEarly;
         }
         self.empty_held();
-        if self.exposure >= u32::from(self.settings.l2) {
-            let had_event = !self.peaks.is_empty();
+        let had_event = !self.peaks.is_empty();
+        let has_waited = self.exposure >= self.echo_at * u32::from(self.settings.wait);
+        if self.exposure >= u32::from(self.settings.l2) || had_event && has_waited {
             self.statistics.expired += u64::from(!had_event);
             self.statistics.expired_deferred += u64::from(!had_event && self.put_off);
             self.begin(self.peaks.last().copied());
@@ -166,6 +172,7 @@ impl Pixel {
         self.waiting = Some(self.event(found, last_cycle));
         self.near += u32::from(found.is_expected);
         self.statistics.events += 1;
+        self.echo_at = self.exposure;
         let is_last = self.peaks.len() + 1 == usize::from(self.settings.echoes);
         if is_last || !self.hold(found.bin) {
             self.cramped += u32::from(!is_last);

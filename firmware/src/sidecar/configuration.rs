@@ -34,7 +34,8 @@ impl Sidecar<'_> {
                 .estimator(wanted.estimator)
                 .one_hit_tdc(wanted.one_hit_tdc)
                 .tracking(tracking)
-                .echoes(wanted.echoes, wanted.peel_reach);
+                .echoes(wanted.echoes, wanted.peel_reach)
+                .echo_wait(wanted.echo_wait);
             Ok(config.build()?)
         };
         let config = config_of(wanted.rule)?;

@@ -29,6 +29,7 @@ pub const CONFIGURATION: Configuration = Configuration {
     tracking: false,
     echoes: EchoNumber::FIRST,
     peel_reach: 0,
+    echo_wait: 4,
     bin_width_ps: U16F16::lit("250"),
     offset_mm: I24F8::ZERO,
     source: Source::Sensor,

@@ -93,7 +93,9 @@ pub fn configs(wanted: &Configuration) -> [PixelConfig<128, AnyRule>; 2] {
     [wanted.rule, wanted.rule.of_blocks(levels)].map(|rule| {
         let config = PixelConfig::with_rule(rule).x(wanted.x).l1(wanted.l1);
         let config = config.l2(wanted.l2).gate(gate).estimator(wanted.estimator);
-        let config = config.echoes(wanted.echoes, wanted.peel_reach);
+        let config = config
+            .echoes(wanted.echoes, wanted.peel_reach)
+            .echo_wait(wanted.echo_wait);
         let tracking = rule.tracking(&gate).filter(|_| wanted.tracking);
         config.tracking(tracking).build().unwrap()
     })

@@ -30,6 +30,8 @@ pub struct EchoConfig {
     pub echoes: usize,
     /// Bins to either side of an echo that are left out after it.
     pub reach: usize,
+    /// An exposure ends when it is so many times as long as it was at its last echo.
+    pub wait: u32,
 }
 
 /// An event.
@@ -59,6 +61,8 @@ pub struct EchoPixel {
     config: EchoConfig,
     histogram: Histogram,
     exposure: u32,
+    /// The exposure at the last echo.
+    echo_at: Option<u32>,
     peaks: Vec<usize>,
     left_out: BTreeSet<usize>,
     expected: Option<usize>,
@@ -72,6 +76,7 @@ impl EchoPixel {
             config,
             histogram: Histogram::new(bins, limit),
             exposure: 0,
+            echo_at: None,
             peaks: Vec::new(),
             left_out: BTreeSet::new(),
             expected: None,
@@ -104,13 +109,15 @@ impl EchoPixel {
         if !self.exposure.is_multiple_of(x) || self.exposure <= l1 {
             return None;
         }
-        if self.exposure >= l2 {
+        let end = self.echo_at.map_or(l2, |at| l2.min(at * self.config.wait));
+        if self.exposure >= end {
             self.start_over();
             return None;
         }
         let (window, is_expected) = self.look(&mut stands_clear)?;
         let echo = self.echo(window, is_expected);
         self.peaks.push(window.bin);
+        self.echo_at = Some(self.exposure);
         let (first, last, reach) = (self.config.first, self.config.last, self.config.reach);
         for bin in first.max(window.bin.saturating_sub(reach))..=last.min(window.bin + reach) {
             self.left_out.insert(bin);
@@ -181,6 +188,7 @@ impl EchoPixel {
         self.left_out.clear();
         self.histogram.clear();
         self.exposure = 0;
+        self.echo_at = None;
     }
 }
 
@@ -200,6 +208,7 @@ mod tests {
         last: 31,
         echoes: 3,
         reach: 2,
+        wait: 100,
     };
 
     /// Laser cycle, number and bin of the events with the same photons in each laser cycle.
@@ -228,6 +237,16 @@ mod tests {
         assert_eq!(
             run(CONFIG, 48, &[12]),
             [(7, 1, 12, false), (31, 1, 12, false)]
+        );
+    }
+
+    #[test]
+    fn one_surface_waits_no_longer_than_it_took_several_times() {
+        // The look at 8 laser cycles finds it, and that at 16 ends the exposure.
+        let config = EchoConfig { wait: 2, ..CONFIG };
+        assert_eq!(
+            run(config, 40, &[12]),
+            [(7, 1, 12, false), (23, 1, 12, false), (39, 1, 12, false)]
         );
     }
 

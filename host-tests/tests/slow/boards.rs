@@ -17,7 +17,7 @@ use dtof::engine::Engine;
 use dtof::engine::host::host_engine;
 use dtof::engine::settings::Settings;
 use dtof::input::source::{Geometry, PhotonSource};
-use dtof::simulate::scene;
+use dtof::simulate::{demo, scene};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{BlockLevel, Count, EchoNumber, PaperRule, WindowRule};
 use dtof_link::{AdaptiveBinning, FaultRecord, Source};
@@ -280,7 +280,7 @@ fn decides_alike(
     cycles: u16,
 ) -> Result<String> {
     let start = Instant::now();
-    let mut photons = scene::photons(geometry, settings, cycles.into())?;
+    let mut photons = demo::photons(geometry, settings.seed, cycles.into())?;
     let addresses = photons.addresses();
     let slice = photons.next_slice(cycles)?;
     let mut on_host = host_engine(settings, geometry, &addresses)?;

@@ -1,5 +1,4 @@
-//! `dtof demo`: a simulated static scene at the paper's settings (section
-//! III-B).
+//! `dtof demo`: a simulated scene that shows what blocks of pixels and several echoes are for.
 
 use std::path::PathBuf;
 
@@ -7,7 +6,7 @@ use anyhow::Result;
 use clap::Parser;
 use dtof::cli::arguments::{path, whole};
 use dtof::input::source::Geometry;
-use dtof::simulate::scene::{self, Scene};
+use dtof::simulate::demo;
 
 use super::simulate::{Simulation, array};
 
@@ -27,7 +26,7 @@ pub struct Demo {
     #[arg(long, value_name = "FILE", requires = "device")]
     image: Option<PathBuf>,
     /// Laser cycles of the scene
-    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = whole(1..=u64::MAX))]
+    #[arg(long, value_name = "N", default_value_t = 4000, value_parser = whole(1..=u64::MAX))]
     cycles: u64,
     /// Seed of the simulated photons.
     #[arg(long, default_value_t = 1, value_parser = whole(0..=u64::MAX))]
@@ -39,17 +38,19 @@ pub struct Demo {
 
 impl Demo {
     pub fn run(&self) -> Result<()> {
-        let settings = scene::settings(self.seed);
-        let mut scene = Scene::demo()?;
+        let settings = demo::settings(self.seed)?;
+        let mut scene = demo::scene()?;
         if let Some(geometry) = self.array {
             scene.geometry = geometry;
         } else if self.device.is_some() {
             (scene.geometry.columns, scene.geometry.rows) = (8, 8);
         }
         let lead = format!(
-            "A simulated static scene of {}×{} macropixels: a wall, before it a matt box, before \
-             that a bright ball. Every pixel reports a depth event the moment its peak stands \
-             clear of the background, then starts over.",
+            "A simulated scene of {}×{} macropixels. Every pixel reports a depth event the moment \
+             its peak stands clear of the background, then starts over: that of the bright ball \
+             often, that of the wall later. Pixels on the dark curtain are too dim alone and report \
+             in blocks. Through the pane of glass a pixel reports two echoes. A ball is thrown \
+             across.",
             scene.geometry.columns, scene.geometry.rows
         );
         Simulation {

@@ -43,9 +43,13 @@ pub struct Operation {
     #[arg(long)]
     tracking: bool,
     /// Echoes that a pixel reports in an exposure, 1 to 4. From 2 on it goes on until it has them
-    /// all or reaches L2
+    /// all, or has waited for the next
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1..=EchoNumber::LAST.raw()))]
     echoes: u8,
+    /// Two or more echoes: how long a pixel waits for the next one, as a multiple of the laser
+    /// cycles that the last one took; at most to L2
+    #[arg(long, value_name = "TIMES", default_value_t = Settings::ECHO_WAIT, value_parser = whole(2..=u8::MAX))]
+    echo_wait: u8,
 }
 
 /// The option of commands that run on this computer: a device reports events.
@@ -54,7 +58,7 @@ pub struct Frames {
     /// Simulate a frame-based sensor for comparison: every N laser cycles each pixel reads its
     /// highest bin, if that stands above the background
     #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX),
-        conflicts_with_all = ["rule", "alpha", "window", "z", "false_alarm", "min_count", "l1", "l2", "x", "binning", "patience", "tracking", "echoes"])]
+        conflicts_with_all = ["rule", "alpha", "window", "z", "false_alarm", "min_count", "l1", "l2", "x", "binning", "patience", "tracking", "echoes", "echo_wait"])]
     pub frame: Option<u16>,
 }
 
@@ -110,6 +114,7 @@ impl Operation {
             }),
             tracking: self.tracking,
             echoes: EchoNumber::new(self.echoes).unwrap_or(EchoNumber::FIRST),
+            echo_wait: self.echo_wait,
             one_hit_tdc: false,
             frame: None,
             seed,

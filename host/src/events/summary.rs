@@ -202,7 +202,11 @@ impl Settings {
         }
         if self.echoes > EchoNumber::FIRST {
             let reach = self.peel_reach();
-            let text = format!("up to {} an exposure, ±{reach} bins left out", self.echoes);
+            let (most, wait) = (self.echoes, self.echo_wait);
+            let text = format!(
+                "up to {most} an exposure, which ends after {wait} times the laser cycles of the last; \
+                 ±{reach} bins left out"
+            );
             rows.push(row("echoes", text));
         }
         if self.frame.is_none() {

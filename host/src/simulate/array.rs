@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use super::pixel::SimulatedPixel;
 use crate::input::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
 
-/// The rates of a pixel in a laser cycle, for scenes that change.
-pub type RatesAt = Box<dyn Fn(PixelAddress, u64) -> Rates + Send + Sync>;
+/// The rates of a pixel in a laser cycle, for scenes that change: those of what it sees, and of
+/// what is behind.
+pub type RatesAt = Box<dyn Fn(PixelAddress, u64) -> [Rates; 2] + Send + Sync>;
 
 /// An array of simulated pixels.
 pub struct SimulatedArray {
@@ -67,7 +68,9 @@ impl PhotonSource for SimulatedArray {
             for cycle in 0..cycles {
                 if let Some(rates_at) = rates_at {
                     let at = first_cycle + u64::from(cycle);
-                    pixel.set_rates(&rates_at(PixelAddress(address), at))?;
+                    let [rates, behind] = rates_at(PixelAddress(address), at);
+                    pixel.set_rates(&rates)?;
+                    pixel.set_behind(&behind)?;
                 }
                 pixel.next_cycle(|code| photons.push(Photon { cycle, code }));
             }

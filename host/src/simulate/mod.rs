@@ -23,6 +23,7 @@
 
 mod array;
 mod arrival;
+pub mod demo;
 mod detector;
 pub mod effects;
 mod pixel;

@@ -10,6 +10,7 @@ use super::arrival::{Arrival, code};
 use super::detector::Detector;
 use super::effects::Effects;
 use super::effects::limits::Timing;
+use super::stream::Stream;
 
 /// The plain model at constant rates.
 #[derive(Clone, Debug)]
@@ -57,13 +58,47 @@ impl Model {
     }
 }
 
+/// Rates and their photons.
+#[derive(Clone, Debug)]
+struct Light {
+    rates: Rates,
+    model: Model,
+    rng: Pcg64,
+}
+
+impl Light {
+    fn new(rates: &Rates, bins: u16, rng: Pcg64) -> Result<Self> {
+        Ok(Self {
+            rates: *rates,
+            model: Model::new(rates, bins)?,
+            rng,
+        })
+    }
+
+    fn set(&mut self, rates: &Rates, bins: u16) -> Result<()> {
+        if *rates != self.rates {
+            self.model = Model::new(rates, bins)?;
+            self.rates = *rates;
+        }
+        Ok(())
+    }
+
+    fn photons_per_cycle(&self, bins: u16) -> f64 {
+        self.rates.background * f64::from(bins) + self.rates.signal
+    }
+
+    fn draw(&mut self, arrival: impl FnMut(Arrival)) {
+        self.model.draw(&mut self.rng, arrival);
+    }
+}
+
 /// One pixel.
 #[derive(Clone, Debug)]
 pub struct SimulatedPixel {
-    model: Model,
-    rates: Rates,
+    light: Light,
+    /// From behind a surface that lets light through; without background.
+    behind: Option<Light>,
     bins: u16,
-    rng: Pcg64,
     /// If there is an effect.
     detector: Option<Box<Detector>>,
 }
@@ -76,12 +111,22 @@ impl SimulatedPixel {
     /// If a rate is negative or not a number, or `bins` is 0.
     pub fn new(rates: &Rates, bins: u16, rng: Pcg64) -> Result<Self> {
         Ok(Self {
-            model: Model::new(rates, bins)?,
-            rates: *rates,
+            light: Light::new(rates, bins, rng)?,
+            behind: None,
             bins,
-            rng,
             detector: None,
         })
+    }
+
+    /// The same pixel with light from behind the surface it sees: the signal of `rates`, without
+    /// their background. Its random numbers are by `seed` and `address`.
+    ///
+    /// # Errors
+    /// If a rate is negative or not a number.
+    pub fn with_behind(mut self, rates: &Rates, seed: u64, address: PixelAddress) -> Result<Self> {
+        let rng = Stream::Behind.rng(seed, address);
+        self.behind = Some(Light::new(&without_background(rates), self.bins, rng)?);
+        Ok(self)
     }
 
     /// The same pixel with `effects`, which have random numbers by `seed` and
@@ -97,7 +142,7 @@ impl SimulatedPixel {
         address: PixelAddress,
     ) -> Result<Self> {
         if effects.any() {
-            let detector = Detector::new(effects, &self.rates, timing, seed, address)?;
+            let detector = Detector::new(effects, &self.light.rates, timing, seed, address)?;
             self.detector = Some(Box::new(detector));
         }
         Ok(self)
@@ -109,34 +154,58 @@ impl SimulatedPixel {
     /// # Errors
     /// If a rate is negative or not a number.
     pub fn set_rates(&mut self, rates: &Rates) -> Result<()> {
-        if *rates != self.rates {
-            self.model = Model::new(rates, self.bins)?;
-            self.rates = *rates;
+        self.light.set(rates, self.bins)
+    }
+
+    /// From the next laser cycle on the signal from behind the surface is that of these rates.
+    /// Nothing changes for a pixel without such light.
+    ///
+    /// # Errors
+    /// If a rate is negative or not a number.
+    pub fn set_behind(&mut self, rates: &Rates) -> Result<()> {
+        match &mut self.behind {
+            Some(behind) => behind.set(&without_background(rates), self.bins),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Photons that have to be drawn in a laser cycle.
     pub(super) fn photons_per_cycle(&self) -> f64 {
-        let plain = self.rates.background * f64::from(self.bins) + self.rates.signal;
+        let lights = [Some(&self.light), self.behind.as_ref()];
+        let lights = lights.into_iter().flatten();
+        let plain = lights.map(|light| light.photons_per_cycle(self.bins)).sum();
         let detector = self.detector.as_ref();
         detector.map_or(plain, |detector| detector.photons_per_cycle(plain))
     }
 
     /// Gives `photon` the TDC code of each photon of the next laser cycle.
     pub fn next_cycle(&mut self, mut photon: impl FnMut(u16)) {
+        let lights = [Some(&mut self.light), self.behind.as_mut()];
+        let lights = lights.into_iter().flatten();
         if let Some(detector) = &mut self.detector {
             detector.begin();
-            self.model
-                .draw(&mut self.rng, |arrival| detector.arrive(&arrival));
+            for light in lights {
+                light.draw(|arrival| detector.arrive(&arrival));
+            }
             detector.finish(photon);
             return;
         }
         let end = f64::from(self.bins);
-        self.model.draw(&mut self.rng, |arrival| match arrival {
-            Arrival::Background(bin) => photon(bin),
-            Arrival::Signal(position) if (0.0..end).contains(&position) => photon(code(position)),
-            Arrival::Signal(_) => {}
-        });
+        for light in lights {
+            light.draw(|arrival| match arrival {
+                Arrival::Background(bin) => photon(bin),
+                Arrival::Signal(position) if (0.0..end).contains(&position) => {
+                    photon(code(position));
+                }
+                Arrival::Signal(_) => {}
+            });
+        }
+    }
+}
+
+fn without_background(rates: &Rates) -> Rates {
+    Rates {
+        background: 0.0,
+        ..*rates
     }
 }

@@ -1,6 +1,7 @@
 //! Scenes: what an array of simulated pixels looks at, read from a TOML file.
 //!
-//! Each pixel sees one surface, the nearest at its place. Signal photons follow
+//! Each pixel sees one surface, the nearest at its place, and the next one behind if that lets
+//! light through. Signal photons follow
 //! the reflectivity and the inverse square of the range; the background is the
 //! same everywhere. `docs/scenes.md` lists all keys.
 
@@ -79,14 +80,6 @@ pub struct View {
 }
 
 impl Scene {
-    /// The scene of the demo, `scenes/demo.toml`.
-    ///
-    /// # Errors
-    /// Never: it is a part of the program.
-    pub fn demo() -> Result<Self> {
-        Self::parse(include_str!("../../../scenes/demo.toml"))
-    }
-
     /// The same scene with the laser off: no signal, and no crosstalk.
     #[must_use]
     pub fn with_laser_off(mut self) -> Self {
@@ -101,28 +94,48 @@ impl Scene {
     /// compared with. None if there is nothing at its place.
     #[must_use]
     pub fn truth(&self, pixel: PixelAddress, cycle: u64) -> Option<View> {
+        self.views(pixel, cycle)[0]
+    }
+
+    /// What `pixel` sees in laser cycle `cycle`: the nearest surface, and if that lets light
+    /// through the nearest of those behind it.
+    #[must_use]
+    pub fn views(&self, pixel: PixelAddress, cycle: u64) -> [Option<View>; 2] {
         let sight = self.sight(pixel);
         let seconds = self.seconds(cycle);
-        let mut nearest: Option<View> = None;
+        let [mut nearest, mut second]: [Option<View>; 2] = [None; 2];
         for (index, surface) in self.surfaces.iter().enumerate() {
             let Some(range_mm) = surface.range_mm(&sight, seconds, self.layout) else {
                 continue;
             };
+            let view = Some(View {
+                surface: index,
+                range_mm,
+                light: surface.light(&sight),
+            });
             if nearest.is_none_or(|other| range_mm < other.range_mm) {
-                nearest = Some(View {
-                    surface: index,
-                    range_mm,
-                    light: surface.light(&sight),
-                });
+                (nearest, second) = (view, nearest);
+            } else if second.is_none_or(|other| range_mm < other.range_mm) {
+                second = view;
             }
         }
-        nearest
+        let transmittance = nearest.map_or(0.0, |view| self.surfaces[view.surface].transmittance);
+        // The light passes on its way there and back.
+        let behind = second.filter(|_| transmittance > 0.0).map(|view| View {
+            light: view.light.times(transmittance.powi(2)),
+            ..view
+        });
+        [nearest, behind]
     }
 
     /// The rates of `pixel` in laser cycle `cycle`.
     #[must_use]
     pub fn rates(&self, pixel: PixelAddress, cycle: u64) -> Rates {
-        let view = self.truth(pixel, cycle);
+        self.rates_of(self.truth(pixel, cycle))
+    }
+
+    /// The rates of what a pixel sees.
+    fn rates_of(&self, view: Option<View>) -> Rates {
         Rates {
             background: self.background,
             signal: view.map_or(0.0, |view| self.signal(view.light, view.range_mm)),
@@ -140,14 +153,24 @@ impl Scene {
         self.check_motion(cycles)?;
         self.check_hot_pixels()?;
         let timing = self.timing();
+        let has_behind = self
+            .surfaces
+            .iter()
+            .any(|surface| surface.transmittance > 0.0);
         let pixels = self.addresses()?.map(|address| {
-            SimulatedPixel::new(&self.rates(address, 0), self.bins, pixel_rng(seed, address))?
-                .with_effects(&self.effects, &timing, seed, address)
+            let [rates, behind] = self.views(address, 0).map(|view| self.rates_of(view));
+            let pixel = SimulatedPixel::new(&rates, self.bins, pixel_rng(seed, address))?;
+            let pixel = match has_behind {
+                true => pixel.with_behind(&behind, seed, address)?,
+                false => pixel,
+            };
+            pixel.with_effects(&self.effects, &timing, seed, address)
         });
         let pixels = pixels.collect::<Result<_>>()?;
         let rates_at = self.surfaces.iter().any(Surface::moves).then(|| {
             let scene = self.clone();
-            Box::new(move |pixel, cycle| scene.rates(pixel, cycle)) as RatesAt
+            Box::new(move |pixel, cycle| scene.views(pixel, cycle).map(|view| scene.rates_of(view)))
+                as RatesAt
         });
         let photons = SimulatedArray::new(self.geometry, pixels, cycles, rates_at);
         let each_cycle = photons.photons_per_cycle();
@@ -289,20 +312,9 @@ pub fn settings(seed: u64) -> Settings {
         binning: None,
         tracking: false,
         echoes: EchoNumber::FIRST,
+        echo_wait: Settings::ECHO_WAIT,
         one_hit_tdc: false,
         frame: None,
         seed,
     }
-}
-
-/// The photons of the demo's scene on an array, `cycles` laser cycles of them.
-///
-/// # Errors
-/// If there are more pixels than addresses.
-pub fn photons(geometry: Geometry, settings: &Settings, cycles: u64) -> Result<SimulatedArray> {
-    let scene = Scene {
-        geometry,
-        ..Scene::demo()?
-    };
-    scene.photons(settings.seed, cycles)
 }

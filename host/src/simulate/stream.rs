@@ -18,6 +18,8 @@ pub(super) enum Stream {
     HotPixels,
     Afterpulsing,
     Jitter,
+    /// Photons from behind a surface that lets light through.
+    Behind,
 }
 
 impl Stream {

@@ -13,7 +13,7 @@ use dtof::engine::Engine;
 use dtof::engine::host::host_engine;
 use dtof::engine::settings::Settings;
 use dtof::input::source::{Geometry, PhotonSource};
-use dtof::simulate::scene;
+use dtof::simulate::{demo, scene};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{BlockLevel, Count, DepthEvent, EchoNumber, PixelAddress, WindowRule};
 use dtof_firmware::sidecar::Sidecar;
@@ -61,7 +61,7 @@ fn device(lives: Option<Duration>) -> String {
 /// settings.
 fn events(engine: &mut dyn Engine, cycles: u64) -> anyhow::Result<Vec<DepthEvent>> {
     let geometry = Geometry::new(8, 8);
-    let mut photons = scene::photons(geometry, &settings(), cycles)?;
+    let mut photons = demo::photons(geometry, 1, cycles)?;
     let mut events = Vec::new();
     for _ in 0..cycles / 250 {
         events.extend(engine.run(&photons.next_slice(250)?)?);

@@ -21,8 +21,9 @@ fn simulated(scratch: &Scratch, scene: &Path, options: &str) -> serde_json::Valu
 #[test]
 fn the_demos_scene_and_settings_give_the_demos_events() {
     let scratch = Scratch::new();
-    scratch.printed("demo --cycles 2000 --seed 7 --quiet");
-    let settings = "--alpha 8 --l1 100 --l2 2000 --x 10 --cycles 2000 --seed 7 --quiet";
+    scratch.printed("demo --cycles 1000 --seed 7 --quiet");
+    let settings =
+        "--rule window --sigma-bins 1 --binning 2 --echoes 2 --cycles 1000 --seed 7 --quiet";
     let output = scratch.simulate(&repository("scenes/demo.toml"), settings);
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
     for name in ["events.csv", "events.aer", "depth-last.svg"] {

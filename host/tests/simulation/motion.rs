@@ -1,6 +1,7 @@
 //! Motion: what a scene says is true, and where the photons are.
 
 use dtof::input::source::Geometry;
+use dtof::simulate::demo;
 use dtof::simulate::scene::{Scene, View};
 use dtof_core::PixelAddress;
 
@@ -112,7 +113,7 @@ fn the_nearest_surface_is_seen_and_nothing_where_there_is_none() {
 
 #[test]
 fn another_array_looks_at_the_same_scene() {
-    let demo = Scene::demo().unwrap();
+    let demo = demo::scene().unwrap();
     let geometry = Geometry::new(16, 8);
     let small = Scene {
         geometry,

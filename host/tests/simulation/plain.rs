@@ -2,23 +2,35 @@
 //! nothing.
 
 use dtof::input::source::{Geometry, PhotonSource};
-use dtof::simulate::scene::{self, Scene};
+use dtof::simulate::scene::Scene;
 use dtof_core::PixelAddress;
 use dtof_theory::random::pixel_rng;
 use rand_distr::{Bernoulli, Distribution, Normal, Poisson, Uniform};
 
 use super::{Photons, array, pixel, sliced};
 
-/// The photons of the demo before there were scene files and effects.
+/// A still scene.
+const SCENE: &str = "columns = 64\nrows = 32\nbackground = 0.02\n\
+    [[surface]]\nrange_mm = 3400\nrange_right_mm = 3800\nreflectivity = 0.5\n\
+    [[surface]]\nrange_mm = 2400\nreflectivity = 0.2\n\
+    rectangle = { columns = [8, 28], rows = [10, 30] }\n\
+    [[surface]]\nrange_mm = 1550\nreflectivity = 0.9\n\
+    ball = { centre = [46, 17], radius = 10, radius_mm = 300 }\n";
+
+/// Its photons before there were scene files and effects.
 #[test]
-fn the_demos_photons_are_what_they_were_bit_for_bit() {
+fn the_photons_of_a_plain_scene_are_what_they_were_bit_for_bit() {
     for (columns, rows, expected) in [
         (64, 32, 0x462a_dbd0_560f_f395_u64),
         (8, 8, 0x13fb_0c3a_4633_b873),
         (5, 3, 0xdf13_a2d4_baeb_f6cb),
     ] {
         let geometry = Geometry { columns, rows };
-        let mut photons = scene::photons(geometry, &scene::settings(1), 600).unwrap();
+        let scene = Scene {
+            geometry,
+            ..Scene::parse(SCENE).unwrap()
+        };
+        let mut photons = scene.photons(1, 600).unwrap();
         // FNV-1a over laser cycle and code, slice by slice of 200 laser cycles.
         let mut hash = 0xcbf2_9ce4_8422_2325;
         for _ in 0..3 {

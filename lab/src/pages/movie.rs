@@ -1,17 +1,21 @@
 //! Events as a moving picture: each flash is an event.
 //!
 //! A pixel appears with its first event, in the colour of its range, and lights up with
-//! each event. The picture is an SVG document with animations of its own style sheet: a
+//! each event. That of a block lights up all of the block. A second echo is a smaller square
+//! within the pixel. The picture is an SVG document with animations of its own style sheet: a
 //! viewer that knows none, or a reader who wants no motion, sees the last moment.
 
+use std::collections::{BTreeMap, HashMap};
+
 use anyhow::Result;
-use dtof_core::RangeScale;
+use dtof_core::{EchoNumber, PixelAddress, RangeScale};
 
 use dtof::engine::host::host_engine;
 use dtof::events::events_csv::range_mm;
+use dtof::events::reports::LastReports;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::rows::grouped;
-use dtof::simulate::scene::{self, Scene};
+use dtof::simulate::demo;
 use dtof_draw::palette;
 use dtof_draw::picture::{levels, span};
 use dtof_draw::svg::{Anchor, At, EDGE, Svg, TEXT, TITLE, wrapped};
@@ -31,12 +35,22 @@ const LINE: f64 = 19.0;
 /// Seconds that a flash takes to fade, of [`WHOLE`], in percent.
 const FADE: f64 = 6.0;
 
-/// An event: its moment, its pixel, and its range in millimetres.
+/// An event: its moment, its place in the array, and its range in millimetres.
 #[derive(Clone, Copy, Debug)]
 struct Flash {
     moment: u16,
-    pixel: u16,
+    square: Square,
     range_mm: f64,
+}
+
+/// A pixel, or a block of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Square {
+    column: u32,
+    row: u32,
+    side: u32,
+    /// Drawn smaller: a second echo.
+    is_behind: bool,
 }
 
 /// The first laser cycles of `dtof demo`.
@@ -44,39 +58,41 @@ struct Flash {
 /// # Errors
 /// If the scene of the demo cannot be simulated.
 pub fn demo() -> Result<String> {
-    let (scene, settings) = (Scene::demo()?, scene::settings(1));
+    let (scene, settings) = (demo::scene()?, demo::settings(1)?);
     let mut photons = scene.photons(settings.seed, CYCLES.into())?;
     let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses())?;
     let slice = photons.next_slice(CYCLES)?;
     let events = engine.run(&slice)?;
     let scale: RangeScale = settings.range_scale()?;
-    let moment = |cycle: u64| {
-        let moment = cycle * u64::from(MOMENTS) / u64::from(CYCLES);
-        u16::try_from(moment).unwrap_or(MOMENTS)
-    };
-    let flashes: Vec<Flash> = events
-        .iter()
-        .map(|event| Flash {
+    let geometry = scene.geometry;
+    let mut firsts = vec![u64::MAX; geometry.addresses()];
+    let mut reports = vec![LastReports::default(); geometry.addresses()];
+    let mut flashes = Vec::new();
+    let mut marks = Vec::new();
+    for event in &events {
+        let flash = |pixel, side| Flash {
             moment: moment(event.cycle.0),
-            pixel: event.pixel.0,
+            square: square(pixel, side, event.echo, geometry),
             range_mm: range_mm(event, &scale),
-        })
-        .collect();
+        };
+        flashes.push(flash(event.pixel, 1 << event.level.raw()));
+        for pixel in geometry.block(event.pixel, event.level) {
+            let index = usize::from(pixel.0);
+            if reports[index].take(event.level, event.cycle, event.exposure.into()) {
+                marks.push(flash(pixel, 1));
+                firsts[index] = firsts[index].min(event.cycle.0 + 1);
+            }
+        }
+    }
     let mut notes = Vec::new();
     for (index, surface) in scene.surfaces.iter().enumerate() {
         let on_surface = |address| {
             let view = scene.truth(address, 0);
             view.is_some_and(|view| view.surface == index)
         };
-        let mut firsts: Vec<u64> = photons
-            .addresses()
-            .into_iter()
-            .filter(|&address| on_surface(address))
-            .map(|address| {
-                let first = events.iter().find(|event| event.pixel == address);
-                first.map_or(u64::MAX, |event| event.cycle.0 + 1)
-            })
-            .collect();
+        let seen = photons.addresses().into_iter();
+        let seen = seen.filter(|&address| on_surface(address));
+        let mut firsts: Vec<u64> = seen.map(|pixel| firsts[usize::from(pixel.0)]).collect();
         firsts.sort_unstable();
         let median = firsts.get(firsts.len() / 2).copied().unwrap_or(u64::MAX);
         let more = if median > u64::from(CYCLES) {
@@ -87,13 +103,33 @@ pub fn demo() -> Result<String> {
         let first = grouped(median.min(CYCLES.into()));
         notes.push(format!("{} after {more}{first}", surface.name));
     }
-    let title = "Each flash is an event: bright pixels report often, dim ones later";
+    let title = "Each flash is an event: bright pixels report often, dim ones later and in blocks";
     let notes = notes.join(", ");
-    let note = format!("First event of a typical pixel, in laser cycles: {notes}.");
-    Ok(draw(scene.geometry, &flashes, title, &note))
+    let note = format!(
+        "First event of a typical pixel, in laser cycles: {notes}. Small squares are the wall \
+         behind the glass, a second echo."
+    );
+    Ok(draw(geometry, &flashes, &marks, title, &note))
 }
 
-fn draw(geometry: Geometry, flashes: &[Flash], title: &str, note: &str) -> String {
+fn moment(cycle: u64) -> u16 {
+    let moment = cycle * u64::from(MOMENTS) / u64::from(CYCLES);
+    u16::try_from(moment).unwrap_or(MOMENTS)
+}
+
+/// That of a pixel, or of a block that starts there.
+fn square(pixel: PixelAddress, side: u32, echo: EchoNumber, geometry: Geometry) -> Square {
+    let pixel = u32::from(pixel.0);
+    Square {
+        column: pixel % geometry.columns,
+        row: pixel / geometry.columns,
+        side,
+        is_behind: echo > EchoNumber::FIRST,
+    }
+}
+
+/// `flashes` light up. `marks` stay until another is in their place.
+fn draw(geometry: Geometry, flashes: &[Flash], marks: &[Flash], title: &str, note: &str) -> String {
     let mut svg = Svg::default();
     svg.raw(&format!("<style>{}</style>", sheet()));
     let lines = wrapped(title, TITLE.0, INNER);
@@ -103,27 +139,25 @@ fn draw(geometry: Geometry, flashes: &[Flash], title: &str, note: &str) -> Strin
     svg.raw(&format!(
         "<g transform=\"translate({left} {top})scale({side})\">"
     ));
-    let ranges: Vec<Option<f64>> = flashes.iter().map(|flash| Some(flash.range_mm)).collect();
-    let steps: Vec<u8> = levels(&ranges)
+    let all = flashes.iter().chain(marks);
+    let ranges: Vec<Option<f64>> = all.map(|flash| Some(flash.range_mm)).collect();
+    let mut steps = levels(&ranges)
         .into_iter()
-        .map(|level| (level.unwrap_or(0).saturating_add(STEP / 2) / STEP) * STEP)
-        .collect();
-    let mut seen = vec![false; geometry.addresses()];
-    let (mut firsts, mut all) = (Vec::new(), Vec::new());
-    for (flash, step) in flashes.iter().zip(steps) {
-        let seen = &mut seen[usize::from(flash.pixel)];
-        if !*seen {
-            firsts.push((flash, step));
-            *seen = true;
-        }
-        all.push((flash, step));
-    }
+        .map(|level| (level.unwrap_or(0).saturating_add(STEP / 2) / STEP) * STEP);
+    let mut stepped = |flashes: &[Flash]| -> Vec<(Flash, u8)> {
+        flashes.iter().copied().zip(&mut steps).collect()
+    };
+    let (flashes, marks) = (stepped(flashes), changes(&stepped(marks)));
+    svg.raw("<g class=\"s\">");
     for moment in 0..=MOMENTS {
-        let of = |those: &[(&Flash, u8)]| shapes(those, moment, geometry);
-        let (first, flash) = (of(&firsts), of(&all));
-        if !first.is_empty() {
-            svg.raw(&format!("<g class=\"b b{moment}\">{first}</g>"));
+        let mark = shapes(&marks, moment);
+        if !mark.is_empty() {
+            svg.raw(&format!("<g class=\"b b{moment}\">{mark}</g>"));
         }
+    }
+    svg.raw("</g>");
+    for moment in 0..=MOMENTS {
+        let flash = shapes(&flashes, moment);
         if !flash.is_empty() {
             let delay = At(f64::from(moment) / f64::from(MOMENTS) * RUN);
             svg.raw(&format!(
@@ -144,21 +178,51 @@ fn draw(geometry: Geometry, flashes: &[Flash], title: &str, note: &str) -> Strin
     svg.document((WIDTH, y + EDGE - 4.0), title)
 }
 
-/// The pixels of one moment, a path a colour.
-fn shapes(those: &[(&Flash, u8)], moment: u16, geometry: Geometry) -> String {
+/// Those marks that are not what their place shows already.
+fn changes(marks: &[(Flash, u8)]) -> Vec<(Flash, u8)> {
+    let mut shown: HashMap<Square, u8> = HashMap::new();
+    let mut changes = Vec::new();
+    for &(flash, step) in marks {
+        let before = shown.insert(flash.square, step);
+        let is_far = before.is_none_or(|before| before.abs_diff(step) > STEP);
+        if is_far {
+            changes.push((flash, step));
+        } else if let Some(before) = before {
+            shown.insert(flash.square, before);
+        }
+    }
+    changes
+}
+
+/// The squares of one moment, a path for those of a size and colour; the small ones on top.
+fn shapes(those: &[(Flash, u8)], moment: u16) -> String {
+    let mut paths: BTreeMap<(bool, u32, u8), String> = BTreeMap::new();
+    for (flash, step) in those.iter().filter(|(flash, _)| flash.moment == moment) {
+        let Square {
+            column,
+            row,
+            side,
+            is_behind,
+        } = flash.square;
+        // A line as long as it is wide is a square, in the fewest letters.
+        let y = At(f64::from(row) + f64::from(side) / 2.0);
+        let path = paths.entry((is_behind, side, *step)).or_default();
+        *path += &match is_behind {
+            false => format!("M{column} {y}h{side}"),
+            true => {
+                let x = At(f64::from(column) + f64::from(side) * 0.3);
+                format!("M{x} {y}h{}", At(f64::from(side) * 0.4))
+            }
+        };
+    }
     let mut text = String::new();
-    let here = those.iter().filter(|(flash, _)| flash.moment == moment);
-    for step in (0..=u8::MAX).step_by(STEP.into()) {
-        let mut path = String::new();
-        for (flash, _) in here.clone().filter(|(_, of)| *of == step) {
-            let pixel = u32::from(flash.pixel);
-            let (row, column) = (pixel / geometry.columns, pixel % geometry.columns);
-            path += &format!("M{column} {row}h1.05v1.05h-1.05z");
-        }
-        if !path.is_empty() {
-            let fill = palette::hex(palette::level(step));
-            text += &format!("<path fill=\"{fill}\" d=\"{path}\"/>");
-        }
+    for ((is_behind, side, step), path) in paths {
+        let width = match is_behind {
+            false => format!("{side}.05"), // no seams
+            true => At(f64::from(side) * 0.4).to_string(),
+        };
+        let colour = palette::hex(palette::level(step));
+        text += &format!("<path stroke=\"{colour}\" stroke-width=\"{width}\" d=\"{path}\"/>");
     }
     text
 }
@@ -167,7 +231,7 @@ fn shapes(those: &[(&Flash, u8)], moment: u16, geometry: Geometry) -> String {
 fn sheet() -> String {
     let end = RUN / WHOLE * 100.0;
     let mut sheet = format!(
-        ".b{{opacity:.35}}.f{{opacity:0;animation:f {WHOLE}s linear infinite}}\
+        ".s{{opacity:.45}}.f{{opacity:0;animation:f {WHOLE}s linear infinite}}\
          .t{{transform-box:fill-box;transform-origin:left;animation:t {WHOLE}s linear infinite}}\
          @keyframes f{{0%{{opacity:1}}{FADE}%,to{{opacity:0}}}}\
          @keyframes t{{0%{{transform:scaleX(0)}}{}%,to{{transform:scaleX(1)}}}}",
@@ -178,11 +242,11 @@ fn sheet() -> String {
         let (before, at) = (At(at), At(at + 0.1));
         sheet += &format!(
             "\n.b{moment}{{animation:b{moment} {WHOLE}s linear infinite}}\
-             @keyframes b{moment}{{0%,{before}%{{opacity:0}}{at}%,to{{opacity:.35}}}}"
+             @keyframes b{moment}{{0%,{before}%{{opacity:0}}{at}%,to{{opacity:1}}}}"
         );
     }
     sheet
-        + "\n@media (prefers-reduced-motion:reduce){.b,.f,.t{animation:none!important}.b{opacity:1}}"
+        + "\n@media (prefers-reduced-motion:reduce){.b,.f,.t{animation:none!important}.s{opacity:1}}"
 }
 
 /// The laser cycles as a bar that grows. Gives where it ends.
@@ -235,17 +299,24 @@ mod tests {
             columns: 2,
             rows: 2,
         };
-        let flash = |moment, pixel| Flash {
+        let flash = |moment, column, row, side| Flash {
             moment,
-            pixel,
-            range_mm: 1000.0 + f64::from(pixel),
+            square: Square {
+                column,
+                row,
+                side,
+                is_behind: false,
+            },
+            range_mm: 1000.0 + 100.0 * f64::from(column),
         };
-        let flashes = [flash(3, 1), flash(3, 2), flash(40, 1)];
-        let svg = draw(geometry, &flashes, "t", "n");
+        let flashes = [flash(3, 1, 0, 1), flash(3, 0, 0, 2), flash(40, 1, 0, 1)];
+        let marks = [flash(3, 1, 0, 1), flash(3, 0, 1, 1), flash(40, 1, 0, 1)];
+        let svg = draw(geometry, &flashes, &marks, "t", "n");
         assert_eq!(svg.matches("<g class=\"b b").count(), 1);
         assert_eq!(svg.matches("<g class=\"f\"").count(), 2);
-        assert_eq!(svg.matches("M1 0h1.05").count(), 3);
-        assert_eq!(svg.matches("M0 1h1.05").count(), 2);
+        assert_eq!(svg.matches("M1 0.5h1\"").count(), 3);
+        assert_eq!(svg.matches("M0 1h2\"").count(), 1);
+        assert_eq!(svg.matches("M0 1.5h1\"").count(), 1);
         assert!(svg.contains("animation-delay:4s"));
     }
 

@@ -329,6 +329,7 @@ fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(rule: R) {
     keep((config.x(), config.l1(), config.l2()));
     keep((*config.gate(), *config.rule(), *config.estimator()));
     keep((config.is_one_hit(), config.echoes(), config.peel_reach()));
+    keep(config.echo_wait());
     keep(
         config
             .tracking()

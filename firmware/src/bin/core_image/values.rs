@@ -24,6 +24,7 @@ pub fn settings<const BINS: usize, R: DetectionRule>(rule: R) -> PixelConfigBuil
         .one_hit_tdc(more())
         .tracking(more().then(|| Tracking::new(rule, rule, half())))
         .echoes(echo(), byte())
+        .echo_wait(byte())
 }
 
 pub fn gate<const BINS: usize>() -> RangeGate<BINS> {

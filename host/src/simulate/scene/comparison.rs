@@ -3,7 +3,7 @@
 
 use dtof_core::{DepthEvent, EchoNumber, PixelAddress, RangeScale};
 
-use super::Scene;
+use super::{Scene, View};
 use crate::engine::settings::Settings;
 use crate::events::events_csv::range_mm;
 use crate::events::summary::truth::{
@@ -124,17 +124,18 @@ impl Comparison<'_> {
         let range_mm = range_mm(event, &self.scale);
         let (mut surface, mut sum, mut pixels) = (None, 0.0, 0.0);
         for pixel in self.scene.geometry.block(event.pixel, event.level) {
-            let Some(view) = self.scene.truth(pixel, event.cycle.0) else {
-                continue;
-            };
-            let error = range_mm - view.range_mm;
-            let errors = [Some(error), self.behind_mm.map(|behind| error - behind)];
-            let mut errors = errors.into_iter().flatten();
-            if let Some(error) = errors.find(|error| error.abs() <= limit_mm) {
-                surface.get_or_insert(view.surface);
+            let [nearest, behind] = self.scene.views(pixel, event.cycle.0);
+            let echo = nearest.zip(self.behind_mm).map(|(view, behind_mm)| View {
+                range_mm: view.range_mm + behind_mm,
+                ..view
+            });
+            let views = [nearest, echo, behind].into_iter().flatten();
+            let mut errors = views.map(|view| (view.surface, range_mm - view.range_mm));
+            if let Some((of, error)) = errors.find(|(_, error)| error.abs() <= limit_mm) {
+                surface.get_or_insert(of);
                 sum += error;
                 pixels += 1.0;
-                self.tallies[view.surface].has_sent[usize::from(pixel.0)] = true;
+                self.tallies[of].has_sent[usize::from(pixel.0)] = true;
             }
         }
         Some((surface?, sum / pixels))

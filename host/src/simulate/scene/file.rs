@@ -82,6 +82,8 @@ struct SurfaceEntry {
     reflectivity: Option<f64>,
     signal: Option<f64>,
     #[serde(default)]
+    transmittance: f64,
+    #[serde(default)]
     velocity_m_per_s: f64,
     #[serde(default)]
     columns_per_s: f64,
@@ -204,6 +206,7 @@ impl SurfaceEntry {
             }
             _ => anyhow::bail!("needs reflectivity or signal, and not both"),
         };
+        within("transmittance", self.transmittance, 0.0..=1.0)?;
         within("velocity_m_per_s", self.velocity_m_per_s, -1e5..=1e5)?;
         within("columns_per_s", self.columns_per_s, -1e7..=1e7)?;
         within("rows_per_s", self.rows_per_s, -1e7..=1e7)?;
@@ -227,6 +230,7 @@ impl SurfaceEntry {
             range_mm,
             range_right_mm,
             light,
+            transmittance: self.transmittance,
             velocity_m_per_s: self.velocity_m_per_s,
             drift_per_s: [self.columns_per_s, self.rows_per_s],
             shape,

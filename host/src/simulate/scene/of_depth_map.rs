@@ -35,6 +35,7 @@ impl Scene {
             range_mm: nearest,
             range_right_mm: nearest,
             light: Light::Reflectivity(1.0),
+            transmittance: 0.0,
             velocity_m_per_s: 0.0,
             drift_per_s: [0.0; 2],
             shape: Shape::DepthMap(map),

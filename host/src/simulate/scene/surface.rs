@@ -22,6 +22,8 @@ pub struct Surface {
     pub range_right_mm: f64,
     /// How many photons come back.
     pub light: Light,
+    /// How much light passes each way, to the surface behind and back.
+    pub transmittance: f64,
     /// Metres a second away from the sensor.
     pub velocity_m_per_s: f64,
     /// Columns and rows a second across the array, to the right and down.
@@ -38,6 +40,16 @@ pub enum Light {
     Reflectivity(f64),
     /// Signal photons a laser cycle, whatever the range.
     Signal(f64),
+}
+
+impl Light {
+    /// The same, by `factor`.
+    pub(super) fn times(self, factor: f64) -> Self {
+        match self {
+            Self::Reflectivity(share) => Self::Reflectivity(share * factor),
+            Self::Signal(signal) => Self::Signal(signal * factor),
+        }
+    }
 }
 
 /// Which places a surface covers at the start.

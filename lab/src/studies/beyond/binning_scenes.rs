@@ -1,6 +1,6 @@
 //! What blocks report of scenes from files: how much of it is wrong, and what it costs pixels.
 
-use super::field::{Reports, verdict};
+use super::field::{Reports, is_right};
 use super::setting::{BINS, LEVELS, Setting, VERDICT_HEAD, levels_name};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
@@ -57,7 +57,7 @@ const SCENES: [File; 5] = [
         name: "demo",
         text: include_str!("../../../../scenes/demo.toml"),
         light: 1.0,
-        cycles: 5000,
+        cycles: 4000,
     },
 ];
 /// The tilted wall of the file; and those that the title is of.
@@ -126,11 +126,11 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         let engine = host_engine(&setting.settings(setting.z())?, array, &addresses)?;
         runs.push((engine, Reports::new(array), Counts::default()));
     }
-    // What a pixel without a surface reports is wrong.
+    // Right is also what is seen through a surface. A pixel without a surface reports wrongly.
     let is_wrong = |event: &DepthEvent, pixel: usize| {
-        let view = scene.truth(addresses[pixel], event.cycle.0);
-        let position = view.map(|view| view.range_mm / scene.mm_per_bin());
-        position.is_none_or(|position| verdict(event, position) == "wrong")
+        let views = scene.views(addresses[pixel], event.cycle.0);
+        let mut views = views.into_iter().flatten();
+        !views.any(|view| is_right(event, view.range_mm / scene.mm_per_bin()))
     };
     for _ in 0..file.cycles / u64::from(SLICE) {
         let slice = photons.next_slice(SLICE)?;

@@ -87,6 +87,7 @@ impl Setting {
             }),
             tracking: self.tracking,
             echoes: EchoNumber::FIRST,
+            echo_wait: Settings::ECHO_WAIT,
             one_hit_tdc: false,
             frame: None,
             seed: 0,
