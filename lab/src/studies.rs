@@ -9,7 +9,9 @@ pub mod scenes;
 use anyhow::{Context, Result};
 
 use self::analysis::{false_events, gaussian_error, hit_rate, roc};
-use self::beyond::{binning_edges, binning_rate, binning_reports, echoes, tracking};
+use self::beyond::{
+    binning_edges, binning_rate, binning_reports, binning_scenes, echoes, tracking,
+};
 use self::methods::{depth_error, event_depth, false_rate, time_to_detect};
 use self::scenes::{
     depth_step, dynamic_depth, fan_motion, hyperparameters, latency, radial_motion, static_scene,
@@ -36,6 +38,7 @@ pub const ALL: &[Study] = &[
     binning_rate::STUDY,
     binning_reports::STUDY,
     binning_edges::STUDY,
+    binning_scenes::STUDY,
     tracking::STUDY,
     echoes::STUDY,
     failures::STUDY,

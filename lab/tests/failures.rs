@@ -1,7 +1,6 @@
 //! What the study of failures finds, on a few seeds.
 
-use dtof_lab::studies::failures::cases::Case;
-use dtof_lab::studies::failures::{Outcome, Rule, STUDY, Verdict, Warning, outcomes};
+use dtof_lab::studies::failures::{Case, Outcome, Rule, STUDY, Verdict, Warning, outcomes};
 use dtof_lab::sweep;
 
 /// Those of a case, whose name starts with `name`.
@@ -74,6 +73,21 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
     // A background that changes within the exposure makes no false alarms.
     let changing = ["weak signal, background × 4", "weak signal, background / 4"];
     check(&changing, |of| surely_false(of) < 0.02);
+    let steps = ["background × 4 at 20", "background / 4 at 20"];
+    check(&steps, |of| surely_false(of) < 0.02);
+    // A pulse that stays is a target, and no flag says that it is not the own; nor does one
+    // tell a veil. A random time from pulse to pulse spreads that pulse.
+    check(&["another LiDAR, clock"], |of| {
+        surely_false(of) > 0.1 && of.warning == Warning::Silent
+    });
+    check(&["veil of twice the signal"], |of| {
+        surely_false(of) > 0.8 && of.warning == Warning::Silent
+    });
+    let spread = ["another LiDAR, rate", "another LiDAR, own pulses"];
+    let rain = ["rain, a drop of 3 photons", "the same rain, gate"];
+    check(&[spread, rain].concat(), |of| {
+        surely_false(of) < 0.02 && of.verdict != Verdict::Fails
+    });
     // A target that moves while it is exposed is reported where it was.
     let still = of(&all, "weak signal").iter();
     for (still, drifting) in still.zip(of(&all, "weak signal, the same drift")) {

@@ -3,17 +3,14 @@
 //! The events are those of depth; what a pixel would send in their place (section III-E of
 //! the paper) is drawn over time, as in its Fig. 17 and 18.
 
-use std::collections::HashMap;
-
 use anyhow::{Context, Result};
-use dtof_core::{
-    BlockLevel, DepthEvent, DynamicDepthConfig, DynamicDepthPixel, EchoNumber, PixelAddress,
-    Polarity, RangeScale,
-};
+use dtof_core::{DepthEvent, Polarity, RangeScale};
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::{Colour, Mark, Pen};
 use dtof_link::DynamicDepth;
 
+use crate::events::dynamic::DepthChanges;
+use crate::events::echoes::Echo;
 use crate::events::sample::Sample;
 use crate::rows::grouped;
 
@@ -32,9 +29,8 @@ const fn pen(colour: Colour, mark: Mark) -> Pen {
 /// The changes of all pixels.
 #[derive(Clone, Debug)]
 pub struct Changes {
-    config: DynamicDepthConfig,
+    found: DepthChanges,
     scale: RangeScale,
-    pixels: HashMap<(PixelAddress, BlockLevel), DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>>,
     /// Depth events.
     events: u64,
     /// Of either side, as [`SIDES`].
@@ -48,10 +44,10 @@ impl Changes {
     /// If the threshold is too low.
     pub fn new(options: &DynamicDepth, scale: RangeScale) -> Result<Self> {
         let config = options.config(&scale);
+        let config = config.with_context(|| format!("--threshold-mm {}", options.threshold_mm))?;
         Ok(Self {
-            config: config.with_context(|| format!("--threshold-mm {}", options.threshold_mm))?,
+            found: DepthChanges::new(config, Echo::All),
             scale,
-            pixels: HashMap::new(),
             events: 0,
             sides: [Sample::new(DRAWN), Sample::new(DRAWN)],
         })
@@ -61,12 +57,7 @@ impl Changes {
     /// first.
     pub fn add(&mut self, event: &DepthEvent) {
         self.events += 1;
-        if event.echo > EchoNumber::FIRST {
-            return;
-        }
-        let pixel = self.pixels.entry((event.pixel, event.level));
-        let pixel = pixel.or_default();
-        let Some(change) = pixel.observe(&self.config, event) else {
+        let Some(change) = self.found.observe(event) else {
             return;
         };
         let [nearer, farther] = &mut self.sides;

@@ -6,6 +6,7 @@ use dtof_core::fixed::types::I24F8;
 use dtof_core::{BlockLevel, DepthEvent, PixelAddress, RangeScale, Reflectivity};
 
 use crate::events::events_csv::range_mm;
+use crate::events::reports::LastReports;
 use crate::input::source::{Geometry, Slice};
 
 /// How many events the mean map averages, as in the paper's figure.
@@ -20,8 +21,7 @@ pub struct PixelHistory {
     reflectivity: Reflectivity,
     /// All events, those of blocks that stand for the pixel included.
     pub events: u64,
-    /// One more than the laser cycle of the last event of each level, 0 before it.
-    last: [u64; 4],
+    reports: LastReports,
     /// All photons, whatever became of them.
     pub photons: u64,
 }
@@ -32,13 +32,6 @@ impl PixelHistory {
             self.recent.pop_front();
         }
         self.recent.push_back(range_mm);
-    }
-
-    /// Whether an event of a smaller block, or of the pixel itself, has come since laser
-    /// cycle `first`: it says more of the pixel.
-    fn has_reported_finer(&self, level: BlockLevel, first: u64) -> bool {
-        let finer = self.last.iter().take(level.raw().into());
-        finer.max().is_some_and(|&last| last > first)
     }
 
     /// The range of the last event.
@@ -90,20 +83,17 @@ impl Maps {
         }
     }
 
-    /// Takes one event into account. That of a block holds for those of its pixels that have
-    /// not reported by themselves, or in a smaller block, within its exposure.
+    /// Takes one event into account. That of a block holds for those of its pixels that
+    /// [`LastReports`] tells.
     pub fn add(&mut self, event: &DepthEvent, scale: &RangeScale) {
         let range_mm = range_mm(event, scale);
-        let end = event.cycle.0.saturating_add(1);
-        let first = end.saturating_sub(event.exposure.into());
+        let exposure = event.exposure.into();
         for address in self.geometry.block(event.pixel, event.level) {
             let pixel = &mut self.pixels[usize::from(address.0)];
-            if pixel.has_reported_finer(event.level, first) {
-                continue;
+            if pixel.reports.take(event.level, event.cycle, exposure) {
+                pixel.push(range_mm);
+                pixel.events += 1;
             }
-            pixel.push(range_mm);
-            pixel.events += 1;
-            pixel.last[usize::from(event.level.raw())] = end;
         }
         if event.level == BlockLevel::PIXEL {
             self.pixels[usize::from(event.pixel.0)]

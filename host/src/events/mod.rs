@@ -2,6 +2,7 @@
 
 pub mod aer_file;
 pub mod changes;
+pub mod dynamic;
 pub mod echoes;
 pub mod events_csv;
 #[cfg(test)]

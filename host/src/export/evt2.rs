@@ -13,19 +13,15 @@
 //! Time is in microseconds. A time word comes before the first event and before each
 //! whose upper bits differ from those of the event before it.
 
-use std::collections::HashMap;
 use std::io::{self, Write};
 
 use anyhow::{Result, ensure};
-use dtof_core::{
-    BlockLevel, DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, EchoNumber, PixelAddress,
-    Polarity,
-};
-use dtof_link::DynamicDepth;
+use dtof_core::{DynamicDepthConfig, DynamicDepthEvent, Polarity};
 
 use super::reorder::{Reorder, WAITING};
 use super::{Finished, LaserClock, Out, Sink};
 use crate::events::aer_file::Event;
+use crate::events::dynamic::DepthChanges;
 use crate::events::echoes::Echo;
 use crate::input::source::Geometry;
 
@@ -97,11 +93,7 @@ pub struct Evt2 {
     order: Reorder<Change>,
     clock: LaserClock,
     array: Geometry,
-    config: DynamicDepthConfig,
-    /// The one echo of each exposure that comes, if not all.
-    echo: Echo,
-    /// The last depths of each pixel or block, three as in the paper.
-    pixels: HashMap<(PixelAddress, BlockLevel), DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>>,
+    changes: DepthChanges,
     written: u64,
 }
 
@@ -123,23 +115,15 @@ impl Evt2 {
             order: Reorder::new(WAITING),
             clock,
             array,
-            config,
-            echo,
-            pixels: HashMap::new(),
+            changes: DepthChanges::new(config, echo),
             written: 0,
         })
     }
 
-    /// Each pixel and block sends its events in order, so that they are looked at as they
-    /// come. Of all echoes the first is followed, else the one that is wanted.
     fn change(&mut self, event: &Event) -> Option<DynamicDepthEvent> {
         match event {
             Event::DynamicDepth(event) => Some(*event),
-            Event::Depth(event) if self.echo != Echo::All || event.echo == EchoNumber::FIRST => {
-                let pixel = self.pixels.entry((event.pixel, event.level));
-                pixel.or_default().observe(&self.config, event)
-            }
-            Event::Depth(_) => None,
+            Event::Depth(event) => self.changes.observe(event),
         }
     }
 

@@ -4,8 +4,7 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 
-use crate::studies::failures::cases::Case;
-use crate::studies::failures::{Method, Outcome, Verdict, Warning, outcomes};
+use crate::studies::failures::{Case, Method, Outcome, Verdict, Warning, outcomes};
 use crate::sweep::Part;
 use crate::sweep::values::Values;
 use dtof::rows::grouped;

@@ -3,6 +3,8 @@
 pub mod binning_edges;
 pub mod binning_rate;
 pub mod binning_reports;
+pub mod binning_scenes;
 pub mod echoes;
 mod field;
+mod setting;
 pub mod tracking;

@@ -1,10 +1,12 @@
 //! Where methods fail: scenes that are not the plain model, and whether events say
 //! that something is wrong with them.
 
+mod case;
 pub mod cases;
 mod outcome;
+mod stray;
 
-use self::cases::{BACKGROUNDS, Case, background_name, cases};
+use self::cases::{BACKGROUNDS, background_name, cases};
 use crate::studies::scenes::one_pixel::{PER_BIN, in_parts};
 use crate::sweep::mean::{add, add_error};
 use crate::sweep::results::{Figure, Results};
@@ -21,6 +23,7 @@ use dtof_draw::palette::{self, Pen};
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 
+pub use self::case::Case;
 pub use self::outcome::{Outcome, Verdict, Warning, outcomes};
 
 /// Bins of a histogram.
@@ -333,7 +336,7 @@ mod tests {
     /// Random numbers of its own.
     #[test]
     fn four_is_the_least_alpha_with_one_percent_of_false_events_in_the_plain_scene() {
-        let rates = Rates::without_target(cases::BACKGROUND);
+        let rates = Rates::without_target(case::BACKGROUND);
         let ladders = [Ladder::new(Passed::Paper, 255, 256, 64)];
         let tallies: Vec<Tally> = (0..8)
             .into_par_iter()

@@ -6,9 +6,10 @@
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-use dtof_core::{BlockLevel, EchoNumber, RangeScale};
+use dtof_core::{EchoNumber, RangeScale};
 
 use crate::events::aer_file::Event;
+use crate::events::reports::LastReports;
 use crate::input::source::Geometry;
 use dtof_draw::palette;
 use dtof_draw::picture::{levels, span};
@@ -33,8 +34,7 @@ pub struct LiveMap {
     room: Room,
     array: Geometry,
     ranges: Vec<Option<f64>>,
-    /// For each pixel the level of the event it shows, and the laser cycle after it.
-    shown: Vec<(BlockLevel, u64)>,
+    reports: Vec<LastReports>,
     /// The text below the picture.
     line: String,
     /// Lines that are there from the last time, and the room there was.
@@ -56,7 +56,7 @@ impl LiveMap {
             room,
             array: Geometry::new(side(columns), side(rows)),
             ranges: vec![None; pixels],
-            shown: vec![(BlockLevel::PIXEL, 0); pixels],
+            reports: vec![LastReports::default(); pixels],
             line: String::new(),
             lines: 0,
             before: (0, 0),
@@ -64,9 +64,8 @@ impl LiveMap {
         }
     }
 
-    /// Takes events in. That of a block fills its pixels, but for those that have reported by
-    /// themselves, or in a smaller block, within its exposure. Of several echoes the first is
-    /// shown.
+    /// Takes events in. That of a block fills those of its pixels that [`LastReports`] tells.
+    /// Of several echoes the first is shown.
     pub fn add(&mut self, events: &[Event], scale: &RangeScale) {
         for event in events {
             if event.echo() > EchoNumber::FIRST {
@@ -77,18 +76,15 @@ impl LiveMap {
                 Event::Depth(event) => event.exposure.into(),
                 Event::DynamicDepth(_) => 0,
             };
-            let (level, end) = (event.level(), event.cycle().0.saturating_add(1));
-            for pixel in self.array.block(event.pixel(), level) {
+            for pixel in self.array.block(event.pixel(), event.level()) {
                 let pixel = usize::from(pixel.0);
-                let (Some(range), Some(shown)) =
-                    (self.ranges.get_mut(pixel), self.shown.get_mut(pixel))
+                let (Some(range), Some(reports)) =
+                    (self.ranges.get_mut(pixel), self.reports.get_mut(pixel))
                 else {
                     continue;
                 };
-                let (finest, last) = *shown;
-                if finest >= level || last <= end.saturating_sub(exposure) {
+                if reports.take(event.level(), event.cycle(), exposure) {
                     *range = Some(range_mm);
-                    *shown = (level, end);
                 }
             }
         }

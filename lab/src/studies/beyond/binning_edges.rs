@@ -1,7 +1,8 @@
 //! What blocks report where their pixels do not see the same: edges, slants, and an object of
 //! a single pixel.
 
-use super::field::{Field, Reports, SIGMA, Setting, is_right, level};
+use super::field::{Field, Reports, verdict};
+use super::setting::{LEVELS, SIGMA, Setting, VERDICT_HEAD, by_level, verdict_cells};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
@@ -18,10 +19,8 @@ const BACKGROUND: f64 = 0.05;
 /// Of the dim surface, and of what is brighter.
 const DIM: f64 = 0.05;
 const BRIGHT: f64 = 0.145;
-const LEVELS: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
 const PATIENCES: [f64; 3] = [40.0, 64.0, 250.0];
 const PENS: [Pen; 3] = [STEPS[2], STEPS[4], STEPS[6]];
-const ONE_IN: u32 = 100;
 const ARRAY: Geometry = Geometry::new(32, 32);
 /// Bins between two surfaces.
 const STEP: f64 = 30.0;
@@ -91,12 +90,7 @@ fn scene(number: usize, rng: &mut Pcg64) -> Result<Vec<(f64, f64)>> {
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    let setting = Setting {
-        levels: level(point["levels"])?,
-        patience: whole(point, "patience"),
-        tracking: false,
-        one_in: ONE_IN,
-    };
+    let setting = Setting::of(point)?;
     let number = usize::from(whole(point, "scene"));
     let seen = scene(number, rng)?;
     let rates: Vec<Rates> = seen
@@ -115,18 +109,12 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     field.run(BEFORE + CYCLES, rng, |event| events.push(*event))?;
     let mut tally = Tally::new();
     for event in &events {
-        let covered: Vec<usize> = field.covered(event, &reports).collect();
-        for &pixel in &covered {
-            reports.note(pixel, event);
+        for pixel in reports.take(event) {
             if event.cycle.0 < BEFORE {
                 continue;
             }
             let (signal, position) = seen[pixel];
-            let verdict = if is_right(event, position) {
-                "right"
-            } else {
-                "wrong"
-            };
+            let verdict = verdict(event, position);
             let who = if number == OBJECTS && signal == BRIGHT {
                 "object "
             } else {
@@ -143,30 +131,20 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 
 /// The share of wrong ones among the pixels that blocks of the levels cover.
 fn wrong(point: &PointTally) -> Measured {
-    let sum = |verdict: &str| -> u64 {
-        [1, 2, 3]
-            .map(|level| point.count(&format!("{verdict} {level}")))
-            .iter()
-            .sum()
-    };
+    let sum = |verdict: &str| -> u64 { by_level(point, verdict)[1..].iter().sum() };
     Measured::share(sum("wrong"), sum("wrong") + sum("right"))
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let mut csv = "scene,levels,patience,right 0,right 1,right 2,right 3,wrong 0,wrong 1,wrong 2,wrong 3,object right 0\n".to_owned();
+    let mut csv = format!("scene,levels,patience,{VERDICT_HEAD},object right 0\n");
     for point in part.points() {
-        let counts = ["right", "wrong"].map(|verdict| {
-            [0, 1, 2, 3]
-                .map(|level| point.count(&format!("{verdict} {level}")).to_string())
-                .join(",")
-        });
         writeln!(
             csv,
             "{},{},{},{},{}",
             SCENES[usize::from(whole(&point.parameters, "scene"))],
             point.parameter("levels"),
             point.parameter("patience"),
-            counts.join(","),
+            verdict_cells(point),
             point.count("object right 0")
         )?;
     }

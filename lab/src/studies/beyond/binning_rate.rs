@@ -1,9 +1,10 @@
 //! Whether pixels and blocks have together the false alarms that were asked for.
 
-use super::field::{Field, L2, Reports, Setting, level};
+use super::field::Field;
+use super::setting::{L2, LEVELS, ONE_IN, Setting, by_level, levels_name, with_one_patience_alone};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results, ends};
-use crate::sweep::{Part, Point, Study, Tally, grid, whole};
+use crate::sweep::{Part, Point, Study, Tally, grid};
 use anyhow::Result;
 use dtof::input::source::Geometry;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
@@ -14,12 +15,9 @@ use std::fmt::Write as _;
 
 /// Background photons a bin and laser cycle.
 const BACKGROUNDS: [f64; 3] = [0.01, 0.05, 0.2];
-const LEVELS: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
 const PATIENCES: [f64; 2] = [40.0, 1000.0];
 /// The pens of the patiences.
 const PENS: [Pen; 2] = [STEPS[1], STEPS[5]];
-/// One pixel of so many is to be covered in L2 laser cycles.
-const ONE_IN: u32 = 100;
 const ARRAY: Geometry = Geometry::new(8, 8);
 /// Laser cycles before what counts, in which feeds and exposures settle, and those that count.
 const BEFORE: u64 = 2000;
@@ -38,24 +36,17 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    let mut points = grid([
+    let points = grid([
         ("tracking", &[0.0, 1.0]),
         ("levels", &LEVELS),
         ("patience", &PATIENCES),
         ("background", &BACKGROUNDS),
     ]);
-    // Without blocks there is no patience.
-    points.retain(|point| point["levels"] > 0.0 || point["patience"] == PATIENCES[0]);
-    points
+    with_one_patience_alone(points, PATIENCES[0])
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    let setting = Setting {
-        levels: level(point["levels"])?,
-        patience: whole(point, "patience"),
-        tracking: point["tracking"] > 0.0,
-        one_in: ONE_IN,
-    };
+    let setting = Setting::of(point)?;
     let settings = setting.settings(setting.z())?;
     let rates = vec![Rates::without_target(point["background"]); ARRAY.addresses()];
     let mut field = Field::new(ARRAY, &rates, &settings)?;
@@ -66,8 +57,8 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         field.run(L2.into(), rng, |event| events.push(*event))?;
         let mut covered = vec![false; ARRAY.addresses()];
         for event in &events {
-            for pixel in field.covered(event, &Reports::new(ARRAY)) {
-                covered[pixel] = true;
+            for pixel in ARRAY.block(event.pixel, event.level) {
+                covered[usize::from(pixel.0)] = true;
             }
             *tally.entry(format!("reports {}", event.level)).or_default() += 1;
         }
@@ -98,8 +89,7 @@ fn results(part: &Part) -> Result<Results> {
                     .filter(|point| point.parameter("patience") == patience)
                 {
                     let covered: Measured = point.share("covered", "windows");
-                    let reports =
-                        [0, 1, 2, 3].map(|level| point.count(&format!("reports {level}")));
+                    let reports = by_level(point, "reports");
                     fewest = fewest.min(reports.iter().sum());
                     shares.push(covered.value / wanted);
                     let background = point.parameter("background");
@@ -117,11 +107,7 @@ fn results(part: &Part) -> Result<Results> {
             }
             let with = if tracking > 0.0 { ", tracking" } else { "" };
             panels.push(Panel {
-                title: match levels {
-                    0.0 => format!("pixels alone{with}"),
-                    1.0 => format!("1 level{with}"),
-                    _ => format!("{levels} levels{with}"),
-                },
+                title: levels_name(levels) + with,
                 series,
             });
         }

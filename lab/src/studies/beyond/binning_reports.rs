@@ -1,9 +1,14 @@
 //! How often a pixel of a dim wall is reported, by itself or in a block.
 
-use super::field::{Field, L2, Reports, SIGMA, Setting, is_right, level};
+use super::field::{Field, Reports, verdict};
+use super::setting::{
+    L2, LEVELS, SIGMA, Setting, VERDICT_HEAD, by_level, levels_name, verdict_cells,
+    with_one_patience_alone,
+};
+use crate::sweep::mean::{Measured, Z_99};
 use crate::sweep::results::{Figure, Results};
-use crate::sweep::{Part, Point, Study, Tally, grid, whole};
-use anyhow::Result;
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
+use anyhow::{Context, Result};
 use dtof::input::source::Geometry;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{Pen, STEPS};
@@ -15,10 +20,8 @@ use std::fmt::Write as _;
 const BACKGROUND: f64 = 0.05;
 /// Signal photons a laser cycle.
 const SIGNALS: [f64; 6] = [0.025, 0.05, 0.1, 0.145, 0.3, 1.0];
-const LEVELS: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
 const PATIENCES: [f64; 3] = [40.0, 64.0, 250.0];
 const PENS: [Pen; 4] = [STEPS[0], STEPS[2], STEPS[4], STEPS[6]];
-const ONE_IN: u32 = 100;
 const ARRAY: Geometry = Geometry::new(8, 8);
 /// Laser cycles before what counts, and those that count.
 const BEFORE: u64 = 1000;
@@ -37,22 +40,29 @@ pub const STUDY: Study = Study {
 };
 
 fn points() -> Vec<Point> {
-    let mut points = grid([
+    let points = grid([
         ("patience", &PATIENCES),
         ("levels", &LEVELS),
         ("signal", &SIGNALS),
     ]);
-    points.retain(|point| point["levels"] > 0.0 || point["patience"] == PATIENCES[0]);
+    let mut points = with_one_patience_alone(points, PATIENCES[0]);
+    points.extend(grid([
+        ("lend", &[1.0]),
+        ("levels", &[0.0]),
+        ("patience", &PATIENCES[1..]),
+        ("signal", &SIGNALS),
+    ]));
     points
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    let setting = Setting {
-        levels: level(point["levels"])?,
-        patience: whole(point, "patience"),
-        tracking: false,
-        one_in: ONE_IN,
-    };
+    let mut setting = Setting::of(point)?;
+    let z = setting.z();
+    // A pixel that lends gives its photons away after the patience and starts anew: its own
+    // exposure is no longer. How its block does is not asked.
+    if point.contains_key("lend") {
+        setting.l2 = setting.patience;
+    }
     let position = 40.0 + Uniform::new(0.0, 1.0)?.sample(rng);
     let rates = Rates {
         background: BACKGROUND,
@@ -60,7 +70,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         position,
         sigma: SIGMA,
     };
-    let settings = setting.settings(setting.z())?;
+    let settings = setting.settings(z)?;
     let mut field = Field::new(ARRAY, &vec![rates; ARRAY.addresses()], &settings)?;
     let mut events = Vec::new();
     field.run(BEFORE, rng, |_| {})?;
@@ -69,19 +79,91 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let mut tally = Tally::new();
     let mut add = |what: &str, number: u64| *tally.entry(what.to_owned()).or_default() += number;
     for event in &events {
-        let covered: Vec<usize> = field.covered(event, &reports).collect();
-        for &pixel in &covered {
-            reports.note(pixel, event);
-        }
-        let verdict = if is_right(event, position) {
-            "right"
-        } else {
-            "wrong"
-        };
-        add(&format!("{verdict} {}", event.level), covered.len() as u64);
+        let covered = reports.take(event).len() as u64;
+        add(
+            &format!("{} {}", verdict(event, position), event.level),
+            covered,
+        );
     }
     add("cycles", CYCLES * ARRAY.addresses() as u64);
     Ok(tally)
+}
+
+/// Whether its pixels lend.
+fn is_lent(point: &PointTally) -> bool {
+    point.parameters.contains_key("lend")
+}
+
+/// Right events of a pixel itself over those of pixels alone: of pixels that share with two
+/// levels, or that lend.
+fn kept(part: &Part, is_lent: bool, patience: f64, signal: f64) -> Result<Measured> {
+    let own = |point: &PointTally| point.count("right 0") as f64;
+    let alone = part.one([
+        ("levels", 0.0),
+        ("patience", PATIENCES[0]),
+        ("signal", signal),
+    ])?;
+    let at = [("patience", patience), ("signal", signal)];
+    let of = if is_lent {
+        part.at(at).find(|point| self::is_lent(point))
+    } else {
+        part.at(at).find(|point| point.parameter("levels") == 2.0)
+    };
+    let (of, alone) = (own(of.context("no such point")?), own(alone).max(1.0));
+    // As if both counts were Poisson's.
+    let half = Z_99 * (1.0 / of.max(1.0) + 1.0 / alone).sqrt();
+    let value = of / alone;
+    Ok(Measured {
+        value,
+        interval: ((value * (1.0 - half)).max(0.0), value * (1.0 + half)),
+    })
+}
+
+/// Pixels that lend beside those that share.
+fn lending(part: &Part) -> Result<(Figure, [String; 4])> {
+    let ways = [
+        (false, PATIENCES[1], STEPS[0], "share, patience 64"),
+        (true, PATIENCES[2], STEPS[3], "lend, patience 250"),
+        (true, PATIENCES[1], STEPS[6], "lend, patience 64"),
+    ];
+    let mut series = Vec::new();
+    for (is_lent, patience, pen, _) in ways {
+        let mut dots = Vec::new();
+        for signal in SIGNALS {
+            dots.push(kept(part, is_lent, patience, signal)?.at(signal));
+        }
+        series.push(Series::unnamed(pen, Style::JoinedDots, dots));
+    }
+    let of = |way: usize, signal| -> Result<String> {
+        let (is_lent, patience, ..) = ways[way];
+        Ok(format!(
+            "{:.0}",
+            100.0 * kept(part, is_lent, patience, signal)?.value
+        ))
+    };
+    let told = [of(0, 0.145)?, of(2, 0.145)?, of(1, 0.145)?, of(2, 0.05)?];
+    let chart = Chart {
+        finding: format!(
+            "Of 0.145 signal photons a cycle, pixels that share keep {} % of their own events, pixels \
+             that lend {} %",
+            told[0], told[1]
+        ),
+        holds: true,
+        note: format!(
+            "Right events over those of pixels alone, whose exposures last up to {L2} laser cycles. A pixel that \
+             lends starts anew after the patience. Bars hold 99 %."
+        ),
+        x: Axis::logarithmic("signal photons a laser cycle"),
+        y: Axis::linear("own events kept, %")
+            .percent()
+            .within(0.0, 1.1),
+        key: ways
+            .map(|(.., pen, name)| Key::new(pen, Style::JoinedDots, name))
+            .into(),
+        columns: 1,
+        panels: vec![Panel::only(series)],
+    };
+    Ok((Figure::new("binning-lend", &chart)?, told))
 }
 
 /// Laser cycles between right reports of a pixel; of the pixel itself, and all.
@@ -93,27 +175,23 @@ fn between(part: &Part, levels: f64, patience: f64, signal: f64) -> Result<[f64;
         ("signal", signal),
     ];
     let point = part.one(at)?;
-    let right = [0, 1, 2, 3].map(|level| point.count(&format!("right {level}")));
+    let right = by_level(point, "right");
     let cycles = point.count("cycles") as f64;
     Ok([right[0], right.iter().sum()].map(|reports| cycles / reports as f64))
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let mut csv = "patience,levels,signal,cycles,right 0,right 1,right 2,right 3,wrong 0,wrong 1,wrong 2,wrong 3\n".to_owned();
+    let mut csv = format!("patience,levels,signal,cycles,{VERDICT_HEAD},lend\n");
     for point in part.points() {
-        let counts = ["right", "wrong"].map(|verdict| {
-            [0, 1, 2, 3]
-                .map(|level| point.count(&format!("{verdict} {level}")).to_string())
-                .join(",")
-        });
         writeln!(
             csv,
-            "{},{},{},{},{}",
+            "{},{},{},{},{},{}",
             point.parameter("patience"),
             point.parameter("levels"),
             point.parameter("signal"),
             point.count("cycles"),
-            counts.join(",")
+            verdict_cells(point),
+            u8::from(is_lent(point))
         )?;
     }
     let mut panels = Vec::new();
@@ -158,21 +236,15 @@ fn results(part: &Part) -> Result<Results> {
         key: LEVELS
             .into_iter()
             .zip(PENS)
-            .map(|(levels, pen)| {
-                let name = match levels {
-                    0.0 => "pixels alone".to_owned(),
-                    1.0 => "1 level".to_owned(),
-                    _ => format!("{levels} levels"),
-                };
-                Key::new(pen, Style::JoinedDots, name)
-            })
+            .map(|(levels, pen)| Key::new(pen, Style::JoinedDots, levels_name(levels)))
             .collect(),
         columns: 3,
         panels,
     };
     let whole = |value: f64| format!("{value:.0}");
+    let (lending, [shared, lent, lent_later, lent_dim]) = lending(part)?;
     Ok(Results {
-        figures: vec![Figure::new("binning-reports", &chart)?],
+        figures: vec![Figure::new("binning-reports", &chart)?, lending],
         values: [
             ("alone", whole(dim[0])),
             ("two", whole(dim[1])),
@@ -180,6 +252,10 @@ fn results(part: &Part) -> Result<Results> {
             ("bright alone", whole(bright[0])),
             ("bright two", whole(bright[1])),
             ("bright three", whole(bright[2])),
+            ("shared", shared),
+            ("lent", lent),
+            ("lent later", lent_later),
+            ("lent dim", lent_dim),
             ("kept", format!("{:.0}", 100.0 * bright[0] / kept)),
         ]
         .into(),

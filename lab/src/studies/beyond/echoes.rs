@@ -1,6 +1,6 @@
 //! Several echoes of one exposure: two surfaces of one pixel, a glass before a wall.
 
-use super::field::{BINS, L1, L2, SIGMA, X};
+use super::setting::{BINS, L1, L2, SIGMA, X};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::{Context, Result};

@@ -1,76 +1,21 @@
 //! Photons of an array whose pixels see one surface each, and the engine that decides.
 
-use anyhow::{Context, Result};
+use super::setting::{BINS, X};
+use anyhow::Result;
 use dtof::engine::group::{Configs, Group};
-use dtof::engine::settings::{AdaptiveBinning, Settings};
+use dtof::engine::settings::Settings;
+use dtof::events::reports::LastReports;
 use dtof::input::source::{Geometry, Photon, PixelPhotons};
-use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
-use dtof_core::{
-    BlockLevel, Count, DepthEvent, EchoNumber, PixelAddress, RangeGate, WindowRule, z_for_levels,
-};
+use dtof_core::{DepthEvent, PixelAddress};
 use dtof_theory::rates::Rates;
 use rand_core::Rng;
 use rand_distr::{Distribution, Normal, Poisson};
 use rand_pcg::Pcg64;
 
-/// Bins of a histogram.
-pub const BINS: usize = 128;
-/// Laser cycles between looks, the first look with N > L1, and the longest exposure.
-pub const X: u16 = 4;
-pub const L1: u16 = 40;
-pub const L2: u16 = 1000;
-/// Standard deviation of the pulse in bins.
-pub const SIGMA: f64 = 1.0;
 /// Laser cycles drawn at a time.
 const SLICE: u16 = 100;
 /// An event farther from the surface, in bins, is wrong.
 pub const NEAR: f64 = 3.0;
-
-/// What is on beside the single pixel.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Setting {
-    /// Levels of blocks.
-    pub levels: BlockLevel,
-    /// Laser cycles.
-    pub patience: u16,
-    /// Whether pixels expect their next event.
-    pub tracking: bool,
-    /// One of so many pixels is to be covered by a false report in L2 laser cycles.
-    pub one_in: u32,
-}
-
-impl Setting {
-    /// The z for it.
-    pub fn z(&self) -> U4F12 {
-        let gate = RangeGate::<BINS>::full();
-        z_for_levels(self.one_in, &gate, X, L1, L2, self.levels)
-    }
-
-    /// With this z.
-    pub fn settings(&self, z: U4F12) -> Result<Settings> {
-        Ok(Settings {
-            bins: BINS,
-            bin_width_ps: const { U16F16::lit("250") },
-            offset_mm: I24F8::ZERO,
-            gate: None,
-            rule: WindowRule::new(3, z, Count::saturating(5))?.into(),
-            sigma_bins: Some(U8F8::from_num(SIGMA)),
-            l1: L1,
-            l2: L2,
-            x: X,
-            binning: (self.levels != BlockLevel::PIXEL).then_some(AdaptiveBinning {
-                levels: self.levels,
-                patience: self.patience,
-            }),
-            tracking: self.tracking,
-            echoes: EchoNumber::FIRST,
-            echo_wait: Settings::ECHO_WAIT,
-            one_hit_tdc: false,
-            frame: None,
-            seed: 0,
-        })
-    }
-}
 
 /// The photons of a pixel in X laser cycles.
 struct Law {
@@ -124,7 +69,6 @@ impl Law {
 
 /// An array and what decides on its photons.
 pub struct Field {
-    array: Geometry,
     laws: Vec<Law>,
     configs: Configs<BINS>,
     groups: Vec<Group<BINS>>,
@@ -148,7 +92,6 @@ impl Field {
             }
         };
         Ok(Self {
-            array,
             laws: rates.iter().map(Law::new).collect::<Result<_>>()?,
             configs: Configs {
                 pixels: settings.config()?,
@@ -201,44 +144,30 @@ impl Field {
         }
         Ok(())
     }
-
-    /// The pixels that an event stands for: those that have not reported by themselves, or in
-    /// a smaller block, within its exposure.
-    pub fn covered<'a>(
-        &'a self,
-        event: &'a DepthEvent,
-        reports: &'a Reports,
-    ) -> impl Iterator<Item = usize> + 'a {
-        let first = (event.cycle.0 + 1).saturating_sub(event.exposure.into());
-        let pixels = self.array.block(event.pixel, event.level);
-        let finer = usize::from(event.level.raw());
-        pixels
-            .map(|pixel| usize::from(pixel.0))
-            .filter(move |&pixel| {
-                reports.last[pixel][..finer]
-                    .iter()
-                    .all(|&last| last <= first)
-            })
-    }
 }
 
-/// When pixels reported last, by themselves or in a block: one more than the laser cycle, 0
-/// before.
+/// When pixels reported last, by themselves or in a block.
 pub struct Reports {
-    last: Vec<[u64; 4]>,
+    array: Geometry,
+    last: Vec<LastReports>,
 }
 
 impl Reports {
     /// None yet.
     pub fn new(array: Geometry) -> Self {
         Self {
-            last: vec![[0; 4]; array.addresses()],
+            array,
+            last: vec![LastReports::default(); array.addresses()],
         }
     }
 
-    /// Pixel `pixel` was covered by `event`.
-    pub fn note(&mut self, pixel: usize, event: &DepthEvent) {
-        self.last[pixel][usize::from(event.level.raw())] = event.cycle.0 + 1;
+    /// Takes an event, and gives the pixels that it stands for.
+    pub fn take(&mut self, event: &DepthEvent) -> Vec<usize> {
+        let pixels = self.array.block(event.pixel, event.level);
+        pixels
+            .map(|pixel| usize::from(pixel.0))
+            .filter(|&pixel| self.last[pixel].take(event.level, event.cycle, event.exposure.into()))
+            .collect()
     }
 }
 
@@ -247,8 +176,11 @@ pub fn is_right(event: &DepthEvent, position: f64) -> bool {
     (f64::from(event.position().raw()) / 256.0 - position).abs() <= NEAR
 }
 
-/// The level of so many.
-pub fn level(levels: f64) -> Result<BlockLevel> {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    BlockLevel::new(levels as u8).context("a level from 0 to 3")
+/// The same as a tally calls it.
+pub fn verdict(event: &DepthEvent, position: f64) -> &'static str {
+    if is_right(event, position) {
+        "right"
+    } else {
+        "wrong"
+    }
 }

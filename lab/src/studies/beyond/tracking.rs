@@ -1,12 +1,13 @@
 //! What tracking gains where the target stays, and what it costs where it does not.
 
-use super::field::{Field, L2, SIGMA, Setting, is_right};
+use super::field::{Field, is_right, verdict};
+use super::setting::{L2, SIGMA, Setting};
 use crate::sweep::mean::{Measured, Z_99, add_value};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
 use anyhow::Result;
 use dtof::input::source::Geometry;
-use dtof_core::{BlockLevel, DepthEvent};
+use dtof_core::DepthEvent;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{EVENTS, PAPER, REFERENCE};
 use dtof_theory::rates::Rates;
@@ -25,7 +26,6 @@ const VANISHES: u16 = 3;
 const DRIFT: f64 = 0.1;
 /// A jump, in bins.
 const JUMP: f64 = 30.0;
-const ONE_IN: u32 = 100;
 const ARRAY: Geometry = Geometry::new(8, 8);
 /// Laser cycles with the target in its first place, and after that.
 const BEFORE: u64 = 3000;
@@ -55,12 +55,7 @@ fn points() -> Vec<Point> {
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    let setting = Setting {
-        levels: BlockLevel::PIXEL,
-        patience: 0,
-        tracking: point["tracking"] > 0.0,
-        one_in: ONE_IN,
-    };
+    let setting = Setting::of(point)?;
     let target = whole(point, "target");
     let start = 40.0 + Uniform::new(0.0, 1.0)?.sample(rng);
     let rates = |position: f64, signal: f64| {
@@ -87,11 +82,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         // The target moves while an event's photons come: half of what it has moved.
         let at = |event: &DepthEvent| start + DRIFT * event.cycle.0 as f64 / 100.0;
         for event in events.iter().filter(|event| event.cycle.0 >= u64::from(L2)) {
-            let verdict = if is_right(event, at(event)) {
-                "right"
-            } else {
-                "wrong"
-            };
+            let verdict = verdict(event, at(event));
             *tally.entry(verdict.to_owned()).or_default() += 1;
         }
         tally.insert("cycles".to_owned(), (BEFORE + AFTER - u64::from(L2)) * 64);

@@ -2,29 +2,27 @@
 //! thing.
 
 use anyhow::Result;
-use dtof_core::{PixelAddress, RangeGate};
-use rand_core::Rng;
-use rand_pcg::Pcg64;
+use dtof_core::RangeGate;
 
-use super::{BINS, L1, SIGMA};
-use dtof::simulate::SimulatedPixel;
+use super::L1;
+use super::case::{BACKGROUND, Case, PLACE, SIGNAL};
+use super::stray::Stray;
 use dtof::simulate::effects::Effects;
 use dtof::simulate::effects::dead_time::DeadTime;
-use dtof::simulate::effects::limits::Timing;
 use dtof::simulate::effects::tail::Tail;
 use dtof::simulate::effects::tdc::Tdc;
-use dtof_theory::random::pixel_rng;
-use dtof_theory::rates::Rates;
 
-/// Of the plain scene: background photons a bin and laser cycle, signal photons a
-/// laser cycle, and where they lie.
-pub(super) const BACKGROUND: f64 = 0.05;
-const SIGNAL: f64 = 0.5;
-const PLACE: f64 = 80.3;
 /// A signal that takes the window rule some 250 laser cycles.
 const WEAK: f64 = 0.12;
-/// When a background changes, in laser cycles.
+/// When the background of a weak signal changes, in laser cycles; and that of the plain one,
+/// which has its first look after 44.
 const CHANGE: u32 = 200;
+const EARLY_CHANGE: u32 = 20;
+/// Raindrops are seen before this bin, 0.9 m away; a gate begins where their pulses have ended.
+const RAIN_ENDS: f64 = 24.0;
+const RAIN_GATE: u16 = 28;
+/// A cover glass.
+const GLASS: (f64, f64) = (10.0 * SIGNAL, 3.5);
 /// Background counts a bin after L1 laser cycles.
 pub const BACKGROUNDS: [f64; 5] = [0.05, 0.5, 5.0, 50.0, 500.0];
 
@@ -36,190 +34,12 @@ pub fn background_name(counts: f64, is_weak: bool) -> String {
     format!("background {counts}{weak}")
 }
 
-/// A Gaussian pulse.
-#[derive(Clone, Copy, Debug)]
-struct Pulse {
-    signal: f64,
-    position: f64,
-    /// Not the cover glass.
-    is_surface: bool,
-}
-
-/// A scene.
-#[derive(Clone, Debug)]
-pub struct Case {
-    /// What is special about it.
-    pub name: String,
-    /// Against its failures; not measured.
-    pub advice: Option<&'static str>,
-    /// Why no flag tells wrong events, where none does.
-    pub silence: Option<&'static str>,
-    /// What may hold the peak.
-    pub gate: RangeGate<BINS>,
-    /// Exposures of a trial.
-    pub exposures: u64,
-    background: f64,
-    pulses: Vec<Pulse>,
-    effects: Effects,
-    /// By what the background is multiplied after [`CHANGE`] laser cycles.
-    change: f64,
-    /// Bins that the surfaces go in a laser cycle.
-    drift: f64,
-}
-
-impl Case {
-    fn new(name: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            advice: None,
-            silence: None,
-            gate: RangeGate::full(),
-            exposures: 10,
-            background: BACKGROUND,
-            pulses: Vec::new(),
-            effects: Effects::default(),
-            change: 1.0,
-            drift: 0.0,
-        }
-        .and(SIGNAL, PLACE)
-    }
-
-    fn advised(mut self, advice: &'static str) -> Self {
-        self.advice = Some(advice);
-        self
-    }
-
-    fn silent_as(mut self, silence: &'static str) -> Self {
-        self.silence = Some(silence);
-        self
-    }
-
-    /// One more surface.
-    fn and(mut self, signal: f64, position: f64) -> Self {
-        self.pulses.push(Pulse {
-            signal,
-            position,
-            is_surface: true,
-        });
-        self
-    }
-
-    /// The only surface.
-    fn only(mut self, signal: f64, position: f64) -> Self {
-        self.pulses.clear();
-        self.and(signal, position)
-    }
-
-    fn with_cover_glass(mut self) -> Self {
-        self.pulses.push(Pulse {
-            signal: 10.0 * SIGNAL,
-            position: 3.5,
-            is_surface: false,
-        });
-        self
-    }
-
-    fn with_background(mut self, background: f64) -> Self {
-        self.background = background;
-        self
-    }
-
-    fn with_effects(mut self, effects: Effects) -> Self {
-        self.effects = effects;
-        self
-    }
-
-    fn changing(mut self, change: f64) -> Self {
-        self.change = change;
-        self
-    }
-
-    fn drifting(mut self, drift: f64) -> Self {
-        self.drift = drift;
-        self
-    }
-
-    /// Whether its TDC takes one hit a laser cycle, which pixels are told.
-    #[must_use]
-    pub fn is_one_hit(&self) -> bool {
-        self.effects.one_hit_tdc()
-    }
-
-    /// Where the surfaces lie at the end of laser cycle number `cycle` of an
-    /// exposure, in bins from the start of bin 0.
-    pub fn surfaces(&self, cycle: u32) -> impl Iterator<Item = f64> {
-        let surfaces = self.pulses.iter().filter(|pulse| pulse.is_surface);
-        let moved = self.drift * f64::from(cycle);
-        surfaces.map(move |pulse| pulse.position + moved)
-    }
-
-    /// A pixel before it.
-    ///
-    /// # Errors
-    /// If a rate or an effect is out of its range.
-    pub fn pixel(&self, rng: &mut Pcg64) -> Result<CasePixel> {
-        let timing = Timing {
-            bins: u16::try_from(BINS)?,
-            bin_width_ps: 250.0,
-            period: 400.0,
-        };
-        let mut parts = Vec::new();
-        for (index, pulse) in self.pulses.iter().enumerate() {
-            let rates = Rates {
-                background: if index == 0 { self.background } else { 0.0 },
-                signal: pulse.signal,
-                position: pulse.position,
-                sigma: SIGMA,
-            };
-            let (seed, address) = (rng.next_u64(), PixelAddress(0));
-            let part = SimulatedPixel::new(&rates, timing.bins, pixel_rng(seed, address))?;
-            parts.push((
-                part.with_effects(&self.effects, &timing, seed, address)?,
-                rates,
-            ));
-        }
-        Ok(CasePixel {
-            parts,
-            change: self.change,
-            drift: self.drift,
-        })
-    }
-}
-
-/// The photons of a scene: independent ones of each pulse, the first with the
-/// background.
-pub struct CasePixel {
-    parts: Vec<(SimulatedPixel, Rates)>,
-    change: f64,
-    drift: f64,
-}
-
-impl CasePixel {
-    /// Gives `photon` the TDC codes of laser cycle number `cycle`, from 1.
-    ///
-    /// # Errors
-    /// If the change leaves a rate negative.
-    pub fn next_cycle(&mut self, cycle: u32, mut photon: impl FnMut(u16)) -> Result<()> {
-        for (part, rates) in &mut self.parts {
-            let factor = if cycle > CHANGE { self.change } else { 1.0 };
-            part.set_rates(&Rates {
-                background: rates.background * factor,
-                position: rates.position + self.drift * f64::from(cycle),
-                ..*rates
-            })?;
-            part.next_cycle(&mut photon);
-        }
-        Ok(())
-    }
-}
-
 /// All of them, in the order of the table.
 ///
 /// # Errors
 /// If a gate does not fit the bins.
 pub fn cases() -> Result<Vec<Case>> {
-    let mut cases = vec![Case::new("plain"), Case::new("no target").only(0.0, PLACE)];
-    cases[1].pulses[0].is_surface = false;
+    let mut cases = vec![Case::new("plain"), Case::new("no target").without_target()];
     for is_weak in [false, true] {
         for counts in BACKGROUNDS {
             let background = counts / f64::from(L1);
@@ -289,20 +109,19 @@ pub fn cases() -> Result<Vec<Case>> {
             .advised("switch the pixel off")
             .silent_as(hot),
         Case::new("cover glass 10 × the signal")
-            .with_cover_glass()
+            .behind(GLASS.0, GLASS.1)
             .advised("a gate: see the next row")
             .silent_as(glass),
-        Case {
-            gate: RangeGate::new(10, 127)?,
-            ..Case::new("cover glass 10 × the signal, gate from bin 10").with_cover_glass()
-        },
+        Case::new("cover glass 10 × the signal, gate from bin 10")
+            .behind(GLASS.0, GLASS.1)
+            .gated(RangeGate::new(10, 127)?),
         Case::new("weak signal").only(WEAK, PLACE),
         Case::new("weak signal, background × 4 at 200")
             .only(WEAK, PLACE)
-            .changing(4.0),
+            .changing(4.0, CHANGE),
         Case::new("weak signal, background / 4 at 200")
             .only(WEAK, PLACE)
-            .changing(0.25),
+            .changing(0.25, CHANGE),
         Case::new("drift of 5 bins in 1000 laser cycles")
             .drifting(0.005)
             .advised("a rule that fires sooner")
@@ -313,7 +132,76 @@ pub fn cases() -> Result<Vec<Case>> {
             .advised("more light or a shorter L2, so that exposures are shorter")
             .silent_as(smeared),
     ]);
+    cases.extend(weather()?);
+    cases.extend(others());
     Ok(cases)
+}
+
+/// Rain, a veil, and the sun that comes out.
+fn weather() -> Result<Vec<Case>> {
+    let drops = |each, photons| Stray::Drops {
+        each,
+        photons,
+        before: RAIN_ENDS,
+    };
+    let gate = "a gate from where the drops end: see the rows with one";
+    let echoes = "several echoes: take the last";
+    let drop = "The histogram is that of a near target. It does not tell that all photons came in one laser cycle";
+    let two = "The histogram is that of two surfaces";
+    let wide =
+        "The histogram is that of a wide target before another one. No test of the width is built";
+    // A net or a curtain is 20 bins before the surface, and smoke begins there. Neither is what
+    // is looked for: their events are false.
+    let veil = PLACE - 20.0;
+    let smoke = Stray::Smoke {
+        photons: 2.0 * SIGNAL,
+        from: veil,
+        decay: 10.0,
+    };
+    let gated = RangeGate::new(RAIN_GATE, 127)?;
+    Ok(vec![
+        Case::new("rain, a drop of 3 photons each 20 laser cycles").with_stray(drops(20.0, 3.0)),
+        Case::new("rain, a drop of 30 photons each 200 laser cycles")
+            .with_stray(drops(200.0, 30.0))
+            .advised(gate)
+            .silent_as(drop),
+        Case::new("the same rain, gate from bin 28")
+            .with_stray(drops(200.0, 30.0))
+            .gated(gated),
+        Case::new("veil of half the signal")
+            .behind(0.5 * SIGNAL, veil)
+            .advised(echoes)
+            .silent_as(two),
+        Case::new("veil of twice the signal")
+            .behind(2.0 * SIGNAL, veil)
+            .advised(echoes)
+            .silent_as(two),
+        Case::new("smoke of twice the signal")
+            .with_stray(smoke)
+            .advised(echoes)
+            .silent_as(wide),
+        Case::new("background × 4 at 20").changing(4.0, EARLY_CHANGE),
+        Case::new("background / 4 at 20").changing(0.25, EARLY_CHANGE),
+    ])
+}
+
+/// Another LiDAR of twice the signal. Clocks of one kind differ by some 20 parts in a million,
+/// 0.008 bins a laser cycle; other rates by any number, here 1 %.
+fn others() -> Vec<Case> {
+    let photons = 2.0 * SIGNAL;
+    let dither = "a random time from pulse to pulse: see the row with one";
+    vec![
+        Case::new("another LiDAR, clock 20 ppm off")
+            .with_stray(Stray::Laser {
+                photons,
+                step: 0.008,
+            })
+            .advised(dither)
+            .silent_as("The histogram is that of a target where the other pulse stays"),
+        Case::new("another LiDAR, rate 1 % off").with_stray(Stray::Laser { photons, step: 4.0 }),
+        Case::new("another LiDAR, own pulses at random times")
+            .with_stray(Stray::Dithered { photons }),
+    ]
 }
 
 /// Scenes in which photons hide each other.

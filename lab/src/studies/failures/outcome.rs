@@ -3,8 +3,8 @@
 
 use anyhow::Result;
 
-use super::Method;
-use super::cases::{Case, cases};
+use super::cases::cases;
+use super::{Case, Method};
 use crate::studies::scenes::one_pixel::PER_BIN;
 use crate::sweep::mean::Measured;
 use crate::sweep::{Part, PointTally};

@@ -1,7 +1,7 @@
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
-use dtof_core::DepthEvent;
+use dtof_core::{BlockLevel, DepthEvent};
 
 use super::*;
 use crate::events::fixtures::{self, event, scale};

@@ -1,0 +1,126 @@
+//! How the pixels of these studies decide, as a point says it, and what tallies and charts call
+//! it.
+
+use crate::sweep::{Point, PointTally, whole};
+use anyhow::{Context, Result};
+use dtof::engine::settings::{AdaptiveBinning, Settings};
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
+use dtof_core::{BlockLevel, Count, EchoNumber, RangeGate, WindowRule, z_for_levels};
+
+/// Bins of a histogram.
+pub const BINS: usize = 128;
+/// Laser cycles between looks, the first look with N > L1, and the longest exposure.
+pub const X: u16 = 4;
+pub const L1: u16 = 40;
+pub const L2: u16 = 1000;
+/// Standard deviation of the pulse in bins.
+pub const SIGMA: f64 = 1.0;
+/// One of so many pixels is to be covered by a false report in L2 laser cycles.
+pub const ONE_IN: u32 = 100;
+/// Levels of blocks, as a point has them.
+pub const LEVELS: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
+
+/// What is on beside the single pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// Levels of blocks.
+    pub levels: BlockLevel,
+    /// Laser cycles.
+    pub patience: u16,
+    /// Whether pixels expect their next event.
+    pub tracking: bool,
+    /// The longest exposure.
+    pub l2: u16,
+}
+
+impl Setting {
+    /// Pixels alone.
+    pub const ALONE: Self = Self {
+        levels: BlockLevel::PIXEL,
+        patience: 0,
+        tracking: false,
+        l2: L2,
+    };
+
+    /// Of a point: what it does not name is off.
+    pub fn of(point: &Point) -> Result<Self> {
+        let named = |name| point.contains_key(name).then(|| whole(point, name));
+        Ok(Self {
+            patience: named("patience").unwrap_or_default(),
+            tracking: named("tracking").is_some_and(|tracking| tracking > 0),
+            ..Self::ALONE.with_levels(point.get("levels").copied().unwrap_or_default())?
+        })
+    }
+
+    /// With so many levels of blocks, 0 to 3.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "0 to 3"
+    )]
+    pub fn with_levels(self, levels: f64) -> Result<Self> {
+        let levels = BlockLevel::new(levels as u8).context("a level from 0 to 3")?;
+        Ok(Self { levels, ..self })
+    }
+
+    /// The z for it.
+    pub fn z(&self) -> U4F12 {
+        let gate = RangeGate::<BINS>::full();
+        z_for_levels(ONE_IN, &gate, X, L1, self.l2, self.levels)
+    }
+
+    /// With this z.
+    pub fn settings(&self, z: U4F12) -> Result<Settings> {
+        Ok(Settings {
+            bins: BINS,
+            bin_width_ps: const { U16F16::lit("250") },
+            offset_mm: I24F8::ZERO,
+            gate: None,
+            rule: WindowRule::new(3, z, Count::saturating(5))?.into(),
+            sigma_bins: Some(U8F8::from_num(SIGMA)),
+            l1: L1,
+            l2: self.l2,
+            x: X,
+            binning: (self.levels != BlockLevel::PIXEL).then_some(AdaptiveBinning {
+                levels: self.levels,
+                patience: self.patience,
+            }),
+            tracking: self.tracking,
+            echoes: EchoNumber::FIRST,
+            echo_wait: Settings::ECHO_WAIT,
+            one_hit_tdc: false,
+            frame: None,
+            seed: 0,
+        })
+    }
+}
+
+/// Without blocks there is no patience: the points of pixels alone have `patience` only.
+pub fn with_one_patience_alone(mut points: Vec<Point>, patience: f64) -> Vec<Point> {
+    points.retain(|point| point["levels"] > 0.0 || point["patience"] == patience);
+    points
+}
+
+/// The counts of `what` of each level.
+pub fn by_level(point: &PointTally, what: &str) -> [u64; 4] {
+    [0, 1, 2, 3].map(|level| point.count(&format!("{what} {level}")))
+}
+
+/// Those of right and of wrong reports as cells of a table.
+pub fn verdict_cells(point: &PointTally) -> String {
+    let counts = ["right", "wrong"].map(|verdict| by_level(point, verdict));
+    let cells: Vec<String> = counts.iter().flatten().map(u64::to_string).collect();
+    cells.join(",")
+}
+
+/// The head of these cells.
+pub const VERDICT_HEAD: &str = "right 0,right 1,right 2,right 3,wrong 0,wrong 1,wrong 2,wrong 3";
+
+/// What a chart calls pixels with so many levels of blocks.
+pub fn levels_name(levels: f64) -> String {
+    match levels {
+        0.0 => "pixels alone".to_owned(),
+        1.0 => "1 level".to_owned(),
+        _ => format!("{levels} levels"),
+    }
+}

@@ -1,0 +1,230 @@
+//! A scene in which a method may fail, and its photons.
+
+use anyhow::Result;
+use dtof_core::{PixelAddress, RangeGate};
+use rand_core::Rng;
+use rand_pcg::Pcg64;
+
+use super::stray::{Stray, StrayPhotons};
+use super::{BINS, SIGMA};
+use dtof::simulate::SimulatedPixel;
+use dtof::simulate::effects::Effects;
+use dtof::simulate::effects::limits::Timing;
+use dtof_theory::random::pixel_rng;
+use dtof_theory::rates::Rates;
+
+/// Of the plain scene: background photons a bin and laser cycle, signal photons a
+/// laser cycle, and where they lie.
+pub(super) const BACKGROUND: f64 = 0.05;
+pub(super) const SIGNAL: f64 = 0.5;
+pub(super) const PLACE: f64 = 80.3;
+/// Bins between two pulses of the laser: 100 ns.
+pub(super) const PERIOD: f64 = 400.0;
+
+/// A Gaussian pulse.
+#[derive(Clone, Copy, Debug)]
+struct Pulse {
+    signal: f64,
+    position: f64,
+    /// Not the cover glass.
+    is_surface: bool,
+}
+
+/// A scene.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// What is special about it.
+    pub name: String,
+    /// Against its failures; not measured.
+    pub advice: Option<&'static str>,
+    /// Why no flag tells wrong events, where none does.
+    pub silence: Option<&'static str>,
+    /// What may hold the peak.
+    pub gate: RangeGate<BINS>,
+    /// Exposures of a trial.
+    pub exposures: u64,
+    background: f64,
+    pulses: Vec<Pulse>,
+    effects: Effects,
+    stray: Option<Stray>,
+    /// By what the background is multiplied after how many laser cycles.
+    change: (f64, u32),
+    /// Bins that the surfaces go in a laser cycle.
+    drift: f64,
+}
+
+impl Case {
+    /// The plain one.
+    pub(super) fn new(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            advice: None,
+            silence: None,
+            gate: RangeGate::full(),
+            exposures: 10,
+            background: BACKGROUND,
+            pulses: Vec::new(),
+            effects: Effects::default(),
+            stray: None,
+            change: (1.0, 0),
+            drift: 0.0,
+        }
+        .and(SIGNAL, PLACE)
+    }
+
+    pub(super) fn advised(mut self, advice: &'static str) -> Self {
+        self.advice = Some(advice);
+        self
+    }
+
+    pub(super) fn silent_as(mut self, silence: &'static str) -> Self {
+        self.silence = Some(silence);
+        self
+    }
+
+    /// One more surface.
+    pub(super) fn and(mut self, signal: f64, position: f64) -> Self {
+        self.pulses.push(Pulse {
+            signal,
+            position,
+            is_surface: true,
+        });
+        self
+    }
+
+    /// The only surface.
+    pub(super) fn only(mut self, signal: f64, position: f64) -> Self {
+        self.pulses.clear();
+        self.and(signal, position)
+    }
+
+    /// Something before the surface that is not looked for.
+    pub(super) fn behind(mut self, signal: f64, position: f64) -> Self {
+        self.pulses.push(Pulse {
+            signal,
+            position,
+            is_surface: false,
+        });
+        self
+    }
+
+    /// Nothing to look for.
+    pub(super) fn without_target(mut self) -> Self {
+        self.pulses.clear();
+        self.behind(0.0, PLACE)
+    }
+
+    pub(super) fn with_background(mut self, background: f64) -> Self {
+        self.background = background;
+        self
+    }
+
+    pub(super) fn with_effects(mut self, effects: Effects) -> Self {
+        self.effects = effects;
+        self
+    }
+
+    /// Its background is multiplied by `factor` after laser cycle `cycle`.
+    pub(super) fn changing(mut self, factor: f64, cycle: u32) -> Self {
+        self.change = (factor, cycle);
+        self
+    }
+
+    pub(super) fn with_stray(mut self, stray: Stray) -> Self {
+        self.stray = Some(stray);
+        self
+    }
+
+    pub(super) fn gated(mut self, gate: RangeGate<BINS>) -> Self {
+        self.gate = gate;
+        self
+    }
+
+    pub(super) fn drifting(mut self, drift: f64) -> Self {
+        self.drift = drift;
+        self
+    }
+
+    /// Whether its TDC takes one hit a laser cycle, which pixels are told.
+    #[must_use]
+    pub fn is_one_hit(&self) -> bool {
+        self.effects.one_hit_tdc()
+    }
+
+    /// Where the surfaces lie at the end of laser cycle number `cycle` of an
+    /// exposure, in bins from the start of bin 0.
+    pub fn surfaces(&self, cycle: u32) -> impl Iterator<Item = f64> {
+        let surfaces = self.pulses.iter().filter(|pulse| pulse.is_surface);
+        let moved = self.drift * f64::from(cycle);
+        surfaces.map(move |pulse| pulse.position + moved)
+    }
+
+    /// A pixel before it.
+    ///
+    /// # Errors
+    /// If a rate or an effect is out of its range.
+    pub fn pixel(&self, rng: &mut Pcg64) -> Result<CasePixel> {
+        let timing = Timing {
+            bins: u16::try_from(BINS)?,
+            bin_width_ps: 250.0,
+            period: PERIOD,
+        };
+        let mut parts = Vec::new();
+        for (index, pulse) in self.pulses.iter().enumerate() {
+            let rates = Rates {
+                background: if index == 0 { self.background } else { 0.0 },
+                signal: pulse.signal,
+                position: pulse.position,
+                sigma: SIGMA,
+            };
+            let (seed, address) = (rng.next_u64(), PixelAddress(0));
+            let part = SimulatedPixel::new(&rates, timing.bins, pixel_rng(seed, address))?;
+            parts.push((
+                part.with_effects(&self.effects, &timing, seed, address)?,
+                rates,
+            ));
+        }
+        let stray = self.stray.map(|stray| {
+            let seed = rng.next_u64();
+            StrayPhotons::new(stray, pixel_rng(seed, PixelAddress(0)))
+        });
+        Ok(CasePixel {
+            parts,
+            stray: stray.transpose()?,
+            change: self.change,
+            drift: self.drift,
+        })
+    }
+}
+
+/// The photons of a scene: independent ones of each pulse, the first with the
+/// background, and stray ones.
+pub struct CasePixel {
+    parts: Vec<(SimulatedPixel, Rates)>,
+    stray: Option<StrayPhotons>,
+    change: (f64, u32),
+    drift: f64,
+}
+
+impl CasePixel {
+    /// Gives `photon` the TDC codes of laser cycle number `cycle`, from 1.
+    ///
+    /// # Errors
+    /// If the change leaves a rate negative.
+    pub fn next_cycle(&mut self, cycle: u32, mut photon: impl FnMut(u16)) -> Result<()> {
+        let (factor, after) = self.change;
+        let factor = if cycle > after { factor } else { 1.0 };
+        for (part, rates) in &mut self.parts {
+            part.set_rates(&Rates {
+                background: rates.background * factor,
+                position: rates.position + self.drift * f64::from(cycle),
+                ..*rates
+            })?;
+            part.next_cycle(&mut photon);
+        }
+        if let Some(stray) = &mut self.stray {
+            stray.next_cycle(photon)?;
+        }
+        Ok(())
+    }
+}
