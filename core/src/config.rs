@@ -105,9 +105,6 @@ impl<const BINS: usize> PixelConfig<BINS> {
 }
 
 impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
-    /// [`PixelConfigBuilder::echo_wait`] unless set otherwise.
-    pub const ECHO_WAIT: u8 = 4;
-
     /// With another rule. Unless set otherwise X is 4, L1 is 40, L2 is 2000, there is no
     /// gate, the depth is the paper's, and the TDC takes every photon.
     pub const fn with_rule(rule: R) -> PixelConfigBuilder<BINS, R> {
@@ -122,7 +119,7 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
             tracking: None,
             echoes: EchoNumber::FIRST,
             peel_reach: 0,
-            echo_wait: Self::ECHO_WAIT,
+            echo_wait: u8::MAX,
         })
     }
 
@@ -256,7 +253,8 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
         self.peel_reach
     }
 
-    /// An exposure ends once it is so many times as long as it was at its last echo.
+    /// An exposure ends once it is so many times as long as it was at its last echo; with 255
+    /// at L2.
     #[must_use]
     pub const fn echo_wait(&self) -> u8 {
         self.echo_wait
@@ -265,7 +263,11 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
     /// The exposure at which one ends that was `exposure` laser cycles long at its last echo.
     pub(crate) const fn end_after_echo(&self, exposure: u16) -> u16 {
         let end = exposure.saturating_mul(self.echo_wait as u16);
-        if end < self.l2 { end } else { self.l2 }
+        if end < self.l2 && self.echo_wait < u8::MAX {
+            end
+        } else {
+            self.l2
+        }
     }
 
     /// Whether the TDC takes one photon a laser cycle.
@@ -321,10 +323,11 @@ impl<const BINS: usize, R: DetectionRule> PixelConfigBuilder<BINS, R> {
         self
     }
 
-    /// An exposure with an echo waits for the next until it is `times` as long as it was at
-    /// that echo, but not beyond L2. So a bright pixel does not wait long, and a weaker echo
-    /// is found if it is bright enough to stand clear in that time. With 1 or less it ends at
-    /// the next look, and with 255 most often at L2.
+    /// An exposure with an echo ends once it is `times` as long as it was at that echo, or at
+    /// L2. With 255, as it is unless set otherwise, it always goes on until L2: a weak echo
+    /// behind a strong one has its time, but a pixel with one surface reports once in L2 laser
+    /// cycles. With 4 it reports much sooner, and finds a second surface half as bright. With 1
+    /// or less the exposure ends at the next look.
     pub const fn echo_wait(mut self, times: u8) -> Self {
         self.0.echo_wait = times;
         self

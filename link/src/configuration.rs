@@ -51,7 +51,8 @@ pub struct Configuration {
     pub echoes: EchoNumber,
     /// Bins to either side of an echo's peak that are left out once it is reported.
     pub peel_reach: u8,
-    /// An exposure ends once it is so many times as long as it was at its last echo.
+    /// An exposure ends once it is so many times as long as it was at its last echo; with 255
+    /// at L2.
     pub echo_wait: u8,
     /// Picoseconds a bin.
     pub bin_width_ps: U16F16,

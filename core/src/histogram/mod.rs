@@ -343,14 +343,14 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         let mut emptied = 0u32;
         for range in ranges {
             let (first, last) = (usize::from(*range.start()), usize::from(*range.end()));
-            let counters = self.counts.iter_mut().take(last + 1).skip(first);
-            for counter in counters {
+            for counter in self.counts.iter_mut().take(last + 1).skip(first) {
                 emptied = emptied.wrapping_add((*counter).into());
                 *counter = W::ZERO;
             }
         }
-        if emptied > 0 {
-            self.total = self.total.wrapping_sub(emptied);
+        self.total = self.total.wrapping_sub(emptied);
+        // A peak that is still there is still the highest.
+        if self.count(self.peak().bin.raw().into()) == Some(0) {
             let highest = W::Counter::highest(&self.counts);
             self.peak_key = Self::key_of(&self.counts, highest);
         }

@@ -46,10 +46,10 @@ pub struct Operation {
     /// all, or has waited for the next
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1..=EchoNumber::LAST.raw()))]
     echoes: u8,
-    /// Two or more echoes: how long a pixel waits for the next one, as a multiple of the laser
-    /// cycles that the last one took; at most to L2
-    #[arg(long, value_name = "TIMES", default_value_t = Settings::ECHO_WAIT, value_parser = whole(2..=u8::MAX))]
-    echo_wait: u8,
+    /// Two or more echoes: an exposure ends once it is so many times as long as it was at its
+    /// last echo [default: it goes on until L2]
+    #[arg(long, value_name = "TIMES", value_parser = whole(2..=u8::MAX - 1))]
+    echo_wait: Option<u8>,
 }
 
 /// The option of commands that run on this computer: a device reports events.

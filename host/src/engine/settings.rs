@@ -44,8 +44,9 @@ pub struct Settings {
     /// The last echo that a pixel reports in an exposure.
     #[serde(serialize_with = "echo")]
     pub echoes: EchoNumber,
-    /// An exposure ends once it is so many times as long as it was at its last echo.
-    pub echo_wait: u8,
+    /// An exposure ends once it is so many times as long as it was at its last echo, without
+    /// it at L2.
+    pub echo_wait: Option<u8>,
     /// Whether the TDC takes one photon a laser cycle, so that events say when that
     /// makes for pile-up.
     pub one_hit_tdc: bool,
@@ -55,11 +56,6 @@ pub struct Settings {
     pub frame: Option<u16>,
     /// Seed of every random number.
     pub seed: u64,
-}
-
-impl Settings {
-    /// [`Self::echo_wait`] unless it is given.
-    pub const ECHO_WAIT: u8 = PixelConfig::<128>::ECHO_WAIT;
 }
 
 /// A fixed-point number as a decimal one.
@@ -162,7 +158,7 @@ impl Settings {
             .one_hit_tdc(self.one_hit_tdc)
             .tracking(tracking)
             .echoes(self.echoes, self.peel_reach())
-            .echo_wait(self.echo_wait)
+            .echo_wait(self.echo_wait.unwrap_or(u8::MAX))
             .build()
             .with_context(|| format!("--x {} --l1 {} --l2 {}", self.x, self.l1, self.l2))
     }

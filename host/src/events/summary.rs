@@ -203,10 +203,10 @@ impl Settings {
         if self.echoes > EchoNumber::FIRST {
             let reach = self.peel_reach();
             let (most, wait) = (self.echoes, self.echo_wait);
-            let text = format!(
-                "up to {most} an exposure, which ends after {wait} times the laser cycles of the last; \
-                 ±{reach} bins left out"
-            );
+            let ends = wait.map_or(String::new(), |times| {
+                format!(", which ends after {times} times the laser cycles of the last")
+            });
+            let text = format!("up to {most} an exposure{ends}; ±{reach} bins left out");
             rows.push(row("echoes", text));
         }
         if self.frame.is_none() {

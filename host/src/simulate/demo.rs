@@ -19,7 +19,7 @@ pub fn scene() -> Result<Scene> {
 }
 
 /// Blocks of 4×4 pixels and two echoes, with the window rule and one false alarm in a hundred
-/// exposures: `--rule window --sigma-bins 1 --binning 2 --echoes 2`.
+/// exposures: `--rule window --sigma-bins 1 --binning 2 --echoes 2 --echo-wait 4`.
 ///
 /// # Errors
 /// Never: the numbers are those of a rule.
@@ -40,6 +40,7 @@ pub fn settings(seed: u64) -> Result<Settings> {
             patience: AdaptiveBinning::PATIENCE,
         }),
         echoes: EchoNumber::new(2).context("an echo")?,
+        echo_wait: Some(4),
         ..scene::settings(seed)
     })
 }

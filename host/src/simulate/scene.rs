@@ -313,7 +313,7 @@ pub fn settings(seed: u64) -> Settings {
         binning: None,
         tracking: false,
         echoes: EchoNumber::FIRST,
-        echo_wait: Settings::ECHO_WAIT,
+        echo_wait: None,
         one_hit_tdc: false,
         frame: None,
         seed,

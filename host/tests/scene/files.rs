@@ -22,8 +22,7 @@ fn simulated(scratch: &Scratch, scene: &Path, options: &str) -> serde_json::Valu
 fn the_demos_scene_and_settings_give_the_demos_events() {
     let scratch = Scratch::new();
     scratch.printed("demo --cycles 1000 --seed 7 --quiet");
-    let settings =
-        "--rule window --sigma-bins 1 --binning 2 --echoes 2 --cycles 1000 --seed 7 --quiet";
+    let settings = "--rule window --sigma-bins 1 --binning 2 --echoes 2 --echo-wait 4 --cycles 1000 --seed 7 --quiet";
     let output = scratch.simulate(&repository("scenes/demo.toml"), settings);
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
     for name in ["events.csv", "events.aer", "depth-last.svg"] {

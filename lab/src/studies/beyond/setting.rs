@@ -87,7 +87,7 @@ impl Setting {
             }),
             tracking: self.tracking,
             echoes: EchoNumber::FIRST,
-            echo_wait: Settings::ECHO_WAIT,
+            echo_wait: None,
             one_hit_tdc: false,
             frame: None,
             seed: 0,
