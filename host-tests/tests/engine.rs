@@ -220,6 +220,8 @@ fn settings(levels: u8, tracking: bool, echoes: u8, seed: u64) -> Settings {
         binning: (levels > BlockLevel::PIXEL).then_some(AdaptiveBinning { levels, patience }),
         tracking,
         echoes: EchoNumber::new(echoes).unwrap(),
+        // Of every other run.
+        echo_wait: seed.is_multiple_of(2).then_some(5),
         ..scene::settings(seed)
     }
 }

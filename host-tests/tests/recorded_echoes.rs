@@ -149,7 +149,8 @@ fn tmf8829() -> Option<Vec<([u16; 64], f64)>> {
             // All columns of a row of histograms are the same. They are those of the first row of
             // results.
             let bins = &frame["mp_histo"][pixel][0]["bin"];
-            let bins = std::array::from_fn(|bin| bins[bin].as_u64().unwrap() as u16);
+            let bins =
+                std::array::from_fn(|bin| u16::try_from(bins[bin].as_u64().unwrap()).unwrap());
             let peaks = &frame["results"][0][pixel]["peaks"];
             all.push((bins, peaks[0]["distance"].as_f64().unwrap()));
         }

@@ -242,6 +242,7 @@ fn with_all() -> Settings {
         }),
         tracking: true,
         echoes: EchoNumber::new(2).unwrap(),
+        echo_wait: Some(4),
         sigma_bins: Some(U8F8::lit("1")),
         l2: 300,
         ..with_windows()
