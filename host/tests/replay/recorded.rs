@@ -194,31 +194,45 @@ fn a_gate_leaves_the_cover_glass_out() {
 }
 
 #[test]
-fn the_demo_is_the_papers_static_scene_and_every_pixel_reports() {
+fn every_pixel_of_the_demo_reports_alone_or_in_a_block() {
     let scratch = Scratch::new();
     let output = scratch.run("demo --quiet");
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
     let read = |name: &str| scratch.read(&format!("out/demo/{name}"));
     let summary: serde_json::Value = serde_json::from_str(&read("summary.json")).unwrap();
-    // Section III-B: α = 8, L1 = 100, L2 = 2000, X = 10, 10,000 laser cycles.
     let settings = &summary["settings"];
-    assert_eq!(settings["alpha"], 8.0);
-    assert_eq!(
-        ["l1", "l2", "x"].map(|name| &settings[name]),
-        [100, 2000, 10]
-    );
+    let names = [
+        "l1",
+        "l2",
+        "x",
+        "binning",
+        "patience",
+        "echoes",
+        "echo_wait",
+    ];
+    let numbers = names.map(|name| settings[name].as_u64().unwrap());
+    assert_eq!(numbers, [40, 2000, 4, 2, 64, 2, 4]);
     let counts = ["cycles", "pixels", "pixels_reporting"].map(|name| &summary[name]);
-    assert_eq!(counts, [10_000, 2048, 2048]);
+    assert_eq!(counts, [4000, 2048, 2048]);
     let events = read("events.csv");
-    // The first look above L1, N = 110.
+    // The first look above L1, N = 44.
     let first = events.lines().nth(1).unwrap();
-    assert!(first.starts_with("109,"), "{first}");
+    assert!(first.starts_with("43,"), "{first}");
     let report = read("report.html");
     assert!(report.contains("</html>") && report.matches("<svg").count() == 4);
     // As documented: the report stays small enough to send.
-    assert!(report.len() < 5_000_000 && report.contains("All 53,534 events are shown."));
+    assert!(report.len() < 5_000_000 && report.contains("All 33,180 events are shown."));
     for picture in ["depth-mean", "reflectivity-events", "reflectivity-signal"] {
         assert!(read(&format!("{picture}.svg")).ends_with("</svg>\n"));
+    }
+    // All surfaces are there: that behind the glass, and the dim one.
+    for surface in summary["against_truth"]["surfaces"].as_array().unwrap() {
+        let (name, events) = (&surface["name"], surface["events"].as_u64().unwrap());
+        let false_alarms = surface["false_alarms"].as_u64().unwrap();
+        assert!(
+            events > 400 && false_alarms * 40 <= events,
+            "{name}: {events}, {false_alarms}"
+        );
     }
     // The array of the AER file's header: 64 columns, 32 rows.
     let aer = std::fs::read(scratch.path("out/demo/events.aer")).unwrap();

@@ -36,6 +36,8 @@ const L2: u16 = 2000;
 const MINIMUM_COUNT: u32 = 5;
 /// Standard deviation of the pulse in bins.
 const SIGMA: f64 = 1.0;
+/// Bins between two pulses of the laser: 100 ns.
+const PERIOD: f64 = 400.0;
 /// An event farther from every surface is false: 1 + 2σ bins, at least 2.
 const FALSE: i64 = 3 * PER_BIN;
 

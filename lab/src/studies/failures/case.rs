@@ -6,7 +6,7 @@ use rand_core::Rng;
 use rand_pcg::Pcg64;
 
 use super::stray::{Stray, StrayPhotons};
-use super::{BINS, SIGMA};
+use super::{BINS, PERIOD, SIGMA};
 use dtof::simulate::SimulatedPixel;
 use dtof::simulate::effects::Effects;
 use dtof::simulate::effects::limits::Timing;
@@ -18,8 +18,6 @@ use dtof_theory::rates::Rates;
 pub(super) const BACKGROUND: f64 = 0.05;
 pub(super) const SIGNAL: f64 = 0.5;
 pub(super) const PLACE: f64 = 80.3;
-/// Bins between two pulses of the laser: 100 ns.
-pub(super) const PERIOD: f64 = 400.0;
 
 /// A Gaussian pulse.
 #[derive(Clone, Copy, Debug)]

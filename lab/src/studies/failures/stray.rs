@@ -1,8 +1,6 @@
 //! Light that is neither the target's nor even: rain, smoke, another LiDAR.
 
-use super::BINS;
-use super::SIGMA;
-use super::case::PERIOD;
+use super::{BINS, PERIOD, SIGMA};
 use anyhow::Result;
 use rand_distr::{Distribution, Exp, Normal, Poisson, Uniform};
 use rand_pcg::Pcg64;
