@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 
 use self::analysis::{false_events, gaussian_error, hit_rate, roc};
 use self::beyond::{
-    binning_edges, binning_rate, binning_reports, binning_scenes, echoes, tracking,
+    binning_edges, binning_rate, binning_reports, binning_scenes, echo_wait, echoes, tracking,
 };
 use self::methods::{depth_error, event_depth, false_rate, time_to_detect};
 use self::scenes::{
@@ -41,6 +41,7 @@ pub const ALL: &[Study] = &[
     binning_scenes::STUDY,
     tracking::STUDY,
     echoes::STUDY,
+    echo_wait::STUDY,
     failures::STUDY,
 ];
 

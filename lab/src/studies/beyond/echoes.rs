@@ -1,5 +1,6 @@
 //! Several echoes of one exposure: two surfaces of one pixel, a glass before a wall.
 
+use super::light::Light;
 use super::setting::{BINS, L1, L2, SIGMA, X};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
@@ -11,8 +12,7 @@ use dtof_core::{
 };
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
 use dtof_draw::palette::{Pen, STEPS};
-use rand_core::Rng;
-use rand_distr::{Distribution, Normal, Poisson, Uniform};
+use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 
@@ -59,45 +59,6 @@ fn config() -> Result<PixelConfig<BINS, WindowRule>> {
     let estimator = DepthEstimator::for_pulse(U8F8::from_num(SIGMA));
     let config = PixelConfig::with_rule(rule).x(X).l1(L1).l2(L2);
     Ok(config.estimator(estimator).echoes(two, REACH).build()?)
-}
-
-/// The photons of a background and some surfaces.
-struct Light {
-    background: Poisson<f64>,
-    surfaces: Vec<(Poisson<f64>, Normal<f64>)>,
-}
-
-impl Light {
-    fn new(background: f64, surfaces: &[(f64, f64)]) -> Result<Self> {
-        let surface = |&(photons, position): &(f64, f64)| {
-            Ok((Poisson::new(photons)?, Normal::new(position, SIGMA)?))
-        };
-        Ok(Self {
-            background: Poisson::new(background * BINS as f64)?,
-            surfaces: surfaces.iter().map(surface).collect::<Result<_>>()?,
-        })
-    }
-
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "bins"
-    )]
-    fn draw(&self, rng: &mut Pcg64) -> Vec<u16> {
-        let number = self.background.sample(rng) as u64;
-        let mut codes: Vec<u16> = (0..number)
-            .map(|_| rng.next_u32() as u16 % BINS as u16)
-            .collect();
-        for (number, place) in &self.surfaces {
-            for _ in 0..number.sample(rng) as u64 {
-                let bin = place.sample(rng).floor();
-                if (0.0..BINS as f64).contains(&bin) {
-                    codes.push(bin as u16);
-                }
-            }
-        }
-        codes
-    }
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
