@@ -153,9 +153,6 @@ fn blocks_report_its_walls_and_leave_pixels_their_events() {
     }
     let kept = of_pixels(&events) as f64 / own as f64;
     println!("{own} events alone, {kept} kept; of blocks {right} right, {wrong} wrong");
-    assert!(own > 1000 && kept >= 0.95, "{own}, {kept}");
-    assert!(
-        right > 10_000 && wrong * 50 <= right + wrong,
-        "{right}, {wrong}"
-    );
+    assert!(own > 1000 && kept >= 0.965, "{own}, {kept}");
+    assert!(right > 120_000 && wrong * 1000 < right, "{right}, {wrong}");
 }

@@ -106,7 +106,7 @@ fn reference_config(config: &PixelConfig<BINS, AnyRule>) -> EchoConfig {
         last: config.gate().last().into(),
         echoes: config.echoes().raw().into(),
         reach: config.peel_reach().into(),
-        wait: config.echo_wait().into(),
+        wait: Some(config.echo_wait().into()).filter(|&times| times < 255),
     }
 }
 

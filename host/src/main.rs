@@ -19,7 +19,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Simulate a static scene and show its events.
+    /// Simulate the scene of the demo and show its events.
     Demo(command::demo::Demo),
     /// Simulate a scene that a file describes.
     Simulate(Box<command::simulate::Simulate>),

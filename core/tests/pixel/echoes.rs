@@ -217,6 +217,38 @@ proptest! {
     }
 }
 
+/// The longest wait is no multiple: 2 laser cycles for the first echo, and 600 until L2.
+#[test]
+fn the_longest_wait_is_until_l2() {
+    for (wait, end) in [(254, 508), (255, 600)] {
+        let settings = Settings {
+            x: 1,
+            l1: 1,
+            l2: 600,
+            first: 0,
+            last: 63,
+            rule: Rule::Paper(4 * 256),
+            minimum: 5,
+            is_one_hit: false,
+            echoes: 2,
+            reach: 4,
+            wait,
+            tracks: false,
+        };
+        let config = settings.config::<64>();
+        let mut lone = Lone::<64>::new(0);
+        let mut looks = (0..end).map(|cycle| {
+            (0..5).for_each(|_| lone.pixel.count(&config, 20));
+            lone.end(&config, cycle, 1)
+        });
+        assert_eq!(looks.nth(1), Some(Look::Event));
+        assert_eq!(
+            looks.position(|look| look == Look::Ended),
+            Some(end as usize - 3)
+        );
+    }
+}
+
 /// By hand: 5 photons a laser cycle in bin 20, 3 in bin 32, 1 in bin 26. The first look above
 /// L1 finds bin 20, the next bin 32, the third bin 26, right behind the bins around bin 20.
 #[test]

@@ -122,7 +122,8 @@ impl Pixel {
         }
         self.empty_held();
         let had_event = !self.peaks.is_empty();
-        let has_waited = self.now.exposure >= self.echo_at * u32::from(self.settings.wait);
+        let wait = self.settings.wait;
+        let has_waited = wait < 255 && self.now.exposure >= self.echo_at * u32::from(wait);
         if self.now.exposure >= u32::from(l2) || had_event && has_waited {
             self.now.statistics.expired += u64::from(!had_event);
             self.now.statistics.expired_deferred += u64::from(!had_event && self.now.put_off);

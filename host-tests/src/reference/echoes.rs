@@ -30,8 +30,9 @@ pub struct EchoConfig {
     pub echoes: usize,
     /// Bins to either side of an echo that are left out after it.
     pub reach: usize,
-    /// An exposure ends when it is so many times as long as it was at its last echo.
-    pub wait: u32,
+    /// An exposure ends when it is so many times as long as it was at its last echo, without
+    /// it at `L_2`.
+    pub wait: Option<u32>,
 }
 
 /// An event.
@@ -109,7 +110,8 @@ impl EchoPixel {
         if !self.exposure.is_multiple_of(x) || self.exposure <= l1 {
             return None;
         }
-        let end = self.echo_at.map_or(l2, |at| l2.min(at * self.config.wait));
+        let end = self.echo_at.zip(self.config.wait);
+        let end = end.map_or(l2, |(at, times)| l2.min(at * times));
         if self.exposure >= end {
             self.start_over();
             return None;
@@ -208,7 +210,7 @@ mod tests {
         last: 31,
         echoes: 3,
         reach: 2,
-        wait: 100,
+        wait: None,
     };
 
     /// Laser cycle, number and bin of the events with the same photons in each laser cycle.
@@ -243,7 +245,10 @@ mod tests {
     #[test]
     fn one_surface_waits_no_longer_than_it_took_several_times() {
         // The look at 8 laser cycles finds it, and that at 16 ends the exposure.
-        let config = EchoConfig { wait: 2, ..CONFIG };
+        let config = EchoConfig {
+            wait: Some(2),
+            ..CONFIG
+        };
         assert_eq!(
             run(config, 40, &[12]),
             [(7, 1, 12, false), (23, 1, 12, false), (39, 1, 12, false)]

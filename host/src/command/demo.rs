@@ -48,8 +48,8 @@ impl Demo {
         let lead = format!(
             "A simulated scene of {}×{} macropixels. Every pixel reports a depth event the moment \
              its peak stands clear of the background, then starts over: that of the bright ball \
-             often, that of the wall later. Pixels on the dark curtain are too dim alone and report \
-             in blocks. Through the pane of glass a pixel reports two echoes. A ball is thrown \
+             often, that of the wall later. Pixels on the dark curtain are too dim to report soon alone, so they \
+             report in blocks. Through the pane of glass a pixel reports two echoes. A ball is thrown \
              across.",
             scene.geometry.columns, scene.geometry.rows
         );

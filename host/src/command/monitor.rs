@@ -132,7 +132,7 @@ impl Monitor {
                     geometry,
                     bin_width_ps: settings.bin_width_ps,
                     offset_mm: settings.offset_mm,
-                    laser_millihertz: 0,
+                    laser_millihertz: sensor.laser_millihertz,
                 };
                 Some(Recording::new(
                     file,

@@ -36,7 +36,7 @@ pub struct Operation {
     binning: u8,
     /// Adaptive binning: laser cycles without an event after which a pixel counts in its block,
     /// too
-    #[arg(long, value_name = "N", default_value_t = AdaptiveBinning::PATIENCE, value_parser = whole(1..=u16::MAX))]
+    #[arg(long, value_name = "N", default_value_t = AdaptiveBinning::PATIENCE, requires = "binning", value_parser = whole(1..=u16::MAX))]
     patience: u16,
     /// Window rule: expect the next event of a pixel near its last, and spend half of the false
     /// alarms there
@@ -48,7 +48,7 @@ pub struct Operation {
     echoes: u8,
     /// Two or more echoes: an exposure ends once it is so many times as long as it was at its
     /// last echo [default: it goes on until L2]
-    #[arg(long, value_name = "TIMES", value_parser = whole(2..=u8::MAX - 1))]
+    #[arg(long, value_name = "TIMES", requires = "echoes", value_parser = whole(2..=u8::MAX - 1))]
     echo_wait: Option<u8>,
 }
 

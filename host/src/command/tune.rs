@@ -153,7 +153,7 @@ impl Tune {
         );
         ensure!(
             self.binning == 0 || self.rule == RuleName::Window,
-            "--binning is for --rule window"
+            "--binning needs --rule window here: only its z is shared with blocks"
         );
         let wanted = match (self.false_alarms_per_second, self.laser_hz) {
             (Some(per_second), Some(laser_hz)) => Wanted::PerCycle(per_second / laser_hz),

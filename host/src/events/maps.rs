@@ -48,9 +48,15 @@ impl PixelHistory {
         (count > 0).then(|| self.recent.iter().sum::<f64>() / count as f64)
     }
 
+    /// Blocks say nothing of how bright a pixel is.
+    fn has_own_events(&self) -> bool {
+        self.reflectivity.events() > 0
+    }
+
     /// Relative reflectivity as the paper has it, events × range², at the mean range.
     #[must_use]
     pub fn reflectivity_of_events(&self) -> Option<f64> {
+        self.has_own_events().then_some(())?;
         let range = I24F8::saturating_from_num(self.mean_mm()?);
         Some(self.reflectivity.of_events(range) as f64)
     }
@@ -59,6 +65,7 @@ impl PixelHistory {
     /// mean range.
     #[must_use]
     pub fn reflectivity_of_signal(&self) -> Option<f64> {
+        self.has_own_events().then_some(())?;
         let range = I24F8::saturating_from_num(self.mean_mm()?);
         Some(self.reflectivity.of_signal(range).to_num())
     }

@@ -135,7 +135,7 @@ impl Summary {
             ),
         ]);
         if self.settings.binning.is_some() {
-            rows.push(row("of these, of blocks", self.events_of_blocks));
+            rows.push(row("events of blocks", self.events_of_blocks));
         }
         if self.settings.frame.is_none() {
             rows.push(row("exposures without an event", self.expired));

@@ -106,8 +106,8 @@ pub fn demo() -> Result<String> {
     let title = "Each flash is an event: bright pixels report often, dim ones later and in blocks";
     let notes = notes.join(", ");
     let note = format!(
-        "First event of a typical pixel, in laser cycles: {notes}. Small squares are the wall \
-         behind the glass, a second echo."
+        "First event of a typical pixel, in laser cycles: {notes}. Small squares are \
+         second echoes: on the pane the wall behind it, elsewhere edges and motion."
     );
     Ok(draw(geometry, &flashes, &marks, title, &note))
 }

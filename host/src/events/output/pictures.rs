@@ -66,7 +66,8 @@ pub fn pictures(maps: &Maps, sides: [&str; 2], [one, several]: [&str; 2]) -> Res
             &format!("Number of {several}"),
             several,
             Some(if one == "event" {
-                "How many events each pixel reported. Near and bright surfaces report more often."
+                "How many events each pixel has. Near and bright surfaces report more often. Two echoes \
+                 count twice, and an event of a block counts for its pixels."
                     .to_owned()
             } else {
                 format!("How many {several} each pixel has: one a frame with a photon.")

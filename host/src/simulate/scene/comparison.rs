@@ -85,8 +85,9 @@ impl Scene {
     /// far away for the histogram.
     fn pixels_beyond(&self, surface: usize, cycles: u64) -> usize {
         let is_beyond = |address, cycle| {
-            let view = self.truth(address, cycle);
-            view.is_some_and(|view| view.surface == surface && view.range_mm >= self.end_mm())
+            let views = self.views(address, cycle).into_iter().flatten();
+            let mut of_surface = views.filter(|view| view.surface == surface);
+            of_surface.any(|view| view.range_mm >= self.end_mm())
         };
         let pixels = (0..=u16::MAX).map(PixelAddress);
         pixels
@@ -130,8 +131,9 @@ impl Comparison<'_> {
                 ..view
             });
             let views = [nearest, echo, behind].into_iter().flatten();
-            let mut errors = views.map(|view| (view.surface, range_mm - view.range_mm));
-            if let Some((of, error)) = errors.find(|(_, error)| error.abs() <= limit_mm) {
+            let errors = views.map(|view| (view.surface, range_mm - view.range_mm));
+            let nearest = errors.min_by(|(_, one), (_, other)| one.abs().total_cmp(&other.abs()));
+            if let Some((of, error)) = nearest.filter(|(_, error)| error.abs() <= limit_mm) {
                 surface.get_or_insert(of);
                 sum += error;
                 pixels += 1.0;

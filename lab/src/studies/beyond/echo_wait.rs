@@ -202,8 +202,8 @@ fn results(part: &Part) -> Result<Results> {
     let (least, most) = (format!("{:.0}", gain.0), format!("{:.0}", gain.1));
     let chart = Chart {
         finding: format!(
-            "A wait of 4 reports a lone surface {least} to {most} times as often as one until L2, and \
-             finds a second half as bright in {} % of exposures or more",
+            "In four scenes a wait of 4 reports a lone surface {least} to {most} times as often as one \
+             until L2, and finds a second half as bright in {} % of exposures or more",
             percent(half)
         ),
         holds: gain.0 >= 2.0 && half >= 0.5,
