@@ -114,42 +114,24 @@ fn each_of_the_three_makes_other_events() {
     let script = script(2_000, 15, &mut Pcg32::seed_from_u64(2));
     let all = wanted(5, 3);
     let (of_all, _) = over_link(&all, &script, 1);
-    let levels = BlockLevel::saturating(1);
-    let fewer = AdaptiveBinning {
-        levels,
-        patience: 50,
+    let binning = |levels, patience| {
+        let levels = BlockLevel::saturating(levels);
+        Some(AdaptiveBinning { levels, patience })
     };
-    let patient = AdaptiveBinning {
-        patience: 53,
-        ..all.binning.unwrap()
+    let with = |change: &dyn Fn(&mut Configuration)| {
+        let mut other = all;
+        change(&mut other);
+        other
     };
     let others = [
-        Configuration {
-            binning: Some(fewer),
-            ..all
-        },
-        Configuration {
-            binning: Some(patient),
-            ..all
-        },
-        Configuration {
-            tracking: false,
-            ..all
-        },
-        Configuration {
-            echoes: EchoNumber::FIRST,
-            ..all
-        },
-        Configuration {
-            peel_reach: 5,
-            ..all
-        },
-        Configuration {
-            echo_wait: 2,
-            ..all
-        },
+        with(&|other| other.binning = binning(1, 50)),
+        with(&|other| other.binning = binning(3, 53)),
+        with(&|other| other.tracking = false),
+        with(&|other| other.echoes = EchoNumber::FIRST),
+        with(&|other| other.peel_reach = 5),
+        with(&|other| other.echo_wait = 2),
         // Three rows of five lie otherwise.
-        Configuration { columns: 3, ..all },
+        with(&|other| other.columns = 3),
     ];
     for other in others {
         let (host, report) = over_link(&other, &script, 1);

@@ -216,17 +216,23 @@ def is_closed(report):
     report.complaints.clear()
 
 
-def places_are_true(browser):
-    """Ranges beyond the colours, too: the axis is linear over all of them."""
-    ranges = [500, 1000, 2000, 9000]
-    records = b"".join(struct.pack("<IfHB", at, mm, 0, 0x01) for at, mm in enumerate(ranges))
-    data = {"columns": 1, "rows": 1, "cycles": 4, "unit": 1, "oneOf": 1, "low": 1000, "high": 2000}
+def page_of(browser, data, records):
+    """A page with these events and the scripts that place them, and nothing else."""
     data |= {"sides": ["column", "row"], "events": "events"}
     data |= {"colours": "000000" * 256, "records": base64.b64encode(records).decode()}
     page = browser.new_page()
     page.set_content(f'<script type="application/json" id="data">{json.dumps(data)}</script>')
     for script in ["events.js", "projection.js"]:
         page.add_script_tag(content=(SCRIPTS / script).read_text())
+    return page
+
+
+def places_are_true(browser):
+    """Ranges beyond the colours, too: the axis is linear over all of them."""
+    ranges = [500, 1000, 2000, 9000]
+    records = b"".join(struct.pack("<IfHB", at, mm, 0, 0x01) for at, mm in enumerate(ranges))
+    data = {"columns": 1, "rows": 1, "cycles": 4, "unit": 1, "oneOf": 1, "low": 1000, "high": 2000}
+    page = page_of(browser, data, records)
     found = page.evaluate(
         """() => {
             Object.assign(view, VIEWS.side, { third: "range" });
@@ -249,12 +255,7 @@ def blocks_are_as_large_as_their_pixels(browser):
     events = [(7, 0x01), (2, 0x11), (0, 0x22), (0, 0x33), (14, 0x14)]
     records = b"".join(struct.pack("<IfHB", 9, 1000, *event) for event in events)
     data = {"columns": 5, "rows": 3, "cycles": 10, "unit": 1, "oneOf": 1, "low": 900, "high": 1100}
-    data |= {"sides": ["column", "row"], "events": "events"}
-    data |= {"colours": "000000" * 256, "records": base64.b64encode(records).decode()}
-    page = browser.new_page()
-    page.set_content(f'<script type="application/json" id="data">{json.dumps(data)}</script>')
-    for script in ["events.js", "projection.js"]:
-        page.add_script_tag(content=(SCRIPTS / script).read_text())
+    page = page_of(browser, data, records)
     found = page.evaluate(
         """() => {
             Object.assign(view, VIEWS.front, { third: "range" });

@@ -161,7 +161,6 @@ impl Simulation<'_> {
             |events| comparison.add(events),
         )?;
         summary.input = self.input.map(|file| file.display().to_string());
-        summary.laser_hz = Some(self.scene.laser_hz());
         summary.field_of_view_degrees = Some(self.scene.view().degrees());
         summary.export_with = export_with(self.scene);
         let against_truth = comparison.finish();

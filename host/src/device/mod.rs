@@ -102,7 +102,7 @@ pub fn configuration(
         tracking: settings.tracking,
         echoes: settings.echoes,
         peel_reach: settings.peel_reach(),
-        echo_wait: settings.echo_wait.unwrap_or(u8::MAX),
+        echo_wait: settings.echo_wait_times(),
         bin_width_ps: settings.bin_width_ps,
         offset_mm: settings.offset_mm,
         source,

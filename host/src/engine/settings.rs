@@ -158,9 +158,15 @@ impl Settings {
             .one_hit_tdc(self.one_hit_tdc)
             .tracking(tracking)
             .echoes(self.echoes, self.peel_reach())
-            .echo_wait(self.echo_wait.unwrap_or(u8::MAX))
+            .echo_wait(self.echo_wait_times())
             .build()
             .with_context(|| format!("--x {} --l1 {} --l2 {}", self.x, self.l1, self.l2))
+    }
+
+    /// [`Self::echo_wait`] as pixels know it: without it the most, which is until L2.
+    #[must_use]
+    pub fn echo_wait_times(&self) -> u8 {
+        self.echo_wait.unwrap_or(u8::MAX)
     }
 
     /// Bins to either side of an echo's peak that are left out once it is reported: four

@@ -79,7 +79,7 @@ impl Summary {
         Self {
             program: concat!("dtof ", env!("CARGO_PKG_VERSION")),
             input: None,
-            laser_hz: None,
+            laser_hz: source.laser_hz(),
             field_of_view_degrees: None,
             export_with: None,
             recorded_cycles: source.recorded_cycles(),
