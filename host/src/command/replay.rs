@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::Result;
 use clap::Args;
 use dtof::cli::arguments::{bins, fixed, path, positive, whole};
 use dtof::engine::host::host_engine;
@@ -10,10 +10,8 @@ use dtof::engine::run::run;
 use dtof::engine::settings::Settings;
 use dtof::events::echoes::Echo;
 use dtof::events::output::Output;
-use dtof::input::photon_csv::PhotonCsv;
-use dtof::input::recorded::{Capture, RecordedHistograms, RecordingLength};
-use dtof::input::source::{Geometry, PhotonSource};
-use dtof::input::{npy, tmf8820};
+use dtof::input::open::{Opening, Recording, open};
+use dtof::input::recorded::RecordingLength;
 use dtof_core::fixed::types::{I24F8, U16F16};
 
 use super::dynamic_depth::Shown;
@@ -68,29 +66,21 @@ pub struct Replay {
     quiet: bool,
 }
 
-/// An opened recording and the settings its format stands for.
-struct Recording {
-    photons: Box<dyn PhotonSource>,
-    bins: usize,
-    bin_width_ps: U16F16,
-    offset_mm: I24F8,
-}
-
 impl Replay {
     pub fn run(&self) -> Result<()> {
         let changes = self.changes.wanted()?;
         let Recording {
             mut photons,
-            bins,
-            bin_width_ps,
-            offset_mm,
-        } = self.open()?;
+            format,
+        } = open(&self.input, &self.opening())?;
         let settings = Settings {
             frame: self.frames.frame,
             ..self.operation.settings(
-                bins,
-                self.bin_width_ps.unwrap_or(bin_width_ps),
-                self.offset_mm.unwrap_or(offset_mm),
+                format.bins,
+                self.bin_width_ps
+                    .or(format.bin_width_ps)
+                    .unwrap_or(const { U16F16::lit("250") }),
+                self.offset_mm.or(format.offset_mm).unwrap_or(I24F8::ZERO),
                 self.seed,
             )?
         };
@@ -116,83 +106,16 @@ impl Replay {
         Ok(())
     }
 
-    /// Reads or checks the whole file, by its extension.
-    fn open(&self) -> Result<Recording> {
-        let path = &self.input;
-        let extension = path.extension().and_then(|extension| extension.to_str());
-        let extension = extension.map(str::to_ascii_lowercase);
-        ensure!(
-            self.columns.is_none() || extension.as_deref() == Some("csv"),
-            "--columns is for photon lists; {} has its own",
-            path.display()
-        );
-        match extension.as_deref() {
-            Some("npy") => {
-                let npy = npy::read(path)?;
-                self.expect_bins(npy.bins)?;
-                let photons = self.histograms(npy.geometry, &[npy.capture])?;
-                Ok(Recording::new(photons, npy.bins))
-            }
-            Some("json") => {
-                let log = tmf8820::read(path)?;
-                self.expect_bins(tmf8820::BINS)?;
-                let photons = self
-                    .histograms(log.geometry, &log.captures)?
-                    .with_sides(tmf8820::SIDES);
-                Ok(Recording {
-                    bin_width_ps: tmf8820::BIN_WIDTH_PS,
-                    offset_mm: tmf8820::OFFSET_MM,
-                    ..Recording::new(photons, tmf8820::BINS)
-                })
-            }
-            Some("csv") => {
-                ensure!(
-                    self.photons_per_cycle.is_none() && self.recorded_cycles.is_none(),
-                    "--photons-per-cycle and --recorded-cycles are for histograms; {} holds photons",
-                    path.display()
-                );
-                let bins = self.bins.unwrap_or(128).into();
-                Ok(Recording::new(
-                    PhotonCsv::open(path, bins, self.columns, self.cycles)?,
-                    bins,
-                ))
-            }
-            _ => bail!(
-                "{}: the name must end in .npy, .json or .csv",
-                path.display()
-            ),
-        }
-    }
-
-    fn histograms(&self, geometry: Geometry, captures: &[Capture]) -> Result<RecordedHistograms> {
-        let length = match (self.recorded_cycles, self.photons_per_cycle) {
-            (Some(cycles), _) => RecordingLength::Cycles(cycles),
-            (None, rate) => RecordingLength::PhotonsPerCycle(rate.unwrap_or(1.0)),
-        };
-        let name = || self.input.display().to_string();
-        RecordedHistograms::new(geometry, captures, length, self.cycles, self.seed)
-            .with_context(name)
-    }
-
-    /// A file that says how many bins it has is not read as another.
-    fn expect_bins(&self, bins: usize) -> Result<()> {
-        let name = self.input.display();
-        let wanted = self.bins.map_or(bins, usize::from);
-        ensure!(
-            wanted == bins,
-            "{name}: --bins {wanted}, but the file has {bins}; leave --bins out"
-        );
-        Ok(())
-    }
-}
-
-impl Recording {
-    fn new(photons: impl PhotonSource + 'static, bins: usize) -> Self {
-        Self {
-            photons: Box::new(photons),
-            bins,
-            bin_width_ps: U16F16::lit("250"),
-            offset_mm: I24F8::ZERO,
+    /// What the options say of the recording.
+    fn opening(&self) -> Opening {
+        let cycles = self.recorded_cycles.map(RecordingLength::Cycles);
+        let rate = self.photons_per_cycle.map(RecordingLength::PhotonsPerCycle);
+        Opening {
+            columns: self.columns,
+            bins: self.bins,
+            length: cycles.or(rate),
+            cycles: self.cycles,
+            seed: self.seed,
         }
     }
 }

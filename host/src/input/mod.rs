@@ -1,6 +1,7 @@
 //! Where photons come from.
 
 pub mod npy;
+pub mod open;
 pub mod photon_csv;
 pub mod range;
 pub mod recorded;

@@ -15,6 +15,8 @@ use crate::input::source::Geometry;
 
 /// Zones of the sensor.
 pub const ZONES: u32 = 9;
+/// The one that looks straight ahead.
+pub const CENTRE: u32 = 4;
 /// The names of the columns and rows of a log.
 pub const SIDES: [&str; 2] = ["zone", "capture"];
 /// Bins of its histograms.
@@ -32,13 +34,17 @@ pub struct Tmf8820Log {
     pub geometry: Geometry,
     /// Nine histograms each.
     pub captures: Vec<Capture>,
+    /// The true distance in millimetres of each zone that has one, if the log has it: of the
+    /// centre zones.
+    pub truth_mm: Option<Vec<Option<f64>>>,
 }
 
-/// The part of a capture that is read. The ground truth and the sensor's own results stand
-/// beside it in the log.
+/// The part of a capture that is read. The sensor's own results stand beside it in the log.
 #[derive(Deserialize)]
 struct LogEntry {
     hists: Vec<Vec<u64>>,
+    /// Of the centre zone, in metres.
+    dist_to_plane: Option<f64>,
 }
 
 /// Reads `path`.
@@ -70,8 +76,14 @@ pub fn read(path: &Path) -> Result<Tmf8820Log> {
         }
     }
     let rows = u32::try_from(entries.len())?;
+    let truth = entries
+        .iter()
+        .flat_map(|entry| (0..ZONES).map(|zone| entry.dist_to_plane.filter(|_| zone == CENTRE)));
+    let truth: Vec<Option<f64>> = truth.map(|metres| Some(metres? * 1000.0)).collect();
+    let truth_mm = truth.iter().any(Option::is_some).then_some(truth);
     Ok(Tmf8820Log {
         geometry: Geometry::new(ZONES, rows),
         captures: entries.into_iter().map(|entry| entry.hists).collect(),
+        truth_mm,
     })
 }
