@@ -19,5 +19,6 @@ pub mod geometry;
 pub mod input;
 pub mod progress;
 pub mod rows;
+pub mod settings;
 pub mod simulate;
 pub mod view;

@@ -331,6 +331,7 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
             statistics: &mut statistics,
             map: None,
             recording: None,
+            masked: 0,
         },
     )?;
     // Less their header.

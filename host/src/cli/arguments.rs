@@ -59,6 +59,17 @@ pub fn fixed<T: Fixed + FromStr>(text: &str) -> Result<T, String> {
     Ok(number)
 }
 
+/// A fixed-point number, of up to 53 bits, with as few decimals as [`fixed`] reads it from.
+#[must_use]
+pub fn shortest<T: Fixed + FromStr>(number: T) -> String {
+    // The decimals of a fixed-point number's own format may be those of its neighbour.
+    let exact: f64 = number.to_num();
+    let all = T::FRAC_NBITS as usize;
+    let texts = (0..all).map(|decimals| format!("{exact:.decimals$}"));
+    let mut texts = texts.filter(|text| fixed(text) == Ok(number));
+    texts.next().unwrap_or_else(|| format!("{exact:.all$}"))
+}
+
 /// Reads a number above 0.
 ///
 /// # Errors
@@ -124,7 +135,7 @@ fn plain(text: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_core::fixed::types::{I24F8, U8F8};
+    use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
 
     #[test]
     fn numbers_are_what_they_say_however_written() {
@@ -164,6 +175,30 @@ mod tests {
             let error = bins(text).unwrap_err();
             assert_eq!(error, "must be a power of two from 8 to 1024");
         }
+    }
+
+    #[test]
+    fn a_number_is_written_as_short_as_it_reads() {
+        for bits in 0..=u16::MAX {
+            let number = U8F8::from_bits(bits);
+            let text = shortest(number);
+            assert_eq!(fixed(&text), Ok(number), "{bits} {text}");
+            let (shorter, _) = text.split_at(text.len() - 1);
+            assert!(
+                !text.contains('.') || fixed::<U8F8>(shorter) != Ok(number),
+                "{text}"
+            );
+            let number = U4F12::from_bits(bits);
+            assert_eq!(fixed(&shortest(number)), Ok(number));
+        }
+        assert_eq!(shortest(U8F8::from_bits(1076)), "4.203");
+        assert_eq!(shortest(U8F8::lit("0.8")), "0.8");
+        assert_eq!(shortest(I24F8::lit("-179.5")), "-179.5");
+        assert_eq!(shortest(U16F16::lit("92.1")), "92.1");
+        assert_eq!(
+            shortest(U16F16::from_bits(1)).parse(),
+            Ok(U16F16::from_bits(1))
+        );
     }
 
     #[test]

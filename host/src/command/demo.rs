@@ -6,9 +6,10 @@ use anyhow::Result;
 use clap::Parser;
 use dtof::cli::arguments::{path, whole};
 use dtof::input::source::Geometry;
+use dtof::settings::Run;
 use dtof::simulate::demo;
 
-use super::simulate::{Simulation, array};
+use super::simulate::{Simulation, array, of_scene};
 
 #[derive(Parser)]
 pub struct Demo {
@@ -45,6 +46,12 @@ impl Demo {
         } else if self.device.is_some() {
             (scene.geometry.columns, scene.geometry.rows) = (8, 8);
         }
+        let said = Run {
+            cycles: Some(self.cycles),
+            seed: Some(self.seed),
+            ..Run::default()
+        };
+        let said = of_scene(said.into(), &scene)?;
         let lead = format!(
             "A simulated scene of {}×{} macropixels. Every pixel reports a depth event the moment \
              its peak stands clear of the background, then starts over: that of the bright ball \
@@ -59,6 +66,8 @@ impl Demo {
             light: Vec::new(),
             cycles: self.cycles,
             settings: &settings,
+            said: &said,
+            file: None,
             changes: None,
             echo: None,
             device: self.device.as_deref(),

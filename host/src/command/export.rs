@@ -11,6 +11,7 @@ use dtof::events::echoes::Echo;
 use dtof::export::{Format, LaserClock, Optics, Options, export};
 use dtof::geometry::FieldOfView;
 use dtof::rows::grouped;
+use dtof::settings::{Rays, SettingsFile};
 
 use super::dynamic_depth;
 
@@ -25,6 +26,9 @@ pub struct Export {
     /// The file to write
     #[arg(long, value_name = "FILE", value_parser = path())]
     out: PathBuf,
+    /// A settings file: its rays and its laser rate hold unless an option says otherwise
+    #[arg(long, value_name = "FILE", value_parser = path())]
+    settings: Option<PathBuf>,
     /// The field of view in degrees from edge to edge [default: 60 across the longer side,
     /// square pixels]
     #[arg(
@@ -59,13 +63,17 @@ pub struct Export {
 impl Export {
     pub fn run(&self) -> Result<()> {
         self.check()?;
-        let optics = match &self.calibration {
-            Some(file) => Optics::Calibration(file.clone()),
-            None => Optics::Pinhole(self.fov),
+        let file = self.settings.as_deref().map(SettingsFile::read);
+        let file = file.transpose()?.unwrap_or_default();
+        let optics = match (&self.calibration, self.fov) {
+            (Some(file), _) => Optics::Calibration(file.clone()),
+            (None, Some(view)) => Optics::Pinhole(Some(view)),
+            (None, None) => optics(&file.rays)?,
         };
+        let laser_hz = self.laser_hz.or(file.sensor.laser_hz);
         let options = Options {
             optics,
-            clock: self.laser_hz.map(LaserClock::new).transpose()?,
+            clock: laser_hz.map(LaserClock::new).transpose()?,
             kind: self.events,
             echo: self.echo,
             slice_ns: self.slice_us.map(|us| us * 1000),
@@ -114,4 +122,13 @@ impl Export {
         }
         Ok(())
     }
+}
+
+/// Where pixels look, as a settings file says.
+fn optics(rays: &Rays) -> Result<Optics> {
+    Ok(match (&rays.calibration, rays.field_of_view_degrees) {
+        (Some(file), _) => Optics::Calibration(file.into()),
+        (None, Some(degrees)) => Optics::Pinhole(Some(FieldOfView::new(degrees)?)),
+        (None, None) => Optics::Pinhole(None),
+    })
 }

@@ -2,7 +2,6 @@
 
 pub mod decode;
 pub mod demo;
-mod detection;
 mod dynamic_depth;
 pub mod export;
 pub mod monitor;

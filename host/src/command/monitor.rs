@@ -14,6 +14,7 @@ use dtof::device::monitor::map::{LiveMap, SHOW_CURSOR};
 use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::device::{self, Client};
 use dtof::events::aer_file::Header;
+use dtof::settings::{Sensor, SettingsFile};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_link::SensorRecord;
 
@@ -70,11 +71,18 @@ impl Monitor {
             !self.map || io::stderr().is_terminal(),
             "--map draws on standard error, which is no terminal here"
         );
+        let said = self.operation.said(SettingsFile {
+            sensor: Sensor {
+                columns: self.columns.map(u32::from),
+                bin_width_ps: self.bin_width_ps,
+                offset_mm: self.offset_mm,
+                ..Sensor::default()
+            },
+            ..SettingsFile::default()
+        })?;
+        let has_blocks = said.detection.binning.is_some_and(|levels| levels > 0);
         ensure!(
-            self.columns.is_none()
-                || self.map
-                || self.record.is_some()
-                || self.operation.has_blocks(),
+            self.columns.is_none() || self.map || self.record.is_some() || has_blocks,
             "--columns is of --map, --record and --binning"
         );
         let name = || self.device.clone();
@@ -98,17 +106,26 @@ impl Monitor {
             laser_millihertz: 0,
         });
         let pixels = self.pixels.unwrap_or(sensor.pixels.min(client.pixels()));
-        let any = const { U16F16::lit("250") };
-        let settings = self.operation.settings(
-            client.bins().into(),
-            self.bin_width_ps.or(sensor.bin_width).unwrap_or(any),
-            self.offset_mm.unwrap_or(sensor.offset),
-            0, // nothing is drawn here
-        )?;
+        let said = said.or(SettingsFile {
+            sensor: Sensor {
+                bin_width_ps: sensor.bin_width,
+                offset_mm: Some(sensor.offset),
+                ..Sensor::default()
+            },
+            ..SettingsFile::default()
+        });
+        ensure!(
+            said.sensor.bins.is_none_or(|bins| bins == client.bins()),
+            "{}: the settings are for {} bins, the device has {}",
+            self.device,
+            said.sensor.bins.unwrap_or_default(),
+            client.bins()
+        );
+        let settings = said.settings(client.bins().into())?;
         let length = self
             .seconds
             .map(|seconds| Duration::from_secs(seconds.into()));
-        let geometry = array(pixels, self.columns);
+        let geometry = array(pixels, said.sensor.columns);
         let mut map = self.map.then(|| {
             let terminal = Term::stderr();
             let asked = terminal.clone();
@@ -159,6 +176,7 @@ impl Monitor {
                 statistics: &mut io::stderr(),
                 map: map.as_mut(),
                 recording: recording.as_mut(),
+                masked: 0,
             },
         )
         .with_context(name);

@@ -1,55 +1,32 @@
 //! The options that say how pixels operate, the same for every command.
 
-use anyhow::{Context, Result, ensure};
-use clap::Args;
-use dtof::cli::arguments::whole;
-use dtof::engine::settings::Settings;
-use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{BlockLevel, Count, EchoNumber, HIGHEST_Z, RangeGate, z_for_levels};
-use dtof_link::AdaptiveBinning;
-use dtof_theory::tune::window::one_in;
+use std::path::PathBuf;
 
-use super::detection::Detection;
+use anyhow::Result;
+use clap::Args;
+use dtof::cli::arguments::{fixed, path, whole};
+use dtof::settings::{Detection, Sensor, SettingsFile};
+use dtof_core::CentredWindow;
+use dtof_core::fixed::types::U8F8;
 
 #[derive(Args)]
 pub struct Operation {
+    /// A TOML file with settings, as every run writes one; options override it. docs/settings.md
+    /// lists its keys
+    #[arg(long, value_name = "FILE", value_parser = path())]
+    pub settings: Option<PathBuf>,
     /// Only these bins may hold the peak, both inclusive [default: all]
     #[arg(long, value_name = "FIRST..LAST", value_parser = gate)]
     gate: Option<(u16, u16)>,
+    /// Pixels that are left out, such as hot and dead ones, as 3,70
+    #[arg(long, value_name = "PIXELS", value_delimiter = ',', value_parser = whole(0..=u16::MAX))]
+    mask: Option<Vec<u16>>,
+    /// Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. The depth then
+    /// comes from a window that suits it [default: the centroid of three bins]
+    #[arg(long, value_name = "S", value_parser = sigma, allow_hyphen_values = true)]
+    sigma_bins: Option<U8F8>,
     #[command(flatten)]
     detection: Detection,
-    /// Photons a reported peak, or the window around it, holds at least
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = whole(1..=1023_u16))]
-    min_count: u16,
-    /// The exposure a decision must exceed, in laser cycles
-    #[arg(long, value_name = "N", default_value_t = 40, value_parser = whole(0..=u16::MAX))]
-    l1: u16,
-    /// The exposure at which a pixel starts over without an event, in laser cycles
-    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = whole(0..=u16::MAX))]
-    l2: u16,
-    /// Laser cycles between looks
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = whole(0..=u16::MAX))]
-    x: u16,
-    /// Adaptive binning: pixels that stay silent also count together, in blocks of 2x2 pixels,
-    /// from level 2 on 4x4 and at level 3 8x8
-    #[arg(long, value_name = "LEVELS", default_value_t = 0, value_parser = whole(0..=BlockLevel::MAX.raw()))]
-    binning: u8,
-    /// Adaptive binning: laser cycles without an event after which a pixel counts in its block,
-    /// too
-    #[arg(long, value_name = "N", default_value_t = AdaptiveBinning::PATIENCE, requires = "binning", value_parser = whole(1..=u16::MAX))]
-    patience: u16,
-    /// Window rule: expect the next event of a pixel near its last, and spend half of the false
-    /// alarms there
-    #[arg(long)]
-    tracking: bool,
-    /// Echoes that a pixel reports in an exposure, 1 to 4. From 2 on it goes on until it has them
-    /// all, or has waited for the next
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1..=EchoNumber::LAST.raw()))]
-    echoes: u8,
-    /// Two or more echoes: an exposure ends once it is so many times as long as it was at its
-    /// last echo [default: it goes on until L2]
-    #[arg(long, value_name = "TIMES", requires = "echoes", value_parser = whole(2..=u8::MAX - 1))]
-    echo_wait: Option<u8>,
 }
 
 /// The option of commands that run on this computer: a device reports events.
@@ -63,62 +40,28 @@ pub struct Frames {
 }
 
 impl Operation {
-    /// Whether blocks of pixels decide together.
-    pub const fn has_blocks(&self) -> bool {
-        self.binning > 0
-    }
-
-    /// With what the options do not say.
+    /// What these options say, then `more`, then the file.
     ///
     /// # Errors
-    /// Options that contradict each other.
-    pub fn settings(
-        &self,
-        bins: usize,
-        bin_width_ps: U16F16,
-        offset_mm: I24F8,
-        seed: u64,
-    ) -> Result<Settings> {
-        let levels = BlockLevel::saturating(self.binning);
-        let z_for = |share| {
-            // Only how many bins the gate leaves counts; a number of bins that cannot be is
-            // refused by the engine.
-            #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
-            let last_bin = bins.clamp(8, 1024) as u16 - 1;
-            let (first, last) = self.gate.unwrap_or((0, last_bin));
-            let gate = RangeGate::<1024>::new(first, last)
-                .with_context(|| format!("--gate {first}..{last} with {bins} bins"))?;
-            let (x, l1, l2) = (self.x, self.l1, self.l2);
-            let z = z_for_levels(one_in(share), &gate, x, l1, l2, levels);
-            ensure!(
-                z < HIGHEST_Z,
-                "--false-alarm {share}: there is no z for so few; --z may be up to 15.9998"
-            );
-            Ok(z)
+    /// What is wrong with the file.
+    pub fn said(&self, more: SettingsFile) -> Result<SettingsFile> {
+        let options = SettingsFile {
+            sensor: Sensor {
+                gate: self.gate,
+                masked: self.mask.clone(),
+                sigma_bins: self.sigma_bins,
+                ..Sensor::default()
+            },
+            detection: self.detection.clone(),
+            ..SettingsFile::default()
         };
-        Ok(Settings {
-            bins,
-            bin_width_ps,
-            offset_mm,
-            gate: self.gate,
-            rule: self
-                .detection
-                .rule(Count::saturating(self.min_count.into()), z_for)?,
-            sigma_bins: self.detection.sigma_bins,
-            l1: self.l1,
-            l2: self.l2,
-            x: self.x,
-            binning: (levels != BlockLevel::PIXEL).then_some(AdaptiveBinning {
-                levels,
-                patience: self.patience,
-            }),
-            tracking: self.tracking,
-            echoes: EchoNumber::new(self.echoes).unwrap_or(EchoNumber::FIRST),
-            echo_wait: self.echo_wait,
-            one_hit_tdc: false,
-            frame: None,
-            seed,
-        })
+        let file = self.settings.as_deref().map(SettingsFile::read);
+        let mut file = file.transpose()?.unwrap_or_default();
+        if self.detection != Detection::default() {
+            // Frames have none of these options.
+            file.run.frame = None;
+        }
+        Ok(options.or(more).or(file))
     }
 }
 
@@ -128,4 +71,13 @@ fn gate(text: &str) -> Result<(u16, u16), String> {
         Some((bin(first).ok()?, bin(last).ok()?))
     });
     bins.ok_or("must be FIRST..LAST, as 20..119".to_owned())
+}
+
+fn sigma(text: &str) -> Result<U8F8, String> {
+    const WIDEST: U8F8 = CentredWindow::WIDEST_PULSE;
+    let sigma = fixed::<U8F8>(text)?;
+    if sigma == U8F8::ZERO || sigma > WIDEST {
+        return Err(format!("must be above 0 and at most {WIDEST}"));
+    }
+    Ok(sigma)
 }

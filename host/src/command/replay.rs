@@ -7,11 +7,13 @@ use clap::Args;
 use dtof::cli::arguments::{bins, fixed, path, positive, whole};
 use dtof::engine::host::host_engine;
 use dtof::engine::run::run;
-use dtof::engine::settings::Settings;
 use dtof::events::echoes::Echo;
 use dtof::events::output::Output;
+use dtof::input::masked::Masked;
 use dtof::input::open::{Opening, Recording, open};
 use dtof::input::recorded::RecordingLength;
+use dtof::input::source::PhotonSource;
+use dtof::settings::{Run, Sensor, SettingsFile};
 use dtof_core::fixed::types::{I24F8, U16F16};
 
 use super::dynamic_depth::Shown;
@@ -55,12 +57,15 @@ pub struct Replay {
     /// Histograms: laser cycles the recording lasted
     #[arg(long, value_name = "N", value_parser = whole(1..=u64::MAX))]
     recorded_cycles: Option<u64>,
-    /// Replay only the first N laser cycles
-    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = whole(1..=u64::MAX))]
-    cycles: u64,
-    /// Seed of the laser cycles that recorded photons are given
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=u64::MAX))]
-    seed: u64,
+    /// Laser cycles a second, for what is exported [default: not known]
+    #[arg(long, value_name = "HZ", value_parser = whole(1..=1_000_000_000_000_u64))]
+    laser_hz: Option<u64>,
+    /// Replay only the first N laser cycles [default: 10000]
+    #[arg(long, value_name = "N", value_parser = whole(1..=u64::MAX))]
+    cycles: Option<u64>,
+    /// Seed of the laser cycles that recorded photons are given [default: 1]
+    #[arg(long, value_name = "N", value_parser = whole(0..=u64::MAX))]
+    seed: Option<u64>,
     /// Print nothing but errors
     #[arg(long)]
     quiet: bool,
@@ -69,27 +74,29 @@ pub struct Replay {
 impl Replay {
     pub fn run(&self) -> Result<()> {
         let changes = self.changes.wanted()?;
-        let Recording {
-            mut photons,
-            format,
-        } = open(&self.input, &self.opening())?;
-        let settings = Settings {
-            frame: self.frames.frame,
-            ..self.operation.settings(
-                format.bins,
-                self.bin_width_ps
-                    .or(format.bin_width_ps)
-                    .unwrap_or(const { U16F16::lit("250") }),
-                self.offset_mm.or(format.offset_mm).unwrap_or(I24F8::ZERO),
-                self.seed,
-            )?
-        };
+        let said = self.operation.said(self.options())?;
+        let Recording { photons, format } = open(&self.input, &opening(&said))?;
+        let said = said.or(SettingsFile {
+            sensor: Sensor {
+                laser_hz: photons.laser_hz(),
+                columns: Some(photons.geometry().columns),
+                bin_width_ps: format.bin_width_ps,
+                offset_mm: format.offset_mm,
+                gate: format.gate,
+                ..Sensor::default()
+            },
+            ..SettingsFile::default()
+        });
+        let settings = said.settings(format.bins)?;
+        let photons = Masked::new(photons, &settings.masked)?;
+        let mut photons = photons.with_laser_hz(said.sensor.laser_hz);
         let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses())?;
-        let mut output = Output::create(&self.out, &settings, photons.as_ref(), Some(&self.input))?
+        let mut output = Output::create(&self.out, &settings, &photons, Some(&self.input))?
+            .with_settings(said.with(&settings), self.operation.settings.as_deref())?
             .with_changes(changes.as_ref())?
             .with_echo(self.echo, &settings);
         let mut summary = run(
-            photons.as_mut(),
+            &mut photons,
             engine.as_mut(),
             &mut output,
             &settings,
@@ -106,16 +113,45 @@ impl Replay {
         Ok(())
     }
 
-    /// What the options say of the recording.
-    fn opening(&self) -> Opening {
-        let cycles = self.recorded_cycles.map(RecordingLength::Cycles);
-        let rate = self.photons_per_cycle.map(RecordingLength::PhotonsPerCycle);
-        Opening {
-            columns: self.columns,
-            bins: self.bins,
-            length: cycles.or(rate),
-            cycles: self.cycles,
-            seed: self.seed,
+    /// What the options say, but for those of every command.
+    fn options(&self) -> SettingsFile {
+        SettingsFile {
+            sensor: Sensor {
+                laser_hz: self.laser_hz,
+                columns: self.columns,
+                bins: self.bins,
+                bin_width_ps: self.bin_width_ps,
+                offset_mm: self.offset_mm,
+                ..Sensor::default()
+            },
+            run: Run {
+                cycles: self.cycles,
+                seed: self.seed,
+                photons_per_cycle: self.photons_per_cycle,
+                recorded_cycles: self.recorded_cycles,
+                frame: self.frames.frame,
+            },
+            ..SettingsFile::default()
         }
+    }
+}
+
+/// What is said of a recording.
+pub fn opening(said: &SettingsFile) -> Opening {
+    let Run {
+        cycles,
+        seed,
+        photons_per_cycle,
+        recorded_cycles,
+        ..
+    } = said.run;
+    let recorded = recorded_cycles.map(RecordingLength::Cycles);
+    let rate = photons_per_cycle.map(RecordingLength::PhotonsPerCycle);
+    Opening {
+        columns: said.sensor.columns,
+        bins: said.sensor.bins,
+        length: recorded.or(rate),
+        cycles: cycles.unwrap_or(10_000),
+        seed: seed.unwrap_or(1),
     }
 }

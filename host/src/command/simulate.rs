@@ -13,12 +13,14 @@ use dtof::engine::settings::Settings;
 use dtof::events::echoes::Echo;
 use dtof::events::output::Output;
 use dtof::geometry::FieldOfView;
+use dtof::input::masked::Masked;
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::rows::Row;
+use dtof::settings::{Rays, Run, Sensor, SettingsFile};
 use dtof::simulate::scene::Scene;
 use dtof::view::report::Section;
 use dtof_core::PixelAddress;
-use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_core::fixed::types::U16F16;
 use dtof_link::DynamicDepth;
 
 use super::dynamic_depth::Shown;
@@ -62,9 +64,9 @@ pub struct Simulate {
     /// Laser cycles [default: the file's]
     #[arg(long, value_name = "N", value_parser = whole(1..=u64::MAX))]
     cycles: Option<u64>,
-    /// Seed of the simulated photons
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=u64::MAX))]
-    seed: u64,
+    /// Seed of the simulated photons [default: 1]
+    #[arg(long, value_name = "N", value_parser = whole(0..=u64::MAX))]
+    seed: Option<u64>,
     /// Print nothing but errors
     #[arg(long)]
     quiet: bool,
@@ -77,14 +79,20 @@ impl Simulate {
         if self.laser_off {
             scene = scene.with_laser_off();
         }
-        let bin_width_ps = U16F16::from_num(scene.bin_width_ps);
-        let bins = scene.bins.into();
+        let run = Run {
+            cycles: self.cycles,
+            seed: self.seed,
+            frame: self.frames.frame,
+            ..Run::default()
+        };
+        let said = self.operation.said(run.into())?;
+        let said = of_scene(said, &scene).with_context(|| match &self.operation.settings {
+            Some(file) => file.display().to_string(),
+            None => "the scene".to_owned(),
+        })?;
         let settings = Settings {
             one_hit_tdc: scene.effects.one_hit_tdc(),
-            frame: self.frames.frame,
-            ..self
-                .operation
-                .settings(bins, bin_width_ps, I24F8::ZERO, self.seed)?
+            ..said.settings(scene.bins.into())?
         };
         let file = self.view.input(self.scene.as_deref());
         let Geometry { columns, rows } = scene.geometry;
@@ -98,8 +106,10 @@ impl Simulate {
             scene: &scene,
             input: self.scene.as_deref().or(self.view.depth.as_deref()),
             light: self.view.rows(&scene),
-            cycles: self.cycles.unwrap_or(scene.cycles),
+            cycles: said.run.cycles.unwrap_or(scene.cycles),
             settings: &settings,
+            said: &said,
+            file: self.operation.settings.as_deref(),
             changes: self.changes.wanted()?,
             echo: self.echo,
             device: self.device.as_deref(),
@@ -121,6 +131,9 @@ pub struct Simulation<'a> {
     pub light: Vec<Row>,
     pub cycles: u64,
     pub settings: &'a Settings,
+    /// What was said of them, and the file that did.
+    pub said: &'a SettingsFile,
+    pub file: Option<&'a Path>,
     /// Dynamic depth, if the report is to show it.
     pub changes: Option<DynamicDepth>,
     /// The echo that maps and report show.
@@ -137,10 +150,11 @@ pub struct Simulation<'a> {
 impl Simulation<'_> {
     pub fn run(self) -> Result<()> {
         let photons = self.scene.photons(self.settings.seed, self.cycles);
-        let mut photons = match self.input {
+        let photons = match self.input {
             Some(file) => photons.with_context(|| file.display().to_string())?,
             None => photons?,
         };
+        let mut photons = Masked::new(Box::new(photons), &self.settings.masked)?;
         let mut engine = engine(
             self.device,
             self.image,
@@ -149,6 +163,7 @@ impl Simulation<'_> {
             &photons.addresses(),
         )?;
         let mut output = Output::create(self.out, self.settings, &photons, self.input)?
+            .with_settings(self.said.with(self.settings), self.file)?
             .with_changes(self.changes.as_ref())?
             .with_echo(self.echo, self.settings);
         let mut comparison = self.scene.comparison(self.settings, self.cycles)?;
@@ -177,6 +192,48 @@ impl Simulation<'_> {
         }
         Ok(())
     }
+}
+
+/// What is said, on a scene: it has histograms and rays of its own.
+///
+/// # Errors
+/// If what is said is for other histograms.
+pub fn of_scene(said: SettingsFile, scene: &Scene) -> Result<SettingsFile> {
+    let bin_width_ps = U16F16::from_num(scene.bin_width_ps);
+    let Sensor {
+        bins: said_bins,
+        bin_width_ps: said_width,
+        ..
+    } = said.sensor;
+    let (bins, width) = (
+        said_bins.unwrap_or(scene.bins),
+        said_width.unwrap_or(bin_width_ps),
+    );
+    ensure!(
+        (bins, width) == (scene.bins, bin_width_ps),
+        "{bins} bins of {width} ps, but the scene has {} of {bin_width_ps} ps",
+        scene.bins
+    );
+    Ok(SettingsFile {
+        sensor: Sensor {
+            laser_hz: Some(scene.laser_hz()),
+            columns: Some(scene.geometry.columns),
+            bins: Some(bins),
+            bin_width_ps: Some(width),
+            // Simulated photons come at their distance.
+            offset_mm: None,
+            ..said.sensor
+        },
+        rays: Rays {
+            field_of_view_degrees: Some(scene.view().degrees()),
+            calibration: None,
+        },
+        run: Run {
+            cycles: said.run.cycles.or(Some(scene.cycles)),
+            ..said.run
+        },
+        ..said
+    })
 }
 
 /// The options without which `dtof export` takes the scene for another, if any.

@@ -8,7 +8,8 @@ use std::io::{self, Write};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::cli::arguments::{bins, positive, whole};
+use dtof::cli::arguments::{bins, positive, shortest, whole};
+use dtof::settings::RuleName;
 use dtof::simulate::MM_PER_PS;
 use dtof_core::BlockLevel;
 use dtof_theory::gaussian;
@@ -17,8 +18,6 @@ use dtof_theory::looks::table::Table;
 use dtof_theory::rates::{signal_for_snr, snr};
 use dtof_theory::tune::{Request, Source, Wanted, tune};
 use serde_json::json;
-
-use super::detection::RuleName;
 
 #[derive(Args)]
 pub struct Tune {
@@ -199,8 +198,8 @@ impl Tune {
         lines.extend(self.expected(request, &tuned.detections));
         let source = "formula: Eq. 11, one look, background known; not for use";
         lines.push(Line("gaussian_alpha", gaussian, source.to_owned()));
-        // All digits: fewer may be another multiple of 1/256.
-        let alpha = tuned.alpha.to_num::<f64>();
+        // As few digits as name it.
+        let alpha = shortest(tuned.alpha);
         Ok((lines, format!("--alpha {alpha} --l1 {}", tuned.l1)))
     }
 

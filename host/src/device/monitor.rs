@@ -7,7 +7,7 @@ mod recording;
 use std::io::{self, ErrorKind, Write};
 use std::time::{Duration, Instant};
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use dtof_core::RangeScale;
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::{DynamicDepth, FaultRecord, Report, Source};
@@ -39,14 +39,14 @@ pub struct Task<'a> {
 /// The array of so many `pixels`, to draw and to record: in so many `columns`, or else as
 /// high as wide, or the least bit wider.
 #[must_use]
-pub fn array(pixels: u16, columns: Option<u16>) -> Geometry {
+pub fn array(pixels: u16, columns: Option<u32>) -> Geometry {
     let pixels = u32::from(pixels);
     let squarest = || {
         let rows = (1..=pixels).take_while(|rows| rows * rows <= pixels);
         let rows = rows.filter(|rows| pixels.is_multiple_of(*rows)).last();
         pixels / rows.unwrap_or(1)
     };
-    let columns = columns.map_or_else(squarest, u32::from).max(1);
+    let columns = columns.unwrap_or_else(squarest).max(1);
     Geometry {
         columns,
         rows: pixels.div_ceil(columns),
@@ -64,6 +64,8 @@ pub struct Outputs<'a> {
     pub map: Option<&'a mut LiveMap>,
     /// All events once more.
     pub recording: Option<&'a mut Recording>,
+    /// Events of pixels that are left out, which are written nowhere.
+    pub masked: u64,
 }
 
 impl Outputs<'_> {
@@ -82,8 +84,19 @@ impl Outputs<'_> {
         Ok(())
     }
 
-    /// Events. They are recorded whether or not somebody reads them.
-    fn write(&mut self, events: &[Event], scale: &RangeScale, readers: &mut Readers) -> Result<()> {
+    /// Events, but for those of pixels left out. They are recorded whether or not somebody reads
+    /// them.
+    fn write(
+        &mut self,
+        mut events: Vec<Event>,
+        settings: &Settings,
+        readers: &mut Readers,
+    ) -> Result<()> {
+        let scale = &settings.range_scale()?;
+        let all = events.len();
+        events.retain(|event| !settings.masked.contains(&event.pixel().0));
+        self.masked += (all - events.len()) as u64;
+        let events = &events[..];
         if let Some(recording) = &mut self.recording {
             recording.write(events)?;
         }
@@ -132,13 +145,12 @@ pub fn monitor(
     done: impl Fn(Duration) -> bool,
     outputs: &mut Outputs,
 ) -> Result<()> {
-    let scale = task.settings.range_scale()?;
     let mut readers = Readers {
         events: true,
         statistics: true,
     };
-    let watched = watch(client, task, &scale, done, outputs, &mut readers);
-    let written = outputs.write(&client.take_events(), &scale, &mut readers);
+    let watched = watch(client, task, done, outputs, &mut readers);
+    let written = outputs.write(client.take_events(), task.settings, &mut readers);
     watched.and(written).and(outputs.finish(&readers))
 }
 
@@ -146,7 +158,6 @@ pub fn monitor(
 fn watch(
     client: &mut Client,
     task: &Task,
-    scale: &RangeScale,
     done: impl Fn(Duration) -> bool,
     outputs: &mut Outputs,
     readers: &mut Readers,
@@ -160,6 +171,10 @@ fn watch(
             task.dynamic_depth,
         )
     };
+    ensure!(
+        task.settings.masked.is_empty() || task.settings.binning.is_none(),
+        "the blocks of a device count masked pixels, too; leave out --mask or --binning"
+    );
     client.configure(&configuration(Source::Sensor)?)?;
     let started = Instant::now();
     let mut figures = Figures {
@@ -182,9 +197,10 @@ fn watch(
             asked = true;
         }
         let report = client.poll_report()?;
-        outputs.write(&client.take_events(), scale, readers)?;
+        outputs.write(client.take_events(), task.settings, readers)?;
         if let Some(report) = report {
-            outputs.tell(figures.line(client, &report), readers)?;
+            let line = figures.line(client, &report, outputs.masked);
+            outputs.tell(line, readers)?;
             asked = false;
         }
     }
@@ -198,7 +214,8 @@ fn watch(
                 break report;
             }
         };
-        outputs.tell(figures.line(client, &report), readers)?;
+        let line = figures.line(client, &report, outputs.masked);
+        outputs.tell(line, readers)?;
     }
     // After the answer there are no more events.
     client.configure(&configuration(Source::Link)?)
@@ -241,8 +258,8 @@ struct Figures {
 }
 
 impl Figures {
-    /// Rates since the last line.
-    fn line(&mut self, client: &Client, report: &Report) -> String {
+    /// Rates since the last line; so many events were left out.
+    fn line(&mut self, client: &Client, report: &Report, masked: u64) -> String {
         let seconds = self.since.elapsed().as_secs_f64();
         let rate = |now: u64, before: u64| now.saturating_sub(before) as f64 / seconds;
         // Photons of blocks are those of pixels.
@@ -254,6 +271,9 @@ impl Figures {
             rate(now[1], self.last[1]),
         );
         line += &losses(report, &self.first, &since(client.counters(), &self.here));
+        if masked > 0 {
+            line += &format!(", events left out {masked}");
+        }
         self.since = Instant::now();
         self.last = now;
         line

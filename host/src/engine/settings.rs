@@ -23,13 +23,18 @@ pub struct Settings {
     pub offset_mm: I24F8,
     /// First and last bin that may hold the peak, both inclusive.
     pub gate: Option<(u16, u16)>,
+    /// Addresses of pixels that are left out: hot and dead ones.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub masked: Vec<u16>,
     /// The rule that decides whether a peak stands clear.
     #[serde(flatten, serialize_with = "rule")]
     pub rule: AnyRule,
-    /// The standard deviation of the pulse in bins, if the depth is to come from a window
-    /// that suits it, and not from three bins.
-    #[serde(flatten, serialize_with = "estimator")]
+    /// The standard deviation of the pulse in bins, if it is known.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "known")]
     pub sigma_bins: Option<U8F8>,
+    /// The depth comes from three bins, even if a window would suit the pulse.
+    #[serde(skip)]
+    pub centroid: bool,
     /// The exposure a decision must exceed, in laser cycles.
     pub l1: u16,
     /// The exposure at which a pixel starts over without an event.
@@ -90,17 +95,9 @@ fn with_alpha<M: SerializeMap>(
     fields.serialize_entry("min_count", &threshold.minimum_count().raw())
 }
 
-/// An estimator by its name, with the pulse it suits.
-fn estimator<S: Serializer>(sigma: &Option<U8F8>, serializer: S) -> Result<S::Ok, S::Error> {
-    let mut fields = serializer.serialize_map(None)?;
-    match sigma {
-        None => fields.serialize_entry("estimator", "centroid")?,
-        Some(sigma) => {
-            fields.serialize_entry("estimator", "centred-window")?;
-            fields.serialize_entry("sigma_bins", &sigma.to_num::<f64>())?;
-        }
-    }
-    fields.end()
+/// A fixed-point number that is there.
+fn known<S: Serializer>(sigma: &Option<U8F8>, serializer: S) -> Result<S::Ok, S::Error> {
+    number(&sigma.unwrap_or_default(), serializer)
 }
 
 /// The levels of adaptive binning, 0 without, and how patient pixels are.
@@ -182,6 +179,7 @@ impl Settings {
     #[must_use]
     pub fn estimator(&self) -> DepthEstimator {
         self.sigma_bins
+            .filter(|_| !self.centroid)
             .map_or(DepthEstimator::Centroid3, DepthEstimator::for_pulse)
     }
 

@@ -1,5 +1,5 @@
 //! The output folder: `events.csv`, `events.aer`, `summary.json`, the maps as
-//! SVG, and `report.html` that shows them.
+//! SVG, `report.html` that shows them, and `dtof.toml` with the settings.
 //!
 //! Every file is written beside its place. When all are whole they are moved
 //! there, the summary last: a folder with a summary is complete.
@@ -25,6 +25,7 @@ use crate::events::summary::{self, Summary};
 use crate::files::{ASIDE, are_same, aside, flushed, may_replace};
 use crate::input::source::{PhotonSource, Slice};
 use crate::rows::Row;
+use crate::settings::{self, SettingsFile};
 use crate::view::report::{self, Cloud, Figure, Section};
 use dtof_draw::svg;
 use dtof_link::DynamicDepth;
@@ -33,6 +34,7 @@ use pictures::{Picture, pictures};
 const CSV: &str = "events.csv";
 const AER: &str = "events.aer";
 const REPORT: &str = "report.html";
+const SETTINGS: &str = "dtof.toml";
 /// Makes a folder complete: moved to its place last.
 const SUMMARY: &str = "summary.json";
 /// Names of files of a run that are not complete begin so.
@@ -42,7 +44,9 @@ const OF_A_RUN: &str = ".dtof-run-";
 pub struct Output {
     folder: PathBuf,
     /// What is read, and so stays.
-    input: Option<PathBuf>,
+    inputs: Vec<PathBuf>,
+    /// The settings of the run.
+    settings: SettingsFile,
     csv: BufWriter<NamedTempFile>,
     aer: aer_file::Writer<BufWriter<NamedTempFile>>,
     scale: RangeScale,
@@ -73,8 +77,9 @@ impl Output {
         let scale = settings.range_scale()?;
         fs::create_dir_all(folder)
             .with_context(|| format!("{}: cannot be the output folder", folder.display()))?;
-        may_hold_results(folder, input)?;
-        remove_leftovers(folder, input);
+        let inputs: Vec<PathBuf> = input.into_iter().map(Path::to_owned).collect();
+        may_hold_results(folder, &inputs)?;
+        remove_leftovers(folder, &inputs);
         let geometry = source.geometry();
         let mut csv = BufWriter::new(aside(folder, OF_A_RUN)?);
         writeln!(csv, "{}", events_csv::HEADER)?;
@@ -88,7 +93,8 @@ impl Output {
         let aer = aer_file::Writer::new(BufWriter::new(aside(folder, OF_A_RUN)?), &header)?;
         Ok(Self {
             folder: folder.to_owned(),
-            input: input.map(Path::to_owned),
+            inputs,
+            settings: SettingsFile::default().with(settings),
             csv,
             aer,
             scale,
@@ -99,6 +105,17 @@ impl Output {
             selection: selection(None, settings),
             changes: None,
         })
+    }
+
+    /// The settings file of the folder is `said`, which was read from `file`, if from one.
+    ///
+    /// # Errors
+    /// If a result would replace it.
+    pub fn with_settings(mut self, said: SettingsFile, file: Option<&Path>) -> Result<Self> {
+        self.settings = said;
+        self.inputs.extend(file.map(Path::to_owned));
+        may_hold_results(&self.folder, &self.inputs)?;
+        Ok(self)
     }
 
     /// The report shows dynamic depth as well, if there are `options` for it.
@@ -250,13 +267,14 @@ impl Output {
             files.push((aside(&picture.svg)?, picture.name));
         }
         files.push((aside(&report)?, REPORT));
+        files.push((aside(&self.settings.to_toml()?)?, SETTINGS));
         files.push((
             aside(&(serde_json::to_string_pretty(summary)? + "\n"))?,
             SUMMARY,
         ));
 
         // Something may have come there since.
-        may_hold_results(&self.folder, self.input.as_deref())?;
+        may_hold_results(&self.folder, &self.inputs)?;
         // Without a summary the folder does not look complete.
         let old = self.folder.join(SUMMARY);
         match fs::remove_file(&old) {
@@ -288,22 +306,24 @@ fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
         (CSV, events_csv::HEADER),
         (AER, aer_file::MAGIC),
         (REPORT, report::MARK),
+        (SETTINGS, settings::MARK),
         (SUMMARY, summary::MARK),
     ])
 }
 
-/// Checks that no result would replace `input`, or a file that no run has written.
-fn may_hold_results(folder: &Path, input: Option<&Path>) -> Result<()> {
-    results().try_for_each(|(name, mark)| may_replace(&folder.join(name), mark, input.as_slice()))
+/// Checks that no result would replace one of `inputs`, or a file that no run has written.
+fn may_hold_results(folder: &Path, inputs: &[PathBuf]) -> Result<()> {
+    let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+    results().try_for_each(|(name, mark)| may_replace(&folder.join(name), mark, &inputs))
 }
 
 /// Removes what a killed run has left, and nothing of an export or a recording, which
 /// may be under way. None of it is worth an error.
-fn remove_leftovers(folder: &Path, input: Option<&Path>) {
+fn remove_leftovers(folder: &Path, inputs: &[PathBuf]) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        let is_read = input.is_some_and(|input| are_same(input, &entry.path()));
+        let is_read = inputs.iter().any(|input| are_same(input, &entry.path()));
         if name.starts_with(OF_A_RUN) && name.ends_with(ASIDE) && !is_read {
             let _ = fs::remove_file(entry.path());
         }

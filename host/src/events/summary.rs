@@ -4,7 +4,7 @@
 pub mod truth;
 
 use dtof_core::{AnyRule, DepthEstimator, EchoNumber, Statistics, Threshold};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::engine::settings::Settings;
 use crate::input::source::PhotonSource;
@@ -52,6 +52,8 @@ pub struct Summary {
     pub saturated_in_blocks: u64,
     /// Photons outside the range gate.
     pub gated_out: u64,
+    /// Photons of pixels that are left out.
+    pub masked: u64,
     /// Decisions put off because the event before was not taken yet.
     pub deferred: u64,
     /// Exposures that reached L2 without an event.
@@ -64,7 +66,27 @@ pub struct Summary {
     /// How the events of a simulated scene compare with it.
     pub against_truth: Option<AgainstTruth>,
     /// How the pixels operated.
+    #[serde(serialize_with = "with_estimator")]
     pub settings: Settings,
+}
+
+/// Settings, and the name of the estimator that they choose.
+fn with_estimator<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Chosen<'a> {
+        #[serde(flatten)]
+        settings: &'a Settings,
+        estimator: &'static str,
+    }
+    let estimator = match settings.estimator() {
+        DepthEstimator::Centroid3 => "centroid",
+        DepthEstimator::CentredWindow(_) => "centred-window",
+    };
+    Chosen {
+        settings,
+        estimator,
+    }
+    .serialize(serializer)
 }
 
 impl Summary {
@@ -94,6 +116,7 @@ impl Summary {
             saturated: statistics.saturated,
             saturated_in_blocks: blocks.saturated,
             gated_out: statistics.gated_out,
+            masked: source.masked(),
             deferred: statistics.deferred + blocks.deferred,
             expired: statistics.expired,
             expired_deferred: statistics.expired_deferred,
@@ -150,6 +173,7 @@ impl Summary {
         // Losses are named where there are any.
         let losses = [
             ("photons outside the range gate", self.gated_out),
+            ("photons of pixels left out", self.masked),
             ("photons lost to full counters", self.saturated),
             (
                 "photons lost to full counters of blocks",
@@ -185,6 +209,10 @@ impl Settings {
             row("range offset", format!("{} mm", self.offset_mm)),
             row("range gate", gate),
         ];
+        if !self.masked.is_empty() {
+            let pixels: Vec<String> = self.masked.iter().map(u16::to_string).collect();
+            rows.push(row("pixels left out", pixels.join(", ")));
+        }
         rows.extend(self.detection_rows());
         if let Some(binning) = self.binning {
             let side = 1 << binning.levels.raw();

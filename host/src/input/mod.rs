@@ -1,5 +1,6 @@
 //! Where photons come from.
 
+pub mod masked;
 pub mod npy;
 pub mod open;
 pub mod photon_csv;

@@ -166,28 +166,23 @@ pub fn counts(path: &Path, opening: &Opening) -> Result<Counts> {
 fn read(path: &Path, opening: &Opening) -> Result<Content> {
     let extension = path.extension().and_then(|extension| extension.to_str());
     let extension = extension.map(str::to_ascii_lowercase);
-    ensure!(
-        opening.columns.is_none() || extension.as_deref() == Some("csv"),
-        "--columns is for photon lists; {} has its own",
-        path.display()
-    );
-    match extension.as_deref() {
+    let content = match extension.as_deref() {
         Some("npy") => {
             let npy = npy::read(path)?;
             expect_bins(path, opening, npy.bins)?;
-            Ok(Content::Histograms(Counts {
+            Content::Histograms(Counts {
                 geometry: npy.geometry,
                 sides: ["column", "row"],
                 captures: vec![npy.capture],
                 cycles: None,
                 truth_mm: None,
                 format: Known::new(npy.bins),
-            }))
+            })
         }
         Some("json") => {
             let log = tmf8820::read(path)?;
             expect_bins(path, opening, tmf8820::BINS)?;
-            Ok(Content::Histograms(Counts {
+            Content::Histograms(Counts {
                 geometry: log.geometry,
                 sides: tmf8820::SIDES,
                 captures: log.captures,
@@ -198,7 +193,7 @@ fn read(path: &Path, opening: &Opening) -> Result<Content> {
                     offset_mm: Some(tmf8820::OFFSET_MM),
                     ..Known::new(tmf8820::BINS)
                 },
-            }))
+            })
         }
         Some("csv") => {
             ensure!(
@@ -208,13 +203,22 @@ fn read(path: &Path, opening: &Opening) -> Result<Content> {
             );
             let bins = opening.bins.unwrap_or(128).into();
             let photons = PhotonCsv::open(path, bins, opening.columns, opening.cycles)?;
-            Ok(Content::Photons(photons, Known::new(bins)))
+            Content::Photons(photons, Known::new(bins))
         }
         _ => bail!(
             "{}: the name must end in .npy, .json or .csv",
             path.display()
         ),
+    };
+    if let (Content::Histograms(counts), Some(columns)) = (&content, opening.columns) {
+        ensure!(
+            columns == counts.geometry.columns,
+            "--columns {columns}: {} has {}",
+            path.display(),
+            counts.geometry.columns
+        );
     }
+    Ok(content)
 }
 
 /// A file that says how many bins it has is not read as another.

@@ -99,6 +99,11 @@ pub trait PhotonSource {
         0
     }
 
+    /// Photons of pixels that are left out so far.
+    fn masked(&self) -> u64 {
+        0
+    }
+
     /// Laser cycles that recorded histograms are taken to have lasted: those of
     /// the shortest and of the longest capture.
     fn recorded_cycles(&self) -> Option<(u64, u64)> {

@@ -11,9 +11,10 @@ use dtof::simulate::scene;
 
 const PHOTONS: &str = "pixel,cycle,bin\n0,0,0\n";
 const SCENE: &str = "cycles = 100\n[[surface]]\nrange_mm = 1000\nsignal = 1\n";
-const RESULTS: [&str; 10] = [
+const RESULTS: [&str; 11] = [
     "depth-last.svg",
     "depth-mean.svg",
+    "dtof.toml",
     "event-counts.svg",
     "events.aer",
     "events.csv",
@@ -87,6 +88,15 @@ fn a_scene_in_the_output_folder_is_kept() {
     scratch.file("out/summary.json", SCENE);
     let line = "simulate --scene out/summary.json --out out";
     kept(&scratch, line, "out/summary.json", READ);
+}
+
+#[test]
+fn settings_in_the_output_folder_are_kept() {
+    let scratch = Scratch::new();
+    scratch.file("photons.csv", PHOTONS);
+    scratch.file("out/dtof.toml", "# dtof settings\n");
+    let line = format!("{REPLAY} --settings out/dtof.toml");
+    kept(&scratch, &line, "out/dtof.toml", READ);
 }
 
 #[test]

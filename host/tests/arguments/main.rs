@@ -6,4 +6,5 @@ mod common;
 mod kept;
 mod numbers;
 mod rule;
+mod settings;
 mod tune;

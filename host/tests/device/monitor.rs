@@ -14,10 +14,11 @@ use anyhow::Result;
 use dtof::device::Client;
 use dtof::device::monitor::{Outputs, Task, monitor};
 use dtof::engine::host::host_engine;
+use dtof::engine::settings::{AdaptiveBinning, Settings};
 use dtof::events::events_csv;
 use dtof::input::source::{Geometry, Photon, PixelPhotons, Slice};
 use dtof_core::fixed::types::{U0F32, U8F24, U16F16, U24F8};
-use dtof_core::{DepthEvent, DynamicDepthPixel, PixelAddress, Reference};
+use dtof_core::{BlockLevel, DepthEvent, DynamicDepthPixel, PixelAddress, Reference};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::DynamicDepth;
 use dtof_sensors::simulated::{self, Pulse, Simulated, SimulatedPixel};
@@ -173,8 +174,24 @@ fn watch(
     events: &mut dyn Write,
     statistics: &mut dyn Write,
 ) -> Result<()> {
+    watch_with(
+        &settings(),
+        client,
+        dynamic_depth,
+        length,
+        [events, statistics],
+    )
+}
+
+fn watch_with(
+    settings: &Settings,
+    client: &mut Client,
+    dynamic_depth: Option<DynamicDepth>,
+    length: Duration,
+    [events, statistics]: [&mut dyn Write; 2],
+) -> Result<()> {
     let task = Task {
-        settings: &settings(),
+        settings,
         pixels: PIXELS,
         columns: 2,
         dynamic_depth,
@@ -184,8 +201,52 @@ fn watch(
         statistics,
         map: None,
         recording: None,
+        masked: 0,
     };
     monitor(client, &task, |elapsed| elapsed >= length, &mut outputs)
+}
+
+#[test]
+fn events_of_masked_pixels_are_left_out_and_counted() {
+    let mut client = client(&device(true, LONG));
+    let (mut events, mut statistics) = (Vec::new(), Vec::new());
+    let masked = Settings {
+        masked: vec![1],
+        ..settings()
+    };
+    let outputs: [&mut dyn Write; 2] = [&mut events, &mut statistics];
+    let length = Duration::from_millis(1_600);
+    watch_with(&masked, &mut client, None, length, outputs).unwrap();
+    let [events, statistics] = [events, statistics].map(|text| String::from_utf8(text).unwrap());
+    let pixel = |row: &str| row.split(',').nth(1).unwrap().to_owned();
+    let is_masked = |row: &&str| pixel(row) == "1";
+    assert!(events.lines().count() > 20 && !events.lines().any(|row| is_masked(&row)));
+    assert!(statistics.contains(", events left out "), "{statistics}");
+    // Those of the other pixels are all there.
+    let others = reference();
+    let others: Vec<&str> = others.lines().filter(|row| !is_masked(row)).collect();
+    assert!(
+        events
+            .lines()
+            .zip(&others)
+            .all(|(row, other)| row == *other)
+    );
+
+    // Blocks would hold their photons.
+    let blocks = Settings {
+        binning: Some(AdaptiveBinning {
+            levels: BlockLevel::saturating(1),
+            patience: 64,
+        }),
+        ..masked
+    };
+    let outputs: [&mut dyn Write; 2] = [&mut Vec::new(), &mut Vec::new()];
+    let refused = watch_with(&blocks, &mut client, None, length, outputs).unwrap_err();
+    assert!(
+        refused
+            .to_string()
+            .contains("leave out --mask or --binning")
+    );
 }
 
 #[test]

@@ -175,6 +175,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
             statistics: &mut io::sink(),
             map: Some(&mut map),
             recording: Some(&mut recording),
+            masked: 0,
         },
     );
     recording.finish().unwrap();

@@ -1,6 +1,7 @@
 //! The average rule.
 
 use anyhow::Result;
+use dtof::cli::arguments::shortest;
 use dtof_theory::tune::{Request, average};
 
 use super::{Line, Tune};
@@ -19,7 +20,11 @@ impl Tune {
             self.counted(tuned.false_alarms),
         ];
         lines.extend(self.expected(request, &tuned.detections));
-        let options = format!("--rule average --alpha {} --l1 {}", tuned.alpha, tuned.l1);
+        let options = format!(
+            "--rule average --alpha {} --l1 {}",
+            shortest(tuned.alpha),
+            tuned.l1
+        );
         Ok((lines, options))
     }
 }

@@ -1,6 +1,7 @@
 //! The window rule.
 
 use anyhow::{Result, ensure};
+use dtof::cli::arguments::shortest;
 use dtof_core::{CentredWindow, DepthEstimator};
 use dtof_theory::tune::{Request, window};
 
@@ -35,16 +36,14 @@ impl Tune {
             self.counted(tuned.false_alarms),
         ]);
         lines.extend(self.expected(request, &tuned.detections));
-        // All digits: fewer may be another multiple of the smallest step.
+        // As few digits as name them.
         let binning = match self.binning {
             0 => String::new(),
             levels => format!(" --binning {levels}"),
         };
         let options = format!(
             "--rule window --sigma-bins {} --z {} --l1 {}{binning}",
-            tuned.sigma.to_num::<f64>(),
-            tuned.z.to_num::<f64>(),
-            tuned.l1
+            tuned.sigma, tuned.z, tuned.l1
         );
         Ok((lines, options))
     }

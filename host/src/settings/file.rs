@@ -1,0 +1,320 @@
+//! Reading and writing the file.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow};
+use serde::{Deserialize, Serialize};
+
+use super::{Detection, Rays, Run, Sensor};
+
+/// The first line of every file that this program writes.
+pub(crate) const MARK: &str = "# dtof settings";
+
+/// What each key is, in the order in which keys are written.
+const COMMENTS: [(&str, &[(&str, &str)]); 4] = [
+    (
+        "sensor",
+        &[
+            ("laser_hz", "laser cycles a second"),
+            ("columns", "pixel = row * columns + column"),
+            ("bins", "of a histogram"),
+            ("bin_width_ps", "picoseconds a bin"),
+            ("offset_mm", "added to every range"),
+            ("gate", "first and last bin that may hold a peak"),
+            ("masked", "addresses of pixels that are left out"),
+            ("sigma_bins", "standard deviation of the pulse"),
+            ("one_hit_tdc", "the TDC takes one photon a laser cycle"),
+            (
+                "background",
+                "photons a bin and laser cycle of the median pixel",
+            ),
+            (
+                "glass",
+                "photons a laser cycle and pixel of the cover glass",
+            ),
+        ],
+    ),
+    (
+        "detection",
+        &[
+            ("rule", "paper, average or window"),
+            ("alpha", "standard deviations, of rules paper and average"),
+            ("window", "bins, of rule window"),
+            ("z", "standard deviations, of rule window"),
+            (
+                "false_alarm",
+                "share of exposures without a target, instead of z",
+            ),
+            ("estimator", "centroid or window"),
+            ("min_count", "photons"),
+            ("l1", "laser cycles that a decision must exceed"),
+            ("l2", "laser cycles at which a pixel starts over"),
+            ("x", "laser cycles between looks"),
+            ("binning", "levels of blocks"),
+            (
+                "patience",
+                "laser cycles until a silent pixel counts in its block",
+            ),
+            ("tracking", "expect the next event near the last"),
+            ("echoes", "of an exposure"),
+            ("echo_wait", "times the laser cycles of the last echo"),
+        ],
+    ),
+    (
+        "rays",
+        &[
+            ("field_of_view_degrees", "horizontal, vertical"),
+            ("calibration", "file with a ray for each pixel"),
+        ],
+    ),
+    (
+        "run",
+        &[
+            ("cycles", "laser cycles"),
+            ("seed", "of every random number"),
+            ("photons_per_cycle", "in the brightest pixel of a recording"),
+            ("recorded_cycles", "laser cycles of a recording"),
+            ("frame", "laser cycles, of a frame-based sensor"),
+        ],
+    ),
+];
+
+/// A settings file, or what the command line says of the same. All of it may be missing.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SettingsFile {
+    /// What is known of the sensor.
+    pub sensor: Sensor,
+    /// How pixels decide.
+    pub detection: Detection,
+    /// Where pixels look.
+    pub rays: Rays,
+    /// What is replayed or simulated.
+    pub run: Run,
+}
+
+impl SettingsFile {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// One line with the name of the file, and the line or the key that is wrong.
+    pub fn read(path: &Path) -> Result<Self> {
+        let name = || path.display().to_string();
+        let text = fs::read_to_string(path).with_context(name)?;
+        let mut file = Self::parse(&text).with_context(name)?;
+        // A path of the file is meant from where the file is.
+        if let (Some(rays), Some(folder)) = (&mut file.rays.calibration, path.parent()) {
+            let whole = std::path::absolute(folder.join(&rays)).with_context(name)?;
+            *rays = whole.display().to_string();
+        }
+        Ok(file)
+    }
+
+    /// The text of a file.
+    ///
+    /// # Errors
+    /// The line or the key that is wrong.
+    pub fn parse(text: &str) -> Result<Self> {
+        let file: Self = toml::from_str(text).map_err(|error| {
+            let before = error.span().and_then(|span| text.get(..span.start));
+            let line = before.map_or(1, |text| text.matches('\n').count() + 1);
+            anyhow!("line {line}: {}", error.message())
+        })?;
+        file.sensor.check()?;
+        file.detection.check()?;
+        file.rays.check()?;
+        file.run.check()?;
+        Ok(file)
+    }
+
+    /// These, and of `other` what these do not say.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        // A field of view replaces a calibration, and the other way round.
+        let rays = if self.rays == Rays::default() {
+            other.rays
+        } else {
+            self.rays
+        };
+        Self {
+            sensor: self.sensor.or(other.sensor),
+            detection: self.detection.or(other.detection),
+            rays,
+            run: self.run.or(other.run),
+        }
+    }
+
+    /// The text of the file: what is said, a line a key, with what it is.
+    ///
+    /// # Errors
+    /// If a number is none.
+    pub fn to_toml(&self) -> Result<String> {
+        let all = toml::Table::try_from(self)?;
+        let mut text = format!("{MARK}: `--settings FILE` takes them, options override them.\n");
+        for (section, keys) in COMMENTS {
+            let said = all.get(section).and_then(toml::Value::as_table);
+            let lines = keys.iter().filter_map(|(key, comment)| {
+                let value = said?.get(*key)?;
+                Some((format!("{key} = {value}"), comment))
+            });
+            let lines: Vec<_> = lines.collect();
+            if lines.is_empty() {
+                continue;
+            }
+            write!(text, "\n[{section}]\n")?;
+            for (line, comment) in lines {
+                writeln!(text, "{line:<28} # {comment}")?;
+            }
+        }
+        Ok(text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every key of every section.
+    const WHOLE: &str = "
+[sensor]
+laser_hz = 10_000_000
+columns = 16
+bins = 128
+bin_width_ps = 92.1
+offset_mm = -179.5
+gate = [12, 127]
+masked = [3, 70]
+sigma_bins = 0.8
+one_hit_tdc = true
+background = 0.05
+glass = 0.4
+[detection]
+rule = 'window'
+window = 3
+z = 4.45
+estimator = 'centroid'
+min_count = 5
+l1 = 40
+l2 = 2000
+x = 4
+binning = 2
+patience = 64
+tracking = true
+echoes = 2
+echo_wait = 4
+[rays]
+field_of_view_degrees = [60.0, 40.0]
+[run]
+cycles = 10_000
+seed = 7
+recorded_cycles = 20_000
+frame = 500
+";
+
+    #[test]
+    fn what_is_written_reads_as_what_it_was() {
+        let file = SettingsFile::parse(WHOLE).unwrap();
+        let text = file.to_toml().unwrap();
+        assert_eq!(SettingsFile::parse(&text).unwrap(), file, "{text}");
+        assert!(text.contains("sigma_bins = 0.8 "), "{text}");
+        // Each key is there, with its comment; those of other rules and choices are not.
+        let others = ["alpha", "false_alarm", "calibration", "photons_per_cycle"];
+        for (_, keys) in COMMENTS {
+            for (key, comment) in keys {
+                let line = text
+                    .lines()
+                    .find(|line| line.starts_with(&format!("{key} = ")));
+                assert_eq!(line.is_none(), others.contains(key), "{key}");
+                assert!(line.is_none_or(|line| line.ends_with(comment)), "{key}");
+            }
+        }
+        let empty = SettingsFile::default().to_toml().unwrap();
+        assert_eq!(
+            SettingsFile::parse(&empty).unwrap(),
+            SettingsFile::default()
+        );
+    }
+
+    #[test]
+    fn what_holds_can_be_said_again() {
+        let file = SettingsFile::parse(WHOLE).unwrap();
+        let settings = file.settings(128).unwrap();
+        assert_eq!(file.with(&settings), file);
+        let file = SettingsFile::parse("[detection]\nrule = 'average'\nalpha = 6.3").unwrap();
+        let settings = file.settings(64).unwrap();
+        let said = file.with(&settings);
+        assert_eq!(said.settings(64).unwrap(), settings);
+        assert_eq!(said.detection.alpha, file.detection.alpha);
+        assert_eq!((said.sensor.bins, said.run.seed), (Some(64), Some(1)));
+    }
+
+    #[test]
+    fn an_option_overrides_the_file() {
+        let file = SettingsFile::parse(WHOLE).unwrap();
+        let over = |text: &str| {
+            let options = SettingsFile::parse(text).unwrap();
+            options.or(file.clone())
+        };
+        let of = |text: &str| over(&format!("[detection]\n{text}")).detection;
+        assert_eq!(of("l1 = 8").l1, Some(8));
+        assert_eq!(of("l1 = 8").z, file.detection.z);
+        // z and false_alarm say the same.
+        let share = of("false_alarm = 0.02");
+        assert_eq!((share.z, share.false_alarm), (None, Some(0.02)));
+        // The numbers of another rule are not taken, those of any rule are.
+        let paper = of("rule = 'paper'");
+        assert_eq!((paper.z, paper.window, paper.tracking), (None, None, None));
+        assert_eq!((paper.l1, paper.binning), (Some(40), Some(2)));
+        assert_eq!(of("rule = 'window'").z, file.detection.z);
+        assert_eq!(of("tracking = false").tracking, Some(false));
+        let run = over("[run]\nphotons_per_cycle = 0.5").run;
+        assert_eq!(
+            (run.photons_per_cycle, run.recorded_cycles),
+            (Some(0.5), None)
+        );
+        let rays = over("[rays]\ncalibration = 'rays.toml'").rays;
+        assert_eq!(rays.field_of_view_degrees, None);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        for (text, reason) in [
+            ("l1 = 4", "line 1: unknown field `l1`"),
+            ("[sensor]\nbins = 100", "bins 100: must be a power of two"),
+            ("[sensor]\nbins = 'x'", "line 2: invalid type"),
+            (
+                "[sensor]\nsigma_bins = 0.001",
+                "line 2: 0.001: is less than half",
+            ),
+            ("[sensor]\nsigma_bins = 2", "sigma_bins 2: must be above 0"),
+            ("[sensor]\nlaser_hz = 0", "laser_hz 0: must be from 1"),
+            ("[sensor]\nglass = -1.0", "glass -1: must be from 0"),
+            ("[sensor]\nmasked = [70000]", "line 2: invalid value"),
+            (
+                "[detection]\nrule = 'best'",
+                "line 2: unknown variant `best`",
+            ),
+            ("[detection]\nz = 99", "line 2: 99: must be a number from 0"),
+            ("[detection]\nz = 4\nfalse_alarm = 0.01", "give one of them"),
+            (
+                "[detection]\nfalse_alarm = 0.5",
+                "must be above 0, at most 0.1",
+            ),
+            ("[detection]\nwindow = 8", "window 8: must be from 1 to 7"),
+            ("[detection]\nechoes = 0", "echoes 0: must be from 1 to 4"),
+            ("[detection]\nalpha = nan", "line 2: NaN: must be a number"),
+            (
+                "[rays]\nfield_of_view_degrees = [0, 40]",
+                "field_of_view_degrees",
+            ),
+            ("[run]\ncycles = 0", "cycles 0: must be at least 1"),
+            ("[run]\nphotons_per_cycle = inf", "must be a number above 0"),
+        ] {
+            let error = format!("{:#}", SettingsFile::parse(text).unwrap_err());
+            assert!(error.contains(reason), "{text}: {error}");
+            assert!(!error.contains('\n'), "{error}");
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! The settings file: what is known of a sensor, how its pixels decide, where they look, and
+//! what a run was. `docs/settings.md` lists the keys.
+//!
+//! A key of the file is an option of the command line with `_` for `-`. An option overrides the
+//! file. What neither says has a default.
+
+mod detection;
+mod file;
+mod resolve;
+mod sections;
+
+pub use detection::{Detection, EstimatorName, RuleName};
+pub(crate) use file::MARK;
+pub use file::SettingsFile;
+pub use sections::{Rays, Run, Sensor};

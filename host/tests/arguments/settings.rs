@@ -1,0 +1,116 @@
+//! The settings file, end to end.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use crate::common::{Scratch, says};
+
+/// Four pixels of two rows with a pulse at bin 60 and background.
+fn photons(scratch: &Scratch) -> PathBuf {
+    let mut text = "pixel,cycle,bin\n".to_owned();
+    for cycle in 0..3000 {
+        for pixel in 0..4 {
+            writeln!(text, "{pixel},{cycle},{}", 60 + (cycle + pixel) % 2).unwrap();
+            writeln!(text, "{pixel},{cycle},{}", (cycle * 7 + pixel) % 128).unwrap();
+        }
+    }
+    scratch.file("photons.csv", text)
+}
+
+const ALL: &str = "--columns 2 --bin-width-ps 92.1 --offset-mm -3.3 --gate 10..120 --mask 3 \
+    --rule window --sigma-bins 0.8 --false-alarm 0.02 --l1 8 --l2 1500 --x 2 --min-count 6 \
+    --binning 1 --patience 32 --tracking --echoes 2 --echo-wait 5 --cycles 2500 --seed 9 \
+    --laser-hz 20000";
+
+const RESULTS: [&str; 3] = ["events.csv", "events.aer", "dtof.toml"];
+
+#[test]
+fn a_run_is_repeated_from_its_folder() {
+    let scratch = Scratch::new();
+    photons(&scratch);
+    scratch.printed(&format!("replay --input photons.csv --out first {ALL}"));
+    let again = "replay --input photons.csv --out again --settings first/dtof.toml";
+    scratch.printed(again);
+    for name in RESULTS {
+        let read = |folder| std::fs::read(scratch.path(folder).join(name)).unwrap();
+        assert!(read("first") == read("again"), "{name}");
+    }
+    assert!(scratch.read("first/events.csv").lines().count() > 100);
+    // An option overrides the file, and what it replaces goes.
+    scratch.printed(&format!("{again} --rule paper --alpha 6 --tracking=false"));
+    let toml = scratch.read("again/dtof.toml");
+    says(&toml, "rule = \"paper\"");
+    says(&toml, "alpha = 6.0");
+    says(&toml, "binning = 1");
+    assert!(
+        !toml.contains("tracking") && !toml.contains("\nz ="),
+        "{toml}"
+    );
+}
+
+#[test]
+fn a_simulation_and_its_export_are_repeated_too() {
+    let scratch = Scratch::new();
+    let scene = "columns = 4\nrows = 2\nbackground = 0.05\nlaser_rate_mhz = 1\n\
+                 field_of_view_degrees = [20, 10]\n[[surface]]\nrange_mm = 1000\nsignal = 0.5\n";
+    scratch.file("scene.toml", scene);
+    let simulate = "simulate --scene scene.toml --out";
+    scratch.printed(&format!(
+        "{simulate} first --rule window --window 3 --cycles 5000 --seed 4 --mask 2"
+    ));
+    scratch.printed(&format!("{simulate} again --settings first/dtof.toml"));
+    for name in RESULTS {
+        assert_eq!(
+            std::fs::read(scratch.path("first").join(name)).unwrap(),
+            std::fs::read(scratch.path("again").join(name)).unwrap(),
+            "{name}"
+        );
+    }
+    // Pixel 2 is left out; what it had is counted.
+    assert!(
+        scratch
+            .read("first/events.csv")
+            .lines()
+            .all(|row| row.split(',').nth(1) != Some("2"))
+    );
+    let summary: serde_json::Value =
+        serde_json::from_str(&scratch.read("first/summary.json")).unwrap();
+    let masked = summary["masked"].as_u64().unwrap();
+    // 5,000 laser cycles of 128 bins with 0.05 photons, and 0.5 of signal.
+    assert!((34_500 - 1000..34_500 + 1000).contains(&masked), "{masked}");
+
+    let export = "export first/events.aer --format csv --out";
+    scratch.printed(&format!("{export} a.csv --settings first/dtof.toml"));
+    scratch.printed(&format!("{export} b.csv --fov 20x10 --laser-hz 1000000"));
+    assert_eq!(scratch.read("a.csv"), scratch.read("b.csv"));
+    scratch.printed(&format!(
+        "{export} c.csv --settings first/dtof.toml --fov 60x30"
+    ));
+    assert_ne!(scratch.read("a.csv"), scratch.read("c.csv"));
+}
+
+#[test]
+fn what_contradicts_the_file_is_refused() {
+    let scratch = Scratch::new();
+    photons(&scratch);
+    scratch.file("scene.toml", "[[surface]]\nrange_mm = 1000\nsignal = 1\n");
+    scratch.file("wide.toml", "[sensor]\nbins = 64\n");
+    scratch.file("key.toml", "[detection]\nl_1 = 4\n");
+    scratch.file("z.toml", "[detection]\nrule = 'window'\n");
+    scratch.all_refused(
+        "replay --input photons.csv --out out",
+        "--settings missing.toml | missing.toml: No such file
+        --settings key.toml | key.toml: line 2: unknown field `l_1`
+        --settings z.toml | --rule window needs --window or --sigma-bins
+        --mask 4 | --mask 4: there are 4 pixels
+        --mask x | must be a whole number from 0 to 65535
+        --patience 8 | --patience is for --binning
+        --echo-wait 8 | --echo-wait is for --echoes of 2 or more
+        --estimator window | --estimator window needs --sigma-bins
+        --tracking | --tracking is for --rule window",
+    );
+    scratch.all_refused(
+        "simulate --scene scene.toml --out out",
+        "--settings wide.toml | wide.toml: 64 bins of 250 ps, but the scene has 128 of 250 ps",
+    );
+}
