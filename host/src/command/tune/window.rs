@@ -43,7 +43,9 @@ impl Tune {
         };
         let options = format!(
             "--rule window --sigma-bins {} --z {} --l1 {}{binning}",
-            tuned.sigma, tuned.z, tuned.l1
+            shortest(tuned.sigma),
+            shortest(tuned.z),
+            tuned.l1
         );
         Ok((lines, options))
     }
