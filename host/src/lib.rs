@@ -9,6 +9,7 @@
 //!   → Output         events.csv, events.aer, summary.json, pictures, report
 //! ```
 
+pub mod calibrate;
 pub mod cli;
 pub mod device;
 pub mod engine;

@@ -1,0 +1,209 @@
+//! Scenes drawn at random for calibration, and the false alarms of what comes out.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "numbers drawn from small ranges"
+)]
+
+use std::fmt::Write as _;
+
+use dtof::calibrate::Calibration;
+use dtof::input::recorded::Capture;
+use dtof::input::source::PhotonSource;
+use dtof::simulate::scene::Scene;
+use dtof_core::fixed::types::U4F12;
+use dtof_core::{Count, DepthEstimator, Histogram, RangeGate, WindowRule, detect};
+use dtof_theory::looks::exposure::{Exposures, Looks};
+use dtof_theory::random::trial_rng;
+use dtof_theory::rates::{Rates, bin_share};
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, Uniform};
+use rand_pcg::Pcg64;
+
+/// Photons of a whole recording, about, at most.
+const PHOTONS: f64 = 2.5e7;
+
+/// A scene and what is not told of it.
+pub struct Drawn {
+    pub scene: Scene,
+    pub cycles: u64,
+    pub wall_mm: f64,
+    pub offset_mm: f64,
+    pub hot: Vec<usize>,
+    pub dead: Vec<usize>,
+    surfaces: usize,
+}
+
+impl Drawn {
+    pub fn new(number: u64) -> Self {
+        let mut rng = Pcg64::seed_from_u64(0x5ca1e + number);
+        let mut between = |low: f64, high: f64| Uniform::new(low, high).unwrap().sample(&mut rng);
+        let log = |between: &mut dyn FnMut(f64, f64) -> f64, low: f64, high: f64| {
+            between(low.ln(), high.ln()).exp()
+        };
+        let bins = [64, 128, 256][between(0.0, 3.0) as usize];
+        let [columns, rows] =
+            [[4, 4], [8, 8], [16, 8], [16, 16], [32, 16]][between(0.0, 5.0) as usize];
+        let pixels = columns * rows;
+        let bin_width_ps = between(60.0, 500.0).round();
+        let mm_per_bin = bin_width_ps * dtof::simulate::MM_PER_PS;
+        let background = log(&mut between, 0.002, 0.3);
+        let sigma = between(0.5, 1.6);
+        // Some with hot pixels, which take most of the photons there are.
+        let hot_count = (between(-3.0, 6.0).max(0.0) as usize).min(pixels / 4);
+        let mut hot = Vec::new();
+        while hot.len() < hot_count {
+            let pixel = between(0.0, pixels as f64) as usize;
+            if !hot.contains(&pixel) {
+                hot.push(pixel);
+            }
+        }
+        hot.sort_unstable();
+        let mut dead = Vec::new();
+        if between(0.0, 1.0) < 0.3 {
+            let pixel = between(0.0, pixels as f64) as usize;
+            if !hot.contains(&pixel) {
+                dead.push(pixel);
+            }
+        }
+        let each_cycle = background * bins as f64 * (pixels + 99 * hot.len()) as f64;
+        let cycles = log(&mut between, 4000.0, 100_000.0).min((PHOTONS / each_cycle).max(4000.0));
+        let cycles = cycles.round();
+        // So many times its noise in each pixel.
+        let noise = (background * (4.0 * sigma + 1.0) / cycles).sqrt();
+        let signal = (between(15.0, 60.0) * noise).max(0.03);
+        let glass = (between(0.0, 1.0) < 0.6).then(|| {
+            let brightness = log(&mut between, 0.2, 10.0);
+            (signal * brightness, between(2.5, 8.0))
+        });
+        let nearest = if glass.is_some() { 24.0 } else { 8.0 };
+        let last = bins as f64 - 10.0;
+        let wall = between(0.6 * last, last);
+        let mut text = format!(
+            "columns = {columns}\nrows = {rows}\nbins = {bins}\nbin_width_ps = {bin_width_ps:?}\n\
+             laser_rate_mhz = 0.5\nbackground = {background:?}\npulse_sigma_bins = {sigma:?}\n\
+             [[surface]]\nposition_bins = {wall:?}\nsignal = {signal:?}\n"
+        );
+        let surfaces = if between(0.0, 1.0) < 0.3 { 0 } else { 3 };
+        for surface in 0..surfaces {
+            // A strip of less than a sixth of the columns or of the rows, the last one slanted.
+            let strip = [columns, rows][surface % 2] as f64;
+            let from = (strip / 4.0 * surface as f64).floor();
+            let to = from + (strip / 6.0).max(1.0).floor();
+            let side = ["columns", "rows"][surface % 2];
+            let other = ["rows", "columns"][surface % 2];
+            let at = between(nearest, wall - 8.0);
+            let right = between(nearest, wall - 8.0);
+            let slant = if surface == 2 { right } else { at } * mm_per_bin;
+            writeln!(
+                text,
+                "[[surface]]\nrange_mm = {:?}\nrange_right_mm = {slant:?}\nsignal = {:?}\n\
+                 rectangle = {{ {side} = [{from}, {to}], {other} = [0, 100] }}",
+                at * mm_per_bin,
+                signal * between(0.5, 2.0)
+            )
+            .unwrap();
+        }
+        if let Some((signal, position)) = glass {
+            writeln!(
+                text,
+                "[cover_glass]\nsignal = {signal:?}\nposition_bins = {position:?}"
+            )
+            .unwrap();
+        }
+        if !hot.is_empty() {
+            writeln!(text, "[hot_pixels]\nmultiple = 100\npixels = {hot:?}").unwrap();
+        }
+        Self {
+            scene: Scene::parse(&text).unwrap(),
+            cycles: cycles as u64,
+            wall_mm: wall * mm_per_bin,
+            offset_mm: between(-300.0, 300.0),
+            hot,
+            dead,
+            surfaces,
+        }
+    }
+
+    /// One flat wall, and no glass before it.
+    pub fn is_wall_alone(&self) -> bool {
+        self.surfaces == 0 && self.scene.effects.cover_glass.is_none()
+    }
+
+    /// The histograms of all pixels.
+    pub fn capture(&self, seed: u64) -> Capture {
+        let mut photons = self.scene.photons(seed, self.cycles).unwrap();
+        let bins = usize::from(self.scene.bins);
+        let mut capture = vec![vec![0; bins]; self.scene.geometry.addresses()];
+        let mut left = self.cycles;
+        while left > 0 {
+            let next = left.min(1000);
+            let slice = photons.next_slice(next as u16).unwrap();
+            for (counts, pixel) in capture.iter_mut().zip(&slice.pixels) {
+                for photon in &pixel.photons {
+                    counts[usize::from(photon.code)] += 1;
+                }
+            }
+            left -= next;
+        }
+        for &pixel in &self.dead {
+            capture[pixel].fill(0);
+        }
+        capture
+    }
+
+    /// The first bin from which on the glass has less than half a standard deviation of the
+    /// background in 2000 laser cycles, or as many as fit the counters.
+    pub fn glass_end(&self) -> u16 {
+        let Some(glass) = &self.scene.effects.cover_glass else {
+            return 0;
+        };
+        let cycles = (860.0 / self.scene.background).min(2000.0).floor();
+        let sigma = self.scene.pulse_sigma_bins;
+        let share = |bin: u16| bin_share(bin.into(), glass.position_bins, sigma);
+        let matters = |bin: &u16| {
+            glass.signal * cycles * share(*bin) >= 0.5 * (self.scene.background * cycles).sqrt()
+        };
+        (0..self.scene.bins)
+            .rev()
+            .find(matters)
+            .map_or(0, |bin| bin + 1)
+    }
+}
+
+/// The share of exposures to `background` alone that end with an event with the settings found.
+pub fn false_alarms(found: &Calibration, background: f64) -> f64 {
+    match found.bins {
+        64 => of::<64>(found, background),
+        128 => of::<128>(found, background),
+        256 => of::<256>(found, background),
+        bins => panic!("{bins} bins"),
+    }
+}
+
+fn of<const BINS: usize>(found: &Calibration, background: f64) -> f64 {
+    // Some 400 events, or as many as do not take long.
+    let exposure = background * BINS as f64 * 2000.0;
+    let exposures_drawn = (1.5e9 / exposure).clamp(10_000.0, 40_000.0) as u32;
+    let detection = found.detection.unwrap();
+    let z = U4F12::from_num(detection.z.unwrap());
+    let minimum = Count::saturating(detection.min_count.into());
+    let rule = WindowRule::new(detection.window, z, minimum).unwrap();
+    let gate = RangeGate::<BINS>::new(found.gate.0, found.gate.1).unwrap();
+    let looks = Looks::new(detection.x, detection.l1, detection.l2);
+    let rates = Rates::without_target(background);
+    let exposures = Exposures::new(&rates, BINS as u16, looks).unwrap();
+    let mut rng = trial_rng(0xfa15e, found.gate.0);
+    let mut events = 0;
+    for _ in 0..exposures_drawn {
+        let mut histogram = Histogram::<BINS>::new();
+        exposures.frames::<BINS>(&mut rng, |_, frame| {
+            histogram.add_frame(frame, &gate);
+            let event = detect(&histogram, &gate, &rule, &DepthEstimator::Centroid3).is_some();
+            events += u32::from(event);
+            event
+        });
+    }
+    f64::from(events) / f64::from(exposures_drawn)
+}

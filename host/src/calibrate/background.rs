@@ -1,0 +1,111 @@
+//! The background of a histogram: what its bins hold where there is no peak.
+//!
+//! Bins that hold certainly more than the others, alone or with both neighbours, are left out
+//! with a bin to either side, and the mean of the rest is taken. That goes on until nothing
+//! changes. It begins at the median, or in sparse histograms at the mean.
+
+use super::limits::{is_more, median};
+
+/// A bin is left out by chance once in so many histograms.
+const ONE_IN: f64 = 100.0;
+/// It has come to rest long before.
+const ROUNDS: usize = 40;
+
+/// The background of one histogram.
+#[derive(Clone, Debug)]
+pub struct Level {
+    /// Photons a bin.
+    pub mean: f64,
+    /// For each bin whether it holds background alone.
+    pub clear: Vec<bool>,
+}
+
+impl Level {
+    /// Of a histogram.
+    #[must_use]
+    pub fn of(counts: &[f64]) -> Self {
+        let all = counts.iter().sum::<f64>() / counts.len() as f64;
+        let middle = median(counts.iter().copied());
+        let mut mean = if middle >= 5.0 { middle } else { all };
+        let mut clear = vec![true; counts.len()];
+        for _ in 0..ROUNDS {
+            let next = clear_bins(counts, mean);
+            // Peaks everywhere: the lowest level there is has to do.
+            if !next.contains(&true) {
+                break;
+            }
+            let settled = next == clear;
+            clear = next;
+            mean = mean_of(counts, &clear);
+            if settled {
+                break;
+            }
+        }
+        Self { mean, clear }
+    }
+
+    /// Bins that hold background alone.
+    #[must_use]
+    pub fn clear_bins(&self) -> usize {
+        self.clear.iter().filter(|&&clear| clear).count()
+    }
+
+    /// Photons in them.
+    #[must_use]
+    pub fn photons(&self) -> f64 {
+        self.mean * self.clear_bins() as f64
+    }
+}
+
+fn clear_bins(counts: &[f64], mean: f64) -> Vec<bool> {
+    let bins = counts.len();
+    let one_in = ONE_IN * bins as f64;
+    let mut clear = vec![true; bins];
+    let mut leave_out = |first: usize, last: usize| {
+        let (first, last) = (first.saturating_sub(1), (last + 1).min(bins - 1));
+        clear[first..=last].fill(false);
+    };
+    for width in [1, 3] {
+        for (first, window) in counts.windows(width).enumerate() {
+            let sum = window.iter().sum();
+            if is_more(sum, mean * width as f64, one_in) {
+                leave_out(first, first + width - 1);
+            }
+        }
+    }
+    clear
+}
+
+fn mean_of(counts: &[f64], clear: &[bool]) -> f64 {
+    let kept = counts.iter().zip(clear).filter(|(_, clear)| **clear);
+    let (sum, bins) = kept.fold((0.0, 0.0), |(sum, bins), (count, _)| {
+        (sum + count, bins + 1.0)
+    });
+    sum / f64::max(bins, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn peaks_and_their_tails_are_no_background() {
+        let mut counts = vec![20.0; 128];
+        for bin in 40..80 {
+            counts[bin] += 9000.0 * (-(bin as f64 - 40.0) / 4.0).exp();
+        }
+        let level = Level::of(&counts);
+        // What is left of the tail where it no longer shows.
+        assert!((level.mean - 20.0).abs() < 0.2, "{}", level.mean);
+        assert!(!level.clear[39] && !level.clear[60] && level.clear[90]);
+    }
+
+    #[test]
+    fn few_photons_are_all_background_and_none_is_none() {
+        let mut counts = vec![0.0; 64];
+        counts[3] = 1.0;
+        counts[50] = 2.0;
+        assert!((Level::of(&counts).mean - 3.0 / 64.0).abs() < 1e-12);
+        assert_eq!(Level::of(&[0.0; 64]).mean, 0.0);
+    }
+}

@@ -1,0 +1,84 @@
+//! How sure a photon count says that its mean is another one.
+//!
+//! With a Poisson number of mean `m`, `k` photons or more have at most the probability
+//! `exp(-(k·ln(k/m) - (k - m)))` if `k > m`, and so have `k` or fewer if `k < m` (Chernoff).
+//! That bound always holds, so that what is called certain is at least as certain.
+
+/// ln of what the probability of `count`, or of one farther from `mean`, is at most, with its
+/// sign turned.
+#[must_use]
+pub fn doubt(count: f64, mean: f64) -> f64 {
+    if mean <= 0.0 {
+        return if count > 0.0 { f64::INFINITY } else { 0.0 };
+    }
+    let entropy = if count > 0.0 {
+        count * (count / mean).ln()
+    } else {
+        0.0
+    };
+    (entropy - (count - mean)).max(0.0)
+}
+
+/// Whether `count` is more than `mean` lets expect but once in `one_in`.
+#[must_use]
+pub fn is_more(count: f64, mean: f64, one_in: f64) -> bool {
+    count > mean && doubt(count, mean) > one_in.ln()
+}
+
+/// Whether it is less.
+#[must_use]
+pub fn is_less(count: f64, mean: f64, one_in: f64) -> bool {
+    count < mean && doubt(count, mean) > one_in.ln()
+}
+
+/// The middle of `values`, the lower of two; 0 of none.
+#[must_use]
+pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// What a share of `values` lies below; 0 of none.
+#[must_use]
+pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> f64 {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    let last = values.len().saturating_sub(1);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let index = (last as f64 * share) as usize;
+    values.get(index).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dtof_theory::counts::poisson::Poisson;
+
+    #[test]
+    fn the_bound_is_never_below_the_probability() {
+        for mean in [0.03, 0.5, 4.0, 77.0, 900.0] {
+            let law = Poisson::new(mean);
+            let mut below = 0.0;
+            for count in 0..law.last().min(1500) {
+                let bound = (-doubt(count.into(), mean)).exp() * (1.0 + 1e-9);
+                below += law.mass(count);
+                let probability = if f64::from(count) > mean {
+                    law.at_least(count)
+                } else {
+                    below
+                };
+                assert!(
+                    probability <= bound,
+                    "{mean} {count}: {probability} {bound}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_more_than_nothing() {
+        assert!(!is_more(0.0, 0.0, 1e6) && !is_less(0.0, 0.0, 1e6));
+        assert!(is_more(1.0, 0.0, 1e6) && is_less(0.0, 20.0, 1e6));
+        assert_eq!(median([3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median([]), 0.0);
+    }
+}

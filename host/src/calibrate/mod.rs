@@ -1,0 +1,221 @@
+//! Calibration: what a sensor needs for its settings, from whole histograms of any scene.
+//!
+//! ```text
+//! histograms → pile-up → background, hot and dead pixels → peaks → cover glass → pulse
+//!   → offset → gate, window, z, L1
+//! ```
+//!
+//! Everything found comes with how sure it is. What a recording does not say is asked for by the
+//! name of the option. `docs/calibrate.md` says how each is found.
+
+mod background;
+mod common;
+mod false_alarms;
+mod glass;
+mod limits;
+mod observed;
+mod offset;
+mod peaks;
+mod pile_up;
+mod pixels;
+mod pulse;
+mod settle;
+mod shape;
+mod watch;
+
+use anyhow::Result;
+use dtof_core::fixed::types::U8F8;
+
+pub use glass::{Glass, Nearest};
+pub use observed::{Length, Observed};
+pub use offset::Offset;
+pub use pile_up::Tdc;
+pub use pixels::Pixels;
+pub use pulse::Pulse;
+pub use settle::{Detection, L2};
+pub use watch::{Change, RunPhotons, glass_change};
+
+use background::Level;
+use common::Scene;
+use shape::Window;
+
+/// What the user says beside the recording.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Asked {
+    /// Whether the nearest peak that all pixels have is a cover glass.
+    pub glass: Option<bool>,
+    /// How far away the target is that most of the pixels see.
+    pub target_mm: Option<f64>,
+    /// The share of exposures without a target that may end with an event.
+    pub false_alarm: f64,
+    /// Seed of what is simulated.
+    pub seed: u64,
+}
+
+impl Default for Asked {
+    fn default() -> Self {
+        Self {
+            glass: None,
+            target_mm: None,
+            false_alarm: 0.01,
+            seed: 1,
+        }
+    }
+}
+
+/// What was found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calibration {
+    /// How long captures lasted.
+    pub length: Length,
+    /// Bins of a histogram.
+    pub bins: usize,
+    /// Picoseconds a bin: fitted, or as they were given.
+    pub bin_width_ps: f64,
+    /// Background, hot and dead pixels.
+    pub pixels: Pixels,
+    /// The TDC, where laser cycles are known.
+    pub tdc: Option<Tdc>,
+    /// The nearest peak that all pixels have.
+    pub nearest: Nearest,
+    /// The pulse, if a peak is bright enough.
+    pub pulse: Option<Pulse>,
+    /// The range offset, if a distance is known.
+    pub offset: Option<Offset>,
+    /// First and last bin that may hold a peak.
+    pub gate: (u16, u16),
+    /// How pixels are to decide, if the pulse is known.
+    pub detection: Option<Detection>,
+    /// Photons a laser cycle of each bin, the mean over all good pixels and captures.
+    pub mean: Vec<f64>,
+    /// Captures and pixels.
+    pub looked_at: (usize, usize),
+}
+
+/// Calibrates by a recording.
+///
+/// # Errors
+/// What is wrong with the recording, or with what was asked.
+pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
+    let mut traces = observed.traces()?;
+    let pixel_count = observed.geometry.addresses();
+    let tdc = observed.length.is_known().then(|| pile_up::tdc(&traces));
+    if let Some(Tdc::OneHit(_)) = tdc {
+        for trace in &mut traces {
+            trace.counts = pile_up::coates(&trace.counts, trace.cycles).0;
+        }
+    }
+    let levels: Vec<Level> = traces
+        .iter()
+        .map(|trace| Level::of(&trace.counts))
+        .collect();
+    let pixels = Pixels::new(pixel_count, &traces, &levels);
+    let truth = observed.truth_mm.unwrap_or_default();
+    let good = traces.into_iter().zip(levels).enumerate();
+    let good = good.filter(|(_, (trace, _))| pixels.is_good(trace.pixel));
+    let (numbers, (traces, levels)): (Vec<usize>, (Vec<_>, Vec<_>)) = good.unzip();
+    anyhow::ensure!(!traces.is_empty(), "every pixel is dead or hot");
+    let scene = Scene::new(observed.geometry, pixels.background, traces, levels);
+
+    let l2 = settle::l2(pixels.background);
+    let nearest = glass::nearest(&scene, asked.glass, l2.into());
+    let found = match &nearest {
+        Nearest::Glass(glass) => Some(glass),
+        _ => None,
+    };
+    let bins = observed.bins();
+    let gate = settle::gate(bins, found.map_or(0, |glass| glass.end))?;
+    let pulse = pulse::pulse(&windows(&scene, gate.0, found));
+    let sigma = pulse.as_ref().map_or(1.0, |pulse| pulse.sigma);
+    let sigma = settle::sigma(sigma);
+    let offset = offset_of(&scene, &numbers, truth, gate, sigma, observed, asked);
+    let cycles = scene.cycles();
+    let (counts, _) = scene.pooled();
+    let detection = pulse.as_ref().map(|pulse| {
+        settle::detection(&settle::Known {
+            bins,
+            gate,
+            pulse,
+            pixels: &pixels,
+            is_absolute: observed.length != Length::Unknown,
+            asked,
+        })
+    });
+    Ok(Calibration {
+        length: observed.length,
+        bins,
+        bin_width_ps: offset
+            .and_then(|offset| offset.bin_width_ps)
+            .unwrap_or(observed.bin_width_ps),
+        tdc,
+        nearest,
+        pulse,
+        offset,
+        gate,
+        detection: detection.transpose()?,
+        mean: counts.iter().map(|count| count / cycles).collect(),
+        looked_at: (observed.captures.len(), pixel_count),
+        pixels,
+    })
+}
+
+/// One window for each histogram: its strongest peak behind the gate's first bin. Without any the
+/// glass has to do, which is a pulse of the same laser.
+fn windows(scene: &Scene, first: u16, glass: Option<&Glass>) -> Vec<Window> {
+    let first = usize::from(first);
+    let of = |wanted: &dyn Fn(&peaks::Peak) -> bool| -> Vec<Window> {
+        let all = scene.traces.iter().zip(&scene.peaks).enumerate();
+        all.filter_map(|(index, (trace, peaks))| {
+            let strongest = (0..peaks.len())
+                .filter(|&at| wanted(&peaks[at]))
+                .max_by(|&one, &other| peaks[one].photons.total_cmp(&peaks[other].photons))?;
+            let before = strongest.checked_sub(1).map_or(0, |at| peaks[at].last + 1);
+            let behind = peaks.get(strongest + 1);
+            let behind = behind.map_or(scene.bins() - 1, |peak| peak.first - 1);
+            let peak = peaks[strongest];
+            let background = scene.background(index, peak.top);
+            let bins = (before.min(peak.first), peak.top, behind.max(peak.last));
+            Some(Window::new(&trace.counts, background, trace.cycles, bins))
+        })
+        .collect()
+    };
+    let behind =
+        of(&|peak| peak.top >= first && glass.is_none_or(|glass| peak.top > glass.top + 1));
+    if behind.is_empty() {
+        of(&|_| true)
+    } else {
+        behind
+    }
+}
+
+fn offset_of(
+    scene: &Scene,
+    numbers: &[usize],
+    truth: &[Option<f64>],
+    gate: (u16, u16),
+    sigma: U8F8,
+    observed: &Observed,
+    asked: &Asked,
+) -> Option<Offset> {
+    let stands = |index: usize| {
+        let peaks = scene.peaks[index].iter();
+        peaks
+            .into_iter()
+            .any(|peak| peak.top >= usize::from(gate.0))
+    };
+    let placed = (0..numbers.len()).filter(|&index| stands(index));
+    let placed = placed.filter_map(|index| {
+        let position = offset::position(&scene.traces[index], gate, sigma)?;
+        Some((numbers[index], position))
+    });
+    let placed: Vec<(usize, f64)> = placed.collect();
+    if let Some(distance) = asked.target_mm {
+        let positions: Vec<f64> = placed.iter().map(|placed| placed.1).collect();
+        return offset::from_target(&positions, distance, observed.bin_width_ps);
+    }
+    let pairs: Vec<(f64, f64)> = placed
+        .iter()
+        .filter_map(|&(number, position)| Some((position, (*truth.get(number)?)?)))
+        .collect();
+    offset::from_distances(&pairs, observed.bin_width_ps)
+}

@@ -1,0 +1,144 @@
+//! Peaks of a histogram: bins in a row that hold certainly more than the background.
+//!
+//! A row with two tops is two peaks if the counts between them fall certainly, and below half of
+//! the lower top.
+
+use super::limits::{is_less, is_more};
+
+/// A bin belongs to a peak by chance once in so many bins.
+const ONE_IN: f64 = 1e7;
+
+/// Bins that hold a peak.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Peak {
+    /// The first.
+    pub first: usize,
+    /// The fullest.
+    pub top: usize,
+    /// The last.
+    pub last: usize,
+    /// Photons above the background.
+    pub photons: f64,
+}
+
+impl Peak {
+    /// All peaks of `counts` above `background` photons a bin, from the nearest on.
+    #[must_use]
+    pub fn all(counts: &[f64], background: f64) -> Vec<Self> {
+        let mut peaks = Vec::new();
+        let stands = standing(counts, background);
+        let mut bin = 0;
+        while bin < counts.len() {
+            if !stands[bin] {
+                bin += 1;
+                continue;
+            }
+            let length = stands[bin..].iter().take_while(|&&stands| stands).count();
+            split(counts, background, bin, bin + length - 1, &mut peaks);
+            bin += length;
+        }
+        peaks
+    }
+
+    fn new(counts: &[f64], background: f64, first: usize, last: usize) -> Self {
+        let top = highest(counts, first, last);
+        let above = counts[first..=last].iter().map(|count| count - background);
+        Self {
+            first,
+            top,
+            last,
+            photons: above.sum(),
+        }
+    }
+}
+
+/// For each bin whether it holds more than background, alone or with both neighbours. Of three
+/// that do only together those count that hold more than the mean.
+fn standing(counts: &[f64], background: f64) -> Vec<bool> {
+    let mut stands: Vec<bool> = counts
+        .iter()
+        .map(|&count| is_more(count, background, ONE_IN))
+        .collect();
+    for (first, three) in counts.windows(3).enumerate() {
+        if is_more(three.iter().sum(), 3.0 * background, ONE_IN) {
+            for (bin, &count) in (first..).zip(three) {
+                stands[bin] |= count > background + background.sqrt();
+            }
+        }
+    }
+    stands
+}
+
+fn highest(counts: &[f64], first: usize, last: usize) -> usize {
+    let mut top = first;
+    for bin in first..=last {
+        if counts[bin] > counts[top] {
+            top = bin;
+        }
+    }
+    top
+}
+
+/// Adds the peaks of the row `first..=last`.
+fn split(counts: &[f64], background: f64, first: usize, last: usize, peaks: &mut Vec<Peak>) {
+    let (mut start, mut top, mut valley) = (first, first, first);
+    for bin in first..=last {
+        if counts[bin] > counts[top] && valley <= top {
+            (top, valley) = (bin, bin);
+            continue;
+        }
+        if counts[bin] < counts[valley] {
+            valley = bin;
+        }
+        if valley <= top {
+            continue;
+        }
+        let above = |bin: usize| counts[bin] - background;
+        // The lower of the two tops, so far.
+        let lower = above(top).min(above(bin));
+        if above(valley) < 0.5 * lower && is_less(counts[valley], lower + background, ONE_IN) {
+            peaks.push(Peak::new(counts, background, start, valley - 1));
+            (start, top, valley) = (valley, bin, bin);
+        } else if counts[bin] > counts[top] {
+            (top, valley) = (bin, bin);
+        }
+    }
+    peaks.push(Peak::new(counts, background, start, last));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pulse(counts: &mut [f64], photons: f64, position: f64, sigma: f64) {
+        for (bin, count) in (0u32..).zip(counts) {
+            *count += photons * dtof_theory::rates::bin_share(bin, position, sigma);
+        }
+    }
+
+    #[test]
+    fn tops_with_a_valley_between_are_two_peaks() {
+        let mut counts = vec![10.0; 128];
+        pulse(&mut counts, 5000.0, 30.5, 1.0);
+        pulse(&mut counts, 1000.0, 36.5, 1.0);
+        pulse(&mut counts, 500.0, 100.2, 0.5);
+        let peaks = Peak::all(&counts, 10.0);
+        let tops: Vec<usize> = peaks.iter().map(|peak| peak.top).collect();
+        assert_eq!(tops, [30, 36, 100]);
+        assert!((peaks[0].photons / 5000.0 - 1.0).abs() < 0.01);
+        assert!(peaks[0].last < peaks[1].first);
+    }
+
+    #[test]
+    fn noise_on_a_slope_is_no_second_peak() {
+        let mut counts = vec![0.0; 64];
+        for (bin, count) in counts.iter_mut().enumerate().skip(20) {
+            *count = 400.0 * (-(bin as f64 - 20.0) / 5.0).exp();
+        }
+        counts[27] += 25.0; // over two standard deviations
+        let peaks = Peak::all(&counts, 0.5);
+        assert_eq!(peaks.len(), 1, "{peaks:?}");
+        assert!(Peak::all(&[7.0; 64], 7.0).is_empty());
+        assert!(Peak::all(&[0.0; 64], 0.0).is_empty());
+    }
+}

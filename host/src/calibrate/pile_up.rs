@@ -1,0 +1,101 @@
+//! Pile-up: a TDC that takes one photon a laser cycle misses those behind the first.
+//!
+//! Of `N` laser cycles, `N_i` are left when bin `i` begins, those without a photon before it. With
+//! `h_i` photons in the bin, Coates' estimator of the photons that came is
+//! `N·ln(N_i / (N_i - h_i))`. With such a TDC the background of a bin goes with `N_i`, with any
+//! other it is even: the likelihood ratio of the two is `Σ h_i·ln(N_i / mean of N_i)` over the
+//! bins that hold background alone.
+
+use super::background::Level;
+use super::observed::Trace;
+
+/// A likelihood ratio that decides: e to this power.
+const DECIDES: f64 = 10.0;
+
+/// What the histograms say of the TDC.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tdc {
+    /// One photon a laser cycle; this share of the photons that came is lost.
+    OneHit(f64),
+    /// More than one, or so little light that it makes no difference.
+    SeveralHits,
+    /// Either; with one this share would be lost.
+    Unclear(f64),
+}
+
+/// Which TDC made `traces`, whose laser cycles are known.
+#[must_use]
+pub fn tdc(traces: &[Trace]) -> Tdc {
+    let (mut ratio, mut counted, mut came) = (0.0, 0.0, 0.0);
+    for trace in traces {
+        let total: f64 = trace.counts.iter().sum();
+        if total > trace.cycles {
+            return Tdc::SeveralHits;
+        }
+        let (corrected, left) = coates(&trace.counts, trace.cycles);
+        counted += total;
+        came += corrected.iter().sum::<f64>();
+        // Clear by either law, so that neither is favoured.
+        let [plain, other] = [&trace.counts, &corrected].map(|counts| Level::of(counts).clear);
+        let clear: Vec<usize> = (0..left.len())
+            .filter(|&bin| plain[bin] && other[bin])
+            .collect();
+        let mean = clear.iter().map(|&bin| left[bin]).sum::<f64>() / clear.len().max(1) as f64;
+        for bin in clear {
+            if left[bin] > 0.0 {
+                ratio += trace.counts[bin] * (left[bin] / mean).ln();
+            }
+        }
+    }
+    let lost = if came > 0.0 {
+        1.0 - counted / came
+    } else {
+        0.0
+    };
+    if ratio > DECIDES {
+        Tdc::OneHit(lost)
+    } else if ratio < -DECIDES {
+        Tdc::SeveralHits
+    } else {
+        Tdc::Unclear(lost)
+    }
+}
+
+/// The photons that came in each bin, and the laser cycles that were left for it.
+#[must_use]
+pub fn coates(counts: &[f64], cycles: f64) -> (Vec<f64>, Vec<f64>) {
+    let mut left = cycles;
+    let bins = counts.iter().map(|&count| {
+        let before = left;
+        left = (left - count).max(0.0);
+        // With the last laser cycle gone nothing is known; half of one bounds the logarithm.
+        let came = if before > 0.0 {
+            cycles * (before / left.max(0.5)).ln().max(0.0)
+        } else {
+            0.0
+        };
+        (came, before)
+    });
+    bins.unzip()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coates_gives_back_the_photons_that_came() {
+        let rates = [0.1, 0.4, 0.05, 0.0, 0.9];
+        let cycles = 1e6;
+        let mut left = cycles;
+        let counts = rates.map(|rate: f64| {
+            let count = left * -(-rate).exp_m1();
+            left -= count;
+            count
+        });
+        let (came, _) = coates(&counts, cycles);
+        for (came, rate) in came.iter().zip(rates) {
+            assert!((came / cycles - rate).abs() < 1e-9);
+        }
+    }
+}

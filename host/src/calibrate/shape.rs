@@ -1,0 +1,288 @@
+//! A peak of one histogram, and the Gaussian that fits it for a given σ.
+
+use dtof_theory::counts::normal;
+
+/// Fisher scoring has come to rest before.
+const STEPS: usize = 30;
+/// σ in bins that are tried.
+const SIGMAS: (f64, f64) = (0.12, 8.0);
+
+/// The part of a histogram that holds one peak.
+#[derive(Clone, Debug)]
+pub struct Window {
+    /// Laser cycles of the histogram.
+    pub cycles: f64,
+    /// Photons a bin without the peak.
+    pub background: f64,
+    /// Photons of the peak, about.
+    pub photons: f64,
+    /// Photons of the bins around it, up to the next peak.
+    counts: Vec<f64>,
+    /// Which bin is the first of them.
+    start: usize,
+    /// Which of them is the top, and which are fitted.
+    top: usize,
+    fitted: (usize, usize),
+}
+
+impl Window {
+    /// The peak at `top`, alone in `first..=last`, of a histogram.
+    #[must_use]
+    pub fn new(
+        counts: &[f64],
+        background: f64,
+        cycles: f64,
+        (first, top, last): (usize, usize, usize),
+    ) -> Self {
+        let counts = counts[first..=last].to_vec();
+        let top = top - first;
+        // Half of the height on either side, and as much again three times.
+        let half = background + (counts[top] - background) / 2.0;
+        let reach = |steps: &mut dyn Iterator<Item = usize>| {
+            steps.take_while(|&bin| counts[bin] > half).count()
+        };
+        let before = reach(&mut (0..top).rev());
+        let behind = reach(&mut (top + 1..counts.len()));
+        let reach = 3 * (before + behind + 1) / 2 + 2;
+        let fitted = (
+            top.saturating_sub(reach),
+            (top + reach).min(counts.len() - 1),
+        );
+        let photons = counts[fitted.0..=fitted.1].iter();
+        let photons = photons.map(|count| count - background).sum();
+        Self {
+            cycles,
+            background,
+            photons,
+            counts,
+            start: first,
+            top,
+            fitted,
+        }
+    }
+
+    /// The signal as a multiple of its noise.
+    #[must_use]
+    pub fn clearness(&self) -> f64 {
+        let all = self.counts[self.fitted.0..=self.fitted.1].iter();
+        self.photons / all.sum::<f64>().max(1.0).sqrt()
+    }
+
+    /// Where more of the background than needed was fitted, less.
+    #[must_use]
+    pub fn narrowed(&self, sigma: f64) -> Self {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let reach = (4.0 * sigma).ceil() as usize + 2;
+        let (first, last) = self.fitted;
+        Self {
+            fitted: (
+                first.max(self.top.saturating_sub(reach)),
+                last.min(self.top + reach),
+            ),
+            ..self.clone()
+        }
+    }
+
+    /// With the bins of at least a quarter of its height alone, and three at least.
+    #[must_use]
+    pub fn core(&self) -> Self {
+        let quarter = self.background + (self.counts[self.top] - self.background) / 4.0;
+        let last = self.counts.len() - 1;
+        let (mut first, mut end) = (self.top.saturating_sub(1), (self.top + 1).min(last));
+        while first > 0 && self.counts[first] >= quarter {
+            first -= 1;
+        }
+        while end < last && self.counts[end] >= quarter {
+            end += 1;
+        }
+        if self.counts[first] < quarter && first + 1 < self.top {
+            first += 1;
+        }
+        if self.counts[end] < quarter && end > self.top + 1 {
+            end -= 1;
+        }
+        Self {
+            fitted: (first, end),
+            ..self.clone()
+        }
+    }
+
+    /// The bins behind the top, with their photons.
+    pub fn behind(&self) -> impl Iterator<Item = (usize, f64)> {
+        let bins = self.counts.iter().copied().enumerate().skip(self.top + 1);
+        bins.map(|(bin, count)| (self.start + bin, count))
+    }
+
+    /// The Gaussian of `sigma` that fits best.
+    #[must_use]
+    pub fn fit(&self, sigma: f64) -> Fit {
+        let (first, last) = self.fitted;
+        let counts = &self.counts[first..=last];
+        let mut amplitude = self.photons.max(1.0);
+        // From the start of the window.
+        let mut position = self.centroid();
+        let mut shares = vec![(0.0, 0.0); counts.len()];
+        let mut information = 0.0;
+        for _ in 0..STEPS {
+            share(&mut shares, first, position, sigma);
+            let (mut score, mut info) = ([0.0; 2], [0.0; 3]);
+            for (count, (share, slope)) in counts.iter().zip(&shares) {
+                let mean = (self.background + amplitude * share).max(1e-12);
+                let off = count / mean - 1.0;
+                let moved = amplitude * slope;
+                score[0] += off * share;
+                score[1] += off * moved;
+                info[0] += share * share / mean;
+                info[1] += share * moved / mean;
+                info[2] += moved * moved / mean;
+            }
+            let determinant = info[0] * info[2] - info[1] * info[1];
+            if determinant <= 0.0 || !determinant.is_finite() {
+                break;
+            }
+            information = determinant.ln();
+            let by_amplitude = (info[2] * score[0] - info[1] * score[1]) / determinant;
+            let by_position = (info[0] * score[1] - info[1] * score[0]) / determinant;
+            amplitude = (amplitude + by_amplitude).clamp(0.3 * amplitude, 3.0 * amplitude);
+            let limit = 0.5 * sigma.max(0.4);
+            position += by_position.clamp(-limit, limit);
+            position = position.clamp(first as f64 - 1.0, last as f64 + 2.0);
+            if by_position.abs() < 1e-7 && by_amplitude.abs() < 1e-7 * amplitude {
+                break;
+            }
+        }
+        share(&mut shares, first, position, sigma);
+        let (mut likelihood, mut deviance) = (0.0, 0.0);
+        for (&count, (share, _)) in counts.iter().zip(&shares) {
+            let mean = (self.background + amplitude * share).max(1e-12);
+            likelihood += count * mean.ln() - mean;
+            deviance += 2.0 * (mean - count);
+            if count > 0.0 {
+                deviance += 2.0 * count * (count / mean).ln();
+            }
+        }
+        Fit {
+            amplitude,
+            position: self.start as f64 + position,
+            likelihood: likelihood - information / 2.0,
+            deviance,
+            freedom: counts.len() as f64 - 3.0,
+        }
+    }
+
+    fn centroid(&self) -> f64 {
+        let first = self.top.saturating_sub(1);
+        let last = (self.top + 1).min(self.counts.len() - 1);
+        let (mut sum, mut moment) = (1e-9, 1e-9 * self.top as f64);
+        for bin in first..=last {
+            let above = (self.counts[bin] - self.background).max(0.0);
+            sum += above;
+            moment += above * bin as f64;
+        }
+        moment / sum + 0.5
+    }
+}
+
+/// The share of the pulse in each bin from `first` on, and how it grows with the position.
+fn share(shares: &mut [(f64, f64)], first: usize, position: f64, sigma: f64) {
+    let at = |bin: usize| {
+        let z = (bin as f64 - position) / sigma;
+        let density = (-z * z / 2.0).exp() / (sigma * (2.0 * std::f64::consts::PI).sqrt());
+        (normal::below(z), density)
+    };
+    let mut start = at(first);
+    for (bin, share) in (first..).zip(shares) {
+        let end = at(bin + 1);
+        *share = (end.0 - start.0, start.1 - end.1);
+        start = end;
+    }
+}
+
+/// A Gaussian in a histogram.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// Its photons.
+    pub amplitude: f64,
+    /// Where its middle is, in bins from the start of bin 0.
+    pub position: f64,
+    likelihood: f64,
+    deviance: f64,
+    freedom: f64,
+}
+
+impl Fit {
+    /// How many standard deviations the deviance lies above what noise makes.
+    #[must_use]
+    pub fn misfit(&self) -> f64 {
+        (self.deviance - self.freedom) / (2.0 * self.freedom.max(1.0)).sqrt()
+    }
+
+    /// What of the photons lies elsewhere than fitted, about: a root of a mean of squares,
+    /// without what noise makes.
+    #[must_use]
+    pub fn unevenness(&self) -> f64 {
+        ((self.deviance - self.freedom).max(0.0) / self.amplitude.max(1.0)).sqrt()
+    }
+}
+
+/// The σ that fits all `windows` best, and the fit of each.
+#[must_use]
+pub fn best(windows: &[Window]) -> (f64, Vec<Fit>) {
+    let of = |log: f64| -total(windows, log.exp());
+    // Golden section; the likelihood has one maximum where peaks stand clear.
+    let golden = (5f64.sqrt() - 1.0) / 2.0;
+    let (mut low, mut high) = (SIGMAS.0.ln(), SIGMAS.1.ln());
+    let (mut left, mut right) = (high - golden * (high - low), low + golden * (high - low));
+    let (mut at_left, mut at_right) = (of(left), of(right));
+    while high - low > 1e-4 {
+        if at_left < at_right {
+            (high, right, at_right) = (right, left, at_left);
+            left = high - golden * (high - low);
+            at_left = of(left);
+        } else {
+            (low, left, at_left) = (left, right, at_right);
+            right = low + golden * (high - low);
+            at_right = of(right);
+        }
+    }
+    let sigma = f64::midpoint(low, high).exp();
+    let fits = windows.iter().map(|window| window.fit(sigma)).collect();
+    (sigma, fits)
+}
+
+fn total(windows: &[Window], sigma: f64) -> f64 {
+    let each = windows.iter().map(|window| window.fit(sigma).likelihood);
+    each.sum()
+}
+
+/// The 95 % interval of `sigma`, from how fast the likelihood falls.
+#[must_use]
+pub fn interval(windows: &[Window], sigma: f64) -> (f64, f64) {
+    let step = 0.02;
+    let at = |by: f64| total(windows, sigma * f64::exp(by));
+    let curvature = (2.0 * at(0.0) - at(step) - at(-step)) / (step * step);
+    // A flat likelihood says nothing.
+    let error = 1.96 / curvature.max(1.0).sqrt();
+    (sigma * (-error).exp(), sigma * error.exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dtof_theory::rates::bin_share;
+
+    #[test]
+    fn the_exact_means_of_a_gaussian_give_it_back() {
+        for (sigma, position) in [(0.5, 20.3), (0.8, 20.98), (1.6, 19.5)] {
+            let counts: Vec<f64> = (0..64)
+                .map(|bin| 12.0 + 4000.0 * bin_share(bin, position, sigma))
+                .collect();
+            let window = Window::new(&counts, 12.0, 100.0, (0, 20, 63));
+            let (found, fits) = best(&[window]);
+            // Cox and Reid's term moves it by about 1/(2·4000).
+            assert!((found / sigma - 1.0).abs() < 2e-3, "{found} for {sigma}");
+            assert!((fits[0].position - position).abs() < 1e-3);
+            assert!((fits[0].amplitude / 4000.0 - 1.0).abs() < 2e-3);
+        }
+    }
+}
