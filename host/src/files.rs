@@ -3,7 +3,7 @@
 //! A file that a command reads is never replaced.
 
 use std::fs;
-use std::io::{BufWriter, ErrorKind, Read};
+use std::io::{BufWriter, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -131,4 +131,22 @@ pub(crate) fn flushed(file: BufWriter<NamedTempFile>) -> Result<NamedTempFile> {
         .map_err(std::io::IntoInnerError::into_error)?;
     file.as_file().sync_all()?;
     Ok(file)
+}
+
+/// Writes `text` as the file `out`, which is whole or not there. A file of an earlier run, with
+/// `mark` near its start, is replaced, but none of `inputs`.
+///
+/// # Errors
+/// If something else is there, or it cannot be written.
+pub fn write_marked(out: &Path, text: &str, mark: &str, inputs: &[&Path]) -> Result<()> {
+    may_replace(out, mark, inputs)?;
+    let place = place_of(out, inputs)?;
+    let mut file = BufWriter::new(aside(&place.folder, ".dtof-")?);
+    let name = || out.display().to_string();
+    file.write_all(text.as_bytes()).with_context(name)?;
+    flushed(file)
+        .with_context(name)?
+        .persist(&place.file)
+        .with_context(name)?;
+    Ok(())
 }

@@ -25,6 +25,8 @@ enum Command {
     Simulate(Box<command::simulate::Simulate>),
     /// Turn recorded photons into events.
     Replay(Box<command::replay::Replay>),
+    /// Find the settings of a sensor from a recording.
+    Calibrate(Box<command::calibrate::Calibrate>),
     /// Print the events of an AER file as CSV.
     Decode(command::decode::Decode),
     /// Write the events of an AER file as points, or as an event camera's.
@@ -41,6 +43,7 @@ fn main() -> ExitCode {
         Some(Command::Demo(demo)) => demo.run(),
         Some(Command::Simulate(simulate)) => simulate.run(),
         Some(Command::Replay(replay)) => replay.run(),
+        Some(Command::Calibrate(calibrate)) => calibrate.run(),
         Some(Command::Decode(decode)) => decode.run(),
         Some(Command::Export(export)) => export.run(),
         Some(Command::Monitor(monitor)) => monitor.run(),

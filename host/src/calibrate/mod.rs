@@ -8,36 +8,34 @@
 //! Everything found comes with how sure it is. What a recording does not say is asked for by the
 //! name of the option. `docs/calibrate.md` says how each is found.
 
-mod background;
-mod common;
 mod false_alarms;
-mod glass;
-mod limits;
-mod observed;
-mod offset;
-mod peaks;
-mod pile_up;
-mod pixels;
-mod pulse;
+mod find;
+mod remarks;
+pub mod report;
 mod settle;
-mod shape;
+mod spend;
 mod watch;
+mod written;
 
 use anyhow::Result;
 use dtof_core::fixed::types::U8F8;
 
-pub use glass::{Glass, Nearest};
-pub use observed::{Length, Observed};
-pub use offset::Offset;
-pub use pile_up::Tdc;
-pub use pixels::Pixels;
-pub use pulse::Pulse;
-pub use settle::{Detection, L2};
+pub use find::glass::{Glass, Nearest};
+pub use find::observed::{Length, Observed};
+pub use find::offset::Offset;
+pub use find::pile_up::Tdc;
+pub use find::pixels::Pixels;
+pub use find::pulse::Pulse;
+pub use remarks::remarks;
+pub use settle::Detection;
+pub use spend::Spent;
 pub use watch::{Change, RunPhotons, glass_change};
 
-use background::Level;
-use common::Scene;
-use shape::Window;
+use find::background::Level;
+use find::common::Scene;
+use find::shape::Window;
+use find::{glass, offset, peaks, pile_up, pulse};
+use spend::Replay;
 
 /// What the user says beside the recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,6 +84,8 @@ pub struct Calibration {
     pub gate: (u16, u16),
     /// How pixels are to decide, if the pulse is known.
     pub detection: Option<Detection>,
+    /// What events of the recording come to, where true distances are known.
+    pub spent: Option<Spent>,
     /// Photons a laser cycle of each bin, the mean over all good pixels and captures.
     pub mean: Vec<f64>,
     /// Captures and pixels.
@@ -128,31 +128,47 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
     let pulse = pulse::pulse(&windows(&scene, gate.0, found));
     let sigma = pulse.as_ref().map_or(1.0, |pulse| pulse.sigma);
     let sigma = settle::sigma(sigma);
-    let offset = offset_of(&scene, &numbers, truth, gate, sigma, observed, asked);
+    let mut offset = offset_of(&scene, &numbers, truth, gate, sigma, observed, asked);
     let cycles = scene.cycles();
     let (counts, _) = scene.pooled();
-    let detection = pulse.as_ref().map(|pulse| {
-        settle::detection(&settle::Known {
+    let known = |min_count| {
+        pulse.as_ref().map(|pulse| settle::Known {
             bins,
             gate,
             pulse,
             pixels: &pixels,
             is_absolute: observed.length != Length::Unknown,
+            min_count,
             asked,
         })
-    });
+    };
+    let decide = |min_count| known(min_count).map(|known| settle::detection(&known));
+    let mut detection = decide(settle::MIN_COUNT).transpose()?;
+    let mut spent = None;
+    let bin_width_ps = offset
+        .and_then(|offset| offset.bin_width_ps)
+        .unwrap_or(observed.bin_width_ps);
+    if let (Some(of), Some(offset)) = (&detection, &mut offset) {
+        let scale = (gate, bin_width_ps, offset.mm);
+        if let Some(replay) = Replay::new(observed, of, scale, asked.seed)? {
+            spent = replay.best()?;
+        }
+        if let Some(spent) = spent {
+            offset.mm += spent.offset_mm;
+            detection = decide(spent.min_count).transpose()?;
+        }
+    }
     Ok(Calibration {
         length: observed.length,
         bins,
-        bin_width_ps: offset
-            .and_then(|offset| offset.bin_width_ps)
-            .unwrap_or(observed.bin_width_ps),
+        bin_width_ps,
         tdc,
         nearest,
         pulse,
         offset,
         gate,
-        detection: detection.transpose()?,
+        detection,
+        spent,
         mean: counts.iter().map(|count| count / cycles).collect(),
         looked_at: (observed.captures.len(), pixel_count),
         pixels,

@@ -1,23 +1,25 @@
 //! Settings from what was found: gate, window, z, L1 and L2.
 
 use anyhow::{Result, ensure};
-use dtof_core::fixed::types::U8F8;
+use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{BlockLevel, CentredWindow, WindowRule};
 use dtof_theory::tune::{Request, Wanted, window};
 
 use super::Asked;
 use super::false_alarms;
-use super::pixels::Pixels;
-use super::pulse::Pulse;
+use super::find::pixels::Pixels;
+use super::find::pulse::Pulse;
 
 /// Laser cycles of an exposure, if the counters hold the background of so many.
-pub const L2: u16 = 2000;
+const L2: u16 = 2000;
 /// Laser cycles between looks.
 const X: u16 = 4;
 /// L1 where the signal is not known.
 const L1: u16 = 40;
+/// The least z that is written. Where lower ones would do, more light would bring false alarms.
+const LEAST_Z: U4F12 = U4F12::lit("3");
 /// Photons in the window, at least.
-const MIN_COUNT: u16 = 5;
+pub const MIN_COUNT: u16 = 5;
 /// A background of so many leaves counters of 10 bits room for what it varies by.
 const FULL: f64 = 860.0;
 
@@ -29,6 +31,8 @@ pub struct Detection {
     /// Standard deviations of the background, for so many false alarms; `None` where rates are
     /// not known.
     pub z: Option<f64>,
+    /// Whether a lower one would do: the fewest photons alone keep false alarms down.
+    pub is_by_count: bool,
     /// Exposures that were simulated for it.
     pub exposures: u64,
     /// The share of exposures without a target that may end with an event.
@@ -57,6 +61,8 @@ pub struct Known<'a> {
     pub pixels: &'a Pixels,
     /// Whether rates are a laser cycle's.
     pub is_absolute: bool,
+    /// Photons in the window, at least.
+    pub min_count: u16,
     /// What is wanted.
     pub asked: &'a Asked,
 }
@@ -103,9 +109,10 @@ pub fn detection(known: &Known) -> Result<Detection> {
     let mut detection = Detection {
         window: WindowRule::width_for_pulse(sigma),
         z: None,
+        is_by_count: false,
         exposures: 0,
         false_alarm: asked.false_alarm,
-        min_count: MIN_COUNT,
+        min_count: known.min_count,
         l1: L1.min(l2 / 2),
         l2,
         x: X,
@@ -142,7 +149,8 @@ pub fn detection(known: &Known) -> Result<Detection> {
         share: asked.false_alarm,
         seed: asked.seed,
     })?;
-    detection.z = Some(z.to_num());
+    detection.is_by_count = z < LEAST_Z;
+    detection.z = Some(z.max(LEAST_Z).to_num());
     detection.exposures = exposures;
     Ok(detection)
 }

@@ -5,7 +5,7 @@
 //! target in a few pixels has another shape: it lifts some of the bins. So the factor is the
 //! weighted median of those of the bins, and what they differ by is part of the interval.
 
-use super::background::Level;
+use super::find::background::Level;
 
 /// Bins that hold at least this share of the highest one's glass count.
 const SHARE: f64 = 0.02;

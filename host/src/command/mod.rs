@@ -1,5 +1,6 @@
 //! One file a command.
 
+pub mod calibrate;
 pub mod decode;
 pub mod demo;
 mod dynamic_depth;

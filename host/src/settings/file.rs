@@ -34,6 +34,7 @@ const COMMENTS: [(&str, &[(&str, &str)]); 4] = [
                 "glass",
                 "photons a laser cycle and pixel of the cover glass",
             ),
+            ("glass_bins", "the same for each bin before the gate"),
         ],
     ),
     (
@@ -190,6 +191,7 @@ sigma_bins = 0.8
 one_hit_tdc = true
 background = 0.05
 glass = 0.4
+glass_bins = [0.0, 0.1, 0.3]
 [detection]
 rule = 'window'
 window = 3

@@ -45,6 +45,8 @@ pub struct Sensor {
     pub background: Option<f64>,
     /// Photons a laser cycle and pixel that the cover glass sends back, before the gate.
     pub glass: Option<f64>,
+    /// The same for each bin before the gate, from bin 0 on.
+    pub glass_bins: Option<Vec<f64>>,
 }
 
 /// `[rays]`: where pixels look.
@@ -79,7 +81,7 @@ impl Sensor {
     pub fn or(self, other: Self) -> Self {
         first_of!(
             self, other; laser_hz, columns, bins, bin_width_ps, offset_mm, gate, masked,
-            sigma_bins, one_hit_tdc, background, glass
+            sigma_bins, one_hit_tdc, background, glass, glass_bins
         )
     }
 
@@ -108,6 +110,9 @@ impl Sensor {
             if let Some(value) = value {
                 within(key, value, 0.0..=1e6)?;
             }
+        }
+        for &rate in self.glass_bins.iter().flatten() {
+            within("glass_bins", rate, 0.0..=1e6)?;
         }
         Ok(())
     }

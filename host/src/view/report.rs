@@ -68,20 +68,38 @@ pub fn html(
     figures: &[Figure],
     events: &Cloud,
 ) -> String {
+    let hash = BASE64.encode(Sha256::digest(cloud::SCRIPT));
+    let script = format!("script-src 'sha256-{hash}'; ");
+    page(title, lead, (&script, &events.html()), sections, figures)
+}
+
+/// The same page without events, and so without a script.
+#[must_use]
+pub fn still(title: &str, lead: &str, sections: &[Section], figures: &[Figure]) -> String {
+    page(title, lead, ("", ""), sections, figures)
+}
+
+/// `interactive` is the policy of its script, and what the script fills.
+fn page(
+    title: &str,
+    lead: &str,
+    (script, interactive): (&str, &str),
+    sections: &[Section],
+    figures: &[Figure],
+) -> String {
     let title = text(title);
     let lead = text(lead);
-    let hash = BASE64.encode(Sha256::digest(cloud::SCRIPT));
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{MARK}\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n\
          <meta http-equiv=\"Content-Security-Policy\" \
-         content=\"default-src 'none'; script-src 'sha256-{hash}'; \
+         content=\"default-src 'none'; {script}\
          style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'\">\n\
          <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n\
          <body>\n<main>\n<header>\n<h1>{title}</h1>\n<p>{lead}</p>\n</header>\n"
     );
-    page += &events.html();
+    page += interactive;
     page += "<div class=\"cards\">\n";
     for figure in figures {
         let svg = element(figure.svg);

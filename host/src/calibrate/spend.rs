@@ -1,0 +1,158 @@
+//! How many photons an event is worth, where true distances are known.
+//!
+//! The recording is replayed. More photons an event make its distance better and come later. As
+//! many are spent as the paper's rule takes with its own minimum, 5 in the highest bin. What
+//! events are off by in the median is taken off the range offset: the place of a few photons of
+//! a pulse that is not symmetric differs from that of many.
+
+use anyhow::{Context, Result};
+use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::{AnyRule, Count, PaperRule, PixelAddress, WindowRule};
+
+use super::find::limits::median;
+use super::{Detection, Length, Observed};
+use crate::engine::host::host_engine;
+use crate::engine::settings::Settings;
+use crate::input::recorded::{RecordedHistograms, RecordingLength};
+use crate::input::source::{Geometry, PhotonSource, Slice};
+use crate::settings::SettingsFile;
+
+/// Laser cycles that are replayed, and photons, at most.
+const CYCLES: u16 = 10_000;
+const PHOTONS: f64 = 2e7;
+/// Fewer events say nothing.
+const LEAST: usize = 200;
+/// The highest minimum that is tried.
+const MOST: u16 = 200;
+
+/// What events come to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spent {
+    /// Photons in the window, at least.
+    pub min_count: u16,
+    /// Photons that an event takes, of all bins.
+    pub photons: f64,
+    /// Median of what single events are off by, in millimetres.
+    pub error_mm: f64,
+    /// To be added to the range offset, in millimetres.
+    pub offset_mm: f64,
+    /// Events it was found from.
+    pub events: usize,
+}
+
+/// Replays the pixels with a true distance.
+pub struct Replay<'a> {
+    settings: Settings,
+    slice: Slice,
+    truth: Vec<f64>,
+    detection: &'a Detection,
+}
+
+impl<'a> Replay<'a> {
+    /// With the settings that were found so far; `None` if nothing can be said.
+    ///
+    /// # Errors
+    /// If the recording cannot be replayed.
+    pub fn new(
+        observed: &Observed,
+        detection: &'a Detection,
+        (gate, bin_width_ps, offset_mm): ((u16, u16), f64, f64),
+        seed: u64,
+    ) -> Result<Option<Self>> {
+        let Some(truth) = observed.truth_mm else {
+            return Ok(None);
+        };
+        let length = match observed.length {
+            Length::Cycles(cycles) => RecordingLength::Cycles(cycles),
+            Length::PhotonsPerCycle(rate) => RecordingLength::PhotonsPerCycle(rate),
+            Length::Unknown => return Ok(None),
+        };
+        let captures = u32::try_from(observed.captures.len())?;
+        let array = observed.geometry;
+        let whole = Geometry::new(array.columns, array.rows * captures);
+        let all = u64::from(CYCLES);
+        let mut photons = RecordedHistograms::new(whole, observed.captures, length, all, seed)?;
+        let most = (PHOTONS / photons.photons_per_cycle().max(1e-9)).clamp(1.0, CYCLES.into());
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let slice = photons.next_slice(most as u16)?;
+        let known = slice.pixels.into_iter().zip(truth);
+        let known = known.filter_map(|(pixel, truth)| Some((pixel, (*truth)?)));
+        let (pixels, truth): (Vec<_>, Vec<f64>) = known.unzip();
+        let settings = Settings {
+            gate: Some(gate),
+            bin_width_ps: U16F16::checked_from_num(bin_width_ps).context("the bin width")?,
+            offset_mm: I24F8::checked_from_num(offset_mm).context("the offset")?,
+            sigma_bins: Some(U8F8::from_num(detection.sigma_bins)),
+            l1: detection.l1,
+            l2: detection.l2,
+            x: detection.x,
+            ..SettingsFile::default().settings(observed.bins())?
+        };
+        let slice = Slice {
+            first_cycle: 0,
+            pixels,
+        };
+        Ok((truth.len() > 1).then_some(Self {
+            settings,
+            slice,
+            truth,
+            detection,
+        }))
+    }
+
+    /// The best minimum; `None` if there are too few events.
+    ///
+    /// # Errors
+    /// If the settings cannot be.
+    pub fn best(&self) -> Result<Option<Spent>> {
+        let least = self.detection.min_count;
+        let count = |minimum: u16| Count::saturating(minimum.into());
+        let papers = PaperRule::new(const { U8F8::lit("4") }, count(least));
+        let Some(papers) = self.replay(papers.into(), least)? else {
+            return Ok(None);
+        };
+        let mut best = None;
+        for minimum in least..=MOST {
+            let z = self.detection.z.unwrap_or(0.0);
+            let z = dtof_core::fixed::types::U4F12::saturating_from_num(z);
+            let rule = WindowRule::new(self.detection.window, z, count(minimum))?;
+            let found = self.replay(rule.into(), minimum)?;
+            if found.is_none_or(|found| best.is_some() && found.photons > papers.photons) {
+                break;
+            }
+            best = found;
+        }
+        Ok(best)
+    }
+
+    fn replay(&self, rule: AnyRule, min_count: u16) -> Result<Option<Spent>> {
+        let settings = Settings {
+            rule,
+            ..self.settings.clone()
+        };
+        let pixels = u16::try_from(self.truth.len())?;
+        let array = Geometry::new(pixels.into(), 1);
+        let addresses: Vec<PixelAddress> = (0..pixels).map(PixelAddress).collect();
+        let mut engine = host_engine(&settings, array, &addresses)?;
+        let events = engine.run(&self.slice)?;
+        if events.len() < LEAST {
+            return Ok(None);
+        }
+        let scale = settings.range_scale()?;
+        let errors = || {
+            events.iter().map(|event| {
+                let range: f64 = scale.range(event.position()).to_num();
+                range - self.truth[usize::from(event.pixel.0)]
+            })
+        };
+        let off = median(errors());
+        let [statistics, _] = engine.statistics();
+        Ok(Some(Spent {
+            min_count,
+            photons: statistics.photons() as f64 / events.len() as f64,
+            error_mm: median(errors().map(|error| (error - off).abs())),
+            offset_mm: -off,
+            events: events.len(),
+        }))
+    }
+}
