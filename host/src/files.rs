@@ -133,20 +133,34 @@ pub(crate) fn flushed(file: BufWriter<NamedTempFile>) -> Result<NamedTempFile> {
     Ok(file)
 }
 
-/// Writes `text` as the file `out`, which is whole or not there. A file of an earlier run, with
-/// `mark` near its start, is replaced, but none of `inputs`.
+/// A text that is to be the file `place`. One of an earlier run, with `mark` near its start, is
+/// replaced.
+pub struct Marked<'a> {
+    /// Where.
+    pub place: &'a Path,
+    /// What.
+    pub text: &'a str,
+    /// By what files of this kind are known.
+    pub mark: &'a str,
+}
+
+/// Writes `files`, all or none, in this order. None of `inputs` is replaced.
 ///
 /// # Errors
-/// If something else is there, or it cannot be written.
-pub fn write_marked(out: &Path, text: &str, mark: &str, inputs: &[&Path]) -> Result<()> {
-    may_replace(out, mark, inputs)?;
-    let place = place_of(out, inputs)?;
-    let mut file = BufWriter::new(aside(&place.folder, ".dtof-")?);
-    let name = || out.display().to_string();
-    file.write_all(text.as_bytes()).with_context(name)?;
-    flushed(file)
-        .with_context(name)?
-        .persist(&place.file)
-        .with_context(name)?;
+/// If something else is in one of the places, or cannot be written.
+pub fn write_marked(files: &[Marked], inputs: &[&Path]) -> Result<()> {
+    let mut written = Vec::new();
+    for Marked { place, text, mark } in files {
+        may_replace(place, mark, inputs)?;
+        let name = || place.display().to_string();
+        let to = place_of(place, inputs)?;
+        let mut file = BufWriter::new(aside(&to.folder, ".dtof-")?);
+        file.write_all(text.as_bytes()).with_context(name)?;
+        written.push((flushed(file).with_context(name)?, to.file));
+    }
+    for (file, place) in written {
+        let name = || place.display().to_string();
+        file.persist(&place).with_context(name)?;
+    }
     Ok(())
 }

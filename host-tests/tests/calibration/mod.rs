@@ -1,16 +1,17 @@
 //! Scenes drawn at random for calibration, and the false alarms of what comes out.
 
 #![allow(
+    dead_code,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "numbers drawn from small ranges"
+    reason = "not every test needs all of it; numbers are drawn from small ranges"
 )]
 
 use std::fmt::Write as _;
 
 use dtof::calibrate::Calibration;
 use dtof::input::recorded::Capture;
-use dtof::input::source::PhotonSource;
+use dtof::input::source::{PhotonSource, Slice};
 use dtof::simulate::scene::Scene;
 use dtof_core::fixed::types::U4F12;
 use dtof_core::{Count, DepthEstimator, Histogram, RangeGate, WindowRule, detect};
@@ -133,20 +134,7 @@ impl Drawn {
 
     /// The histograms of all pixels.
     pub fn capture(&self, seed: u64) -> Capture {
-        let mut photons = self.scene.photons(seed, self.cycles).unwrap();
-        let bins = usize::from(self.scene.bins);
-        let mut capture = vec![vec![0; bins]; self.scene.geometry.addresses()];
-        let mut left = self.cycles;
-        while left > 0 {
-            let next = left.min(1000);
-            let slice = photons.next_slice(next as u16).unwrap();
-            for (counts, pixel) in capture.iter_mut().zip(&slice.pixels) {
-                for photon in &pixel.photons {
-                    counts[usize::from(photon.code)] += 1;
-                }
-            }
-            left -= next;
-        }
+        let mut capture = recorded(&self.scene, self.cycles, seed);
         for &pixel in &self.dead {
             capture[pixel].fill(0);
         }
@@ -170,6 +158,31 @@ impl Drawn {
             .find(matters)
             .map_or(0, |bin| bin + 1)
     }
+}
+
+/// Calls `each` with all photons of a source, part by part.
+pub fn slices(mut photons: impl PhotonSource, cycles: u64, mut each: impl FnMut(&Slice)) {
+    let mut left = cycles;
+    while left > 0 {
+        let next = left.min(1000);
+        each(&photons.next_slice(next as u16).unwrap());
+        left -= next;
+    }
+}
+
+/// The histograms of all pixels of a scene.
+pub fn recorded(scene: &Scene, cycles: u64, seed: u64) -> Capture {
+    let bins = usize::from(scene.bins);
+    let mut capture = vec![vec![0; bins]; scene.geometry.addresses()];
+    let photons = scene.photons(seed, cycles).unwrap();
+    slices(photons, cycles, |slice| {
+        for (counts, pixel) in capture.iter_mut().zip(&slice.pixels) {
+            for photon in &pixel.photons {
+                counts[usize::from(photon.code)] += 1;
+            }
+        }
+    });
+    capture
 }
 
 /// The share of exposures to `background` alone that end with an event with the settings found.

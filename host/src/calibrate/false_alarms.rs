@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 /// Photons that are drawn, about, and exposures.
 const PHOTONS: f64 = 1.5e9;
-const EXPOSURES: (f64, f64) = (6_000.0, 40_000.0);
+const EXPOSURES: (f64, f64) = (6_000.0, 20_000.0);
 /// So many exposures with an event say where the threshold is.
 const ENOUGH: usize = 200;
 /// Parts that threads share.

@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use dtof::calibrate::report::{self, MARKS};
 use dtof::calibrate::{Asked, Length, Observed, calibrate, remarks};
 use dtof::cli::arguments::{bins, fixed, path, positive, real, whole};
-use dtof::files::write_marked;
+use dtof::files::{Marked, write_marked};
 use dtof::input::open::{Counts, counts};
 use dtof::input::recorded::RecordingLength;
 use dtof::input::source::Geometry;
@@ -108,8 +108,13 @@ impl Calibrate {
         let mut inputs: Vec<&Path> = vec![&self.input];
         inputs.extend(self.settings.as_deref());
         // The settings last: where they are, the report is.
-        write_marked(&place, &page, MARKS[1], &inputs)?;
-        write_marked(&self.out, &settings.to_toml()?, MARKS[0], &inputs)?;
+        let text = settings.to_toml()?;
+        let of = |place, text, mark| Marked { place, text, mark };
+        let files = [
+            of(place.as_path(), page.as_str(), MARKS[1]),
+            of(&self.out, &text, MARKS[0]),
+        ];
+        write_marked(&files, &inputs)?;
         if !self.quiet {
             let mut out = io::stdout().lock();
             write!(out, "{}", aligned(&report::rows(&found)))?;
