@@ -1,19 +1,24 @@
 //! What a recording leaves open, and which option answers it.
 
 use super::{Calibration, Length, Nearest, Tdc};
+use crate::rows::Row;
 
-/// What a reader of the settings has to know, a sentence or two each.
+/// What a reader of the settings has to know: a topic, and a sentence or two on it.
 #[must_use]
-pub fn remarks(found: &Calibration) -> Vec<String> {
+pub fn remarks(found: &Calibration) -> Vec<Row> {
     let mut remarks = Vec::new();
-    let mut say = |text: String| remarks.push(text);
+    let mut say = |topic: &str, text: String| remarks.push((topic.to_owned(), text));
     match found.length {
         Length::Cycles(_) => {}
-        Length::PhotonsPerCycle(rate) => say(format!(
-            "Rates rest on --photons-per-cycle {rate}: an assumption. --recorded-cycles N makes them \
+        Length::PhotonsPerCycle(rate) => say(
+            "rates",
+            format!(
+                "Rates rest on --photons-per-cycle {rate}: an assumption. --recorded-cycles N makes them \
              absolute and tells whether there is pile-up."
-        )),
+            ),
+        ),
         Length::Unknown => say(
+            "rates",
             "How long the recording lasted is not known, so background, glass and z are not \
              written: say --recorded-cycles N. The gate is that for one photon a laser cycle in \
              the brightest pixel, as replay takes it."
@@ -21,35 +26,49 @@ pub fn remarks(found: &Calibration) -> Vec<String> {
         ),
     }
     match &found.nearest {
-        Nearest::WallOrGlass(bin) => say(format!(
-            "All pixels see a surface at bin {bin} and nothing behind it. It is taken as a wall. \
+        Nearest::WallOrGlass(bin) => say(
+            "cover glass",
+            format!(
+                "All pixels see a surface at bin {bin} and nothing behind it. It is taken as a wall. \
              --glass yes takes it as a cover glass, --glass no confirms the wall."
-        )),
-        Nearest::Glass(glass) if glass.end == 0 => say(format!(
-            "There is a cover glass at bin {}, so dim that it needs no gate.",
-            glass.top
-        )),
+            ),
+        ),
+        Nearest::Glass(glass) if glass.end == 0 => say(
+            "cover glass",
+            format!(
+                "There is a cover glass at bin {}, so dim that it needs no gate.",
+                glass.top
+            ),
+        ),
         Nearest::Glass(glass) if glass.has_tail => {
             let (low, high) = glass.end_between;
-            say(format!(
-                "The cover glass has a tail: where it ends, bin {low} to {high}, comes from the \
+            say(
+                "cover glass",
+                format!(
+                    "The cover glass has a tail: where it ends, bin {low} to {high}, comes from the \
                  photons, not from the shape of the pulse."
-            ));
+                ),
+            );
         }
         _ => {}
     }
     match &found.pulse {
         None => say(
+            "pulse",
             "No peak is bright enough to measure the pulse: record a target, or say --sigma-bins \
              when you replay."
                 .to_owned(),
         ),
-        Some(pulse) if pulse.is_core => say(format!(
-            "The pulse is no Gaussian: {:.1} % of its photons come more than three standard \
+        Some(pulse) if pulse.is_core => say(
+            "pulse",
+            format!(
+                "The pulse is no Gaussian: {:.1} % of its photons come more than three standard \
              deviations late. The standard deviation is that of its core.",
-            pulse.tail * 100.0
-        )),
+                pulse.tail * 100.0
+            ),
+        ),
         Some(pulse) if pulse.sigma > 1.75 => say(
+            "pulse",
             "The pulse is wider than the widest window, which suits 1.75 bins: that is written. \
              Wider bins suit it better."
                 .to_owned(),
@@ -57,30 +76,48 @@ pub fn remarks(found: &Calibration) -> Vec<String> {
         Some(_) => {}
     }
     match found.tdc {
-        Some(Tdc::OneHit(lost)) => say(format!(
-            "The background falls as it does with a TDC that takes one photon a laser cycle: \
-             {:.1} % of the photons are lost. Rates are corrected for that.",
-            lost * 100.0
-        )),
-        Some(Tdc::Unclear(lost)) if lost > 0.01 => say(format!(
-            "If the TDC takes one photon a laser cycle, {:.1} % of the photons are lost. The \
+        Some(Tdc::OneHit(lost)) => {
+            let even = if lost > 0.1 {
+                " Rules take the background as even: near bins, which have more of it, bring false \
+                 alarms. Less light helps, or a gate."
+            } else {
+                ""
+            };
+            say(
+                "pile-up",
+                format!(
+                    "The background falls as it does with a TDC that takes one photon a laser \
+                     cycle: {:.1} % of the photons are lost. Rates are corrected for that.{even}",
+                    lost * 100.0
+                ),
+            );
+        }
+        Some(Tdc::Unclear(lost)) if lost > 0.01 => say(
+            "pile-up",
+            format!(
+                "If the TDC takes one photon a laser cycle, {:.1} % of the photons are lost. The \
              background does not tell.",
-            lost * 100.0
-        )),
+                lost * 100.0
+            ),
+        ),
         _ => {}
     }
     if found
         .detection
         .is_some_and(|detection| detection.is_by_count)
     {
-        say(format!(
-            "There is so little background that the fewest photons of an event keep false alarms \
+        say(
+            "z",
+            format!(
+                "There is so little background that the fewest photons of an event keep false alarms \
              below {} %: z is the least that is written.",
-            found.detection.map_or(0.0, |of| of.false_alarm) * 100.0
-        ));
+                found.detection.map_or(0.0, |of| of.false_alarm) * 100.0
+            ),
+        );
     }
     if found.offset.is_none() {
         say(
+            "offset",
             "The range offset is not known: put a flat target at a known distance and say \
              --target-mm D."
                 .to_owned(),

@@ -49,6 +49,11 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
         "pulse",
         match &found.pulse {
             None => "no peak is bright enough".to_owned(),
+            Some(pulse) if pulse.is_core => format!(
+                "σ = {} bins, of its core, from {} peaks",
+                short(pulse.sigma),
+                pulse.peaks
+            ),
             Some(pulse) => format!(
                 "σ = {} {} bins, from {} peaks",
                 short(pulse.sigma),
@@ -76,8 +81,10 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
         "gate",
         gate.map_or("not needed".to_owned(), |glass| {
             let (first, last) = found.gate;
-            let (low, high) = glass.end_between;
-            format!("{first}..{last} (begins at {low} to {high})")
+            match glass.end_between {
+                (low, high) if low < high => format!("{first}..{last} (begins at {low} to {high})"),
+                _ => format!("{first}..{last}"),
+            }
         }),
     );
     row(
@@ -173,10 +180,6 @@ pub fn page(
     let svg = histogram(found)?;
     let rows = rows(found);
     let remarks = remarks(found);
-    let remarks: Vec<Row> = (1..)
-        .zip(remarks)
-        .map(|(number, text)| (number.to_string(), text))
-        .collect();
     let file: Vec<Row> = settings
         .to_toml()?
         .lines()
@@ -285,16 +288,16 @@ fn finding(found: &Calibration) -> String {
     let signal = found.pulse.as_ref().map(|pulse| pulse.signal);
     match (&found.nearest, signal) {
         (Nearest::Glass(glass), Some(signal)) if glass.end > 0 => format!(
-            "A cover glass {} times as bright as the median target ends at bin {}",
-            short(glass.photons / signal.max(1e-12)),
-            glass.end
+            "The cover glass ends at bin {}, {} times as bright as targets",
+            glass.end,
+            short(glass.photons / signal.max(1e-12))
         ),
         (Nearest::Glass(_), _) => "The cover glass is so dim that no gate is needed".to_owned(),
         (Nearest::WallOrGlass(bin), _) => {
             format!("All pixels see one surface at bin {bin}: a wall or a cover glass")
         }
         (_, Some(signal)) if found.pixels.background > 0.0 => format!(
-            "No cover glass; the median target is {} times the background of a bin",
+            "No cover glass; targets have {} times the photons of a background bin",
             short(signal / found.pixels.background)
         ),
         _ => "No cover glass".to_owned(),

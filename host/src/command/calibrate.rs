@@ -121,8 +121,8 @@ impl Calibrate {
             if !changes.is_empty() {
                 write!(out, "\nSince the older settings:\n{}", aligned(&changes))?;
             }
-            for remark in remarks(&found) {
-                write!(out, "\n{remark}\n")?;
+            for (topic, remark) in remarks(&found) {
+                write!(out, "\n{topic}: {remark}\n")?;
             }
             writeln!(out, "\nOpen {} in a browser.", place.display())?;
             out.flush()?;

@@ -91,8 +91,8 @@ mod tests {
     #[test]
     fn peaks_and_their_tails_are_no_background() {
         let mut counts = vec![20.0; 128];
-        for bin in 40..80 {
-            counts[bin] += 9000.0 * (-(bin as f64 - 40.0) / 4.0).exp();
+        for (bin, count) in counts.iter_mut().enumerate().take(80).skip(40) {
+            *count += 9000.0 * (-(bin as f64 - 40.0) / 4.0).exp();
         }
         let level = Level::of(&counts);
         // What is left of the tail where it no longer shows.
