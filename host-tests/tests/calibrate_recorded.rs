@@ -64,6 +64,41 @@ fn judged(
     (near, each, median(&mut absolute).unwrap())
 }
 
+/// The median error of an ideal estimate of a pulse from 13 photons: the Cramér-Rao bound for the
+/// pulse that the centre zone shows, whose slope is the difference of the captures before and
+/// after. Of all captures the median, in millimetres.
+fn ideal_error(captures: &[Capture], truth: &[f64], mm_per_bin: f64) -> f64 {
+    let pulses: Vec<Vec<f64>> = captures
+        .iter()
+        .map(|zones| {
+            let mut sorted = zones[CENTRE].clone();
+            sorted.sort_unstable();
+            let above = zones[CENTRE]
+                .iter()
+                .map(|count| count.saturating_sub(sorted[50]));
+            let above: Vec<f64> = above.map(|count| count as f64).collect();
+            let all: f64 = above.iter().sum();
+            above.iter().map(|count| count / all).collect()
+        })
+        .collect();
+    let mut information: Vec<f64> = (30..pulses.len() - 1)
+        .map(|at| {
+            let bins = (truth[at + 1] - truth[at - 1]) / mm_per_bin;
+            let shares = pulses[at].iter().enumerate();
+            let each = shares
+                .filter(|(_, share)| **share > 1e-4)
+                .map(|(bin, share)| {
+                    let slope = (pulses[at + 1][bin] - pulses[at - 1][bin]) / bins;
+                    slope * slope / share
+                });
+            each.sum()
+        })
+        .collect();
+    information.sort_by(f64::total_cmp);
+    // Half of the normal errors are below 0.6745 standard deviations.
+    0.6745 * mm_per_bin / (13.0 * information[information.len() / 2]).sqrt()
+}
+
 #[test]
 fn a_recording_with_distances_calibrates_itself() {
     let Some(log) = log() else { return };
@@ -72,7 +107,7 @@ fn a_recording_with_distances_calibrates_itself() {
         geometry: Geometry::new(9, 1),
         captures: &counts.captures,
         length: Length::PhotonsPerCycle(PHOTONS_PER_CYCLE),
-        bin_width_ps: counts.format.bin_width_ps.unwrap().to_num(),
+        bin_width_ps: counts.known.bin_width_ps.to_num(),
         truth_mm: counts.truth_mm.as_deref(),
     };
     let found = calibrate(&observed, &Asked::default()).unwrap();
@@ -96,4 +131,10 @@ fn a_recording_with_distances_calibrates_itself() {
     assert_eq!(distances, 149);
     assert!(photons <= 13.1, "{photons}");
     assert!(error <= 3.4, "{error}");
+    let mm_per_bin = found.bin_width_ps * dtof::simulate::MM_PER_PS;
+    let ideal = ideal_error(&counts.captures, &truth, mm_per_bin);
+    tell(&format!(
+        "an ideal estimator: {ideal:.2} mm from 13 photons"
+    ));
+    assert!((2.6..=2.8).contains(&ideal), "{ideal}");
 }

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use capture_log::{ground_truth, log, tell};
 use dtof::engine::host::host_engine;
 use dtof::engine::settings::Settings;
+use dtof::input::open::{Opening, counts};
 use dtof::input::recorded::{RecordedHistograms, RecordingLength};
 use dtof::input::source::PhotonSource;
 use dtof::input::tmf8820;
@@ -39,7 +40,7 @@ fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES
         ..scene::settings(1)
     };
     let truth = ground_truth(log);
-    let recorded = tmf8820::read(log).unwrap();
+    let recorded = counts(log, &Opening::default()).unwrap();
     let length = RecordingLength::PhotonsPerCycle(photons_per_cycle);
     let mut photons =
         RecordedHistograms::new(recorded.geometry, &recorded.captures, length, 10_000, 1).unwrap();

@@ -9,13 +9,15 @@ use std::path::{Path, PathBuf};
 use capture_log::{ground_truth, log, tell};
 use dtof::engine::host::host_engine;
 use dtof::engine::settings::Settings;
+use dtof::input::open::{Known, Opening, counts};
 use dtof::input::recorded::{RecordedHistograms, RecordingLength};
 use dtof::input::source::{Geometry, PhotonSource};
 use dtof::input::tmf8820;
 use dtof::simulate::scene;
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
-    Count, Count16, EchoNumber, Flags, Histogram, PixelConfig, RangeGate, WindowRule, z_for,
+    Count, Count16, EchoNumber, Flags, Histogram, LaserCycle, PixelAddress, PixelConfig, RangeGate,
+    RangeScale, WindowRule, z_for,
 };
 use flate2::read::GzDecoder;
 
@@ -60,7 +62,7 @@ fn near_captures(log: &PathBuf, sigma: &str) -> Vec<(f64, Found)> {
         ..scene::settings(1)
     };
     let truth = ground_truth(log);
-    let recorded = tmf8820::read(log).unwrap();
+    let recorded = counts(log, &Opening::default()).unwrap();
     let length = RecordingLength::PhotonsPerCycle(4.0);
     let scale = settings.range_scale().unwrap();
     let captures = truth.into_iter().zip(&recorded.captures);
@@ -131,9 +133,12 @@ fn behind_the_first_echo_of_near_captures_there_is_its_tail_and_no_target() {
     );
 }
 
+/// A histogram, and the distance that the sensor made of it.
+type Measured = ([u16; 64], f64);
+
 /// The log of a TMF8829, `../shared/data/tmf8829_log` beside the workspace: histograms of one
 /// column of 16 pixels in 26 frames, and the distances the sensor made of them.
-fn tmf8829() -> Option<Vec<([u16; 64], f64)>> {
+fn tmf8829() -> Option<(Known, Vec<Measured>)> {
     let path = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../../shared/data/tmf8829_log/tmf8829_log.json.gz"
@@ -142,31 +147,37 @@ fn tmf8829() -> Option<Vec<([u16; 64], f64)>> {
         tell("SKIPPED: recorded echoes: no TMF8829 log beside the workspace");
         return None;
     }
+    let recorded = counts(Path::new(path), &Opening::default()).unwrap();
+    // All columns of a row of histograms are the same. They are those of the first row of
+    // results.
+    assert_eq!(recorded.geometry, Geometry::new(1, 26 * 16));
+    assert_eq!(recorded.known.gate, Some((0, 53)));
     let log: serde_json::Value =
         serde_json::from_reader(GzDecoder::new(File::open(path).unwrap())).unwrap();
+    let frames = log["Result_Set"].as_array().unwrap();
     let mut all = Vec::new();
-    for frame in log["Result_Set"].as_array().unwrap() {
-        for pixel in 0..16 {
-            // All columns of a row of histograms are the same. They are those of the first row of
-            // results.
-            let bins = &frame["mp_histo"][pixel][0]["bin"];
-            let bins =
-                std::array::from_fn(|bin| u16::try_from(bins[bin].as_u64().unwrap()).unwrap());
+    for (frame, capture) in frames.iter().zip(&recorded.captures) {
+        for (pixel, bins) in capture.iter().enumerate() {
+            let bins = std::array::from_fn(|bin| u16::try_from(bins[bin]).unwrap());
             let peaks = &frame["results"][0][pixel]["peaks"];
             all.push((bins, peaks[0]["distance"].as_f64().unwrap()));
         }
     }
-    Some(all)
+    Some((recorded.known, all))
 }
 
 /// Without a gate. In two histograms something before the target is brighter: with one echo
 /// these have no event at the sensor's distance.
 #[test]
 fn the_distances_of_a_newer_sensor_are_among_the_echoes() {
-    let Some(log) = tmf8829() else { return };
+    let Some((known, log)) = tmf8829() else {
+        return;
+    };
+    let scale = RangeScale::new(known.bin_width_ps, known.offset_mm.unwrap()).unwrap();
+    let mut errors = Vec::new();
     let mut found = [[0; 3]; 2];
     for (bins, distance) in &log {
-        // The last ten bins are always empty.
+        // The sensor measured 54 bins and a half.
         let gate = RangeGate::<64>::new(0, 53).unwrap();
         let z = z_for(100, &gate, 4, 40, 2000);
         let rule = WindowRule::new(3, z, Count::saturating(5)).unwrap();
@@ -177,10 +188,12 @@ fn the_distances_of_a_newer_sensor_are_among_the_echoes() {
             histogram.add_frame(bins, &gate);
             let mut right = 0;
             config.detect_echoes(&mut histogram, |echo, detection| {
-                // The line through the highest peaks: some 122 mm a bin.
-                let range = 122.0 * (f64::from(detection.peak.bin.raw()) + 0.5) - 440.0;
-                if right == 0 && (range - distance).abs() < 150.0 {
+                let event = detection.event(PixelAddress(0), LaserCycle(0), 1);
+                let range = scale.range(event.position()).to_num::<f64>();
+                let error = (range - distance).abs();
+                if right == 0 && error < 150.0 {
                     right = usize::from(echo.raw());
+                    errors.push(error);
                 }
             });
             found[right] += 1;
@@ -192,4 +205,10 @@ fn the_distances_of_a_newer_sensor_are_among_the_echoes() {
         found[0], found[1]
     ));
     assert_eq!(found, [[2, 414, 0], [0, 414, 2]]);
+    // The bin width and the offset of such logs are a fit to these distances.
+    let (all, median) = (errors.len(), median(&mut errors));
+    tell(&format!(
+        "recorded echoes, TMF8829: {all} ranges, median error {median:.1} mm"
+    ));
+    assert!(median < 6.0, "{median} mm");
 }

@@ -11,6 +11,7 @@
 
 pub mod calibrate;
 pub mod cli;
+pub mod compare;
 pub mod device;
 pub mod engine;
 pub mod events;

@@ -27,6 +27,8 @@ enum Command {
     Replay(Box<command::replay::Replay>),
     /// Find the settings of a sensor from a recording.
     Calibrate(Box<command::calibrate::Calibrate>),
+    /// Try all methods on a recording or a scene, and say which one to take.
+    Compare(Box<command::compare::Compare>),
     /// Print the events of an AER file as CSV.
     Decode(command::decode::Decode),
     /// Write the events of an AER file as points, or as an event camera's.
@@ -44,6 +46,7 @@ fn main() -> ExitCode {
         Some(Command::Simulate(simulate)) => simulate.run(),
         Some(Command::Replay(replay)) => replay.run(),
         Some(Command::Calibrate(calibrate)) => calibrate.run(),
+        Some(Command::Compare(compare)) => compare.run(),
         Some(Command::Decode(decode)) => decode.run(),
         Some(Command::Export(export)) => export.run(),
         Some(Command::Monitor(monitor)) => monitor.run(),

@@ -42,3 +42,31 @@ impl Progress {
         self.bar.finish_and_clear();
     }
 }
+
+/// What a long job does, step by step.
+pub struct Steps {
+    bar: ProgressBar,
+}
+
+impl Steps {
+    /// Shows on a terminal, unless `quiet`.
+    #[must_use]
+    pub fn new(quiet: bool) -> Self {
+        let bar = ProgressBar::new_spinner();
+        if quiet {
+            bar.set_draw_target(ProgressDrawTarget::hidden());
+        }
+        Self { bar }
+    }
+
+    /// The next step.
+    pub fn at(&self, step: &str) {
+        self.bar.set_message(step.to_owned());
+        self.bar.tick();
+    }
+
+    /// Takes the line away.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -9,6 +9,7 @@ mod capture_log;
 use std::fmt::Write as _;
 
 use capture_log::{ground_truth, log, tell};
+use dtof::input::open::{Opening, counts};
 use dtof::input::recorded::{RecordedHistograms, RecordingLength};
 use dtof::input::source::{PhotonSource, Slice};
 use dtof::input::tmf8820::{self, BINS};
@@ -201,7 +202,7 @@ fn window_rules_need_fewer_photons_than_the_papers() {
         return;
     };
     let truth = ground_truth(&log);
-    let recorded = tmf8820::read(&log).unwrap();
+    let recorded = counts(&log, &Opening::default()).unwrap();
     let mut photons = RecordedHistograms::new(
         recorded.geometry,
         &recorded.captures,

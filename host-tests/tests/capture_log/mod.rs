@@ -2,6 +2,8 @@
 //! `../shared/data/tmf8820_plane_gt/distance_data.json` beside the workspace or where
 //! `TMF8820_LOG` says.
 
+#![allow(dead_code, reason = "not every test needs all of it")]
+
 use std::io::Write;
 use std::path::PathBuf;
 

@@ -61,8 +61,9 @@ pub fn z(asked: &Asked) -> Result<(U4F12, u64)> {
     let wanted = asked.share * all;
     ensure!(
         wanted >= 10.0,
-        "--false-alarm {}: simulation takes 10 of {all} exposures; give --z for so few",
-        asked.share
+        "--false-alarm {}: {all} simulated exposures do not show so few; ask for {} or more",
+        asked.share,
+        10.0 / all
     );
     // From the highest on; the square of z.
     let square = |rank: usize| highest[rank].to_num::<f64>().powi(2);

@@ -33,6 +33,8 @@ pub use watch::{Change, RunPhotons, glass_change};
 
 use find::background::Level;
 use find::common::Scene;
+use find::limits::{is_less, median};
+use find::observed::Trace;
 use find::shape::Window;
 use find::{glass, offset, peaks, pile_up, pulse};
 use spend::Replay;
@@ -99,6 +101,7 @@ pub struct Calibration {
 pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
     let mut traces = observed.traces()?;
     let pixel_count = observed.geometry.addresses();
+    let last = leave_out_unmeasured(&mut traces);
     let tdc = observed.length.is_known().then(|| pile_up::tdc(&traces));
     if let Some(Tdc::OneHit(_)) = tdc {
         for trace in &mut traces {
@@ -124,7 +127,7 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
         _ => None,
     };
     let bins = observed.bins();
-    let gate = settle::gate(bins, found.map_or(0, |glass| glass.end))?;
+    let gate = settle::gate(last, found.map_or(0, |glass| glass.end))?;
     let pulse = pulse::pulse(&windows(&scene, gate.0, found));
     let sigma = pulse.as_ref().map_or(1.0, |pulse| pulse.sigma);
     let sigma = settle::sigma(sigma);
@@ -175,6 +178,30 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
     })
 }
 
+/// The last bin before those that were not measured is left out if it has less than this share of
+/// the photons of the others.
+const PARTLY: f64 = 0.8;
+
+/// Bins at the end that hold no photon where others surely have some were not measured: they are
+/// cut off. Gives the last one that is left.
+fn leave_out_unmeasured(traces: &mut [Trace]) -> usize {
+    let bins = traces.first().map_or(0, |trace| trace.counts.len());
+    let sum = |bin: usize| traces.iter().map(|trace| trace.counts[bin]).sum::<f64>();
+    let sums: Vec<f64> = (0..bins).map(sum).collect();
+    let end = sums.iter().rposition(|&sum| sum > 0.0);
+    let end = end.map_or(bins, |last| last + 1);
+    let usual = median(sums[..end].iter().copied());
+    if !is_less(0.0, usual, 1e6) {
+        return bins.saturating_sub(1);
+    }
+    let is_cut = end < bins && is_less(sums[end - 1], PARTLY * usual, 1e6);
+    let end = end - usize::from(is_cut);
+    for trace in traces {
+        trace.counts.truncate(end);
+    }
+    end - 1
+}
+
 /// One window for each histogram: its strongest peak behind the gate's first bin. Without any the
 /// glass has to do, which is a pulse of the same laser.
 fn windows(scene: &Scene, first: u16, glass: Option<&Glass>) -> Vec<Window> {
@@ -221,7 +248,7 @@ fn offset_of(
     };
     let placed = (0..numbers.len()).filter(|&index| stands(index));
     let placed = placed.filter_map(|index| {
-        let position = offset::position(&scene.traces[index], gate, sigma)?;
+        let position = offset::position(&scene.traces[index], observed.bins(), gate, sigma)?;
         Some((numbers[index], position))
     });
     let placed: Vec<(usize, f64)> = placed.collect();

@@ -29,8 +29,9 @@ pub fn remarks(found: &Calibration) -> Vec<Row> {
         Nearest::WallOrGlass(bin) => say(
             "cover glass",
             format!(
-                "All pixels see a surface at bin {bin} and nothing behind it. It is taken as a wall. \
-             --glass yes takes it as a cover glass, --glass no confirms the wall."
+                "All pixels see a surface at bin {bin}. Whether it is a wall or a cover glass the recording does \
+             not tell: nothing lies behind it, or there are too few pixels. It is taken as a wall. \
+             --glass yes takes it as a glass, --glass no confirms the wall."
             ),
         ),
         Nearest::Glass(glass) if glass.end == 0 => say(
@@ -59,6 +60,12 @@ pub fn remarks(found: &Calibration) -> Vec<Row> {
              when you replay."
                 .to_owned(),
         ),
+        Some(pulse) if pulse.sigma > 1.75 => say(
+            "pulse",
+            "The pulse is wider than the widest window, which suits 1.75 bins: that is written. \
+             Wider bins suit it better."
+                .to_owned(),
+        ),
         Some(pulse) if pulse.is_core => say(
             "pulse",
             format!(
@@ -66,12 +73,6 @@ pub fn remarks(found: &Calibration) -> Vec<Row> {
              deviations late. The standard deviation is that of its core.",
                 pulse.tail * 100.0
             ),
-        ),
-        Some(pulse) if pulse.sigma > 1.75 => say(
-            "pulse",
-            "The pulse is wider than the widest window, which suits 1.75 bins: that is written. \
-             Wider bins suit it better."
-                .to_owned(),
         ),
         Some(_) => {}
     }
@@ -118,8 +119,8 @@ pub fn remarks(found: &Calibration) -> Vec<Row> {
     if found.offset.is_none() {
         say(
             "offset",
-            "The range offset is not known: put a flat target at a known distance and say \
-             --target-mm D."
+            "The range offset is not known: put a flat target at a known distance before more than \
+             half of the pixels, and say --target-mm D."
                 .to_owned(),
         );
     }

@@ -76,16 +76,16 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
             ),
         },
     );
-    let gate = found.glass().filter(|glass| glass.end > 0);
+    let between = found.glass().map(|glass| glass.end_between);
     row(
         "gate",
-        gate.map_or("not needed".to_owned(), |glass| {
-            let (first, last) = found.gate;
-            match glass.end_between {
-                (low, high) if low < high => format!("{first}..{last} (begins at {low} to {high})"),
-                _ => format!("{first}..{last}"),
+        match (found.written_gate(), between) {
+            (None, _) => "not needed".to_owned(),
+            (Some((first, last)), Some((low, high))) if first > 0 && low < high => {
+                format!("{first}..{last} (begins at {low} to {high})")
             }
-        }),
+            (Some((first, last)), _) => format!("{first}..{last}"),
+        },
     );
     row(
         "offset",

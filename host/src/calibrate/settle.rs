@@ -76,16 +76,16 @@ pub fn l2(background: f64) -> u16 {
     most.max(4 * X)
 }
 
-/// The gate that begins at bin `first`.
+/// The gate from bin `first` to bin `last`.
 ///
 /// # Errors
 /// If it leaves too few bins.
-pub fn gate(bins: usize, first: usize) -> Result<(u16, u16)> {
-    let (first, last) = (u16::try_from(first)?, u16::try_from(bins - 1)?);
+pub fn gate(last: usize, first: usize) -> Result<(u16, u16)> {
+    let (first, last) = (u16::try_from(first)?, u16::try_from(last)?);
     ensure!(
         first + 7 <= last,
-        "the cover glass reaches up to bin {first} of {bins}: no gate leaves it out; say --glass no if \
-         it is none"
+        "the cover glass reaches up to bin {first}, the last bin is {last}: no gate leaves it out; say \
+         --glass no if it is none"
     );
     Ok((first, last))
 }

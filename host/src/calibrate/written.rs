@@ -4,7 +4,7 @@ use anyhow::{Context, Result};
 use dtof_core::fixed::types::{I24F8, U4F12, U16F16};
 
 use super::{Calibration, Glass, Length, Nearest, Tdc};
-use crate::settings::{Detection, RuleName, Run, Sensor, SettingsFile};
+use crate::settings::{Detection, RuleName, Sensor, SettingsFile};
 
 impl Calibration {
     /// The settings of the sensor. What was not found is that of `before`: an older calibration, or
@@ -27,7 +27,7 @@ impl Calibration {
             bins: u16::try_from(self.bins).ok(),
             bin_width_ps: Some(width.context("the bin width is too large")?),
             offset_mm: offset.transpose()?.or(before.sensor.offset_mm),
-            gate: (self.gate.0 > 0).then_some(self.gate),
+            gate: self.written_gate(),
             masked: Some(self.masked()?).filter(|masked| !masked.is_empty()),
             sigma_bins: match &self.detection {
                 Some(detection) => Some(detection.sigma_bins),
@@ -52,15 +52,20 @@ impl Calibration {
             x: Some(detection.x),
             ..Detection::default()
         });
-        Ok(SettingsFile {
+        let found = SettingsFile {
             sensor,
             detection: detection.unwrap_or_default().or(before.detection),
             rays: before.rays,
-            run: Run {
-                cycles: None,
-                ..before.run
-            },
-        })
+            run: before.run,
+        };
+        Ok(found.of_any_file())
+    }
+
+    /// The gate, if it leaves out a bin.
+    #[must_use]
+    pub fn written_gate(&self) -> Option<(u16, u16)> {
+        let (first, last) = self.gate;
+        (first > 0 || usize::from(last) + 1 < self.bins).then_some(self.gate)
     }
 
     /// The cover glass, if there is one.

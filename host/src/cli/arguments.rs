@@ -14,6 +14,9 @@ use dtof_core::fixed::traits::Fixed;
 /// Exponents go so far either way, somewhat farther than those of any `f64`.
 const MOST_EXPONENT: u32 = 400;
 
+/// The highest seed or number of laser cycles: that of a settings file.
+pub const MOST_WHOLE: u64 = i64::MAX as u64;
+
 /// Reads a whole number in `range`.
 pub fn whole<T>(
     range: RangeInclusive<T>,

@@ -6,22 +6,20 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use clap::{Args, ValueEnum};
 use dtof::calibrate::report::{self, MARKS};
-use dtof::calibrate::{Asked, Length, Observed, calibrate, remarks};
-use dtof::cli::arguments::{bins, fixed, path, positive, real, whole};
+use dtof::calibrate::{Asked, Calibration, Length, Observed, calibrate, remarks};
+use dtof::cli::arguments::{MOST_WHOLE, path, real, whole};
 use dtof::files::{Marked, write_marked};
 use dtof::input::open::{Counts, counts};
 use dtof::input::recorded::RecordingLength;
 use dtof::input::source::Geometry;
 use dtof::rows::aligned;
-use dtof::settings::{Run, Sensor, SettingsFile};
-use dtof_core::fixed::types::U16F16;
+use dtof::settings::{SettingsFile, share};
 
-use super::replay::opening;
+use super::recording::{Recording, of_file, opening, warn, warn_of_width};
 
 #[derive(Args)]
 pub struct Calibrate {
-    /// Histograms (.npy, or a TMF8820 capture log .json) or photons (.csv with the header
-    /// pixel,cycle,bin)
+    /// A recording, of any format that `replay` reads
     #[arg(long, value_name = "FILE", value_parser = path())]
     input: PathBuf,
     /// The settings file to write
@@ -34,24 +32,8 @@ pub struct Calibrate {
     /// report says what has changed
     #[arg(long, value_name = "FILE", value_parser = path())]
     settings: Option<PathBuf>,
-    /// Histograms: laser cycles that each capture lasted
-    #[arg(long, value_name = "N", value_parser = whole(1..=u64::MAX))]
-    recorded_cycles: Option<u64>,
-    /// Histograms, instead: photons a laser cycle in the brightest pixel of each capture
-    #[arg(long, value_name = "R", value_parser = positive, conflicts_with = "recorded_cycles")]
-    photons_per_cycle: Option<f64>,
-    /// Photon lists: columns of the array, pixel = row × columns + column [default: one row]
-    #[arg(long, value_name = "N", value_parser = whole(1..=65_536_u32))]
-    columns: Option<u32>,
-    /// Bins of a histogram, a power of two from 8 to 1024 [default: the file's; 128 for .csv]
-    #[arg(long, value_name = "N", value_parser = bins)]
-    bins: Option<u16>,
-    /// Picoseconds a bin, rounded to 1/65536 [default: 250; 92.1 for .json]
-    #[arg(long, value_name = "PS", value_parser = fixed::<U16F16>, allow_hyphen_values = true)]
-    bin_width_ps: Option<U16F16>,
-    /// Laser cycles a second
-    #[arg(long, value_name = "HZ", value_parser = whole(1..=1_000_000_000_000_u64))]
-    laser_hz: Option<u64>,
+    #[command(flatten)]
+    recording: Recording,
     /// Distance of a flat target that most of the pixels see, in millimetres
     #[arg(long, value_name = "MM", value_parser = distance, allow_hyphen_values = true)]
     target_mm: Option<f64>,
@@ -62,7 +44,7 @@ pub struct Calibrate {
     #[arg(long, value_name = "SHARE", default_value_t = 0.01, value_parser = share)]
     false_alarm: f64,
     /// Seed of what is simulated
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=u64::MAX))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=MOST_WHOLE))]
     seed: u64,
     /// Print nothing but errors
     #[arg(long)]
@@ -80,20 +62,23 @@ impl Calibrate {
     pub fn run(&self) -> Result<()> {
         let older = self.settings.as_deref().map(SettingsFile::read);
         let older = older.transpose()?;
-        let said = self.options().or(older.clone().unwrap_or_default());
+        let before = older.clone().unwrap_or_default();
+        let said = self.recording.said(|options| Ok(options.or(before)))?;
         let mut opening = opening(&said);
         opening.cycles = u64::MAX;
         let counts = counts(&self.input, &opening)?;
-        let found = self.look(&said, &counts)?;
-        let columns = counts.geometry.columns;
-        let before = said.or(SettingsFile {
-            sensor: Sensor {
-                columns: Some(columns),
-                offset_mm: counts.format.offset_mm,
-                ..Sensor::default()
-            },
-            ..SettingsFile::default()
-        });
+        self.recording.suits(&self.input, &counts.known)?;
+        let asked = Asked {
+            glass: self.glass.map(|answer| answer == Answer::Yes),
+            target_mm: self.target_mm,
+            false_alarm: self.false_alarm,
+            seed: self.seed,
+        };
+        let found = look(&said, &counts, &asked);
+        let found = found.with_context(|| self.input.display().to_string())?;
+        warn(&self.input, &counts.known, self.quiet);
+        warn_of_width(&self.input, &counts.known, &said, self.quiet);
+        let before = said.or(of_file(&counts.known, counts.geometry));
         let settings = found.settings(before)?;
         let changes = older.map_or(Vec::new(), |older| report::changes(&settings, &older));
         let name = self.input.display().to_string();
@@ -129,62 +114,30 @@ impl Calibrate {
         }
         Ok(())
     }
+}
 
-    /// What the options say.
-    fn options(&self) -> SettingsFile {
-        SettingsFile {
-            sensor: Sensor {
-                laser_hz: self.laser_hz,
-                columns: self.columns,
-                bins: self.bins,
-                bin_width_ps: self.bin_width_ps,
-                ..Sensor::default()
-            },
-            run: Run {
-                photons_per_cycle: self.photons_per_cycle,
-                recorded_cycles: self.recorded_cycles,
-                ..Run::default()
-            },
-            ..SettingsFile::default()
-        }
-    }
-
-    fn look(&self, said: &SettingsFile, counts: &Counts) -> Result<dtof::calibrate::Calibration> {
-        let captures = u32::try_from(counts.captures.len())?;
-        let whole = counts.geometry;
-        // Captures lie one after the other.
-        let geometry = Geometry::new(whole.columns, (whole.rows / captures.max(1)).max(1));
-        let length = match (counts.cycles, opening(said).length) {
-            (Some(cycles), _) | (None, Some(RecordingLength::Cycles(cycles))) => {
-                Length::Cycles(cycles)
-            }
-            (None, Some(RecordingLength::PhotonsPerCycle(rate))) => Length::PhotonsPerCycle(rate),
-            (None, None) => Length::Unknown,
-        };
-        let width = said.sensor.bin_width_ps.or(counts.format.bin_width_ps);
-        let observed = Observed {
-            geometry,
-            captures: &counts.captures,
-            length,
-            bin_width_ps: width.map_or(250.0, |width| width.to_num()),
-            truth_mm: counts.truth_mm.as_deref(),
-        };
-        let asked = Asked {
-            glass: self.glass.map(|answer| answer == Answer::Yes),
-            target_mm: self.target_mm,
-            false_alarm: self.false_alarm,
-            seed: self.seed,
-        };
-        calibrate(&observed, &asked).with_context(|| self.input.display().to_string())
-    }
+/// Calibrates by what a recording holds.
+pub fn look(said: &SettingsFile, counts: &Counts, asked: &Asked) -> Result<Calibration> {
+    let captures = u32::try_from(counts.captures.len())?;
+    let whole = counts.geometry;
+    // Captures lie one after the other.
+    let geometry = Geometry::new(whole.columns, (whole.rows / captures.max(1)).max(1));
+    let length = match (counts.cycles, opening(said).length) {
+        (Some(cycles), _) | (None, Some(RecordingLength::Cycles(cycles))) => Length::Cycles(cycles),
+        (None, Some(RecordingLength::PhotonsPerCycle(rate))) => Length::PhotonsPerCycle(rate),
+        (None, None) => Length::Unknown,
+    };
+    let observed = Observed {
+        geometry,
+        captures: &counts.captures,
+        length,
+        bin_width_ps: counts.known.bin_width_ps.to_num(),
+        truth_mm: counts.truth_mm.as_deref(),
+    };
+    calibrate(&observed, asked)
 }
 
 fn distance(text: &str) -> Result<f64, String> {
     let distance = real(text).filter(|distance| (0.0..=1e6).contains(distance));
     distance.ok_or("must be a number from 0 to 1000000".to_owned())
-}
-
-fn share(text: &str) -> Result<f64, String> {
-    let share = positive(text).ok().filter(|share| *share <= 0.1);
-    share.ok_or("must be a number above 0, at most 0.1".to_owned())
 }

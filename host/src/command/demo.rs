@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Parser;
-use dtof::cli::arguments::{path, whole};
+use dtof::cli::arguments::{MOST_WHOLE, path, whole};
 use dtof::input::source::Geometry;
 use dtof::settings::Run;
 use dtof::simulate::demo;
@@ -27,10 +27,10 @@ pub struct Demo {
     #[arg(long, value_name = "FILE", requires = "device")]
     image: Option<PathBuf>,
     /// Laser cycles of the scene
-    #[arg(long, value_name = "N", default_value_t = 4000, value_parser = whole(1..=u64::MAX))]
+    #[arg(long, value_name = "N", default_value_t = 4000, value_parser = whole(1..=MOST_WHOLE))]
     cycles: u64,
     /// Seed of the simulated photons.
-    #[arg(long, default_value_t = 1, value_parser = whole(0..=u64::MAX))]
+    #[arg(long, default_value_t = 1, value_parser = whole(0..=MOST_WHOLE))]
     seed: u64,
     /// Print nothing but errors.
     #[arg(long)]
@@ -72,6 +72,7 @@ impl Demo {
             echo: None,
             device: self.device.as_deref(),
             image: self.image.as_deref(),
+            no_csv: false,
             out: &self.out,
             lead: &lead,
             quiet: self.quiet,

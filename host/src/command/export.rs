@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail, ensure};
 use clap::Args;
-use dtof::cli::arguments::{path, whole};
+use dtof::cli::arguments::{MOST_WHOLE, path, whole};
 use dtof::events::aer_file::EventKind;
 use dtof::events::echoes::Echo;
 use dtof::export::{Format, LaserClock, Optics, Options, export};
@@ -42,7 +42,7 @@ pub struct Export {
     #[arg(long, value_name = "FILE", value_parser = path())]
     calibration: Option<PathBuf>,
     /// Laser cycles a second [default: what the file says, else 10000000]
-    #[arg(long, value_name = "HZ", value_parser = whole(1..=u64::MAX))]
+    #[arg(long, value_name = "HZ", value_parser = whole(1..=MOST_WHOLE))]
     laser_hz: Option<u64>,
     /// The kind of events to export from a file with both
     #[arg(long, value_enum)]

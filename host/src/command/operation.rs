@@ -9,8 +9,9 @@ use dtof::settings::{Detection, Sensor, SettingsFile};
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
 
+/// What is known of the sensor.
 #[derive(Args)]
-pub struct Operation {
+pub struct Known {
     /// A TOML file with settings, as every run writes one; options override it. docs/settings.md
     /// lists its keys
     #[arg(long, value_name = "FILE", value_parser = path())]
@@ -25,6 +26,37 @@ pub struct Operation {
     /// comes from a window that suits it [default: the centroid of three bins]
     #[arg(long, value_name = "S", value_parser = sigma, allow_hyphen_values = true)]
     sigma_bins: Option<U8F8>,
+}
+
+impl Known {
+    /// What these options say, then `more`, then the file.
+    ///
+    /// # Errors
+    /// What is wrong with the file.
+    pub fn said(&self, more: SettingsFile) -> Result<SettingsFile> {
+        let options = SettingsFile {
+            sensor: Sensor {
+                gate: self.gate,
+                masked: self.mask.clone(),
+                sigma_bins: self.sigma_bins,
+                ..Sensor::default()
+            },
+            ..SettingsFile::default()
+        };
+        let file = self.settings.as_deref().map(SettingsFile::read);
+        let mut file = file.transpose()?.unwrap_or_default();
+        if more.detection != Detection::default() {
+            // Frames have none of these options.
+            file.run.frame = None;
+        }
+        Ok(options.or(more).or(file))
+    }
+}
+
+#[derive(Args)]
+pub struct Operation {
+    #[command(flatten)]
+    pub known: Known,
     #[command(flatten)]
     detection: Detection,
 }
@@ -45,23 +77,10 @@ impl Operation {
     /// # Errors
     /// What is wrong with the file.
     pub fn said(&self, more: SettingsFile) -> Result<SettingsFile> {
-        let options = SettingsFile {
-            sensor: Sensor {
-                gate: self.gate,
-                masked: self.mask.clone(),
-                sigma_bins: self.sigma_bins,
-                ..Sensor::default()
-            },
+        self.known.said(SettingsFile {
             detection: self.detection.clone(),
-            ..SettingsFile::default()
-        };
-        let file = self.settings.as_deref().map(SettingsFile::read);
-        let mut file = file.transpose()?.unwrap_or_default();
-        if self.detection != Detection::default() {
-            // Frames have none of these options.
-            file.run.frame = None;
-        }
-        Ok(options.or(more).or(file))
+            ..more
+        })
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::cli::arguments::{path, whole};
+use dtof::cli::arguments::{MOST_WHOLE, path, whole};
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::Engine;
 use dtof::engine::host::host_engine;
@@ -25,8 +25,8 @@ use dtof_link::DynamicDepth;
 
 use super::dynamic_depth::Shown;
 use super::operation::{Frames, Operation};
-use super::print_summary;
 use super::view::View;
+use super::{print_summary, watch_glass};
 
 #[derive(Args)]
 pub struct Simulate {
@@ -61,11 +61,14 @@ pub struct Simulate {
     /// Image that `--device qemu` runs [default: what `cargo xtask image mps2-an386` has built]
     #[arg(long, value_name = "FILE", requires = "device")]
     image: Option<PathBuf>,
+    /// Do not write events.csv
+    #[arg(long)]
+    no_csv: bool,
     /// Laser cycles [default: the file's]
-    #[arg(long, value_name = "N", value_parser = whole(1..=u64::MAX))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=MOST_WHOLE))]
     cycles: Option<u64>,
     /// Seed of the simulated photons [default: 1]
-    #[arg(long, value_name = "N", value_parser = whole(0..=u64::MAX))]
+    #[arg(long, value_name = "N", value_parser = whole(0..=MOST_WHOLE))]
     seed: Option<u64>,
     /// Print nothing but errors
     #[arg(long)]
@@ -86,10 +89,11 @@ impl Simulate {
             ..Run::default()
         };
         let said = self.operation.said(run.into())?;
-        let said = of_scene(said, &scene).with_context(|| match &self.operation.settings {
-            Some(file) => file.display().to_string(),
-            None => "the scene".to_owned(),
-        })?;
+        let said =
+            of_scene(said, &scene).with_context(|| match &self.operation.known.settings {
+                Some(file) => file.display().to_string(),
+                None => "the scene".to_owned(),
+            })?;
         let settings = Settings {
             one_hit_tdc: scene.effects.one_hit_tdc(),
             ..said.settings(scene.bins.into())?
@@ -109,12 +113,13 @@ impl Simulate {
             cycles: said.run.cycles.unwrap_or(scene.cycles),
             settings: &settings,
             said: &said,
-            file: self.operation.settings.as_deref(),
+            file: self.operation.known.settings.as_deref(),
             changes: self.changes.wanted()?,
             echo: self.echo,
             device: self.device.as_deref(),
             image: self.image.as_deref(),
             out: &self.out,
+            no_csv: self.no_csv,
             lead: &lead,
             quiet: self.quiet,
         }
@@ -142,6 +147,8 @@ pub struct Simulation<'a> {
     /// The image of an emulated device.
     pub image: Option<&'a Path>,
     pub out: &'a Path,
+    /// Without `events.csv`.
+    pub no_csv: bool,
     /// The first sentence of the report.
     pub lead: &'a str,
     pub quiet: bool,
@@ -165,7 +172,8 @@ impl Simulation<'_> {
         let mut output = Output::create(self.out, self.settings, &photons, self.input)?
             .with_settings(self.said.with(self.settings), self.file)?
             .with_changes(self.changes.as_ref())?
-            .with_echo(self.echo, self.settings);
+            .with_echo(self.echo, self.settings)
+            .without_csv(self.no_csv);
         let mut comparison = self.scene.comparison(self.settings, self.cycles)?;
         let mut summary = run(
             &mut photons,
@@ -175,6 +183,7 @@ impl Simulation<'_> {
             self.quiet,
             |events| comparison.add(events),
         )?;
+        watch_glass(self.said, &output, &mut summary);
         summary.input = self.input.map(|file| file.display().to_string());
         summary.field_of_view_degrees = Some(self.scene.view().degrees());
         summary.export_with = export_with(self.scene);
@@ -225,7 +234,13 @@ pub fn of_scene(said: SettingsFile, scene: &Scene) -> Result<SettingsFile> {
             ..said.sensor
         },
         rays: Rays {
-            field_of_view_degrees: Some(scene.view().degrees()),
+            // As written: 60 is not 59.99999999999999.
+            field_of_view_degrees: Some(
+                scene
+                    .view()
+                    .degrees()
+                    .map(|angle| (angle * 1e9).round() / 1e9),
+            ),
             calibration: None,
         },
         run: Run {
@@ -252,7 +267,7 @@ fn engine(
     addresses: &[PixelAddress],
 ) -> Result<Box<dyn Engine>> {
     let Some(device) = device else {
-        return host_engine(settings, array, addresses);
+        return Ok(host_engine(settings, array, addresses)?);
     };
     ensure!(
         settings.frame.is_none(),

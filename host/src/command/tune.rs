@@ -8,7 +8,7 @@ use std::io::{self, Write};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::cli::arguments::{bins, positive, shortest, whole};
+use dtof::cli::arguments::{MOST_WHOLE, bins, positive, shortest, whole};
 use dtof::settings::RuleName;
 use dtof::simulate::MM_PER_PS;
 use dtof_core::BlockLevel;
@@ -72,7 +72,7 @@ pub struct Tune {
     #[arg(long, value_name = "LEVELS", default_value_t = 0, value_parser = whole(0..=BlockLevel::MAX.raw()))]
     binning: u8,
     /// Seed of the simulated exposures
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=u64::MAX))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=MOST_WHOLE))]
     seed: u64,
     /// Print JSON
     #[arg(long)]

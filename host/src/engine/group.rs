@@ -31,12 +31,66 @@ struct Member<const BINS: usize> {
     feed: Option<Feed>,
 }
 
+impl<const BINS: usize> Member<BINS> {
+    /// Runs a pixel by itself, `since_look` laser cycles after its last look. Looks before L1
+    /// decide nothing: the photons until the first one after it are counted at once.
+    fn run(
+        &mut self,
+        configs: &Configs<BINS>,
+        first: u64,
+        received: &PixelPhotons,
+        since_look: &mut u16,
+        done: &mut Done,
+    ) {
+        let (config, x) = (&configs.pixels, configs.pixels.x());
+        let mut photons = &received.photons[..];
+        let mut cycle = 0;
+        while cycle < received.cycles {
+            let left = received.cycles - cycle;
+            let mut cycles = x - *since_look;
+            let early = config.l1().saturating_sub(self.pixel.exposure());
+            if early >= cycles {
+                cycles = cycles
+                    .saturating_add((early - cycles) / x * x)
+                    .saturating_add(x);
+            }
+            if cycles > left {
+                // Up to the last look there is, if there is one, and then to the end.
+                let after_look = after(*since_look, left, x);
+                cycles = if left > after_look {
+                    left - after_look
+                } else {
+                    left
+                };
+            }
+            cycle += cycles;
+            while let Some((photon, later)) = photons.split_first()
+                && photon.cycle < cycle
+            {
+                self.pixel.count(config, photon.code);
+                photons = later;
+            }
+            let last = LaserCycle(first + u64::from(cycle) - 1);
+            self.pixel
+                .end_laser_cycles(config, &mut done.pixels, last, cycles);
+            *since_look = after(*since_look, cycles, x);
+            done.events.extend(self.pixel.acknowledge());
+        }
+    }
+}
+
+/// Laser cycles since the last look, `cycles` later, where each `x` there is one.
+fn after(since_look: u16, cycles: u16, x: u16) -> u16 {
+    let rest = (u32::from(since_look) + u32::from(cycles)) % u32::from(x);
+    u16::try_from(rest).unwrap_or(0)
+}
+
 /// Pixels and blocks in the order in which they report.
 #[derive(Clone, Debug)]
 pub struct Group<const BINS: usize> {
     members: Vec<Member<BINS>>,
     blocks: Vec<Block<BINS>>,
-    /// Laser cycles since the blocks looked, and since the last tick.
+    /// Laser cycles since the last look, and of blocks since the last tick.
     since_look: u16,
     since_tick: u16,
 }
@@ -130,6 +184,11 @@ impl<const BINS: usize> Group<BINS> {
     /// Runs one slice that begins with laser cycle `first`. The link takes each event at once.
     pub fn run(&mut self, configs: &Configs<BINS>, first: u64, photons: &[PixelPhotons]) -> Done {
         let mut done = Done::default();
+        if let ([member], []) = (&mut self.members[..], &self.blocks[..]) {
+            let photons = &photons[member.number];
+            member.run(configs, first, photons, &mut self.since_look, &mut done);
+            return done;
+        }
         let of_member = |member: &Member<BINS>| &photons[member.number];
         let cycles = self.members.iter().map(|member| of_member(member).cycles);
         let cycles = cycles.max().unwrap_or(0);
@@ -203,3 +262,6 @@ impl<const BINS: usize> Group<BINS> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -10,10 +10,13 @@ use crate::events::summary::Summary;
 use crate::input::source::PhotonSource;
 use crate::progress::Progress;
 
-/// Laser cycles produced and decided at a time, at most, and about how many
-/// photons. Bounds the memory; changes nothing in the events.
+/// Laser cycles produced and decided at a time, at most. Changes nothing in the events.
 const SLICE: u16 = 256;
-const SLICE_PHOTONS: f64 = 1e7;
+/// About how many photons these are: so many a pixel, that they stay near the processor, but
+/// not so few in all that a slice takes longer than they do, nor more than fit into memory.
+const PHOTONS_A_PIXEL: f64 = 128.0;
+const FEWEST_PHOTONS: f64 = 5e5;
+const MOST_PHOTONS: f64 = 1e7;
 
 /// Runs all of `source` and writes its events into `output`. A progress bar
 /// shows after a second, unless `quiet`, and only on a terminal. `watch` is given all
@@ -34,13 +37,7 @@ pub fn run(
     let pixels = source.addresses();
     let mut done = 0;
     while done < cycles {
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "1 to SLICE"
-        )]
-        let most = (SLICE_PHOTONS / source.photons_per_cycle()).clamp(1.0, SLICE.into()) as u16;
-        let next = u16::try_from(cycles - done).map_or(most, |left| left.min(most));
+        let next = next_cycles(source, done);
         let slice = source.next_slice(next)?;
         output.count(&pixels, &slice);
         let events = engine.run(&slice)?;
@@ -58,4 +55,18 @@ pub fn run(
         reporting,
         settings,
     ))
+}
+
+/// Laser cycles of the next slice, `done` of all being done.
+#[must_use]
+pub fn next_cycles(source: &dyn PhotonSource, done: u64) -> u16 {
+    let photons = source.addresses().len() as f64 * PHOTONS_A_PIXEL;
+    let photons = photons.clamp(FEWEST_PHOTONS, MOST_PHOTONS);
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "1 to SLICE"
+    )]
+    let most = (photons / source.photons_per_cycle()).clamp(1.0, SLICE.into()) as u16;
+    u16::try_from(source.cycles() - done).map_or(most, |left| left.min(most))
 }

@@ -10,7 +10,7 @@ use std::fs;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use dtof_core::{DepthEvent, EchoNumber, PixelAddress, RangeScale};
 use tempfile::NamedTempFile;
 
@@ -47,7 +47,8 @@ pub struct Output {
     inputs: Vec<PathBuf>,
     /// The settings of the run.
     settings: SettingsFile,
-    csv: BufWriter<NamedTempFile>,
+    /// Unless it is not wanted.
+    csv: Option<BufWriter<NamedTempFile>>,
     aer: aer_file::Writer<BufWriter<NamedTempFile>>,
     scale: RangeScale,
     maps: Maps,
@@ -59,6 +60,8 @@ pub struct Output {
     selection: Option<Selection>,
     /// If they are asked for.
     changes: Option<Changes>,
+    /// All photons of the run, bin by bin, if the settings know what a cover glass sends back.
+    bins: Option<Vec<u64>>,
 }
 
 impl Output {
@@ -75,6 +78,11 @@ impl Output {
         input: Option<&Path>,
     ) -> Result<Self> {
         let scale = settings.range_scale()?;
+        ensure!(
+            !folder.join("methods.csv").exists(),
+            "{}: holds the results of a comparison; take another folder",
+            folder.display()
+        );
         fs::create_dir_all(folder)
             .with_context(|| format!("{}: cannot be the output folder", folder.display()))?;
         let inputs: Vec<PathBuf> = input.into_iter().map(Path::to_owned).collect();
@@ -95,7 +103,7 @@ impl Output {
             folder: folder.to_owned(),
             inputs,
             settings: SettingsFile::default().with(settings),
-            csv,
+            csv: Some(csv),
             aer,
             scale,
             maps: Maps::new(geometry),
@@ -104,6 +112,7 @@ impl Output {
             echo: None,
             selection: selection(None, settings),
             changes: None,
+            bins: None,
         })
     }
 
@@ -112,6 +121,8 @@ impl Output {
     /// # Errors
     /// If a result would replace it.
     pub fn with_settings(mut self, said: SettingsFile, file: Option<&Path>) -> Result<Self> {
+        let has_glass = said.sensor.glass_bins.is_some();
+        self.bins = has_glass.then(|| vec![0; said.sensor.bins.unwrap_or_default().into()]);
         self.settings = said;
         self.inputs.extend(file.map(Path::to_owned));
         may_hold_results(&self.folder, &self.inputs)?;
@@ -137,13 +148,21 @@ impl Output {
         self
     }
 
+    /// Without `events.csv`; one of an earlier run is removed.
+    #[must_use]
+    pub fn without_csv(self, without: bool) -> Self {
+        let csv = self.csv.filter(|_| !without);
+        Self { csv, ..self }
+    }
+
     /// Writes events in the order they come.
     ///
     /// # Errors
     /// If the disk does not take them.
     pub fn write(&mut self, events: &[DepthEvent]) -> Result<()> {
         for event in events {
-            events_csv::write(&mut self.csv, event, &self.scale)
+            let csv = self.csv.as_mut();
+            csv.map_or(Ok(()), |csv| events_csv::write(csv, event, &self.scale))
                 .and_then(|()| self.aer.write(&aer_file::Event::Depth(*event)))
                 .with_context(|| self.folder.display().to_string())?;
             if let Some(changes) = &mut self.changes {
@@ -186,6 +205,20 @@ impl Output {
     /// Takes the photons of `pixels` into account.
     pub fn count(&mut self, pixels: &[PixelAddress], slice: &Slice) {
         self.maps.count(pixels, slice);
+        let photons = slice.pixels.iter().flat_map(|pixel| &pixel.photons);
+        if let Some(bins) = &mut self.bins {
+            for photon in photons {
+                if let Some(count) = bins.get_mut(usize::from(photon.code)) {
+                    *count += 1;
+                }
+            }
+        }
+    }
+
+    /// All photons bin by bin, if the settings know what a cover glass sends back.
+    #[must_use]
+    pub fn bins(&self) -> Option<&[u64]> {
+        self.bins.as_deref()
     }
 
     /// The events so far, pixel by pixel.
@@ -259,10 +292,14 @@ impl Output {
             Ok(file)
         };
         // Everything is written before anything is moved to its place.
-        let mut files = vec![
-            (flushed(self.csv)?, CSV),
-            (flushed(self.aer.finish()?)?, AER),
-        ];
+        let mut files = vec![(flushed(self.aer.finish()?)?, AER)];
+        // Without a summary the folder does not look complete; a table that is not written
+        // is not that of another run.
+        let mut gone = vec![SUMMARY];
+        match self.csv {
+            Some(csv) => files.push((flushed(csv)?, CSV)),
+            None => gone.push(CSV),
+        }
         for picture in &pictures {
             files.push((aside(&picture.svg)?, picture.name));
         }
@@ -275,13 +312,14 @@ impl Output {
 
         // Something may have come there since.
         may_hold_results(&self.folder, &self.inputs)?;
-        // Without a summary the folder does not look complete.
-        let old = self.folder.join(SUMMARY);
-        match fs::remove_file(&old) {
-            Err(error) if error.kind() != ErrorKind::NotFound => {
-                return Err(error).with_context(|| old.display().to_string());
+        for name in gone {
+            let old = self.folder.join(name);
+            match fs::remove_file(&old) {
+                Err(error) if error.kind() != ErrorKind::NotFound => {
+                    return Err(error).with_context(|| old.display().to_string());
+                }
+                _ => {}
             }
-            _ => {}
         }
         for (file, name) in files {
             let place = self.folder.join(name);

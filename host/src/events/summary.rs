@@ -63,6 +63,16 @@ pub struct Summary {
     /// Recorded photons that were not replayed, as they lie after the last
     /// laser cycle.
     pub not_replayed: u64,
+    /// How many times as bright the cover glass is as when it was calibrated, and how many times
+    /// at least, if that is surely more.
+    pub cover_glass: Option<[f64; 2]>,
+    /// Recorded photons in bins that were cut off.
+    pub cut_off: u64,
+    /// What was done to the recording before.
+    #[serde(serialize_with = "named")]
+    pub recording: Vec<Row>,
+    /// What is surely wrong with the recording.
+    pub warnings: Vec<String>,
     /// How the events of a simulated scene compare with it.
     pub against_truth: Option<AgainstTruth>,
     /// How the pixels operated.
@@ -87,6 +97,11 @@ fn with_estimator<S: Serializer>(settings: &Settings, serializer: S) -> Result<S
         estimator,
     }
     .serialize(serializer)
+}
+
+/// Rows as an object.
+fn named<S: Serializer>(rows: &[Row], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(rows.iter().map(|(name, value)| (name, value)))
 }
 
 impl Summary {
@@ -121,6 +136,10 @@ impl Summary {
             expired: statistics.expired,
             expired_deferred: statistics.expired_deferred,
             not_replayed: source.not_replayed(),
+            cover_glass: None,
+            cut_off: 0,
+            recording: Vec::new(),
+            warnings: Vec::new(),
             against_truth: None,
             settings: settings.clone(),
         }
@@ -134,6 +153,7 @@ impl Summary {
         if let Some(input) = &self.input {
             rows.push(("input".to_owned(), input.clone()));
         }
+        rows.extend(self.recording.iter().cloned());
         if let Some((shortest, longest)) = self.recorded_cycles {
             let cycles = if shortest == longest {
                 grouped(longest)
@@ -182,6 +202,7 @@ impl Summary {
             ("photons with a code past the last bin", self.rejected),
             ("decisions put off", self.deferred),
             ("recorded photons not replayed", self.not_replayed),
+            ("recorded photons in bins cut off", self.cut_off),
         ];
         rows.extend(
             losses
@@ -189,6 +210,14 @@ impl Summary {
                 .filter(|loss| loss.1 > 0)
                 .map(|&(name, value)| row(name, value)),
         );
+        if let Some([times, least]) = self.cover_glass {
+            let text = format!(
+                "{times:.1} times as bright as when it was calibrated, at least {least:.1}: clean it"
+            );
+            rows.push(("cover glass".to_owned(), text));
+        }
+        let warnings = self.warnings.iter();
+        rows.extend(warnings.map(|warning| ("warning".to_owned(), warning.clone())));
         if let Some(options) = &self.export_with {
             rows.push(("export with".to_owned(), options.clone()));
         }

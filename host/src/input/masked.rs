@@ -38,11 +38,11 @@ impl Masked {
         })
     }
 
-    /// The same with a laser of `hz` cycles a second, if that is known.
+    /// The same with a laser of `hz` cycles a second, if that is said.
     #[must_use]
     pub fn with_laser_hz(self, hz: Option<u64>) -> Self {
         Self {
-            laser_hz: hz,
+            laser_hz: hz.or(self.laser_hz),
             ..self
         }
     }
@@ -55,6 +55,10 @@ impl PhotonSource for Masked {
 
     fn sides(&self) -> [&'static str; 2] {
         self.source.sides()
+    }
+
+    fn capture_rows(&self) -> u32 {
+        self.source.capture_rows()
     }
 
     fn addresses(&self) -> Vec<PixelAddress> {
@@ -83,6 +87,10 @@ impl PhotonSource for Masked {
 
     fn laser_hz(&self) -> Option<u64> {
         self.laser_hz
+    }
+
+    fn spare(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+        self.source.spare(is_wanted);
     }
 
     fn next_slice(&mut self, cycles: u16) -> Result<Slice> {

@@ -1,23 +1,44 @@
-//! Opens a recording of any format that this program reads, by the name of the file.
+//! Opens a recording of any format that this program reads.
 
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::fixed::types::{I24F8, U16F16};
 
-use crate::input::photon_csv::PhotonCsv;
+use crate::input::axes::Axes;
+use crate::input::bins::Fit;
+use crate::input::capture_log::{self, CaptureLog};
+use crate::input::npy::histograms::Histograms;
+use crate::input::npy::records::{self, Records};
+use crate::input::npy::{archive, histograms};
+use crate::input::photon_csv::CsvRows;
+use crate::input::photon_list::{Listed, PhotonList, Rows, Shape};
 use crate::input::recorded::{Capture, RecordedHistograms, RecordingLength};
 use crate::input::source::{Geometry, PhotonSource};
-use crate::input::{npy, tmf8820};
+use crate::input::{tmf8820, tmf8829, warnings};
 use crate::rows::Row;
+
+/// Picoseconds a bin, if neither the user nor the file says.
+pub const BIN_WIDTH_PS: U16F16 = U16F16::lit("250");
+/// Bins of a photon list, unless the user says.
+const LIST_BINS: u16 = 128;
 
 /// What a user says of a recording. What is left out the file says.
 #[derive(Clone, Debug)]
 pub struct Opening {
     /// Photon lists: columns of the array, one row without.
     pub columns: Option<u32>,
-    /// Bins of a run: 128 of a photon list if left out.
+    /// Bins of a run: if left out 128 of a photon list, and of histograms as many as they have,
+    /// or the next power of two. Later bins of histograms are cut off.
     pub bins: Option<u16>,
+    /// Neighbouring bins that are added up, 1 or more.
+    pub rebin: u16,
+    /// Arrays of histograms: which axis is what; without, the last is the bins.
+    pub axes: Option<Axes>,
+    /// `.npz`: the name of the array; a single one needs none.
+    pub array: Option<String>,
+    /// Picoseconds a bin of the recording.
+    pub bin_width_ps: Option<U16F16>,
     /// Histograms: how long they lasted, one photon a laser cycle if left out.
     pub length: Option<RecordingLength>,
     /// Laser cycles to read, at most.
@@ -31,6 +52,10 @@ impl Default for Opening {
         Self {
             columns: None,
             bins: None,
+            rebin: 1,
+            axes: None,
+            array: None,
+            bin_width_ps: None,
             length: None,
             cycles: u64::MAX,
             seed: 1,
@@ -38,12 +63,12 @@ impl Default for Opening {
     }
 }
 
-/// An opened recording, and what its format says of it.
+/// An opened recording, and what is known of it.
 pub struct Recording {
     /// Its photons.
     pub photons: Box<dyn PhotonSource>,
     /// What is known besides.
-    pub format: Known,
+    pub known: Known,
 }
 
 /// All photons of a recording, summed over its laser cycles.
@@ -61,43 +86,46 @@ pub struct Counts {
     /// The true distance of each pixel in millimetres, where the file has it.
     pub truth_mm: Option<Vec<Option<f64>>>,
     /// What is known besides.
-    pub format: Known,
+    pub known: Known,
 }
 
-/// What a recording says of itself.
+/// What is known of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known {
-    /// Bins of a histogram: a power of two from 8 to 1024.
+    /// Whether it is a list of photons, and not histograms.
+    pub is_list: bool,
+    /// Bins of a run: a power of two from 8 to 1024.
     pub bins: usize,
-    /// Picoseconds a bin.
-    pub bin_width_ps: Option<U16F16>,
-    /// Millimetres to be added to every range.
+    /// Picoseconds a bin of the run: as the user says or the file, or [`BIN_WIDTH_PS`], times
+    /// [`Opening::rebin`].
+    pub bin_width_ps: U16F16,
+    /// Millimetres to be added to every range, if the format says.
     pub offset_mm: Option<I24F8>,
-    /// The first and the last bin that were measured, if not all were.
+    /// The first and the last bin that were recorded in full, if not all were.
     pub gate: Option<(u16, u16)>,
-    /// What was done to fit the recording to the bins.
+    /// Whether rows and columns are known, and not a list taken for one row.
+    pub has_shape: bool,
+    /// Photons in bins that were cut off.
+    pub cut_off: u64,
+    /// What was done to the recording.
     pub rows: Vec<Row>,
     /// What is surely wrong with it, a line each.
     pub warnings: Vec<String>,
 }
 
-impl Known {
-    const fn new(bins: usize) -> Self {
-        Self {
-            bins,
-            bin_width_ps: None,
-            offset_mm: None,
-            gate: None,
-            rows: Vec::new(),
-            warnings: Vec::new(),
-        }
-    }
-}
-
 /// What a file holds.
 enum Content {
     Histograms(Counts),
-    Photons(PhotonCsv, Known),
+    Photons(Box<dyn Listed>, Known),
+}
+
+/// What files hold, told by their names.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Array,
+    Archive,
+    Log,
+    Csv,
 }
 
 /// Opens `path` as photons. Everything in it is checked.
@@ -106,25 +134,17 @@ enum Content {
 /// What is wrong with the file or what was said of it; the file's name first.
 pub fn open(path: &Path, opening: &Opening) -> Result<Recording> {
     match read(path, opening)? {
-        Content::Photons(photons, format) => Ok(Recording {
-            photons: Box::new(photons),
-            format,
-        }),
+        Content::Photons(photons, known) => Ok(Recording { photons, known }),
         Content::Histograms(counts) => {
-            let length = opening
-                .length
-                .unwrap_or(RecordingLength::PhotonsPerCycle(1.0));
-            let photons = RecordedHistograms::new(
-                counts.geometry,
-                &counts.captures,
-                length,
-                opening.cycles,
-                opening.seed,
-            );
+            let length = opening.length;
+            let length = length.unwrap_or(RecordingLength::PhotonsPerCycle(1.0));
+            let (most, seed) = (opening.cycles, opening.seed);
+            let photons =
+                RecordedHistograms::new(counts.geometry, &counts.captures, length, most, seed);
             let photons = photons.with_context(|| path.display().to_string())?;
             Ok(Recording {
                 photons: Box::new(photons.with_sides(counts.sides)),
-                format: counts.format,
+                known: counts.known,
             })
         }
     }
@@ -135,140 +155,200 @@ pub fn open(path: &Path, opening: &Opening) -> Result<Recording> {
 /// # Errors
 /// What is wrong with the file or what was said of it; the file's name first.
 pub fn counts(path: &Path, opening: &Opening) -> Result<Counts> {
-    let (mut photons, format) = match read(path, opening)? {
+    let (mut photons, known) = match read(path, opening)? {
         Content::Histograms(counts) => return Ok(counts),
-        Content::Photons(photons, format) => (photons, format),
+        Content::Photons(photons, known) => (photons, known),
     };
-    let geometry = photons.geometry();
-    let addresses = photons.addresses();
-    let mut capture = vec![vec![0; format.bins]; geometry.addresses()];
-    let mut left = photons.cycles();
-    while left > 0 {
-        let next = u16::try_from(left).unwrap_or(u16::MAX);
-        let slice = photons.next_slice(next)?;
-        for (address, pixel) in addresses.iter().zip(&slice.pixels) {
-            for photon in &pixel.photons {
-                capture[usize::from(address.0)][usize::from(photon.code)] += 1;
-            }
-        }
-        left -= u64::from(next);
-    }
     Ok(Counts {
-        geometry,
+        geometry: photons.geometry(),
         sides: photons.sides(),
-        captures: vec![capture],
+        captures: vec![photons.counts()?],
         cycles: Some(photons.cycles()),
         truth_mm: None,
-        format,
+        known,
     })
 }
 
 fn read(path: &Path, opening: &Opening) -> Result<Content> {
-    let extension = path.extension().and_then(|extension| extension.to_str());
-    let extension = extension.map(str::to_ascii_lowercase);
-    let content = match extension.as_deref() {
-        Some("npy") => {
-            let npy = npy::read(path)?;
-            expect_bins(path, opening, npy.bins)?;
-            Content::Histograms(Counts {
-                geometry: npy.geometry,
-                sides: ["column", "row"],
-                captures: vec![npy.capture],
-                cycles: None,
-                truth_mm: None,
-                format: Known::new(npy.bins),
-            })
+    let kind = kind(path)?;
+    let has_records = match kind {
+        Kind::Array => records::other_fields(path)?,
+        _ => None,
+    };
+    let is_list = kind == Kind::Csv || has_records.is_some();
+    suits(path, opening, kind, is_list)?;
+    if let Some(others) = has_records {
+        let mut content = list::<Records>(path, opening)?;
+        if let (false, Content::Photons(_, known)) = (others.is_empty(), &mut content) {
+            let row = ("fields not read".to_owned(), others.join(", "));
+            known.rows.push(row);
         }
-        Some("json") => {
-            let log = tmf8820::read(path)?;
-            expect_bins(path, opening, tmf8820::BINS)?;
-            Content::Histograms(Counts {
-                geometry: log.geometry,
-                sides: tmf8820::SIDES,
-                captures: log.captures,
-                cycles: None,
-                truth_mm: log.truth_mm,
-                format: Known {
-                    bin_width_ps: Some(tmf8820::BIN_WIDTH_PS),
-                    offset_mm: Some(tmf8820::OFFSET_MM),
-                    ..Known::new(tmf8820::BINS)
-                },
-            })
-        }
-        Some("csv") => {
-            ensure!(
-                opening.length.is_none(),
-                "--photons-per-cycle and --recorded-cycles are for histograms; {} holds photons",
-                path.display()
-            );
-            let bins = opening.bins.unwrap_or(128).into();
-            let photons = PhotonCsv::open(path, bins, opening.columns, opening.cycles)?;
-            Content::Photons(photons, Known::new(bins))
-        }
-        _ => bail!(
-            "{}: the name must end in .npy, .json or .csv",
-            path.display()
-        ),
+        return Ok(content);
+    }
+    let (axes, name) = (opening.axes.as_ref(), opening.array.as_deref());
+    let content = match kind {
+        Kind::Csv => list::<CsvRows>(path, opening)?,
+        Kind::Log => log(path, opening)?,
+        Kind::Array => array(path, opening, histograms::read(path, axes)?)?,
+        Kind::Archive => array(path, opening, archive::read(path, name, axes)?)?,
     };
     if let (Content::Histograms(counts), Some(columns)) = (&content, opening.columns) {
+        let has = counts.geometry.columns;
         ensure!(
-            columns == counts.geometry.columns,
-            "--columns {columns}: {} has {}",
-            path.display(),
-            counts.geometry.columns
+            columns == has,
+            "{} has {has} columns, not {columns}; --columns is for photon lists",
+            path.display()
         );
     }
     Ok(content)
 }
 
-/// A file that says how many bins it has is not read as another.
-fn expect_bins(path: &Path, opening: &Opening, bins: usize) -> Result<()> {
-    let wanted = opening.bins.map_or(bins, usize::from);
+fn kind(path: &Path) -> Result<Kind> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.to_ascii_lowercase();
+    let kinds = [
+        (".npy", Kind::Array),
+        (".npz", Kind::Archive),
+        (".json", Kind::Log),
+        (".json.gz", Kind::Log),
+        (".csv", Kind::Csv),
+    ];
+    let kind = kinds.iter().find(|(end, _)| name.ends_with(end));
+    let Some((_, kind)) = kind else {
+        bail!(
+            "{}: the name must end in .npy, .npz, .json, .json.gz or .csv; save another format \
+             from Python as an array of counts with numpy.save",
+            path.display()
+        );
+    };
+    Ok(*kind)
+}
+
+/// Options that say nothing about such a file are refused.
+fn suits(path: &Path, opening: &Opening, kind: Kind, is_list: bool) -> Result<()> {
+    let path = path.display();
     ensure!(
-        wanted == bins,
-        "{}: --bins {wanted}, but the file has {bins}; leave --bins out",
-        path.display()
+        opening.axes.is_none() || (matches!(kind, Kind::Array | Kind::Archive) && !is_list),
+        "--axes is for arrays of histograms; {path} is none"
+    );
+    ensure!(
+        opening.array.is_none() || kind == Kind::Archive,
+        "--array is for .npz files; {path} is none"
     );
     Ok(())
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn counts_of(name: &str, text: &str) -> Counts {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(name);
-        std::fs::write(&path, text).unwrap();
-        counts(&path, &Opening::default()).unwrap()
+fn list<R: Rows + 'static>(path: &Path, opening: &Opening) -> Result<Content> {
+    let shape = Shape {
+        bins: opening.bins.unwrap_or(LIST_BINS),
+        rebin: opening.rebin.max(1),
+        columns: opening.columns,
+    };
+    let mut known =
+        known(shape.bins.into(), None, opening).with_context(|| path.display().to_string())?;
+    let photons = PhotonList::<R>::open(path, shape, opening.cycles)?;
+    known.is_list = true;
+    known.has_shape = shape.columns.is_some() || photons.geometry().addresses() == 1;
+    if shape.rebin > 1 {
+        let sums = format!("{} sums of {}", shape.bins, shape.rebin);
+        known.rows.push(("neighbours added up".to_owned(), sums));
     }
+    Ok(Content::Photons(Box::new(photons), known))
+}
 
-    #[test]
-    fn photon_lists_are_summed_over_their_laser_cycles() {
-        let counts = counts_of(
-            "a.csv",
-            "pixel,cycle,bin\n2,0,5\n2,7,5\n0,70000,127\n2,70000,6\n",
-        );
-        assert_eq!(counts.geometry, Geometry::new(3, 1));
-        assert_eq!(counts.cycles, Some(70_001));
-        let [pixels] = &counts.captures[..] else {
-            panic!("one capture")
-        };
-        let sums: Vec<u64> = pixels.iter().map(|bins| bins.iter().sum()).collect();
-        assert_eq!(sums, [1, 0, 3]);
-        assert_eq!([pixels[2][5], pixels[2][6], pixels[0][127]], [2, 1, 1]);
-    }
+fn array(path: &Path, opening: &Opening, read: Histograms) -> Result<Content> {
+    let Histograms {
+        layout,
+        first,
+        pixels,
+    } = read;
+    let axes = match opening.axes {
+        None => warnings::of_axes(first, &pixels),
+        Some(_) => None,
+    };
+    let bins = layout.bins();
+    let captures = pixels.chunks(layout.capture).map(<[_]>::to_vec).collect();
+    let counts = fitted(captures, [bins, bins], None, opening);
+    let mut counts = counts.with_context(|| path.display().to_string())?;
+    counts.geometry = layout.geometry;
+    counts.sides = layout.sides;
+    counts.known.warnings.extend(axes);
+    Ok(Content::Histograms(counts))
+}
 
-    #[test]
-    fn the_truth_of_a_log_is_that_of_its_centre_zones() {
-        let zone = format!("[{}]", ["3"; 128].join(","));
-        let zones = format!("\"hists\": [{}]", [zone.as_str(); 9].join(","));
-        let log = format!("[{{{zones}}}, {{{zones}, \"dist_to_plane\": 0.25}}]");
-        let counts = counts_of("a.json", &log);
-        assert_eq!(counts.captures.len(), 2);
-        let truth = counts.truth_mm.unwrap();
-        let expected = |address: usize| (address == 9 + 4).then_some(250.0);
-        assert_eq!(truth, (0..18).map(expected).collect::<Vec<_>>());
-        assert_eq!(counts.format.bin_width_ps, Some(tmf8820::BIN_WIDTH_PS));
-    }
+fn log(path: &Path, opening: &Opening) -> Result<Content> {
+    let in_file = || path.display().to_string();
+    let counts = match capture_log::read(path)? {
+        CaptureLog::Tmf8820(log) => {
+            let width = Some(tmf8820::BIN_WIDTH_PS);
+            let counts = fitted(log.captures, [tmf8820::BINS; 2], width, opening);
+            let mut counts = counts.with_context(in_file)?;
+            counts.geometry = log.geometry;
+            counts.sides = tmf8820::SIDES;
+            counts.truth_mm = log.truth_mm;
+            counts.known.offset_mm = Some(tmf8820::OFFSET_MM);
+            counts
+        }
+        CaptureLog::Tmf8829(log) => {
+            let width = Some(log.bin_width_ps);
+            let bins = [tmf8829::BINS, log.measured_bins];
+            let counts = fitted(log.captures, bins, width, opening);
+            let mut counts = counts.with_context(in_file)?;
+            counts.geometry = log.geometry;
+            counts.known.offset_mm = Some(tmf8829::OFFSET_MM);
+            counts.known.rows.splice(0..0, log.rows);
+            counts
+        }
+    };
+    Ok(Content::Histograms(counts))
+}
+
+/// Histograms with the bins of a run. The recording has `recorded` bins, the first `measured`
+/// of them in full.
+fn fitted(
+    captures: Vec<Capture>,
+    [recorded, measured]: [usize; 2],
+    width_ps: Option<U16F16>,
+    opening: &Opening,
+) -> Result<Counts> {
+    let fit = Fit::new(recorded, measured, opening.rebin.into(), opening.bins)?;
+    let mut known = known(fit.bins(), width_ps, opening)?;
+    let mut fit_one = |histogram| {
+        let (histogram, cut_off) = fit.apply(histogram);
+        known.cut_off = known.cut_off.saturating_add(cut_off);
+        histogram
+    };
+    let captures = captures.into_iter();
+    let captures: Vec<Capture> = captures
+        .map(|capture| capture.into_iter().map(&mut fit_one).collect())
+        .collect();
+    known.gate = fit.gate();
+    known.rows = fit.rows(known.cut_off);
+    known.warnings.extend(warnings::of_photons(&captures));
+    Ok(Counts {
+        geometry: Geometry::new(1, 1),
+        sides: ["column", "row"],
+        captures,
+        cycles: None,
+        truth_mm: None,
+        known,
+    })
+}
+
+/// What is known of a run with so many bins, if the file says how wide its own are.
+fn known(bins: usize, width_ps: Option<U16F16>, opening: &Opening) -> Result<Known> {
+    let said = opening.bin_width_ps.or(width_ps).unwrap_or(BIN_WIDTH_PS);
+    let width = said.checked_mul_int(opening.rebin.max(1).into());
+    Ok(Known {
+        bins,
+        bin_width_ps: width
+            .with_context(|| format!("--rebin {} of bins of {said} ps: too wide", opening.rebin))?,
+        offset_mm: None,
+        gate: None,
+        is_list: false,
+        has_shape: true,
+        cut_off: 0,
+        rows: Vec::new(),
+        warnings: warnings::of_bin_width(said).into_iter().collect(),
+    })
 }

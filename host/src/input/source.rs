@@ -78,6 +78,11 @@ pub trait PhotonSource {
         ["column", "row"]
     }
 
+    /// Rows that were recorded together: a block of pixels has no others.
+    fn capture_rows(&self) -> u32 {
+        self.geometry().rows
+    }
+
     /// The pixels that are there, ascending: all of the array unless said
     /// otherwise.
     fn addresses(&self) -> Vec<PixelAddress> {
@@ -114,6 +119,10 @@ pub trait PhotonSource {
     fn laser_hz(&self) -> Option<u64> {
         None
     }
+
+    /// Of pixels that `is_wanted` does not name no photons need be made from now on, if that
+    /// saves time.
+    fn spare(&mut self, _is_wanted: &dyn Fn(PixelAddress) -> bool) {}
 
     /// The photons of the next `cycles` laser cycles.
     ///

@@ -2,11 +2,9 @@
 //! list of captures of the 3×3-zone sensor, each with nine histograms of 128
 //! bins. Pixel address = capture × 9 + zone; zone 4 is the centre.
 
-use std::fs::File;
-use std::io::BufReader;
-use std::path::Path;
+use std::io::Read;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Result, anyhow, ensure};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use serde::Deserialize;
 
@@ -47,16 +45,13 @@ struct LogEntry {
     dist_to_plane: Option<f64>,
 }
 
-/// Reads `path`.
+/// Reads the log from the text of the file `name`.
 ///
 /// # Errors
 /// What is wrong with the file; its name, and the line where there is one,
 /// first.
-pub fn read(path: &Path) -> Result<Tmf8820Log> {
-    let name = path.display();
-    let file = File::open(path).with_context(|| name.to_string())?;
-    let entries = serde_json::from_reader(BufReader::new(file));
-    let entries: Vec<LogEntry> = entries.map_err(|error| {
+pub fn read(name: &str, text: impl Read) -> Result<Tmf8820Log> {
+    let entries: Vec<LogEntry> = serde_json::from_reader(text).map_err(|error| {
         let line = error.line();
         anyhow!("{name}:{line}: not a TMF8820 capture log: {error}")
     })?;

@@ -244,7 +244,11 @@ impl Detection {
     }
 }
 
-fn share(text: &str) -> Result<f64, String> {
+/// Reads a share of false alarms.
+///
+/// # Errors
+/// If it is not above 0 and at most 0.1.
+pub fn share(text: &str) -> Result<f64, String> {
     let share = positive(text).ok().filter(|share| *share <= 0.1);
     share.ok_or("must be a number above 0, at most 0.1".to_owned())
 }

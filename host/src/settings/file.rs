@@ -78,6 +78,9 @@ const COMMENTS: [(&str, &[(&str, &str)]); 4] = [
             ("photons_per_cycle", "in the brightest pixel of a recording"),
             ("recorded_cycles", "laser cycles of a recording"),
             ("frame", "laser cycles, of a frame-based sensor"),
+            ("axes", "of a recorded array"),
+            ("array", "of an archive"),
+            ("rebin", "neighbouring bins that are added up"),
         ],
     ),
 ];
@@ -147,6 +150,13 @@ impl SettingsFile {
         }
     }
 
+    /// Without what holds for one recording alone.
+    #[must_use]
+    pub fn of_any_file(mut self) -> Self {
+        (self.run.axes, self.run.array, self.run.cycles) = (None, None, None);
+        self
+    }
+
     /// The text of the file: what is said, a line a key, with what it is.
     ///
     /// # Errors
@@ -213,6 +223,9 @@ cycles = 10_000
 seed = 7
 recorded_cycles = 20_000
 frame = 500
+axes = 'rows,columns,bins'
+array = 'counts'
+rebin = 2
 ";
 
     #[test]
@@ -310,6 +323,10 @@ frame = 500
             (
                 "[rays]\nfield_of_view_degrees = [0, 40]",
                 "field_of_view_degrees",
+            ),
+            (
+                "[run]\naxes = 'rows'",
+                "line 2: rows: one axis must be the bins",
             ),
             ("[run]\ncycles = 0", "cycles 0: must be at least 1"),
             ("[run]\nphotons_per_cycle = inf", "must be a number above 0"),

@@ -9,7 +9,7 @@ mod file;
 mod resolve;
 mod sections;
 
-pub use detection::{Detection, EstimatorName, RuleName};
+pub use detection::{Detection, EstimatorName, RuleName, share};
 pub(crate) use file::MARK;
 pub use file::SettingsFile;
 pub use sections::{Rays, Run, Sensor};

@@ -6,6 +6,7 @@ use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::FieldOfView;
+use crate::input::axes::Axes;
 use crate::input::range::within;
 
 /// Each field of `$these`, or that of `$others`.
@@ -73,6 +74,13 @@ pub struct Run {
     pub recorded_cycles: Option<u64>,
     /// Laser cycles of a frame, if it is a frame-based sensor.
     pub frame: Option<u16>,
+    /// Of recorded arrays: what each axis is.
+    #[serde(with = "as_text")]
+    pub axes: Option<Axes>,
+    /// Of archives: the name of the array.
+    pub array: Option<String>,
+    /// Of recordings: so many neighbouring bins are added up.
+    pub rebin: Option<u16>,
 }
 
 impl Sensor {
@@ -140,7 +148,9 @@ impl Run {
         if self.photons_per_cycle.is_some() || self.recorded_cycles.is_some() {
             (other.photons_per_cycle, other.recorded_cycles) = (None, None);
         }
-        first_of!(self, other; cycles, seed, photons_per_cycle, recorded_cycles, frame)
+        first_of!(
+            self, other; cycles, seed, photons_per_cycle, recorded_cycles, frame, axes, array, rebin
+        )
     }
 
     pub(super) fn check(&self) -> Result<()> {
@@ -154,6 +164,7 @@ impl Run {
             ("cycles", self.cycles),
             ("recorded_cycles", self.recorded_cycles),
             ("frame", self.frame.map(u64::from)),
+            ("rebin", self.rebin.map(u64::from)),
         ] {
             ensure!(value != Some(0), "{key} 0: must be at least 1");
         }
@@ -163,6 +174,36 @@ impl Run {
             "photons_per_cycle and recorded_cycles: give one of them"
         );
         Ok(())
+    }
+}
+
+/// What is written as a text, as on the command line.
+mod as_text {
+    use std::fmt::Display;
+    use std::str::FromStr;
+
+    use serde::de::{Deserialize, Deserializer, Error as _};
+    use serde::ser::Serializer;
+
+    pub fn serialize<T: Display, S: Serializer>(
+        value: &Option<T>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        match value {
+            None => serializer.serialize_none(),
+            Some(value) => serializer.collect_str(value),
+        }
+    }
+
+    pub fn deserialize<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<T>, D::Error> {
+        let text = Option::<String>::deserialize(deserializer)?;
+        let value = text.map(|text| {
+            let read = text.parse();
+            read.map_err(|error| D::Error::custom(format!("{text}: {error}")))
+        });
+        value.transpose()
     }
 }
 

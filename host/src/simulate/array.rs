@@ -20,6 +20,8 @@ pub struct SimulatedArray {
     pixels: Vec<SimulatedPixel>,
     rates_at: Option<RatesAt>,
     laser_hz: Option<u64>,
+    /// Whether photons of a pixel are not wanted.
+    spared: Vec<bool>,
 }
 
 impl SimulatedArray {
@@ -40,6 +42,7 @@ impl SimulatedArray {
             pixels,
             rates_at,
             laser_hz: None,
+            spared: vec![false; geometry.addresses()],
         }
     }
 
@@ -73,13 +76,22 @@ impl PhotonSource for SimulatedArray {
         self.laser_hz
     }
 
+    fn spare(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+        for (address, spared) in (0..=u16::MAX).map(PixelAddress).zip(&mut self.spared) {
+            *spared = !is_wanted(address);
+        }
+    }
+
     fn next_slice(&mut self, cycles: u16) -> Result<Slice> {
         let first_cycle = self.next_cycle;
         self.next_cycle += u64::from(cycles);
-        let rates_at = self.rates_at.as_ref();
+        let (rates_at, spared) = (self.rates_at.as_ref(), &self.spared);
         let received = |(index, pixel): (usize, &mut SimulatedPixel)| {
             let address = u16::try_from(index).context("more than 65,536 pixels")?;
             let mut photons = Vec::new();
+            if spared[index] {
+                return Ok(PixelPhotons { cycles, photons });
+            }
             for cycle in 0..cycles {
                 if let Some(rates_at) = rates_at {
                     let at = first_cycle + u64::from(cycle);

@@ -6,7 +6,7 @@ use crate::common::aer::{HEADER, events, file};
 use crate::common::{Scratch, names, says};
 use dtof::events::output::Output;
 use dtof::events::summary::Summary;
-use dtof::input::photon_csv::PhotonCsv;
+use dtof::input::open::{Opening, open};
 use dtof::simulate::scene;
 
 const PHOTONS: &str = "pixel,cycle,bin\n0,0,0\n";
@@ -143,13 +143,17 @@ fn a_folder_that_cannot_be_completed_is_left_as_it_was() {
     let scratch = Scratch::new();
     let photons = scratch.file("photons.csv", PHOTONS);
     scratch.replayed(&photons, "");
-    let source = PhotonCsv::open(&photons, 128, None, 1).unwrap();
+    let opening = Opening {
+        cycles: 1,
+        ..Opening::default()
+    };
+    let source = open(&photons, &opening).unwrap().photons;
     let settings = scene::settings(1);
     let out = scratch.path("out");
-    let summary = Summary::new(Default::default(), &source, 0, &settings);
+    let summary = Summary::new(Default::default(), source.as_ref(), 0, &settings);
     let before = scratch.read("out/summary.json");
     let finish = |come: &dyn Fn()| {
-        let output = Output::create(&out, &settings, &source, None).unwrap();
+        let output = Output::create(&out, &settings, source.as_ref(), None).unwrap();
         fs::remove_file(out.join("report.html")).unwrap();
         come();
         let error = output.finish(&summary, "", "", &[]).unwrap_err();

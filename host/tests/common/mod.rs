@@ -5,7 +5,8 @@
 pub mod aer;
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output};
+use std::time::Duration;
 
 use tempfile::TempDir;
 
@@ -135,6 +136,24 @@ pub fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     header.resize(117, b' ');
     header.push(b'\n');
     [b"\x93NUMPY\x01\x00\x76\x00", &header[..], data].concat()
+}
+
+/// The most memory a process had, in kB, as long as it ran.
+pub fn peak_kb(mut child: Child) -> u64 {
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak = 0;
+    loop {
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        if let Some(kb) = line.and_then(|line| line.trim().strip_suffix(" kB")) {
+            peak = kb.parse().unwrap();
+        }
+        if let Some(status) = child.try_wait().unwrap() {
+            assert!(status.success() && peak > 0);
+            return peak;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
 }
 
 /// The names in a folder, sorted.

@@ -3,11 +3,10 @@
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
-use std::process::{Child, Stdio};
-use std::time::Duration;
+use std::process::Stdio;
 
-use crate::common::Scratch;
 use crate::common::aer::{HEADER, depth};
+use crate::common::{Scratch, peak_kb};
 use dtof::events::aer_file::Writer;
 
 const FORMATS: [&str; 6] = ["csv", "csv --echo strongest", "pcd", "ply", "mcap", "evt2"];
@@ -21,24 +20,6 @@ fn write(path: &Path, events: u64) {
         writer.write(&depth(pixel, index, bin)).unwrap();
     }
     writer.finish().unwrap().flush().unwrap();
-}
-
-/// The most memory a process had, in kB, as long as it ran.
-fn peak_kb(mut child: Child) -> u64 {
-    let status = format!("/proc/{}/status", child.id());
-    let mut peak = 0;
-    loop {
-        let text = std::fs::read_to_string(&status).unwrap_or_default();
-        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-        if let Some(kb) = line.and_then(|line| line.trim().strip_suffix(" kB")) {
-            peak = kb.parse().unwrap();
-        }
-        if let Some(status) = child.try_wait().unwrap() {
-            assert!(status.success() && peak > 0);
-            return peak;
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    }
 }
 
 /// The most memory each format took to export so many events, in kB.

@@ -3,6 +3,9 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod arrays;
 mod captures;
+mod opened;
 mod recorded;
 mod refused;
+mod speed;

@@ -95,8 +95,8 @@ mod tests {
             *count += 9000.0 * (-(bin as f64 - 40.0) / 4.0).exp();
         }
         let level = Level::of(&counts);
-        // What is left of the tail where it no longer shows.
-        assert!((level.mean - 20.0).abs() < 0.2, "{}", level.mean);
+        // The tail no longer shows where it is below the noise of three bins.
+        assert!((level.mean - 20.0).abs() < 0.4, "{}", level.mean);
         assert!(!level.clear[39] && !level.clear[60] && level.clear[90]);
     }
 

@@ -19,6 +19,8 @@ const CLEAR: f64 = 5.0;
 const GROUPS: usize = 8;
 /// Of the groups so many must have it.
 const COMMON: f64 = 0.9;
+/// Fewer histograms do not tell a glass from the nearer of two surfaces.
+const SEVERAL: usize = 4;
 /// Something is behind it in at least this share of the histograms.
 const BEHIND: f64 = 0.1;
 /// Of the background, what a peak of all pixels together exceeds at least: backgrounds are not
@@ -34,7 +36,8 @@ pub enum Nearest {
     NotCommon,
     /// A cover glass.
     Glass(Glass),
-    /// A surface at this bin in all pixels, with nothing behind: a wall or a glass.
+    /// A surface at this bin in all pixels, with nothing behind or in very few histograms: a wall
+    /// or a glass.
     WallOrGlass(usize),
     /// The user says that it is no glass.
     Wall(usize),
@@ -135,6 +138,9 @@ fn share_with(scene: &Scene, order: &[usize], top: usize) -> Option<f64> {
 }
 
 fn has_something_behind(scene: &Scene, glass: &Peak) -> bool {
+    if scene.traces.len() < SEVERAL {
+        return false;
+    }
     let holds = |peak: &Peak| peak.first <= glass.top + 1 && peak.last + 1 >= glass.top;
     let all = scene.traces.len() as f64;
     let behind = scene.peaks.iter().filter(|peaks| {

@@ -62,8 +62,8 @@ pub fn from_distances(pairs: &[(f64, f64)], bin_width_ps: f64) -> Option<Offset>
     })
 }
 
-/// From one target at `distance_mm` that most of the pixels see: the positions near the most
-/// common one count.
+/// From one target at `distance_mm`: the positions near the most common one count. `None` if that
+/// is not more than half of them.
 #[must_use]
 pub fn from_target(positions: &[f64], distance_mm: f64, bin_width_ps: f64) -> Option<Offset> {
     let mut sorted = positions.to_vec();
@@ -77,14 +77,17 @@ pub fn from_target(positions: &[f64], distance_mm: f64, bin_width_ps: f64) -> Op
         .iter()
         .map(|&at| near(at))
         .max_by_key(|near| near.len())?;
+    if 2 * most.len() <= positions.len() {
+        return None;
+    }
     let pairs: Vec<(f64, f64)> = most.iter().map(|&at| (at, distance_mm)).collect();
     from_distances(&pairs, bin_width_ps)
 }
 
-/// Where the core places the highest peak of a histogram within `gate`, in bins.
+/// Where the core places the highest peak of a histogram of `bins` bins within `gate`, in bins.
 #[must_use]
-pub fn position(trace: &Trace, gate: (u16, u16), sigma: U8F8) -> Option<f64> {
-    match trace.counts.len() {
+pub fn position(trace: &Trace, bins: usize, gate: (u16, u16), sigma: U8F8) -> Option<f64> {
+    match bins {
         16 => of::<16>(trace, gate, sigma),
         32 => of::<32>(trace, gate, sigma),
         64 => of::<64>(trace, gate, sigma),
@@ -147,5 +150,9 @@ mod tests {
         assert_eq!(found.histograms, 12);
         assert!((found.mm - (1000.0 - 40.3 * 100.0 * MM_PER_PS)).abs() < 1e-9);
         assert_eq!(from_target(&[], 1000.0, 100.0), None);
+        // No surface is that of most.
+        positions.truncate(17);
+        positions.extend([20.0; 4]);
+        assert_eq!(from_target(&positions, 1000.0, 100.0), None);
     }
 }

@@ -3,14 +3,14 @@
 //! Of `N` laser cycles, `N_i` are left when bin `i` begins, those without a photon before it. With
 //! `h_i` photons in the bin, Coates' estimator of the photons that came is
 //! `N·ln(N_i / (N_i - h_i))`. With such a TDC the background of a bin goes with `N_i`, with any
-//! other it is even: the likelihood ratio of the two is `Σ h_i·ln(N_i / mean of N_i)` over the
-//! bins that hold background alone.
+//! other it is even. So it goes with a power of `N_i`, which is 1 or 0: a straight line through
+//! the counts over `ln N_i`, in the bins that hold background alone, tells which.
 
 use super::background::Level;
 use super::observed::Trace;
 
-/// A likelihood ratio that decides: e to this power.
-const DECIDES: f64 = 10.0;
+/// The power is on one side of 1/2 by so many standard deviations.
+const DECIDES: f64 = 4.0;
 
 /// What the histograms say of the TDC.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,7 +26,8 @@ pub enum Tdc {
 /// Which TDC made `traces`, whose laser cycles are known.
 #[must_use]
 pub fn tdc(traces: &[Trace]) -> Tdc {
-    let (mut ratio, mut counted, mut came) = (0.0, 0.0, 0.0);
+    let (mut covariance, mut information) = (0.0, 0.0);
+    let (mut counted, mut came) = (0.0, 0.0);
     for trace in traces {
         let total: f64 = trace.counts.iter().sum();
         if total > trace.cycles {
@@ -37,14 +38,16 @@ pub fn tdc(traces: &[Trace]) -> Tdc {
         came += corrected.iter().sum::<f64>();
         // Clear by either law, so that neither is favoured.
         let [plain, other] = [&trace.counts, &corrected].map(|counts| Level::of(counts).clear);
-        let clear: Vec<usize> = (0..left.len())
-            .filter(|&bin| plain[bin] && other[bin])
+        let clear: Vec<(f64, f64)> = (0..left.len())
+            .filter(|&bin| plain[bin] && other[bin] && left[bin] > 0.0)
+            .map(|bin| (left[bin].ln(), trace.counts[bin]))
             .collect();
-        let mean = clear.iter().map(|&bin| left[bin]).sum::<f64>() / clear.len().max(1) as f64;
-        for bin in clear {
-            if left[bin] > 0.0 {
-                ratio += trace.counts[bin] * (left[bin] / mean).ln();
-            }
+        let bins = clear.len().max(1) as f64;
+        let middle = clear.iter().map(|bin| bin.0).sum::<f64>() / bins;
+        let mean = clear.iter().map(|bin| bin.1).sum::<f64>() / bins;
+        for (log, count) in clear {
+            covariance += (log - middle) * count;
+            information += (log - middle).powi(2) * mean;
         }
     }
     let lost = if came > 0.0 {
@@ -52,9 +55,10 @@ pub fn tdc(traces: &[Trace]) -> Tdc {
     } else {
         0.0
     };
-    if ratio > DECIDES {
+    let from_half = (covariance - 0.5 * information) / information.max(1e-12).sqrt();
+    if from_half > DECIDES {
         Tdc::OneHit(lost)
-    } else if ratio < -DECIDES {
+    } else if from_half < -DECIDES {
         Tdc::SeveralHits
     } else {
         Tdc::Unclear(lost)

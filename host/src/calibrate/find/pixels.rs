@@ -32,7 +32,9 @@ impl Pixels {
         for (trace, level) in traces.iter().zip(levels) {
             of[trace.pixel].add(trace, level);
         }
-        let usual = median(of.iter().map(|pixel| pixel.total));
+        // Most of the pixels may be dead: those with photons say what is usual.
+        let with_photons = of.iter().filter(|pixel| pixel.total > 0.0);
+        let usual = median(with_photons.map(|pixel| pixel.total));
         let is_dead = |pixel: &Sum| pixel.total == 0.0 && usual > ONE_IN.ln();
         let alive = of.iter().filter(|pixel| !is_dead(pixel));
         let rate = median(alive.map(Sum::rate));

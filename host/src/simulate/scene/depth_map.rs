@@ -8,7 +8,7 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 
 use super::sight::Sight;
-use crate::input::npy::{self, Element, Numbers};
+use crate::input::npy::numbers::{self, Element, Numbers};
 use crate::input::source::Geometry;
 
 /// The highest reflectivity of a sample, as of other surfaces.
@@ -42,7 +42,7 @@ impl DepthMap {
     /// # Errors
     /// One line with the name of the file and what is wrong with it.
     pub fn read(path: &Path, along: Along) -> Result<Self> {
-        let numbers = npy::read_numbers(path)?;
+        let numbers = numbers::read(path)?;
         Self::of(&numbers, along).with_context(|| path.display().to_string())
     }
 
@@ -78,7 +78,7 @@ impl DepthMap {
     /// # Errors
     /// One line with the name of the file and what is wrong with it.
     pub fn with_picture(mut self, path: &Path) -> Result<Self> {
-        let numbers = npy::read_numbers(path)?;
+        let numbers = numbers::read(path)?;
         let reflectivity = reflectivity(&numbers, self.size);
         self.reflectivity = reflectivity.with_context(|| path.display().to_string())?;
         Ok(self)

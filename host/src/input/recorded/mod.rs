@@ -1,17 +1,23 @@
 //! Recorded histograms as a photon stream.
 //!
 //! Poisson counts split exactly: every recorded photon is given one uniformly
-//! random laser cycle of the recording, and none is used twice. Laser cycle by
-//! laser cycle this is: of the photons left, each falls into this one of the
-//! laser cycles left with the same probability, so their number is binomial;
-//! which ones they are is a draw without replacement.
+//! random laser cycle of the recording, and none is used twice. Some laser cycles
+//! at a time, a chunk, this is: of the photons left, each falls into this chunk of
+//! the laser cycles left with the same probability, so their number is binomial;
+//! which ones they are is a draw without replacement, and each has any laser cycle
+//! of the chunk. The recording alone says how long a chunk is, so that slices of
+//! any length hold the same photons.
 
-use anyhow::{Context, Result, ensure};
+mod remaining;
+
+use anyhow::{Context, Result, bail, ensure};
 use dtof_core::PixelAddress;
-use rand_distr::{Binomial, Distribution, Uniform};
+use rand_distr::uniform::{UniformInt, UniformSampler};
+use rand_distr::{Binomial, Distribution};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
+use self::remaining::Remaining;
 use crate::input::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_theory::random::pixel_rng;
 
@@ -21,6 +27,11 @@ const MOST: u64 = 1 << 40;
 /// Photons of all pixels in one laser cycle, at most, so that they fit into
 /// memory.
 const MOST_A_CYCLE: f64 = 5e7;
+/// Laser cycles of a chunk, at most, and about how many photons of all pixels.
+const CHUNK: u16 = 2048;
+const CHUNK_PHOTONS: f64 = 4e6;
+/// Photons of a laser cycle that are written at once.
+const AT_ONCE: usize = 4;
 
 /// How many laser cycles a recording is taken to have lasted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,11 +51,14 @@ pub type Capture = Vec<Vec<u64>>;
 pub struct RecordedHistograms {
     geometry: Geometry,
     sides: [&'static str; 2],
+    capture_rows: u32,
     cycles: u64,
     photons_per_cycle: f64,
     /// Laser cycles of the shortest and the longest capture.
     recorded: (u64, u64),
     next_cycle: u64,
+    /// Laser cycles of a chunk.
+    chunk: u16,
     pixels: Vec<RecordedPixel>,
 }
 
@@ -77,13 +91,15 @@ impl RecordedHistograms {
             longest = longest.max(recorded);
             let mean = |total: &u64| *total as f64 / recorded.max(1) as f64;
             photons_per_cycle += totals.iter().map(mean).sum::<f64>();
-            for (counts, total) in capture.iter().zip(totals) {
+            for counts in capture {
                 let address = u16::try_from(pixels.len()).context("more than 65,536 pixels")?;
                 pixels.push(RecordedPixel {
                     left: Remaining::new(counts),
-                    photons_left: total,
                     cycles_left: recorded,
                     rng: pixel_rng(seed, PixelAddress(address)),
+                    chunk: PixelPhotons::default(),
+                    given: 0,
+                    given_photons: 0,
                 });
             }
         }
@@ -94,10 +110,12 @@ impl RecordedHistograms {
         Ok(Self {
             geometry,
             sides: ["column", "row"],
+            capture_rows: geometry.rows / u32::try_from(captures.len().max(1))?,
             photons_per_cycle,
             cycles: cycles.min(longest),
             recorded: (shortest, longest),
             next_cycle: 0,
+            chunk: chunk(photons_per_cycle),
             pixels,
         })
     }
@@ -107,6 +125,16 @@ impl RecordedHistograms {
     pub fn with_sides(self, sides: [&'static str; 2]) -> Self {
         Self { sides, ..self }
     }
+}
+
+/// Laser cycles of a chunk, if all pixels have so many photons a laser cycle.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "1 to CHUNK"
+)]
+fn chunk(photons_per_cycle: f64) -> u16 {
+    (CHUNK_PHOTONS / photons_per_cycle).clamp(1.0, CHUNK.into()) as u16
 }
 
 /// Laser cycles of a capture whose brightest pixel holds `brightest` photons.
@@ -142,6 +170,10 @@ impl PhotonSource for RecordedHistograms {
         self.sides
     }
 
+    fn capture_rows(&self) -> u32 {
+        self.capture_rows
+    }
+
     fn cycles(&self) -> u64 {
         self.cycles
     }
@@ -151,20 +183,29 @@ impl PhotonSource for RecordedHistograms {
     }
 
     fn not_replayed(&self) -> u64 {
-        self.pixels.iter().map(|pixel| pixel.photons_left).sum()
+        self.pixels.iter().map(RecordedPixel::photons_left).sum()
     }
 
     fn recorded_cycles(&self) -> Option<(u64, u64)> {
         Some(self.recorded)
     }
 
+    fn spare(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+        for (address, pixel) in (0..=u16::MAX).map(PixelAddress).zip(&mut self.pixels) {
+            if !is_wanted(address) {
+                pixel.cycles_left = 0;
+            }
+        }
+    }
+
     fn next_slice(&mut self, cycles: u16) -> Result<Slice> {
         let first_cycle = self.next_cycle;
         self.next_cycle += u64::from(cycles);
+        let chunk = self.chunk;
         let pixels = self
             .pixels
             .par_iter_mut()
-            .map(|pixel| pixel.next_cycles(cycles));
+            .map(|pixel| pixel.next_cycles(cycles, chunk));
         Ok(Slice {
             first_cycle,
             pixels: pixels.collect::<Result<_>>()?,
@@ -175,69 +216,98 @@ impl PhotonSource for RecordedHistograms {
 /// One pixel's photons that have not been used.
 #[derive(Clone, Debug)]
 struct RecordedPixel {
+    /// Of the laser cycles after the chunk.
     left: Remaining,
-    photons_left: u64,
     cycles_left: u64,
     rng: Pcg64,
+    /// Some laser cycles.
+    chunk: PixelPhotons,
+    /// Laser cycles and photons of the chunk that slices have had.
+    given: u16,
+    given_photons: usize,
 }
 
 impl RecordedPixel {
-    fn next_cycles(&mut self, cycles: u16) -> Result<PixelPhotons> {
+    fn photons_left(&self) -> u64 {
+        let in_chunk = self.chunk.photons.len() - self.given_photons;
+        self.left.photons() + in_chunk as u64
+    }
+
+    /// The next `cycles` laser cycles, from chunks of `chunk`.
+    fn next_cycles(&mut self, cycles: u16, chunk: u16) -> Result<PixelPhotons> {
         let mut received = PixelPhotons::default();
-        while received.cycles < cycles && self.cycles_left > 0 {
-            let share = 1.0 / self.cycles_left as f64;
-            let count = Binomial::new(self.photons_left, share)?.sample(&mut self.rng);
-            for _ in 0..count {
-                let nth = Uniform::new(0, self.photons_left)?.sample(&mut self.rng);
-                let code = self.left.take(nth);
-                self.photons_left -= 1;
-                received.photons.push(Photon {
-                    cycle: received.cycles,
-                    code,
-                });
+        while received.cycles < cycles {
+            if self.given == self.chunk.cycles {
+                self.next_chunk(chunk)?;
+                if self.chunk.cycles == 0 {
+                    break;
+                }
             }
-            self.cycles_left -= 1;
-            received.cycles += 1;
+            let taken = (self.chunk.cycles - self.given).min(cycles - received.cycles);
+            let end = self.given + taken;
+            // About as many as on average, and some more.
+            let all = self.chunk.photons.len();
+            let share = all * usize::from(taken) / usize::from(self.chunk.cycles);
+            received.photons.reserve(share + share / 4 + 4);
+            for &Photon { cycle, code } in &self.chunk.photons[self.given_photons..] {
+                if cycle >= end {
+                    break;
+                }
+                let cycle = received.cycles + (cycle - self.given);
+                received.photons.push(Photon { cycle, code });
+                self.given_photons += 1;
+            }
+            self.given = end;
+            received.cycles += taken;
         }
         Ok(received)
     }
-}
 
-/// A histogram from which the n-th photon can be taken: a binary tree whose
-/// node `i` holds the photons below it, its children being `2i` and `2i + 1`,
-/// the bins its leaves.
-#[derive(Clone, Debug)]
-struct Remaining {
-    tree: Vec<u64>,
-}
-
-impl Remaining {
-    fn new(counts: &[u64]) -> Self {
-        let leaves = counts.len().next_power_of_two();
-        let mut tree = vec![0; 2 * leaves];
-        tree[leaves..leaves + counts.len()].copy_from_slice(counts);
-        for node in (1..leaves).rev() {
-            tree[node] = tree[2 * node] + tree[2 * node + 1];
+    /// Draws the photons of the next `cycles` laser cycles, or of all there are.
+    fn next_chunk(&mut self, cycles: u16) -> Result<()> {
+        let cycles = u16::try_from(self.cycles_left).map_or(cycles, |left| left.min(cycles));
+        (self.given, self.given_photons) = (0, 0);
+        self.chunk.cycles = cycles;
+        self.chunk.photons.clear();
+        if cycles == 0 {
+            return Ok(());
         }
-        Self { tree }
-    }
-
-    /// Takes the `nth` of the photons left, counted from bin 0, and gives its
-    /// bin.
-    fn take(&mut self, mut nth: u64) -> u16 {
-        let leaves = self.tree.len() / 2;
-        let mut node = 1;
-        loop {
-            self.tree[node] -= 1;
-            if node >= leaves {
-                break u16::try_from(node - leaves).expect("no more than 1024 bins");
-            }
-            node *= 2;
-            if nth >= self.tree[node] {
-                nth -= self.tree[node];
-                node += 1;
-            }
+        let share = f64::from(cycles) / self.cycles_left as f64;
+        let count = Binomial::new(self.left.photons(), share)?.sample(&mut self.rng);
+        self.cycles_left -= u64::from(cycles);
+        // A laser cycle for each. As any photon may have any of them, how many fall into each
+        // says enough.
+        let mut of_cycle = [0u32; CHUNK as usize];
+        for _ in 0..count {
+            let cycle = UniformInt::<u16>::sample_single(0, cycles, &mut self.rng)?;
+            of_cycle[usize::from(cycle)] += 1;
         }
+        let photons = &mut self.chunk.photons;
+        for _ in 0..count {
+            let Some(code) = self.left.draw(&mut self.rng) else {
+                bail!("a photon too few");
+            };
+            photons.push(Photon { cycle: 0, code });
+        }
+        let all = photons.len();
+        // Most laser cycles have few photons: to write some too many, which the next laser
+        // cycles have, is faster than to ask each time.
+        photons.resize(all + AT_ONCE, Photon { cycle: 0, code: 0 });
+        let mut next = 0;
+        for (cycle, &count) in (0..cycles).zip(&of_cycle) {
+            for photon in &mut photons[next..next + AT_ONCE] {
+                photon.cycle = cycle;
+            }
+            let end = next + count as usize;
+            if count as usize > AT_ONCE {
+                for photon in &mut photons[next + AT_ONCE..end] {
+                    photon.cycle = cycle;
+                }
+            }
+            next = end;
+        }
+        photons.truncate(all);
+        Ok(())
     }
 }
 
@@ -269,6 +339,40 @@ mod tests {
         }
         assert_eq!(replayed, counts);
         assert!(photons.is_sorted_by_key(|photon| photon.cycle));
+    }
+
+    /// Of two captures, one of which ends first.
+    #[test]
+    fn slices_of_any_length_hold_the_same_photons() {
+        let photons = |lengths: &[u16]| {
+            let captures = [vec![vec![700; 8]], vec![vec![90; 8]]];
+            let length = RecordingLength::PhotonsPerCycle(0.9);
+            let geometry = Geometry::new(1, 2);
+            let mut source =
+                RecordedHistograms::new(geometry, &captures, length, u64::MAX, 3).unwrap();
+            let mut all = [(); 2].map(|()| Vec::new());
+            for &length in lengths.iter().cycle().take(9_000) {
+                let before = source.not_replayed();
+                let slice = source.next_slice(length).unwrap();
+                let mut given = 0;
+                for (all, pixel) in all.iter_mut().zip(&slice.pixels) {
+                    given += pixel.photons.len() as u64;
+                    let at = |photon: &Photon| {
+                        assert!(photon.cycle < pixel.cycles);
+                        (slice.first_cycle + u64::from(photon.cycle), photon.code)
+                    };
+                    all.extend(pixel.photons.iter().map(at));
+                }
+                assert_eq!(source.not_replayed() + given, before);
+            }
+            assert_eq!(source.not_replayed(), 0);
+            all
+        };
+        let expected = photons(&[7000]);
+        assert_eq!([expected[0].len(), expected[1].len()], [5600, 720]);
+        for lengths in [&[1][..], &[256], &[3, 2048, 1, 700], &[2049]] {
+            assert!(photons(lengths) == expected, "{lengths:?}");
+        }
     }
 
     #[test]

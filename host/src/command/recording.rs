@@ -1,0 +1,183 @@
+//! The options that say what a recording is, the same for every command.
+
+use std::path::Path;
+
+use anyhow::{Result, ensure};
+use clap::Args;
+use dtof::cli::arguments::{MOST_WHOLE, bins, fixed, positive, whole};
+use dtof::input::axes::Axes;
+use dtof::input::open::{BIN_WIDTH_PS, Known, Opening};
+use dtof::input::recorded::RecordingLength;
+use dtof::input::source::Geometry;
+use dtof::rows::grouped;
+use dtof::settings::{Run, Sensor, SettingsFile};
+use dtof_core::fixed::types::{I24F8, U16F16};
+
+#[derive(Args)]
+pub struct Recording {
+    /// Arrays of histograms: what each axis is, of captures, rows, columns and bins
+    /// [default: the last is bins, the one before columns, all others are rows]
+    #[arg(long, value_name = "AXIS,AXIS,...")]
+    axes: Option<Axes>,
+    /// .npz: the array to read [default: the only one]
+    #[arg(long, value_name = "NAME")]
+    array: Option<String>,
+    /// Photon lists: columns of the array, pixel = row × columns + column [default: one row]
+    #[arg(long, value_name = "N", value_parser = whole(1..=65_536_u32))]
+    columns: Option<u32>,
+    /// Add up so many neighbouring bins [default: 1]
+    #[arg(long, value_name = "K", value_parser = whole(1..=512_u16))]
+    rebin: Option<u16>,
+    /// Bins to use, after --rebin, a power of two from 8 to 1024. Of histograms with more the
+    /// last are cut off [default: as many as there are, or the next power of two; 128 of
+    /// photon lists]
+    #[arg(long, value_name = "N", value_parser = bins)]
+    bins: Option<u16>,
+    /// Picoseconds a bin of the file, rounded to 1/65536 [default: 250; of logs that of the
+    /// sensor]
+    #[arg(long, value_name = "PS", value_parser = fixed::<U16F16>, allow_hyphen_values = true)]
+    bin_width_ps: Option<U16F16>,
+    /// Millimetres added to every range, rounded to 1/256 [default: 0; of logs that of the
+    /// sensor]
+    #[arg(long, value_name = "MM", value_parser = fixed::<I24F8>, allow_hyphen_values = true)]
+    offset_mm: Option<I24F8>,
+    /// Histograms: photons a laser cycle in the brightest pixel of each capture [default: 1]
+    #[arg(long, value_name = "R", value_parser = positive, conflicts_with = "recorded_cycles")]
+    photons_per_cycle: Option<f64>,
+    /// Histograms: laser cycles that each capture lasted
+    #[arg(long, value_name = "N", value_parser = whole(1..=MOST_WHOLE))]
+    recorded_cycles: Option<u64>,
+    /// Laser cycles a second [default: not known]
+    #[arg(long, value_name = "HZ", value_parser = whole(1..=1_000_000_000_000_u64))]
+    laser_hz: Option<u64>,
+}
+
+impl Recording {
+    /// What these options say, to which `more` adds the others and the settings file.
+    ///
+    /// # Errors
+    /// What is wrong with these.
+    pub fn said(
+        &self,
+        more: impl FnOnce(SettingsFile) -> Result<SettingsFile>,
+    ) -> Result<SettingsFile> {
+        let options = SettingsFile {
+            sensor: Sensor {
+                laser_hz: self.laser_hz,
+                columns: self.columns,
+                bins: self.bins,
+                offset_mm: self.offset_mm,
+                ..Sensor::default()
+            },
+            run: Run {
+                photons_per_cycle: self.photons_per_cycle,
+                recorded_cycles: self.recorded_cycles,
+                axes: self.axes.clone(),
+                array: self.array.clone(),
+                rebin: self.rebin,
+                ..Run::default()
+            },
+            ..SettingsFile::default()
+        };
+        let mut said = more(options)?;
+        ensure!(
+            self.rebin.is_none()
+                || self.bin_width_ps.is_some()
+                || said.sensor.bin_width_ps.is_none(),
+            "--rebin: the bins of the settings file are others; leave one of them out"
+        );
+        if let Some(width) = self.bin_width_ps {
+            // Settings are of the bins that are used.
+            let used = width.checked_mul_int(said.run.rebin.unwrap_or(1).into());
+            ensure!(
+                used.is_some(),
+                "--bin-width-ps {width}: too much for --rebin"
+            );
+            said.sensor.bin_width_ps = used;
+        }
+        Ok(said)
+    }
+
+    /// Options that say nothing about a list of photons are refused.
+    ///
+    /// # Errors
+    /// If there are any, and it is one.
+    pub fn suits(&self, file: &Path, known: &Known) -> Result<()> {
+        let has_length = self.photons_per_cycle.is_some() || self.recorded_cycles.is_some();
+        ensure!(
+            !(known.is_list && has_length),
+            "--photons-per-cycle and --recorded-cycles are for histograms; {} holds photons",
+            file.display()
+        );
+        Ok(())
+    }
+}
+
+/// How a recording is opened, as is said.
+pub fn opening(said: &SettingsFile) -> Opening {
+    let Run {
+        cycles,
+        seed,
+        photons_per_cycle,
+        recorded_cycles,
+        axes,
+        array,
+        rebin,
+        ..
+    } = said.run.clone();
+    let recorded = recorded_cycles.map(RecordingLength::Cycles);
+    let rate = photons_per_cycle.map(RecordingLength::PhotonsPerCycle);
+    let rebin = rebin.unwrap_or(1);
+    let width = said.sensor.bin_width_ps;
+    Opening {
+        columns: said.sensor.columns,
+        bins: said.sensor.bins,
+        rebin,
+        axes,
+        array,
+        bin_width_ps: width.map(|width| width / U16F16::from_num(rebin.max(1))),
+        length: recorded.or(rate),
+        cycles: cycles.unwrap_or(10_000),
+        seed: seed.unwrap_or(1),
+    }
+}
+
+/// What the file says.
+pub fn of_file(known: &Known, geometry: Geometry) -> SettingsFile {
+    SettingsFile {
+        sensor: Sensor {
+            columns: Some(geometry.columns),
+            bins: u16::try_from(known.bins).ok(),
+            bin_width_ps: Some(known.bin_width_ps),
+            offset_mm: known.offset_mm,
+            gate: known.gate,
+            ..Sensor::default()
+        },
+        ..SettingsFile::default()
+    }
+}
+
+/// Says on standard error what is surely wrong with the recording, and what of it is left out,
+/// unless `quiet`.
+pub fn warn(file: &Path, known: &Known, quiet: bool) {
+    let cut_off = match known.cut_off {
+        0 => None,
+        photons => Some(format!(
+            "{} photons in bins that were cut off",
+            grouped(photons)
+        )),
+    };
+    for warning in known.warnings.iter().chain(&cut_off).filter(|_| !quiet) {
+        eprintln!("warning: {}: {warning}", file.display());
+    }
+}
+
+/// Says that nobody has told how wide a bin is, unless `quiet`.
+pub fn warn_of_width(file: &Path, known: &Known, said: &SettingsFile, quiet: bool) {
+    if said.sensor.bin_width_ps.is_none() && known.bin_width_ps == BIN_WIDTH_PS && !quiet {
+        eprintln!(
+            "warning: {}: bins are taken to be {BIN_WIDTH_PS} ps wide; --bin-width-ps says otherwise",
+            file.display()
+        );
+    }
+}

@@ -1,0 +1,185 @@
+//! A histogram from which photons are drawn without putting them back.
+
+use rand_core::Rng;
+use rand_distr::uniform::{UniformInt, UniformSampler};
+
+/// A bin: its photons have numbers, one bin after the other, and those drawn so far are the
+/// last of them.
+#[derive(Clone, Copy, Debug)]
+struct Bin {
+    /// One past the number of its last photon.
+    end: u64,
+    /// One past the number of the last photon that is still there.
+    left: u64,
+}
+
+/// So many photons or fewer are a list.
+const LIST: u64 = 1024;
+
+/// The photons of a histogram that have not been drawn.
+///
+/// The photons of a bin are all alike, so it does not matter which of them is drawn. A number
+/// is drawn among all photons, and again if that photon is gone. When a quarter of them are
+/// gone the others are numbered anew. A table says in which bin to begin the search for a
+/// number. The last photons are a list.
+#[derive(Clone, Debug)]
+pub struct Remaining {
+    bins: Vec<Bin>,
+    /// Of each number, shifted right: the bin of the first that is shifted to the same.
+    guide: Vec<u16>,
+    shift: u32,
+    /// Photons with a number, drawn or not.
+    numbers: u64,
+    /// Those that have not been drawn.
+    photons: u64,
+    /// The bins of all photons, once they are few.
+    list: Vec<u16>,
+}
+
+impl Remaining {
+    /// All photons of a histogram, fewer than 2^62 in at most 65,536 bins.
+    pub fn new(counts: &[u64]) -> Self {
+        let mut end = 0;
+        let bins = counts.iter().map(|count| {
+            end += count;
+            Bin { end, left: end }
+        });
+        let mut remaining = Self {
+            bins: bins.collect(),
+            guide: Vec::new(),
+            shift: 0,
+            numbers: 0,
+            photons: end,
+            list: Vec::new(),
+        };
+        remaining.number_anew();
+        remaining
+    }
+
+    /// How many there are.
+    pub fn photons(&self) -> u64 {
+        self.photons
+    }
+
+    /// Numbers the photons that are left, or lists them.
+    fn number_anew(&mut self) {
+        let (mut start, mut end) = (0, 0);
+        for bin in &mut self.bins {
+            end += bin.left - start;
+            start = bin.end;
+            *bin = Bin { end, left: end };
+        }
+        self.numbers = end;
+        self.guide.clear();
+        if end <= LIST {
+            self.make_list();
+            return;
+        }
+        let entries = 8 * self.bins.len() as u64;
+        self.shift = 0;
+        while self.numbers >> self.shift >= entries {
+            self.shift += 1;
+        }
+        for (number, bin) in (0..=u16::MAX).zip(&self.bins) {
+            // Numbers before `bin.end` are of this bin or of one before.
+            while ((self.guide.len() as u64) << self.shift) < bin.end {
+                self.guide.push(number);
+            }
+        }
+    }
+
+    /// Lists all photons.
+    fn make_list(&mut self) {
+        let mut start = 0;
+        for (number, bin) in (0..=u16::MAX).zip(&self.bins) {
+            self.list.extend((start..bin.end).map(|_| number));
+            start = bin.end;
+        }
+        (self.bins, self.guide) = (Vec::new(), Vec::new());
+    }
+
+    /// Draws a photon: its bin, or `None` if there is none left.
+    #[inline]
+    pub fn draw(&mut self, rng: &mut impl Rng) -> Option<u16> {
+        if 4 * self.photons < 3 * self.numbers && self.list.is_empty() {
+            self.number_anew();
+        }
+        #[allow(clippy::cast_possible_truncation, reason = "indices of what is there")]
+        if !self.list.is_empty() {
+            let place = UniformInt::<u32>::sample_single(0, self.list.len() as u32, rng).ok()?;
+            self.photons -= 1;
+            return Some(self.list.swap_remove(place as usize));
+        }
+        loop {
+            let number = UniformInt::<u64>::sample_single(0, self.numbers, rng).ok()?;
+            #[allow(clippy::cast_possible_truncation, reason = "an index of the table")]
+            let mut bin = self.guide[(number >> self.shift) as usize];
+            while self.bins[usize::from(bin)].end <= number {
+                bin += 1;
+            }
+            let of_bin = &mut self.bins[usize::from(bin)];
+            if number < of_bin.left {
+                of_bin.left -= 1;
+                self.photons -= 1;
+                return Some(bin);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dtof_core::PixelAddress;
+    use dtof_theory::random::pixel_rng;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_photon_is_drawn_once(
+            counts in prop::collection::vec(prop_oneof![Just(0u64), 1u64..5, 1u64..300, 1u64..3000], 1..40),
+            seed in any::<u64>(),
+        ) {
+            let mut rng = pixel_rng(seed, PixelAddress(0));
+            let mut remaining = Remaining::new(&counts);
+            let mut drawn = vec![0; counts.len()];
+            while let Some(bin) = remaining.draw(&mut rng) {
+                drawn[usize::from(bin)] += 1;
+                let all: u64 = counts.iter().sum();
+                prop_assert_eq!(remaining.photons() + drawn.iter().sum::<u64>(), all);
+            }
+            prop_assert_eq!(drawn, counts);
+        }
+    }
+
+    /// With replacement the first draws would be as likely; without, two draws from bins of
+    /// 1 and 3 photons are in different bins with probability 1/2, and not 3/8.
+    #[test]
+    fn a_photon_is_not_put_back() {
+        let mut rng = pixel_rng(1, PixelAddress(0));
+        let mut differ = 0i32;
+        for _ in 0..40_000 {
+            let mut remaining = Remaining::new(&[1, 0, 3]);
+            let pair = [remaining.draw(&mut rng), remaining.draw(&mut rng)];
+            differ += i32::from(pair[0] != pair[1]);
+        }
+        // The standard deviation is 100.
+        assert!((differ - 20_000).abs() < 500, "{differ}");
+    }
+
+    #[test]
+    fn all_photons_of_a_large_histogram_are_as_likely() {
+        let mut rng = pixel_rng(2, PixelAddress(0));
+        let counts: Vec<u64> = (0..1024).map(|bin| (bin % 4) << 28).collect();
+        let mut remaining = Remaining::new(&counts);
+        let mut drawn = [0i64; 4];
+        for _ in 0..600_000 {
+            let bin = remaining.draw(&mut rng).unwrap();
+            drawn[usize::from(bin) % 4] += 1;
+        }
+        // Five standard deviations of the largest are 1,900.
+        for (expected, count) in [0, 100_000, 200_000, 300_000].into_iter().zip(drawn) {
+            assert!((count - expected).abs() < 1_900, "{drawn:?}");
+        }
+    }
+}
