@@ -24,10 +24,10 @@ const GOOD: Configuration = Configuration {
 };
 
 /// From the rule's byte to that of tracking.
-const AVERAGE_TRACKS: [u8; 20] = {
-    let mut fields = [0; 20];
+const AVERAGE_TRACKS: [u8; 22] = {
+    let mut fields = [0; 22];
     fields[0] = 2;
-    fields[19] = 1;
+    fields[21] = 1;
     fields
 };
 
@@ -197,13 +197,13 @@ fn device() -> Sidecar<'static> {
 fn refused() -> Vec<(Vec<u8>, Refusal)> {
     let good = GOOD.to_le_bytes();
     // From which byte on what stands there, as `docs/link-format.md` numbers them.
-    let bad: [(usize, &[u8], Refusal); 35] = [
+    let bad: [(usize, &[u8], Refusal); 37] = [
         (24, &[2], Refusal::Unknown),
         (25, &[3], Refusal::Unknown),
         (29, &[2], Refusal::Unknown),
-        (32, &[2], Refusal::Unknown),
-        (32, &[1, 2, 0, 1, 0, 0], Refusal::Unknown),
-        (38, &[2], Refusal::Unknown),
+        (34, &[2], Refusal::Unknown),
+        (34, &[1, 2, 0, 1, 0, 0], Refusal::Unknown),
+        (40, &[2], Refusal::Unknown),
         (4, &[0], Refusal::ZeroX),
         (4, &[21], Refusal::XAboveL1),
         (8, &[20], Refusal::L2NotAboveL1),
@@ -219,23 +219,25 @@ fn refused() -> Vec<(Vec<u8>, Refusal)> {
         (24, &[1], Refusal::NoSensor),
         (25, &[1, 0], Refusal::WindowWidth),
         (25, &[1, 8], Refusal::WindowWidth),
-        // 255 and 1025 of 256 to 1024.
-        (29, &[1, 0xff, 0], Refusal::HalfWidth),
-        (29, &[1, 1, 4], Refusal::HalfWidth),
-        (32, &[1, 0, 0], Refusal::ZeroThreshold),
+        // 255 and 1025 of 256 to 1024, before and after the place.
+        (29, &[1, 0xff, 0, 0, 1], Refusal::HalfWidth),
+        (29, &[1, 1, 4, 0, 1], Refusal::HalfWidth),
+        (29, &[1, 0, 1, 0xff, 0], Refusal::HalfWidth),
+        (29, &[1, 0, 1, 1, 4], Refusal::HalfWidth),
+        (34, &[1, 0, 0], Refusal::ZeroThreshold),
         // 1/512 of a bin of 37.5 mm is 0.07 mm, 18.7 of 1/256 mm.
-        (32, &[1, 0, 18], Refusal::ZeroThreshold),
-        (41, &[4], Refusal::Unknown),
-        (44, &[2], Refusal::Unknown),
-        (45, &[0], Refusal::Unknown),
-        (45, &[5], Refusal::Unknown),
-        (41, &[1, 0, 0], Refusal::Patience),
+        (34, &[1, 0, 18], Refusal::ZeroThreshold),
+        (43, &[4], Refusal::Unknown),
+        (46, &[2], Refusal::Unknown),
+        (47, &[0], Refusal::Unknown),
+        (47, &[5], Refusal::Unknown),
+        (43, &[1, 0, 0], Refusal::Patience),
         // No column, and pixels one above the other: four, two and one block.
-        (39, &[0, 0, 1, 100, 0], Refusal::Blocks),
-        (39, &[1, 0, 3, 100, 0], Refusal::Blocks),
+        (41, &[0, 0, 1, 100, 0], Refusal::Blocks),
+        (41, &[1, 0, 3, 100, 0], Refusal::Blocks),
         // The paper's rule, also for blocks, and that with the average of all bins.
-        (44, &[1], Refusal::Tracking),
-        (41, &[1, 100, 0, 1], Refusal::Tracking),
+        (46, &[1], Refusal::Tracking),
+        (43, &[1, 100, 0, 1], Refusal::Tracking),
         (25, &AVERAGE_TRACKS, Refusal::Tracking),
     ];
     // Too short, and as long as that of version 3.

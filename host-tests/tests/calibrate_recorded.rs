@@ -118,19 +118,25 @@ fn a_recording_with_distances_calibrates_itself() {
     ));
     // The pulse has a tail, and that is said instead of a width that is none.
     assert!(pulse.is_core && pulse.tail > 0.05, "{pulse:?}");
+    // It falls more slowly than it rises.
+    let suited = pulse.suited.unwrap();
+    assert!(suited.window.before() < suited.window.after(), "{suited:?}");
+    assert!(suited.error < 0.92 * suited.of_core, "{suited:?}");
     assert_eq!(found.nearest, Nearest::NotCommon);
     // The authors state 91 ps, and a centroid 92.1.
     assert!((91.0..=92.5).contains(&found.bin_width_ps));
 
     let truth = ground_truth(&log);
     // Other photons than those of the calibration.
-    let (distances, photons, error) = judged(&found, &counts.captures, &truth, 2);
-    tell(&format!(
-        "{distances} distances, {photons:.1} photons an event, median error {error:.2} mm"
-    ));
-    assert_eq!(distances, 149);
-    assert!(photons <= 13.1, "{photons}");
-    assert!(error <= 3.4, "{error}");
+    for seed in 2..5 {
+        let (distances, photons, error) = judged(&found, &counts.captures, &truth, seed);
+        tell(&format!(
+            "{distances} distances, {photons:.1} photons an event, median error {error:.2} mm"
+        ));
+        assert_eq!(distances, 149);
+        assert!(photons <= 13.1, "{photons}");
+        assert!(error <= 3.0, "{error}");
+    }
     let mm_per_bin = found.bin_width_ps * dtof::simulate::MM_PER_PS;
     let ideal = ideal_error(&counts.captures, &truth, mm_per_bin);
     tell(&format!(

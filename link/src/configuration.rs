@@ -83,7 +83,7 @@ const TRACKING: u8 = 1;
 
 impl Configuration {
     /// Bytes of the record.
-    pub const BYTES: usize = 48;
+    pub const BYTES: usize = 50;
     /// What a minimum count may be: photons that a counter of 10 bits holds.
     const MINIMUM_COUNTS: core::ops::RangeInclusive<u16> = 1..=1023;
 
@@ -102,9 +102,11 @@ impl Configuration {
                 (WINDOW_RULE, U8F8::ZERO, minimum_count, width, rule.z())
             }
         };
-        let (estimator, half_width) = match self.estimator {
-            DepthEstimator::Centroid3 => (CENTROID, U8F8::ZERO),
-            DepthEstimator::CentredWindow(window) => (CENTRED_WINDOW, window.half_width()),
+        let (estimator, before, after) = match self.estimator {
+            DepthEstimator::Centroid3 => (CENTROID, U8F8::ZERO, U8F8::ZERO),
+            DepthEstimator::CentredWindow(window) => {
+                (CENTRED_WINDOW, window.before(), window.after())
+            }
         };
         let (output, reference, threshold) = match self.dynamic_depth {
             None => (DEPTH_EVENTS, PREVIOUS, U24F8::ZERO),
@@ -150,7 +152,8 @@ impl Configuration {
             .chain([source, rule, window])
             .chain(z.to_le_bytes())
             .chain([estimator])
-            .chain(half_width.to_le_bytes())
+            .chain(before.to_le_bytes())
+            .chain(after.to_le_bytes())
             .chain([output, reference])
             .chain(threshold.to_le_bytes())
             .chain([hits])
@@ -185,7 +188,8 @@ impl Configuration {
         let [source, rule, window] = fields.next()?;
         let z = U4F12::from_le_bytes(fields.next()?);
         let [estimator] = fields.next()?;
-        let half_width = U8F8::from_le_bytes(fields.next()?);
+        let before = U8F8::from_le_bytes(fields.next()?);
+        let after = U8F8::from_le_bytes(fields.next()?);
         let [output, reference] = fields.next()?;
         let threshold_mm = U24F8::from_le_bytes(fields.next()?);
         let [hits] = fields.next()?;
@@ -211,7 +215,7 @@ impl Configuration {
             },
             estimator: match estimator {
                 CENTROID => DepthEstimator::Centroid3,
-                CENTRED_WINDOW => CentredWindow::new(half_width)
+                CENTRED_WINDOW => CentredWindow::with_sides(before, after)
                     .map(DepthEstimator::CentredWindow)
                     .ok_or(Refusal::HalfWidth)?,
                 _ => return Err(Refusal::Unknown),

@@ -2,7 +2,7 @@
 //!
 //! | kind | to | message | body |
 //! |---|---|---|---|
-//! | 0x01 | device | configure | [`Configuration`](crate::Configuration), 48 bytes |
+//! | 0x01 | device | configure | [`Configuration`](crate::Configuration), 50 bytes |
 //! | 0x02 | device | photons | [`Token`](crate::Token)s |
 //! | 0x03 | device | synchronise | anything |
 //! | 0x04 | device | statistics request | none |

@@ -81,7 +81,7 @@ fn a_host_configures_with_the_golden_frame() {
     let z = U4F12::lit("4.5");
     let configuration = Configuration {
         rule: WindowRule::new(3, z, Count::saturating(5)).unwrap().into(),
-        estimator: CentredWindow::new(U8F8::lit("2.5"))
+        estimator: CentredWindow::with_sides(U8F8::lit("2.5"), U8F8::lit("3"))
             .map(DepthEstimator::CentredWindow)
             .unwrap(),
         x: 4,
@@ -157,8 +157,9 @@ fn configuration() -> impl Strategy<Value = Configuration> {
         let window = WindowRule::new(width, U4F12::from_bits(z), count);
         AnyRule::Window(window.unwrap())
     });
-    let centred = (256u16..=1024).prop_map(|half| {
-        DepthEstimator::CentredWindow(CentredWindow::new(U8F8::from_bits(half)).unwrap())
+    let half_width = || (256u16..=1024).prop_map(U8F8::from_bits);
+    let centred = (half_width(), half_width()).prop_map(|(before, after)| {
+        DepthEstimator::CentredWindow(CentredWindow::with_sides(before, after).unwrap())
     });
     let reference = prop_oneof![Just(Reference::Previous), Just(Reference::Reported)];
     let changes = (any::<u32>(), reference).prop_map(|(threshold, reference)| DynamicDepth {
@@ -245,19 +246,20 @@ proptest! {
     fn what_any_bytes_configure_comes_back(
         numbers in any::<[u8; Configuration::BYTES]>(), minimum_count in 1u16..=1023,
         choices in prop::array::uniform6(0u8..3), rule in 0u8..4, width in 0u8..9,
-        half_width in 200u16..1100, levels in 0u8..5, patience in 0u16..9, echoes in 0u8..6,
+        before in 200u16..1100, after in 200u16..1100, levels in 0u8..5, patience in 0u16..9, echoes in 0u8..6,
     ) {
         let mut bytes = numbers;
         bytes[2..4].copy_from_slice(&minimum_count.to_le_bytes());
         let [source, estimator, output, reference, hits, tracking] = choices;
         for (at, value) in [
-            (24, source), (25, rule), (26, width), (29, estimator), (32, output),
-            (33, reference), (38, hits), (41, levels), (44, tracking), (45, echoes),
+            (24, source), (25, rule), (26, width), (29, estimator), (34, output),
+            (35, reference), (40, hits), (43, levels), (46, tracking), (47, echoes),
         ] {
             bytes[at] = value;
         }
-        bytes[30..32].copy_from_slice(&half_width.to_le_bytes());
-        bytes[42..44].copy_from_slice(&patience.to_le_bytes());
+        bytes[30..32].copy_from_slice(&before.to_le_bytes());
+        bytes[32..34].copy_from_slice(&after.to_le_bytes());
+        bytes[44..46].copy_from_slice(&patience.to_le_bytes());
         let found = Configuration::from_le_bytes(&bytes);
         let unknown = source == 2 || rule == 3 || estimator == 2 || output == 2 || hits == 2
             || (output == 1 && reference == 2)
@@ -265,7 +267,7 @@ proptest! {
         prop_assert_eq!(
             found.is_err(),
             unknown || (rule == 1 && !(1..=7).contains(&width))
-                || (estimator == 1 && !(256..=1024).contains(&half_width))
+                || (estimator == 1 && ![before, after].iter().all(|half| (256..=1024).contains(half)))
                 || (levels > 0 && patience == 0)
         );
         if let Ok(configuration) = found {

@@ -70,9 +70,7 @@ impl DepthEstimator {
             Self::CentredWindow(window) => {
                 let mut left_out = 0;
                 if peeled.echoes() > 0 {
-                    let (bin, reach) = (peak.bin.raw(), self.reach());
-                    let first = bin.saturating_sub(reach).max(gate.first());
-                    let last = bin.saturating_add(reach).min(gate.last());
+                    let (first, last) = window.inside(gate, peak.bin.raw());
                     left_out = peeled.bins_among(gate.first()..=gate.last())
                         - peeled.bins_among(first..=last);
                 }
@@ -87,7 +85,11 @@ impl DepthEstimator {
     pub const fn reach(&self) -> u16 {
         match self {
             Self::Centroid3 => 1,
-            Self::CentredWindow(window) => window.half_width().to_bits().div_ceil(256),
+            Self::CentredWindow(window) => {
+                let [before, after] = [window.before().to_bits(), window.after().to_bits()];
+                let widest = if before > after { before } else { after };
+                widest.div_ceil(256)
+            }
         }
     }
 }

@@ -5,28 +5,15 @@
 
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::{
-    BinIndex, CentredWindow, Count, Count10, Count16, Count24, CounterWidth, Depth, Flags,
-    Histogram, Peak, RangeGate, SubBinOffset,
+    CentredWindow, Count10, Count16, Count24, CounterWidth, Depth, Flags, Histogram, RangeGate,
+    SubBinOffset,
 };
 use proptest::prelude::*;
 
-const BINS: usize = 32;
-
-fn histogram<W: CounterWidth>(counts: &[u32; BINS]) -> Histogram<BINS, W> {
-    let mut histogram = Histogram::new();
-    histogram.add_frame(counts, &RangeGate::full());
-    histogram
-}
+use super::formula::{self, BINS, counts, highest, histogram, is_near_limit, path, peak, rest};
 
 fn window(half_width: u16) -> CentredWindow {
     CentredWindow::new(U8F8::from_bits(half_width)).unwrap()
-}
-
-fn peak(counts: &[u32; BINS], bin: usize) -> Peak {
-    Peak {
-        bin: BinIndex::new(bin as u16).unwrap(),
-        count: Count::new(counts[bin]).unwrap(),
-    }
 }
 
 fn depth<W: CounterWidth>(
@@ -35,68 +22,45 @@ fn depth<W: CounterWidth>(
     half_width: u16,
     background: U24F8,
 ) -> Depth {
-    let gate = RangeGate::full();
-    let histogram = histogram::<W>(counts);
-    window(half_width).estimate(&histogram, &gate, peak(counts, bin), background)
+    formula::depth::<W>(counts, bin, (half_width, half_width), background)
 }
 
-/// Where the window comes to rest, from the start of `bin` in 1/256 bin; each step
-/// rounded as documented.
 fn as_written(counts: &[u32; BINS], bin: usize, half_width: u16, background: f64) -> f64 {
-    let half = f64::from(half_width) / 256.0;
-    let middle = bin as f64;
-    let mut x = middle + 0.5;
-    for _ in 0..3 {
-        let (mut photons, mut moment) = (0.0, 0.0);
-        for (bin, &count) in counts.iter().enumerate() {
-            let start = (bin as f64).max(x - half);
-            let end = (bin as f64 + 1.0).min(x + half);
-            let inside = f64::from(count) * (end - start).max(0.0);
-            photons += inside;
-            moment += inside * ((start + end) / 2.0 - x);
-        }
-        let signal = (photons - 2.0 * half * background).max(photons / 4.0);
-        if signal > 0.0 {
-            x += ((moment / signal).clamp(-1.0, 1.0) * 256.0).round() / 256.0;
-        }
-        x = x.clamp(middle - 2.0, middle + 511.0 / 256.0);
-    }
-    (x - middle) * 256.0
-}
-
-/// Counts of a pulse somewhere in the middle, the others low.
-fn counts(highest: u32) -> impl Strategy<Value = [u32; BINS]> {
-    prop::array::uniform32(0..=highest / 8).prop_flat_map(move |counts| {
-        prop::array::uniform5(0..=highest).prop_map(move |pulse| {
-            let mut counts = counts;
-            counts[14..19].copy_from_slice(&pulse);
-            counts
-        })
-    })
-}
-
-fn highest(counts: &[u32; BINS]) -> usize {
-    (8..24).max_by_key(|&bin| counts[bin]).unwrap()
+    rest(counts, bin, (half_width, half_width), background)
 }
 
 #[test]
 fn only_widths_that_can_be_used() {
+    let widths = 256..=1024;
     for bits in 0..=u16::MAX {
-        let window = CentredWindow::new(U8F8::from_bits(bits));
-        assert_eq!(window.is_some(), (256..=1024).contains(&bits));
+        let half = U8F8::from_bits(bits);
+        let window = CentredWindow::new(half);
+        assert_eq!(window.is_some(), widths.contains(&bits));
         if let Some(window) = window {
-            assert_eq!(window.half_width().to_bits(), bits);
+            assert_eq!((window.before(), window.after()), (half, half));
+        }
+        for other in [0, 255, 256, 700, 1024, 1025, u16::MAX] {
+            let sides = CentredWindow::with_sides(half, U8F8::from_bits(other));
+            let are_some = widths.contains(&bits) && widths.contains(&other);
+            assert_eq!(sides.is_some(), are_some);
+            let turned = CentredWindow::with_sides(U8F8::from_bits(other), half);
+            let sides = sides.map(|sides| (sides.before(), sides.after()));
+            assert_eq!(
+                turned.map(|turned| (turned.after(), turned.before())),
+                sides
+            );
         }
         let expected = (2 * u32::from(bits) + 128).clamp(256, 1024);
-        let window = CentredWindow::for_pulse(U8F8::from_bits(bits));
-        assert_eq!(u32::from(window.half_width().to_bits()), expected);
+        let window = CentredWindow::for_pulse(half);
+        assert_eq!(u32::from(window.before().to_bits()), expected);
+        assert_eq!(window.after(), window.before());
     }
 }
 
 #[test]
 fn the_widest_pulse_has_the_widest_window() {
     let widest = CentredWindow::WIDEST_PULSE;
-    let width = |sigma| CentredWindow::for_pulse(sigma).half_width();
+    let width = |sigma| CentredWindow::for_pulse(sigma).after();
     assert_eq!(width(widest), CentredWindow::MAX);
     assert!(width(widest - U8F8::DELTA) < CentredWindow::MAX);
 }
@@ -156,6 +120,10 @@ fn extremes() {
                 for background in [U24F8::ZERO, U24F8::from_num(W::MAX), U24F8::MAX] {
                     for bin in [0, 1, 16, 30, 31] {
                         let _ = depth::<W>(&counts, bin, half_width, background);
+                        for other in [256, 1024] {
+                            let _ =
+                                formula::depth::<W>(&counts, bin, (half_width, other), background);
+                        }
                     }
                 }
             }
@@ -220,8 +188,12 @@ proptest! {
         let mut mirrored = counts;
         mirrored.reverse();
         let seen = depth::<Count10>(&mirrored, BINS - 1 - bin, half_width, level).offset.raw();
-        // Only the ends of what an offset holds are not each other's image.
-        prop_assert!(seen == 256 - offset || offset <= -255 || seen <= -255);
+        // The ends of what an offset holds are not each other's image.
+        let sides = (half_width, half_width);
+        if is_near_limit(&path(&counts, bin, sides, level.to_num())) {
+            return Ok(());
+        }
+        prop_assert_eq!(seen, 256 - offset);
     }
 
     #[test]
@@ -260,13 +232,20 @@ fn the_background_outside_is_the_mean_of_the_bins_not_reached() {
         let gate = RangeGate::<BINS>::new(first, last).unwrap();
         let mut histogram = Histogram::<BINS>::new();
         histogram.add_frame(&counts, &gate);
-        for half_width in [256, 257, 512, 640, 1024] {
+        for (before, after) in [
+            (256, 256),
+            (257, 257),
+            (512, 1024),
+            (640, 256),
+            (1024, 1024),
+        ] {
             for bin in 0..BINS {
-                let window = window(half_width);
+                let window = formula::window((before, after));
                 let found = window.background_outside(&histogram, &gate, peak(&counts, bin), 0);
-                let reach = usize::from(half_width.div_ceil(256));
+                let [below, above] = [before, after].map(|half| usize::from(half.div_ceil(256)));
                 let gated = usize::from(first)..=usize::from(last);
-                let outside = gated.clone().filter(|other| other.abs_diff(bin) > reach);
+                let inside = bin.saturating_sub(below)..=bin + above;
+                let outside = gated.clone().filter(|other| !inside.contains(other));
                 let (mut sum, mut bins) = (0, 0);
                 for other in outside {
                     sum += counts[other];
@@ -274,7 +253,10 @@ fn the_background_outside_is_the_mean_of_the_bins_not_reached() {
                 }
                 let mean = (sum << 8).checked_div(bins).map(U24F8::from_bits);
                 let expected = mean.filter(|_| gated.contains(&bin));
-                assert_eq!(found, expected, "{first} to {last}, {half_width}, {bin}");
+                assert_eq!(
+                    found, expected,
+                    "{first} to {last}, {before} {after}, {bin}"
+                );
             }
         }
     }

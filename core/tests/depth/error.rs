@@ -35,12 +35,15 @@ fn share(bin: usize, position: f64, sigma: f64) -> (f64, f64) {
     (normal(right) - normal(left), derivative)
 }
 
+/// The share of a pulse in each bin at a position, and its derivative by the position.
+type Pulse<'a> = &'a dyn Fn(usize, f64) -> (f64, f64);
+
 /// The least variance of an unbiased estimate of the position, in bins².
-fn bound(position: f64, sigma: f64, signal: f64, background: f64) -> f64 {
+fn bound(pulse: Pulse, position: f64, signal: f64, background: f64) -> f64 {
     // Fisher information of position, amplitude and background.
     let mut f = [[0.0; 3]; 3];
     for bin in 0..BINS {
-        let (share, derivative) = share(bin, position, sigma);
+        let (share, derivative) = pulse(bin, position);
         let gradient = [signal * derivative, share, 1.0];
         let mean = signal * share + background;
         for (row, a) in f.iter_mut().zip(gradient) {
@@ -72,49 +75,64 @@ fn poisson(rng: &mut Pcg64Mcg, mean: f64) -> u32 {
     count
 }
 
-/// Root mean square error of some estimators over that of the bound.
+/// Root mean square error of some estimators over that of the bound. What an estimator is off by
+/// in the mean does not count.
 fn ratios<const N: usize>(
     estimators: [DepthEstimator; N],
-    sigma: f64,
+    pulse: Pulse,
+    reach: f64,
     signal: f64,
     background: f64,
     background_error: f64,
 ) -> [f64; N] {
     let mut rng = Pcg64Mcg::seed_from_u64(7);
-    let (mut least, mut squares) = (0.0, [0.0; N]);
+    let (mut least, mut trials, mut sums) = (0.0, 0.0, [[0.0; 2]; N]);
     for number in 0..POSITIONS {
         let position = 63.0 + (f64::from(number) + 0.5) / f64::from(POSITIONS);
-        let bound = bound(position, sigma, signal, background);
+        let bound = bound(pulse, position, signal, background);
         let means: [f64; BINS] =
-            core::array::from_fn(|bin| background + signal * share(bin, position, sigma).0);
+            core::array::from_fn(|bin| background + signal * pulse(bin, position).0);
         for _ in 0..TRIALS {
             let counts: [u32; BINS] = means.map(|mean| poisson(&mut rng, mean));
             let mut histogram = Histogram::<BINS>::new();
             histogram.add_frame(&counts, &RangeGate::full());
             let peak = histogram.peak();
-            if (f64::from(peak.bin.raw()) + 0.5 - position).abs() > 1.0 + 2.0 * sigma {
+            if (f64::from(peak.bin.raw()) + 0.5 - position).abs() > reach {
                 continue;
             }
             let outside: u32 = counts[..56].iter().chain(&counts[72..]).sum();
             let level = f64::from(outside) / 112.0 + background_error;
             let level = U24F8::from_num(level);
             least += bound;
-            for (square, estimator) in squares.iter_mut().zip(estimators) {
+            trials += 1.0;
+            for ([sum, square], estimator) in sums.iter_mut().zip(estimators) {
                 let depth = estimator.estimate(&histogram, &RangeGate::full(), peak, level);
                 let found = f64::from(peak.bin.raw()) + f64::from(depth.offset.raw()) / 256.0;
+                *sum += found - position;
                 *square += (found - position).powi(2);
             }
         }
     }
-    squares.map(|square| (square / least).sqrt())
+    sums.map(|[sum, square]| ((square - sum * sum / trials) / least).sqrt())
 }
 
-/// Mean and highest ratio over all signals and backgrounds.
+/// Mean and highest ratio over all signals and backgrounds, with a Gaussian pulse.
 fn mean_and_highest(estimator: DepthEstimator, sigma: f64, background_error: f64) -> (f64, f64) {
+    let (pulse, reach) = (
+        |bin, position| share(bin, position, sigma),
+        1.0 + 2.0 * sigma,
+    );
     let (mut sum, mut highest, mut number) = (0.0, 0.0f64, 0.0);
     for background in BACKGROUNDS {
         for signal in SIGNALS {
-            let [ratio] = ratios([estimator], sigma, signal, background, background_error);
+            let [ratio] = ratios(
+                [estimator],
+                &pulse,
+                reach,
+                signal,
+                background,
+                background_error,
+            );
             sum += ratio;
             highest = highest.max(ratio);
             number += 1.0;
@@ -134,7 +152,7 @@ fn a_centred_window_that_suits_the_pulse_is_near_the_bound() {
         let three = mean_and_highest(DepthEstimator::Centroid3, sigma, 0.0);
         println!(
             "{sigma:4} {:.2}: {mean:.3} {highest:.3}; {:.3} {:.3}",
-            window.half_width(),
+            window.after(),
             three.0,
             three.1
         );
@@ -155,5 +173,52 @@ fn a_background_too_high_costs_little() {
         let right = mean_and_highest(estimator, sigma, 0.0).0;
         let high = mean_and_highest(estimator, sigma, 2.0).0;
         assert!(high < 1.07 * right, "{sigma}: {right} {high}");
+    }
+}
+
+/// A Gaussian pulse of deviation `sigma` that falls off like an exponential of the mean `tail`, and
+/// its derivative.
+fn with_tail(bin: usize, position: f64, sigma: f64, tail: f64) -> (f64, f64) {
+    let below = |x: f64| {
+        let z = x / sigma;
+        normal(z)
+            - (sigma * sigma / (2.0 * tail * tail) - x / tail).exp() * normal(z - sigma / tail)
+    };
+    let share = |position: f64| {
+        let left = bin as f64 - position;
+        below(left + 1.0) - below(left)
+    };
+    let step = 1e-4;
+    let slope = (share(position + step) - share(position - step)) / (2.0 * step);
+    (share(position), slope)
+}
+
+/// Windows in steps of a quarter bin: the best with two half widths is nearer to the bound than the
+/// best with equal ones, and all the more the longer the tail.
+#[test]
+fn two_half_widths_suit_a_pulse_with_a_tail() {
+    println!("sigma, tail: best half widths, ratio to the bound; with equal ones");
+    for (sigma, tail, gain) in [(0.5, 0.8, 0.98), (0.5, 1.5, 0.93), (0.7, 1.5, 0.96)] {
+        let pulse = |bin, position| with_tail(bin, position, sigma, tail);
+        let ratio = |before: u16, after: u16| {
+            let sides = [before, after].map(|quarters| U8F8::from_bits(quarters * 64));
+            let window = CentredWindow::with_sides(sides[0], sides[1]).unwrap();
+            let estimator = DepthEstimator::CentredWindow(window);
+            let [ratio] = ratios([estimator], &pulse, 3.0, 30.0, 0.2, 0.0);
+            ratio
+        };
+        let best = |pairs: &mut dyn Iterator<Item = (u16, u16)>| {
+            let ratios = pairs.map(|(before, after)| (ratio(before, after), before, after));
+            ratios
+                .min_by(|one, other| one.0.total_cmp(&other.0))
+                .unwrap()
+        };
+        let even = best(&mut (4..=16).map(|half| (half, half)));
+        let pairs = (4..=12).flat_map(|before| (8..=16).map(move |after| (before, after)));
+        let skew = best(&mut { pairs });
+        println!("{sigma} {tail}: {skew:?}; {even:?}, in quarters of a bin");
+        assert!(skew.1 < skew.2, "{skew:?}");
+        assert!(skew.0 < gain * even.0, "{skew:?} {even:?}");
+        assert!(skew.0 < 1.2, "{skew:?}");
     }
 }

@@ -3,4 +3,6 @@
 mod centred_window;
 mod centroid;
 mod error;
+mod formula;
 mod range_scale;
+mod skew_window;

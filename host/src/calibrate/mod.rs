@@ -18,7 +18,7 @@ mod watch;
 mod written;
 
 use anyhow::Result;
-use dtof_core::fixed::types::U8F8;
+use dtof_core::CentredWindow;
 
 pub use find::glass::{Glass, Nearest};
 pub use find::observed::{Length, Observed};
@@ -128,25 +128,24 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
     };
     let bins = observed.bins();
     let gate = settle::gate(last, found.map_or(0, |glass| glass.end))?;
-    let pulse = pulse::pulse(&windows(&scene, gate.0, found));
-    let sigma = pulse.as_ref().map_or(1.0, |pulse| pulse.sigma);
-    let sigma = settle::sigma(sigma);
-    let mut offset = offset_of(&scene, &numbers, truth, gate, sigma, observed, asked);
+    let pulse = pulse::pulse(&windows(&scene, gate.0, found), asked.seed);
+    let window = window_of(pulse.as_ref());
+    let mut offset = offset_of(&scene, &numbers, truth, gate, window, observed, asked);
     let cycles = scene.cycles();
     let (counts, _) = scene.pooled();
-    let known = |min_count| {
+    let known = |window| {
         pulse.as_ref().map(|pulse| settle::Known {
             bins,
             gate,
             pulse,
             pixels: &pixels,
             is_absolute: observed.length != Length::Unknown,
-            min_count,
+            window,
             asked,
         })
     };
-    let decide = |min_count| known(min_count).map(|known| settle::detection(&known));
-    let mut detection = decide(settle::MIN_COUNT).transpose()?;
+    let decide = |window| known(window).map(|known| settle::detection(&known));
+    let mut detection = decide((None, settle::MIN_COUNT)).transpose()?;
     let mut spent = None;
     let bin_width_ps = offset
         .and_then(|offset| offset.bin_width_ps)
@@ -158,7 +157,7 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
         }
         if let Some(spent) = spent {
             offset.mm += spent.offset_mm;
-            detection = decide(spent.min_count).transpose()?;
+            detection = decide((Some(spent.window), spent.min_count)).transpose()?;
         }
     }
     Ok(Calibration {
@@ -231,12 +230,22 @@ fn windows(scene: &Scene, first: u16, glass: Option<&Glass>) -> Vec<Window> {
     }
 }
 
+/// The window of the depth that events will have; without a pulse one for a bin of deviation.
+fn window_of(pulse: Option<&Pulse>) -> CentredWindow {
+    let suited = pulse.and_then(|pulse| pulse.suited);
+    let sigma = pulse.map_or(1.0, |pulse| pulse.sigma);
+    suited.map_or_else(
+        || CentredWindow::for_pulse(settle::sigma(sigma)),
+        |suited| suited.window,
+    )
+}
+
 fn offset_of(
     scene: &Scene,
     numbers: &[usize],
     truth: &[Option<f64>],
     gate: (u16, u16),
-    sigma: U8F8,
+    window: CentredWindow,
     observed: &Observed,
     asked: &Asked,
 ) -> Option<Offset> {
@@ -248,7 +257,7 @@ fn offset_of(
     };
     let placed = (0..numbers.len()).filter(|&index| stands(index));
     let placed = placed.filter_map(|index| {
-        let position = offset::position(&scene.traces[index], observed.bins(), gate, sigma)?;
+        let position = offset::position(&scene.traces[index], observed.bins(), gate, window)?;
         Some((numbers[index], position))
     });
     let placed: Vec<(usize, f64)> = placed.collect();

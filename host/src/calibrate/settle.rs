@@ -47,6 +47,8 @@ pub struct Detection {
     pub x: u16,
     /// Standard deviation of the pulse that the depth is found with.
     pub sigma_bins: U8F8,
+    /// How far the window that finds it reaches to either side, where that differs.
+    pub half_widths: Option<CentredWindow>,
 }
 
 /// What there is to decide by.
@@ -61,8 +63,8 @@ pub struct Known<'a> {
     pub pixels: &'a Pixels,
     /// Whether rates are a laser cycle's.
     pub is_absolute: bool,
-    /// Photons in the window, at least.
-    pub min_count: u16,
+    /// Bins of the rule's window, if not as suits the pulse, and photons in it, at least.
+    pub window: (Option<u8>, u16),
     /// What is wanted.
     pub asked: &'a Asked,
 }
@@ -106,17 +108,19 @@ pub fn detection(known: &Known) -> Result<Detection> {
     let l2 = l2(background);
     let sigma = sigma(known.pulse.sigma);
     let asked = known.asked;
+    let (window, min_count) = known.window;
     let mut detection = Detection {
-        window: WindowRule::width_for_pulse(sigma),
+        window: window.unwrap_or_else(|| WindowRule::width_for_pulse(sigma)),
         z: None,
         is_by_count: false,
         exposures: 0,
         false_alarm: asked.false_alarm,
-        min_count: known.min_count,
+        min_count,
         l1: L1.min(l2 / 2),
         l2,
         x: X,
         sigma_bins: sigma,
+        half_widths: known.pulse.suited.map(|suited| suited.window),
     };
     if !known.is_absolute {
         return Ok(detection);

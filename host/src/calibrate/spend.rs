@@ -1,12 +1,13 @@
 //! How many photons an event is worth, where true distances are known.
 //!
 //! The recording is replayed. More photons an event make its distance better and come later. As
-//! many are spent as the paper's rule takes with its own minimum, 5 in the highest bin. What
-//! events are off by in the median is taken off the range offset: the place of a few photons of
-//! a pulse that is not symmetric differs from that of many.
+//! many are spent as the paper's rule takes with its own minimum, 5 in the highest bin. Of the
+//! windows that suit the pulse or are wider, each with the highest minimum that spends no more, the
+//! one with the least error is taken. What events are off by in the median is taken off the range offset:
+//! the place of a few photons of a pulse that is not symmetric differs from that of many.
 
 use anyhow::{Context, Result};
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
 use dtof_core::{AnyRule, Count, PaperRule, PixelAddress, WindowRule};
 
 use super::find::limits::median;
@@ -28,7 +29,9 @@ const MOST: u16 = 200;
 /// What events come to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spent {
-    /// Photons in the window, at least.
+    /// Bins of the rule's window.
+    pub window: u8,
+    /// Photons in it, at least.
     pub min_count: u16,
     /// Photons that an event takes, of all bins.
     pub photons: f64,
@@ -82,7 +85,8 @@ impl<'a> Replay<'a> {
             gate: Some(gate),
             bin_width_ps: U16F16::checked_from_num(bin_width_ps).context("the bin width")?,
             offset_mm: I24F8::checked_from_num(offset_mm).context("the offset")?,
-            sigma_bins: Some(U8F8::from_num(detection.sigma_bins)),
+            sigma_bins: Some(detection.sigma_bins),
+            half_widths: detection.half_widths,
             l1: detection.l1,
             l2: detection.l2,
             x: detection.x,
@@ -100,24 +104,40 @@ impl<'a> Replay<'a> {
         }))
     }
 
-    /// The best minimum; `None` if there are too few events.
+    /// The best window and minimum; `None` if there are too few events.
     ///
     /// # Errors
     /// If the settings cannot be.
     pub fn best(&self) -> Result<Option<Spent>> {
         let least = self.detection.min_count;
-        let count = |minimum: u16| Count::saturating(minimum.into());
-        let papers = PaperRule::new(const { U8F8::lit("4") }, count(least));
-        let Some(papers) = self.replay(papers.into(), least)? else {
+        let papers = PaperRule::new(const { U8F8::lit("4") }, Count::saturating(least.into()));
+        let Some(papers) = self.replay(papers.into(), (1, least))? else {
             return Ok(None);
         };
+        let mut best: Option<Spent> = None;
+        let mut first = least;
+        for window in self.detection.window..=WindowRule::MAX_WIDTH {
+            let Some(found) = self.of_window(window, first, papers.photons)? else {
+                continue;
+            };
+            // A wider window holds more.
+            first = found.min_count;
+            if best.is_none_or(|best| found.error_mm < best.error_mm) {
+                best = Some(found);
+            }
+        }
+        Ok(best)
+    }
+
+    /// With the highest minimum, from `first` on, whose events take no more than `most` photons;
+    /// `None` if there is none.
+    fn of_window(&self, window: u8, first: u16, most: f64) -> Result<Option<Spent>> {
         let mut best = None;
-        for minimum in least..=MOST {
-            let z = self.detection.z.unwrap_or(0.0);
-            let z = dtof_core::fixed::types::U4F12::saturating_from_num(z);
-            let rule = WindowRule::new(self.detection.window, z, count(minimum))?;
-            let found = self.replay(rule.into(), minimum)?;
-            if found.is_none_or(|found| best.is_some() && found.photons > papers.photons) {
+        for minimum in first..=MOST {
+            let z = U4F12::saturating_from_num(self.detection.z.unwrap_or(0.0));
+            let rule = WindowRule::new(window, z, Count::saturating(minimum.into()))?;
+            let found = self.replay(rule.into(), (window, minimum))?;
+            if found.is_none_or(|found| found.photons > most) {
                 break;
             }
             best = found;
@@ -125,7 +145,7 @@ impl<'a> Replay<'a> {
         Ok(best)
     }
 
-    fn replay(&self, rule: AnyRule, min_count: u16) -> Result<Option<Spent>> {
+    fn replay(&self, rule: AnyRule, (window, min_count): (u8, u16)) -> Result<Option<Spent>> {
         let settings = Settings {
             rule,
             ..self.settings.clone()
@@ -148,6 +168,7 @@ impl<'a> Replay<'a> {
         let off = median(errors());
         let [statistics, _] = engine.statistics();
         Ok(Some(Spent {
+            window,
             min_count,
             photons: statistics.photons() as f64 / events.len() as f64,
             error_mm: median(errors().map(|error| (error - off).abs())),

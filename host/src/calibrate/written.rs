@@ -46,6 +46,7 @@ impl Calibration {
             window: Some(detection.window),
             z: detection.z.map(U4F12::saturating_from_num),
             false_alarm: detection.z.is_none().then_some(detection.false_alarm),
+            half_widths: detection.half_widths,
             min_count: Some(detection.min_count),
             l1: Some(detection.l1),
             l2: Some(detection.l2),

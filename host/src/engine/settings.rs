@@ -4,7 +4,8 @@ use anyhow::{Context, Result, ensure};
 use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
-    AnyRule, BlockLevel, DepthEstimator, EchoNumber, PixelConfig, RangeGate, RangeScale, Threshold,
+    AnyRule, BlockLevel, CentredWindow, DepthEstimator, EchoNumber, PixelConfig, RangeGate,
+    RangeScale, Threshold,
 };
 pub use dtof_link::AdaptiveBinning;
 use serde::Serialize;
@@ -32,6 +33,10 @@ pub struct Settings {
     /// The standard deviation of the pulse in bins, if it is known.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "known")]
     pub sigma_bins: Option<U8F8>,
+    /// How far the window that the depth comes from reaches before and after its place, in bins,
+    /// if not as suits `sigma_bins`.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "sides")]
+    pub half_widths: Option<CentredWindow>,
     /// The depth comes from three bins, even if a window would suit the pulse.
     #[serde(skip)]
     pub centroid: bool,
@@ -98,6 +103,12 @@ fn with_alpha<M: SerializeMap>(
 /// A fixed-point number that is there.
 fn known<S: Serializer>(sigma: &Option<U8F8>, serializer: S) -> Result<S::Ok, S::Error> {
     number(&sigma.unwrap_or_default(), serializer)
+}
+
+/// Both half widths of a window that is there.
+fn sides<S: Serializer>(window: &Option<CentredWindow>, serializer: S) -> Result<S::Ok, S::Error> {
+    let sides = window.map(|window| [window.before(), window.after()].map(U8F8::to_num::<f64>));
+    sides.serialize(serializer)
 }
 
 /// The levels of adaptive binning, 0 without, and how patient pixels are.
@@ -178,9 +189,11 @@ impl Settings {
     /// The estimator of the depth of a peak.
     #[must_use]
     pub fn estimator(&self) -> DepthEstimator {
-        self.sigma_bins
+        let suits = self.sigma_bins.map(CentredWindow::for_pulse);
+        self.half_widths
+            .or(suits)
             .filter(|_| !self.centroid)
-            .map_or(DepthEstimator::Centroid3, DepthEstimator::for_pulse)
+            .map_or(DepthEstimator::Centroid3, DepthEstimator::CentredWindow)
     }
 
     /// The gate among `BINS` bins.

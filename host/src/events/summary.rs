@@ -316,7 +316,12 @@ impl Settings {
         let depth = match self.estimator() {
             DepthEstimator::Centroid3 => "centroid of 3 bins".to_owned(),
             DepthEstimator::CentredWindow(window) => {
-                format!("centred window of ±{} bins", window.half_width())
+                let [before, after] = [window.before(), window.after()];
+                if before == after {
+                    format!("centred window of ±{before} bins")
+                } else {
+                    format!("centred window from −{before} to +{after} bins")
+                }
             }
         };
         [decision, ("depth".to_owned(), depth)]

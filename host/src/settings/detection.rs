@@ -3,10 +3,13 @@
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, ValueEnum};
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{AnyRule, AverageRule, BlockLevel, Count, EchoNumber, PaperRule, WindowRule};
+use dtof_core::{
+    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, EchoNumber, PaperRule, WindowRule,
+};
 use dtof_link::AdaptiveBinning;
 use serde::{Deserialize, Serialize};
 
+use super::half_widths::half_widths;
 use super::sections::{decimal, first_of};
 use crate::cli::arguments::{fixed, positive, whole};
 use crate::input::range::within;
@@ -38,6 +41,12 @@ pub struct Detection {
     /// Where in its bins a peak lies [default: window if --sigma-bins is known, else centroid]
     #[arg(long, value_enum)]
     pub estimator: Option<EstimatorName>,
+    /// How far the window that the depth comes from reaches before and after its place, in bins:
+    /// 1 to 4 each, rounded to 1/256. More after than before suits a pulse that falls more slowly
+    /// than it rises [default: both as suits --sigma-bins]
+    #[arg(long, value_name = "BEFORE,AFTER", value_parser = half_widths)]
+    #[serde(with = "super::half_widths")]
+    pub half_widths: Option<CentredWindow>,
     /// Photons a reported peak, or the window around it, holds at least [default: 5]
     #[arg(long, value_name = "N", value_parser = whole(1..=1023_u16))]
     pub min_count: Option<u16>,
@@ -90,7 +99,7 @@ pub enum RuleName {
 pub enum EstimatorName {
     /// The centroid of three bins
     Centroid,
-    /// The photons of a window that moves onto the pulse and suits --sigma-bins
+    /// The photons of a window that moves onto the pulse and suits --sigma-bins, or has --half-widths
     Window,
 }
 
@@ -110,12 +119,15 @@ impl Detection {
                 ..other
             };
         }
+        if self.estimator == Some(EstimatorName::Centroid) {
+            other.half_widths = None;
+        }
         if self.z.is_some() || self.false_alarm.is_some() {
             (other.z, other.false_alarm) = (None, None);
         }
         first_of!(
-            self, other; rule, alpha, window, z, false_alarm, estimator, min_count, l1, l2, x,
-            binning, patience, tracking, echoes, echo_wait
+            self, other; rule, alpha, window, z, false_alarm, estimator, half_widths, min_count,
+            l1, l2, x, binning, patience, tracking, echoes, echo_wait
         )
     }
 

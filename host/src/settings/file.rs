@@ -49,6 +49,10 @@ const COMMENTS: [(&str, &[(&str, &str)]); 4] = [
                 "share of exposures without a target, instead of z",
             ),
             ("estimator", "centroid or window"),
+            (
+                "half_widths",
+                "bins before and after the place, of estimator window",
+            ),
             ("min_count", "photons"),
             ("l1", "laser cycles that a decision must exceed"),
             ("l2", "laser cycles at which a pixel starts over"),
@@ -135,7 +139,11 @@ impl SettingsFile {
 
     /// These, and of `other` what these do not say.
     #[must_use]
-    pub fn or(self, other: Self) -> Self {
+    pub fn or(self, mut other: Self) -> Self {
+        // Half widths are those of a pulse.
+        if self.sensor.sigma_bins.is_some() {
+            other.detection.half_widths = None;
+        }
         // A field of view replaces a calibration, and the other way round.
         let rays = if self.rays == Rays::default() {
             other.rays
@@ -206,7 +214,8 @@ glass_bins = [0.0, 0.1, 0.3]
 rule = 'window'
 window = 3
 z = 4.45
-estimator = 'centroid'
+estimator = 'window'
+half_widths = [1.75, 4.0]
 min_count = 5
 l1 = 40
 l2 = 2000

@@ -6,6 +6,7 @@
 
 mod detection;
 mod file;
+mod half_widths;
 mod resolve;
 mod sections;
 

@@ -36,9 +36,15 @@ impl SettingsFile {
             Ok(z)
         };
         let (echoes, echo_wait) = detection.several()?;
+        let has_window = sensor.sigma_bins.is_some() || detection.half_widths.is_some();
         ensure!(
-            detection.estimator != Some(EstimatorName::Window) || sensor.sigma_bins.is_some(),
-            "--estimator window needs --sigma-bins"
+            detection.estimator != Some(EstimatorName::Window) || has_window,
+            "--estimator window needs --sigma-bins or --half-widths"
+        );
+        let centroid = detection.estimator == Some(EstimatorName::Centroid);
+        ensure!(
+            !centroid || detection.half_widths.is_none(),
+            "--half-widths is for --estimator window"
         );
         Ok(Settings {
             bins,
@@ -48,7 +54,8 @@ impl SettingsFile {
             masked: sensor.masked.clone().unwrap_or_default(),
             rule: detection.rule(sensor.sigma_bins, z_for)?,
             sigma_bins: sensor.sigma_bins,
-            centroid: detection.estimator == Some(EstimatorName::Centroid),
+            half_widths: detection.half_widths,
+            centroid,
             l1,
             l2,
             x,
@@ -120,10 +127,16 @@ impl Detection {
         };
         let binning = settings.binning;
         let several = settings.echoes > EchoNumber::FIRST;
-        let centroid = settings.centroid.then_some(EstimatorName::Centroid);
+        let half_widths = settings.half_widths.filter(|_| !settings.centroid);
+        let estimator = match (settings.centroid, half_widths) {
+            (true, _) => Some(EstimatorName::Centroid),
+            (false, Some(_)) => Some(EstimatorName::Window),
+            (false, None) => None,
+        };
         Self {
             min_count: u16::try_from(minimum.raw()).ok(),
-            estimator: centroid,
+            estimator,
+            half_widths,
             l1: Some(settings.l1),
             l2: Some(settings.l2),
             x: Some(settings.x),

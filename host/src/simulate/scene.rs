@@ -308,6 +308,7 @@ pub fn settings(seed: u64) -> Settings {
         masked: Vec::new(),
         rule: PaperRule::new(U8F8::lit("8"), Count::saturating(5)).into(),
         sigma_bins: None,
+        half_widths: None,
         centroid: false,
         l1: 100,
         l2: 2000,

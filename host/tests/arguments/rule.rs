@@ -39,6 +39,30 @@ fn without_an_option_it_is_the_papers_rule_and_centroid() {
     assert_eq!(replayed("--rule paper --alpha 4").1, events);
 }
 
+/// Equal half widths are what a pulse has; others give the same events at other depths. A pulse
+/// that is said in an option has its own.
+#[test]
+fn half_widths_move_the_depth() {
+    let (settings, even) = replayed("--half-widths 2.5,2.5");
+    assert_eq!(settings["estimator"], "centred-window");
+    assert_eq!(settings["half_widths"], serde_json::json!([2.5, 2.5]));
+    assert_eq!(even, replayed("--sigma-bins 1").1);
+    let (settings, skew) = replayed("--half-widths 1,4");
+    assert_eq!(settings["half_widths"], serde_json::json!([1.0, 4.0]));
+    assert_eq!(skew.lines().count(), even.lines().count());
+    assert_ne!(skew, even);
+
+    let scratch = Scratch::new();
+    let file = scratch.file(
+        "dtof.toml",
+        "[sensor]\nsigma_bins = 1\n[detection]\nhalf_widths = [1, 4]\n",
+    );
+    let with = |options: &str| replayed(&format!("--settings {} {options}", file.display())).1;
+    assert_eq!(with(""), skew);
+    assert_eq!(with("--sigma-bins 1"), even);
+    assert_eq!(with("--estimator centroid"), replayed("").1);
+}
+
 /// The peak has 44 of the 59 photons of 44 laser cycles in two bins: the average of 128 is
 /// 0.46, which is 0 as a whole count; the two quadrants have a photon in each.
 #[test]

@@ -106,7 +106,11 @@ fn what_contradicts_the_file_is_refused() {
         --mask x | must be a whole number from 0 to 65535
         --patience 8 | --patience is for --binning
         --echo-wait 8 | --echo-wait is for --echoes of 2 or more
-        --estimator window | --estimator window needs --sigma-bins
+        --estimator window | --estimator window needs --sigma-bins or --half-widths
+        --estimator centroid --half-widths 2,3 | --half-widths is for --estimator window
+        --half-widths 2 | must be BEFORE,AFTER, each 1 to 4 bins
+        --half-widths 2,4.1 | must be BEFORE,AFTER, each 1 to 4 bins
+        --half-widths 0.9,4 | must be BEFORE,AFTER, each 1 to 4 bins
         --tracking | --tracking is for --rule window",
     );
     scratch.all_refused(

@@ -3,7 +3,8 @@
 
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
 use dtof_core::{
-    AnyRule, Count, DepthEstimator, Detection, DetectionRule, RangeGate, WindowRule, detect,
+    AnyRule, CentredWindow, Count, DepthEstimator, Detection, DetectionRule, RangeGate, WindowRule,
+    detect,
 };
 
 use crate::counter::{Counter, Operation};
@@ -26,6 +27,10 @@ const PULSES: [(U8F8, &str); 4] = [
     (U8F8::lit("1"), "centred window, σ 1"),
     (U8F8::lit("1.5"), "centred window, σ 1.5"),
 ];
+
+/// Half widths of a window for a pulse that falls slowly, in bins.
+const BEFORE: U8F8 = U8F8::lit("1.75");
+const AFTER: U8F8 = U8F8::lit("4");
 
 /// Measures all.
 pub fn run(counter: &Counter, state: &mut State) {
@@ -55,9 +60,17 @@ pub fn run(counter: &Counter, state: &mut State) {
     }
     for (sigma, variant) in PULSES {
         state.estimator = DepthEstimator::for_pulse(sigma);
-        let total = exposures(counter, state, estimate, with_target);
-        report::line("depth", variant, total, EXPOSURES);
+        depth(counter, state, variant);
     }
+    if let Some(skew) = CentredWindow::with_sides(BEFORE, AFTER) {
+        state.estimator = DepthEstimator::CentredWindow(skew);
+        depth(counter, state, "centred window, 1.75 before and 4 after");
+    }
+}
+
+fn depth(counter: &Counter, state: &mut State, variant: &str) {
+    let total = exposures(counter, state, estimate, with_target);
+    report::line("depth", variant, total, EXPOSURES);
 }
 
 fn window(width: u8) -> Option<WindowRule> {

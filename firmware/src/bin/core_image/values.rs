@@ -52,9 +52,14 @@ pub fn window_rule() -> Option<WindowRule> {
 
 pub fn estimator() -> DepthEstimator {
     let estimator = DepthEstimator::for_pulse(alpha());
-    match CentredWindow::new(alpha()) {
+    let window = if more() {
+        CentredWindow::new(alpha())
+    } else {
+        CentredWindow::with_sides(alpha(), alpha())
+    };
+    match window {
         Some(window) => {
-            keep(window.half_width());
+            keep((window.before(), window.after()));
             DepthEstimator::CentredWindow(window)
         }
         None if more() => estimator,

@@ -3,6 +3,7 @@
 pub mod background;
 pub mod common;
 pub mod glass;
+pub mod half_widths;
 pub mod limits;
 pub mod observed;
 pub mod offset;

@@ -5,8 +5,8 @@
 //! histograms the width is the median of the slopes of all pairs (Theil and Sen), which outliers
 //! do not move.
 
-use dtof_core::fixed::types::{U8F8, U24F8};
-use dtof_core::{BinPosition, Count16, DepthEstimator, Histogram, RangeGate};
+use dtof_core::fixed::types::U24F8;
+use dtof_core::{BinPosition, CentredWindow, Count16, DepthEstimator, Histogram, RangeGate};
 
 use super::limits::{median, quantile};
 use super::observed::Trace;
@@ -86,37 +86,52 @@ pub fn from_target(positions: &[f64], distance_mm: f64, bin_width_ps: f64) -> Op
 
 /// Where the core places the highest peak of a histogram of `bins` bins within `gate`, in bins.
 #[must_use]
-pub fn position(trace: &Trace, bins: usize, gate: (u16, u16), sigma: U8F8) -> Option<f64> {
+pub fn position(
+    trace: &Trace,
+    bins: usize,
+    gate: (u16, u16),
+    window: CentredWindow,
+) -> Option<f64> {
     match bins {
-        16 => of::<16>(trace, gate, sigma),
-        32 => of::<32>(trace, gate, sigma),
-        64 => of::<64>(trace, gate, sigma),
-        128 => of::<128>(trace, gate, sigma),
-        256 => of::<256>(trace, gate, sigma),
-        512 => of::<512>(trace, gate, sigma),
-        1024 => of::<1024>(trace, gate, sigma),
+        16 => of::<16>(trace, gate, window),
+        32 => of::<32>(trace, gate, window),
+        64 => of::<64>(trace, gate, window),
+        128 => of::<128>(trace, gate, window),
+        256 => of::<256>(trace, gate, window),
+        512 => of::<512>(trace, gate, window),
+        1024 => of::<1024>(trace, gate, window),
         _ => None,
     }
 }
 
-fn of<const BINS: usize>(trace: &Trace, gate: (u16, u16), sigma: U8F8) -> Option<f64> {
+fn of<const BINS: usize>(trace: &Trace, gate: (u16, u16), window: CentredWindow) -> Option<f64> {
     let gate = RangeGate::<BINS>::new(gate.0, gate.1).ok()?;
-    // Counts of any size in counters of 16 bits.
-    let highest = trace.counts.iter().copied().fold(0.0, f64::max);
+    Some(place(&trace.counts, &gate, window))
+}
+
+/// The same of counts of any size.
+#[must_use]
+pub fn place<const BINS: usize>(
+    counts: &[f64],
+    gate: &RangeGate<BINS>,
+    window: CentredWindow,
+) -> f64 {
+    // In counters of 16 bits.
+    let highest = counts.iter().copied().fold(0.0, f64::max);
     let scale = (60_000.0 / highest.max(1.0)).min(1.0);
     let mut frame = [0u32; BINS];
-    for (bin, count) in frame.iter_mut().zip(&trace.counts) {
+    for (bin, count) in frame.iter_mut().zip(counts) {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let count = (count * scale).round() as u32;
         *bin = count;
     }
     let mut histogram = Histogram::<BINS, Count16>::new();
-    histogram.add_frame(&frame, &gate);
+    histogram.add_frame(&frame, gate);
     let peak = histogram.peak();
-    let estimator = DepthEstimator::for_pulse(sigma);
-    let depth = estimator.estimate(&histogram, &gate, peak, U24F8::ZERO);
+    let estimator = DepthEstimator::CentredWindow(window);
+    let depth = estimator.estimate(&histogram, gate, peak, U24F8::ZERO);
     let position = BinPosition::of(peak.bin, depth.offset);
-    Some(f64::from(position.raw()) / 256.0)
+    f64::from(position.raw()) / 256.0
 }
 
 #[cfg(test)]

@@ -8,6 +8,9 @@
 //! two surfaces in one, are left out if the others are more. If they are not, the pulse is no
 //! Gaussian: then its core is fitted, the bins with at least a quarter of its height.
 
+use dtof_core::fixed::types::U8F8;
+
+use super::half_widths::{Suited, suited};
 use super::limits::median;
 use super::shape::{Fit, Window, best};
 
@@ -37,11 +40,13 @@ pub struct Pulse {
     pub tail: f64,
     /// Whether σ is that of the core, as a Gaussian does not fit.
     pub is_core: bool,
+    /// The window that suits a pulse that is no Gaussian, if equal half widths do not.
+    pub suited: Option<Suited>,
 }
 
 /// Finds the pulse from windows that hold one peak each; `None` if no peak is bright enough.
 #[must_use]
-pub fn pulse(windows: &[Window]) -> Option<Pulse> {
+pub fn pulse(windows: &[Window], seed: u64) -> Option<Pulse> {
     let mut bright: Vec<&Window> = windows
         .iter()
         .filter(|window| window.photons >= LEAST_PHOTONS && window.clearness() >= LEAST_SIGNAL)
@@ -69,6 +74,7 @@ pub fn pulse(windows: &[Window]) -> Option<Pulse> {
         fitting
     };
     let (sigma, fits) = best(&kept);
+    let suited = is_core.then(|| suited(&kept, U8F8::saturating_from_num(sigma), seed));
     let between = super::shape::interval(&kept, sigma);
     let signals = kept
         .iter()
@@ -81,6 +87,7 @@ pub fn pulse(windows: &[Window]) -> Option<Pulse> {
         signal: median(signals),
         tail: tail(&kept, &fits, sigma),
         is_core,
+        suited: suited.flatten(),
     })
 }
 

@@ -7,6 +7,9 @@ const STEPS: usize = 30;
 /// σ in bins that are tried.
 const SIGMAS: (f64, f64) = (0.12, 8.0);
 
+/// Bins about the top that are kept with a window.
+pub const ABOUT: usize = 32;
+
 /// The part of a histogram that holds one peak.
 #[derive(Clone, Debug)]
 pub struct Window {
@@ -16,6 +19,8 @@ pub struct Window {
     pub background: f64,
     /// Photons of the peak, about.
     pub photons: f64,
+    /// Photons of so many bins about the top, with those of other peaks.
+    pub about_top: Vec<f64>,
     /// Photons of the bins around it, up to the next peak.
     counts: Vec<f64>,
     /// Which bin is the first of them.
@@ -34,6 +39,8 @@ impl Window {
         cycles: f64,
         (first, top, last): (usize, usize, usize),
     ) -> Self {
+        let from = top.saturating_sub(ABOUT / 2);
+        let about_top = counts[from..counts.len().min(from + ABOUT)].to_vec();
         let counts = counts[first..=last].to_vec();
         let top = top - first;
         // Half of the height on either side, and as much again three times.
@@ -54,6 +61,7 @@ impl Window {
             cycles,
             background,
             photons,
+            about_top,
             counts,
             start: first,
             top,

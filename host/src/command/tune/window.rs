@@ -29,7 +29,7 @@ impl Tune {
         ];
         if let DepthEstimator::CentredWindow(window) = tuned.estimator {
             let source = "formula: 2σ + 1/2, from 1 to 4; centred window".to_owned();
-            lines.push(Line("half_width", window.half_width().to_num(), source));
+            lines.push(Line("half_width", window.after().to_num(), source));
         }
         lines.extend([
             self.l1(tuned.l1, &tuned.detections),

@@ -79,6 +79,7 @@ impl Setting {
             masked: Vec::new(),
             rule: WindowRule::new(3, z, Count::saturating(5))?.into(),
             sigma_bins: Some(U8F8::from_num(SIGMA)),
+            half_widths: None,
             centroid: false,
             l1: L1,
             l2: self.l2,
