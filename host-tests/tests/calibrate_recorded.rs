@@ -11,6 +11,7 @@ use dtof::input::recorded::{Capture, RecordedHistograms, RecordingLength};
 use dtof::input::source::{Geometry, PhotonSource, Slice};
 use dtof::settings::SettingsFile;
 use dtof_core::PixelAddress;
+use dtof_core::fixed::types::U8F8;
 
 const ZONES: usize = 9;
 const CENTRE: usize = 4;
@@ -120,7 +121,8 @@ fn a_recording_with_distances_calibrates_itself() {
     assert!(pulse.is_core && pulse.tail > 0.05, "{pulse:?}");
     // It falls more slowly than it rises.
     let suited = pulse.suited.unwrap();
-    assert!(suited.window.before() < suited.window.after(), "{suited:?}");
+    let (before, after) = (suited.window.before(), suited.window.after());
+    assert_eq!((before, after), (U8F8::lit("1.75"), U8F8::lit("4")));
     assert!(suited.error < 0.92 * suited.of_core, "{suited:?}");
     assert_eq!(found.nearest, Nearest::NotCommon);
     // The authors state 91 ps, and a centroid 92.1.
