@@ -11,7 +11,7 @@ use dtof::events::echoes::Echo;
 use dtof::events::output::Output;
 use dtof::input::masked::Masked;
 use dtof::input::open::open;
-use dtof::input::source::PhotonSource;
+use dtof::input::source::{PhotonSource, has_only_neighbours};
 use dtof::settings::Run;
 
 use super::dynamic_depth::Shown;
@@ -77,11 +77,9 @@ impl Replay {
             self.input.display()
         );
         if let Some(binning) = settings.binning {
-            let ([column, row], rows) = (photons.sides(), photons.capture_rows());
-            let side = 1 << binning.levels.raw();
+            let ([column, row], side) = (photons.sides(), 1 << binning.levels.raw());
             ensure!(
-                column == "column"
-                    && (rows == photons.geometry().rows || rows.is_multiple_of(side)),
+                has_only_neighbours(photons.as_ref(), binning.levels),
                 "{}: --binning {}: blocks of {side}x{side} pixels would reach across captures; \
                  a {column} and a {row} are no neighbours there",
                 self.input.display(),

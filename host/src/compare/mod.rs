@@ -24,7 +24,7 @@ use dtof_core::{BlockLevel, PixelAddress};
 
 use crate::engine::host::host_engine;
 use crate::engine::settings::Settings;
-use crate::input::source::{Geometry, PhotonSource};
+use crate::input::source::{Geometry, PhotonSource, has_only_neighbours};
 use crate::simulate::MM_PER_PS;
 use answer::{Answer, answer, of_longest_frame};
 use bound::Bound;
@@ -294,13 +294,12 @@ fn known_ranges(
 
 /// The highest level whose blocks have more than a pixel, and none of another capture.
 fn most_levels(source: &dyn PhotonSource) -> u8 {
-    let (Geometry { columns, rows }, each) = (source.geometry(), source.capture_rows());
-    let fits = |side| columns.min(rows) >= side && (each == rows || each.is_multiple_of(side));
-    match source.sides() {
-        ["column", _] if fits(4) => 2,
-        ["column", _] if fits(2) => 1,
-        _ => 0,
-    }
+    let Geometry { columns, rows } = source.geometry();
+    let fits = |level: &u8| {
+        columns.min(rows) >= 1 << level
+            && has_only_neighbours(source, BlockLevel::saturating(*level))
+    };
+    [2, 1].into_iter().find(fits).unwrap_or(0)
 }
 
 /// So much of `source` that it has about `most` photons: fewer laser cycles, but enough for three

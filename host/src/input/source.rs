@@ -130,3 +130,11 @@ pub trait PhotonSource {
     /// What went wrong with the recording, naming file and place.
     fn next_slice(&mut self, cycles: u16) -> Result<Slice>;
 }
+
+/// Whether blocks of `level` have only neighbours: columns and rows lie side by side, and no
+/// block reaches into another capture.
+#[must_use]
+pub fn has_only_neighbours(source: &dyn PhotonSource, level: BlockLevel) -> bool {
+    let (rows, side) = (source.capture_rows(), 1 << level.raw());
+    source.sides()[0] == "column" && (rows == source.geometry().rows || rows.is_multiple_of(side))
+}
