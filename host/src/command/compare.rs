@@ -11,7 +11,7 @@ use dtof::compare::page::{self, FILES};
 use dtof::compare::truth::Truth;
 use dtof::compare::{Task, compare};
 use dtof::input::masked::Masked;
-use dtof::input::open::{counts, open};
+use dtof::input::open::{Counts, Opening, counts, open};
 use dtof::input::source::PhotonSource;
 use dtof::progress::Steps;
 use dtof::rows::aligned;
@@ -66,7 +66,16 @@ pub struct Compare {
 struct Subject {
     said: SettingsFile,
     truth: Option<Truth>,
-    scene: Option<Scene>,
+    photons: Photons,
+}
+
+/// Where its photons come from, again and again.
+enum Photons {
+    Scene(Box<Scene>),
+    /// A file is read once.
+    Histograms(Counts),
+    /// A list is never held in memory.
+    List,
 }
 
 impl Compare {
@@ -78,7 +87,11 @@ impl Compare {
             Some(file) => self.of_scene(file)?,
             None => self.of_recording(name)?,
         };
-        let Subject { said, truth, scene } = subject;
+        let Subject {
+            said,
+            truth,
+            photons,
+        } = subject;
         let false_alarm = self.share(&said);
         let sigma = said.sensor.sigma_bins.with_context(|| {
             format!(
@@ -88,15 +101,16 @@ impl Compare {
         })?;
         let settings = said.settings(said.sensor.bins.unwrap_or(128).into())?;
         let photons = |seed: u64| -> Result<Box<dyn PhotonSource>> {
-            let photons: Box<dyn PhotonSource> = match &scene {
-                Some(scene) => {
+            let opening = Opening {
+                seed,
+                ..opening(&said)
+            };
+            let photons: Box<dyn PhotonSource> = match &photons {
+                Photons::Scene(scene) => {
                     Box::new(scene.photons(seed, said.run.cycles.unwrap_or(scene.cycles))?)
                 }
-                None => {
-                    let mut said = said.clone();
-                    said.run.seed = Some(seed);
-                    open(name, &opening(&said))?.photons
-                }
+                Photons::Histograms(counts) => Box::new(counts.photons(&opening)?),
+                Photons::List => open(name, &opening)?.photons,
             };
             let photons = Masked::new(photons, &settings.masked)?;
             Ok(Box::new(photons.with_laser_hz(said.sensor.laser_hz)))
@@ -167,11 +181,10 @@ impl Compare {
         let sigma = U8F8::checked_from_num(scene.pulse_sigma_bins);
         let known = sigma.filter(|sigma| *sigma <= CentredWindow::WIDEST_PULSE);
         said.sensor.sigma_bins = said.sensor.sigma_bins.or(known);
-        said.sensor.one_hit_tdc = scene.effects.one_hit_tdc().then_some(true);
         Ok(Subject {
             said: with_short_exposures(said),
             truth: Some(Truth::Scene(Box::new(scene.clone()))),
-            scene: Some(scene),
+            photons: Photons::Scene(Box::new(scene)),
         })
     }
 
@@ -187,8 +200,7 @@ impl Compare {
         let geometry = counts.geometry;
         let truth = match (&self.truth, &counts.truth_mm) {
             (Some(file), _) => Some(Truth::read(file, geometry)?),
-            (None, Some(ranges)) => Some(Truth::Ranges(ranges.clone())),
-            (None, None) => None,
+            (None, ranges) => ranges.clone().map(Truth::Ranges),
         };
         let said = if said.sensor.sigma_bins.is_some() {
             said.or(of_file(&counts.known, geometry))
@@ -205,7 +217,11 @@ impl Compare {
         Ok(Subject {
             said: with_short_exposures(said),
             truth,
-            scene: None,
+            photons: if counts.known.is_list {
+                Photons::List
+            } else {
+                Photons::Histograms(counts)
+            },
         })
     }
 }

@@ -94,10 +94,7 @@ impl Simulate {
                 Some(file) => file.display().to_string(),
                 None => "the scene".to_owned(),
             })?;
-        let settings = Settings {
-            one_hit_tdc: scene.effects.one_hit_tdc(),
-            ..said.settings(scene.bins.into())?
-        };
+        let settings = said.settings(scene.bins.into())?;
         let file = self.view.input(self.scene.as_deref());
         let Geometry { columns, rows } = scene.geometry;
         let laser = if self.laser_off {
@@ -203,7 +200,7 @@ impl Simulation<'_> {
     }
 }
 
-/// What is said, on a scene: it has histograms and rays of its own.
+/// What is said, on a scene: it has histograms, a TDC and rays of its own.
 ///
 /// # Errors
 /// If what is said is for other histograms.
@@ -231,6 +228,7 @@ pub fn of_scene(said: SettingsFile, scene: &Scene) -> Result<SettingsFile> {
             bin_width_ps: Some(width),
             // Simulated photons come at their distance.
             offset_mm: None,
+            one_hit_tdc: scene.effects.one_hit_tdc().then_some(true),
             ..said.sensor
         },
         rays: Rays {

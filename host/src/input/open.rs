@@ -89,6 +89,21 @@ pub struct Counts {
     pub known: Known,
 }
 
+impl Counts {
+    /// Their photons, each in a random laser cycle of the recording. Those of a photon list
+    /// have laser cycles of their own: [`open`] gives them.
+    ///
+    /// # Errors
+    /// If there are more pixels than addresses, or more photons than can be counted.
+    pub fn photons(&self, opening: &Opening) -> Result<RecordedHistograms> {
+        let length = opening.length;
+        let length = length.unwrap_or(RecordingLength::PhotonsPerCycle(1.0));
+        let (most, seed) = (opening.cycles, opening.seed);
+        let photons = RecordedHistograms::new(self.geometry, &self.captures, length, most, seed)?;
+        Ok(photons.with_sides(self.sides))
+    }
+}
+
 /// What is known of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known {
@@ -136,14 +151,9 @@ pub fn open(path: &Path, opening: &Opening) -> Result<Recording> {
     match read(path, opening)? {
         Content::Photons(photons, known) => Ok(Recording { photons, known }),
         Content::Histograms(counts) => {
-            let length = opening.length;
-            let length = length.unwrap_or(RecordingLength::PhotonsPerCycle(1.0));
-            let (most, seed) = (opening.cycles, opening.seed);
-            let photons =
-                RecordedHistograms::new(counts.geometry, &counts.captures, length, most, seed);
-            let photons = photons.with_context(|| path.display().to_string())?;
+            let photons = counts.photons(opening);
             Ok(Recording {
-                photons: Box::new(photons.with_sides(counts.sides)),
+                photons: Box::new(photons.with_context(|| path.display().to_string())?),
                 known: counts.known,
             })
         }
