@@ -8,6 +8,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 use super::stress::{Light, count};
+use super::tally::mm_per_bin;
 use crate::engine::settings::Settings;
 use dtof_theory::bounds::cramer_rao::Pulse;
 use dtof_theory::bounds::likelihood_ratio::{Evidence, LikelihoodRatio};
@@ -69,7 +70,7 @@ impl Bound {
         let cycles: u32 = with.iter().map(|(cycles, _)| cycles).sum();
         Ok((events > 0).then(|| Self {
             light: *light,
-            mm_per_bin: settings.bin_width_ps.to_num::<f64>() * crate::simulate::MM_PER_PS,
+            mm_per_bin: mm_per_bin(settings),
             cycles: f64::from(cycles) / events as f64,
         }))
     }

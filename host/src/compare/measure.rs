@@ -62,18 +62,10 @@ pub fn measure(
     let cycles = source.cycles();
     let running = trials.iter().map(|trial| {
         let settings = &trial.settings;
-        let mm_per_bin = settings.bin_width_ps.to_num::<f64>() * crate::simulate::MM_PER_PS;
         Ok(Running {
             trial,
             engine: host_engine(settings, geometry, &addresses)?,
-            tally: Tally::new(
-                truth,
-                stress,
-                geometry,
-                settings.range_scale()?,
-                mm_per_bin,
-                cycles,
-            ),
+            tally: Tally::new(truth, stress, geometry, settings, cycles)?,
         })
     });
     let mut running: Vec<Running> = running.collect::<Result<_>>()?;

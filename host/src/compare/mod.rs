@@ -25,7 +25,6 @@ use dtof_core::{BlockLevel, PixelAddress};
 use crate::engine::host::host_engine;
 use crate::engine::settings::Settings;
 use crate::input::source::{Geometry, PhotonSource, has_only_neighbours};
-use crate::simulate::MM_PER_PS;
 use answer::{Answer, answer, of_longest_frame};
 use bound::Bound;
 use measure::{Outcome, Trial, measure};
@@ -34,7 +33,7 @@ use selected::Selected;
 use stress::{Light, Stress, Stressed};
 use survey::{OfPixel, light, median, survey};
 pub use tally::Figures;
-use tally::WRONG_BEYOND_BINS;
+use tally::{WRONG_BEYOND_BINS, mm_per_bin};
 use thresholds::{LEAST_COUNT, Thresholds};
 use truth::Truth;
 
@@ -76,7 +75,7 @@ const FRAMES: [u16; 6] = [100, 200, 500, 1000, 2000, 5000];
 pub struct Task<'a> {
     /// The photons of a seed.
     pub photons: &'a dyn Fn(u64) -> Result<Box<dyn PhotonSource>>,
-    /// What reports are compared with; without, with each other.
+    /// What reports are compared with; without, the range of all photons of the pixel.
     pub truth: Option<Truth>,
     /// Bins, gate, masked pixels, L1, L2, X and seed.
     pub settings: &'a Settings,
@@ -113,14 +112,72 @@ pub struct Comparison {
     pub light: Light,
     /// How errors came about.
     pub truth: Truth,
-    /// The array.
-    pub geometry: Geometry,
     /// Pixels and laser cycles that were compared.
     pub pixels: usize,
     /// Laser cycles.
     pub cycles: u64,
     /// Laser cycles a second, if they are known.
     pub laser_hz: Option<u64>,
+}
+
+/// The methods, and where their trials come from.
+struct Field<'a> {
+    settings: &'a Settings,
+    methods: Vec<Method>,
+    thresholds: Vec<Option<f64>>,
+}
+
+impl<'a> Field<'a> {
+    /// All methods that suit `light`, each with the threshold of equal false alarms.
+    fn new(task: &Task<'a>, light: &Light, most_levels: u8) -> Result<Self> {
+        let settings = task.settings;
+        let pulse = dtof_core::fixed::types::U8F8::saturating_from_num(light.sigma);
+        let methods = Method::all(pulse, most_levels);
+        let mut rules: Vec<Rule> = methods.iter().filter_map(Method::rule).collect();
+        rules.dedup();
+        let known = Thresholds::simulate(&rules, settings, light.background, settings.seed)?;
+        let thresholds = methods.iter().map(|method| {
+            // Blocks have a quarter of the false alarms.
+            let alone = method.levels() == BlockLevel::PIXEL;
+            let share = task.false_alarm * if alone { 1.0 } else { 0.75 };
+            method.rule().map(|rule| known.of(rule, share)).transpose()
+        });
+        Ok(Self {
+            settings,
+            thresholds: thresholds.collect::<Result<_>>()?,
+            methods,
+        })
+    }
+
+    /// A trial of the method with this number.
+    fn trial(&self, number: usize, effort: u16) -> Result<Trial> {
+        let threshold = self.thresholds[number].unwrap_or_default();
+        Ok(Trial {
+            method: number,
+            effort,
+            settings: self.methods[number].settings(self.settings, threshold, effort)?,
+        })
+    }
+
+    /// Every method with every effort.
+    fn trials(&self, light: &Light) -> Result<Vec<Trial>> {
+        let methods = self.methods.iter().enumerate();
+        let trials = methods.flat_map(|(number, method)| {
+            let efforts = efforts(method, self.settings.l2, light).into_iter();
+            efforts.map(move |effort| self.trial(number, effort))
+        });
+        trials.collect()
+    }
+
+    /// Every method at its fastest, and the longest frame.
+    fn fastest(&self) -> Result<Vec<Trial>> {
+        let methods = self.methods.iter().enumerate();
+        let trials = methods.map(|(number, method)| match method.kind {
+            Kind::Frames => self.trial(number, self.settings.l2),
+            Kind::Events { .. } => self.trial(number, LEAST_COUNT),
+        });
+        trials.collect()
+    }
 }
 
 /// Compares all methods that suit the pulse.
@@ -131,129 +188,112 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     let Task {
         settings, sigma, ..
     } = *task;
-    let seed = settings.seed;
     // What no pixel could run with is refused before anything is drawn.
     host_engine(settings, Geometry::new(1, 1), &[])?;
     (task.progress)("surveys the photons");
-    let photons = |nth_seed: u64, most: f64| -> Result<Box<dyn PhotonSource>> {
-        limited((task.photons)(seed + nth_seed)?, most, settings.l2)
-    };
-    let mut source = photons(0, PHOTONS)?;
-    let geometry = source.geometry();
-    let laser_hz = source.laser_hz();
+    let mut source = photons(task, 0, PHOTONS)?;
+    let (geometry, laser_hz) = (source.geometry(), source.laser_hz());
     let most_levels = most_levels(source.as_ref());
     let surveyed = survey(source.as_mut(), settings, sigma)?;
     let truth = known_ranges(task.truth.clone(), &surveyed, settings, geometry)?;
-    let light = light(&surveyed, sigma, |pixel| truth.has_target(pixel, 0));
-    let any_target = surveyed
-        .iter()
-        .any(|(pixel, _)| truth.has_target(*pixel, 0));
+    let has_target = |pixel| truth.has_target(pixel, 0);
     ensure!(
-        any_target,
+        surveyed.iter().any(|(pixel, _)| has_target(*pixel)),
         "no pixel has a target: there is nothing to compare"
     );
+    let light = light(&surveyed, sigma, has_target);
 
     (task.progress)("finds thresholds of equal false alarms");
-    let pulse = dtof_core::fixed::types::U8F8::saturating_from_num(sigma);
-    let methods = Method::all(pulse, most_levels);
-    let mut rules: Vec<Rule> = methods.iter().filter_map(Method::rule).collect();
-    rules.dedup();
-    let known = Thresholds::simulate(&rules, settings, light.background, seed)?;
-    let thresholds = methods.iter().map(|method| {
-        let rule = method.rule();
-        // Blocks have a quarter of the false alarms.
-        let alone = method.levels() == BlockLevel::PIXEL;
-        let share = task.false_alarm * if alone { 1.0 } else { 0.75 };
-        rule.map(|rule| known.of(rule, share)).transpose()
-    });
-    let thresholds: Vec<Option<f64>> = thresholds.collect::<Result<_>>()?;
-    let bound = Bound::new(&light, settings, task.false_alarm, seed)?;
+    let field = Field::new(task, &light, most_levels)?;
+    let bound = Bound::new(&light, settings, task.false_alarm, settings.seed)?;
 
     (task.progress)("tries all methods");
-    let trial = |number: usize, effort: u16| -> Result<Trial> {
-        let method: &Method = &methods[number];
-        let threshold = thresholds[number].unwrap_or_default();
-        Ok(Trial {
-            method: number,
-            effort,
-            settings: method.settings(settings, threshold, effort)?,
-        })
-    };
-    let mut trials = Vec::new();
-    for (number, method) in methods.iter().enumerate() {
-        for effort in efforts(method, settings.l2, &light) {
-            trials.push(trial(number, effort)?);
-        }
-    }
-    let mut source = photons(0, PHOTONS)?;
-    let none = Stress::all(&light, 0).swap_remove(0);
+    let mut source = photons(task, 0, PHOTONS)?;
     let (pixels, cycles) = (source.addresses().len(), source.cycles());
-    let outcomes = measure(source.as_mut(), &methods, &trials, &truth, &none)?;
+    let trials = field.trials(&light)?;
+    let mut outcomes = measure(
+        source.as_mut(),
+        &field.methods,
+        &trials,
+        &truth,
+        &Stress::NONE,
+    )?;
+    outcomes.retain(|outcome| is_measured(outcome, cycles));
 
-    let outcomes: Vec<Outcome> = outcomes
-        .into_iter()
-        .filter(|outcome| is_measured(outcome, cycles))
-        .collect();
-    let frame_mm = of_longest_frame(&methods, &outcomes).map(|frame| frame.0);
-    let within_mm = task.within_mm.or(frame_mm);
-    let within_mm = within_mm.with_context(|| {
-        format!("frames of L2 give fewer than {LEAST_REPORTS} reports here; say --within, or take more laser cycles")
-    })?;
-    let mut found = answer(&methods, &outcomes, within_mm);
-    let mm_per_bin = settings.bin_width_ps.to_num::<f64>() * MM_PER_PS;
-    let widest = task
-        .within_mm
-        .map_or(WRONG_BEYOND_BINS * mm_per_bin, |_| 0.0);
-    while found.taken.is_none() && found.within_mm < widest {
-        found = answer(&methods, &outcomes, WIDER * found.within_mm);
-    }
-    let taken = found.taken.map(|taken| {
-        let threshold = thresholds[taken.method].unwrap_or_default();
-        methods[taken.method].settings(settings, threshold, taken.effort)
-    });
-    let mut stressed = Vec::new();
-    let first_bin = settings.gate.map_or(0, |gate| gate.0);
-    let numbers = 0..methods.len();
-    let fastest = numbers.map(|number| match methods[number].kind {
-        Kind::Frames => trial(number, settings.l2),
-        Kind::Events { .. } => trial(number, LEAST_COUNT),
-    });
-    let mut fastest: Vec<Trial> = fastest.collect::<Result<_>>()?;
+    let frame_mm = of_longest_frame(&field.methods, &outcomes).map(|frame| frame.0);
+    let answer = choose(task, &field.methods, &outcomes, frame_mm)?;
+    let taken = answer.taken.as_ref();
+    let taken = taken.map(|taken| field.trial(taken.method, taken.effort));
+    let taken = taken.transpose()?;
     // The one to take stands under stress as it is taken.
-    if let Some(taken) = &found.taken {
-        fastest.push(trial(taken.method, taken.effort)?);
-    }
-    let columns = geometry.columns;
-    for stress in Stress::all(&light, first_bin) {
-        if surveyed
-            .iter()
-            .all(|(pixel, _)| stress.is_hot(*pixel, columns))
-        {
-            continue; // There is no other to look at.
-        }
-        (task.progress)(stress.name);
-        let source = photons(1, STRESS_PHOTONS)?;
-        let bins = u16::try_from(settings.bins)?;
-        let mut source = Stressed::new(source, &stress, bins, sigma, seed);
-        let outcomes = measure(&mut source, &methods, &fastest, &truth, &stress)?;
-        stressed.push((stress, outcomes));
-    }
+    let mut trials = field.fastest()?;
+    trials.extend(taken.clone());
+    let mut stresses = Stress::all(&light, settings.gate.map_or(0, |gate| gate.0));
+    // Where every pixel is hot there is no other to look at.
+    let is_hot = |stress: &Stress, pixel| stress.is_hot(pixel, geometry.columns);
+    stresses.retain(|stress| surveyed.iter().any(|(pixel, _)| !is_hot(stress, *pixel)));
+    let stressed = stresses
+        .into_iter()
+        .map(|stress| under_stress(task, &field, &trials, &truth, stress))
+        .collect::<Result<_>>()?;
     Ok(Comparison {
         frame_mm,
-        answer: found,
-        taken: taken.transpose()?,
-        methods,
-        thresholds,
+        answer,
+        taken: taken.map(|taken| taken.settings),
+        methods: field.methods,
+        thresholds: field.thresholds,
         outcomes,
         bound,
         stressed,
         light,
         truth,
-        geometry,
         pixels,
         cycles,
         laser_hz,
     })
+}
+
+/// About `most` photons of the seed after so many others.
+fn photons(task: &Task, nth_seed: u64, most: f64) -> Result<Box<dyn PhotonSource>> {
+    let Settings { seed, l2, .. } = *task.settings;
+    limited((task.photons)(seed + nth_seed)?, most, l2)
+}
+
+/// The method to take, as exact as was asked for, or as frames of L2 are with `frame_mm`.
+fn choose(
+    task: &Task,
+    methods: &[Method],
+    outcomes: &[Outcome],
+    frame_mm: Option<f64>,
+) -> Result<Answer> {
+    if let Some(within_mm) = task.within_mm {
+        return Ok(answer(methods, outcomes, within_mm));
+    }
+    let frame_mm = frame_mm.with_context(|| {
+        format!("frames of L2 give fewer than {LEAST_REPORTS} reports here; say --within, or take more laser cycles")
+    })?;
+    let mut found = answer(methods, outcomes, frame_mm);
+    let widest = WRONG_BEYOND_BINS * mm_per_bin(task.settings);
+    while found.taken.is_none() && found.within_mm < widest {
+        found = answer(methods, outcomes, WIDER * found.within_mm);
+    }
+    Ok(found)
+}
+
+/// What `trials` come to under `stress`, on photons of another seed.
+fn under_stress(
+    task: &Task,
+    field: &Field,
+    trials: &[Trial],
+    truth: &Truth,
+    stress: Stress,
+) -> Result<(Stress, Vec<Outcome>)> {
+    (task.progress)(stress.name);
+    let source = photons(task, 1, STRESS_PHOTONS)?;
+    let bins = u16::try_from(task.settings.bins)?;
+    let mut source = Stressed::new(source, &stress, bins, task.sigma, task.settings.seed);
+    let outcomes = measure(&mut source, &field.methods, trials, truth, &stress)?;
+    Ok((stress, outcomes))
 }
 
 /// Whether a trial has enough reports to tell its time and its error.
@@ -270,7 +310,7 @@ fn known_ranges(
     settings: &Settings,
     geometry: Geometry,
 ) -> Result<Truth> {
-    let mm_per_bin = settings.bin_width_ps.to_num::<f64>() * MM_PER_PS;
+    let mm_per_bin = mm_per_bin(settings);
     let offset = settings.offset_mm.to_num::<f64>();
     let range = |pixel: &OfPixel| Some(pixel.position? * mm_per_bin + offset);
     Ok(match truth {

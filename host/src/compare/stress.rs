@@ -44,7 +44,8 @@ pub struct Light {
 const PERIODS: f64 = 8.0;
 
 impl Stress {
-    const NONE: Self = Self {
+    /// Nothing is done to them.
+    pub const NONE: Self = Self {
         name: "as it is",
         keep: 1.0,
         background: 0.0,
@@ -162,6 +163,10 @@ impl Stressed {
 impl PhotonSource for Stressed {
     fn geometry(&self) -> Geometry {
         self.source.geometry()
+    }
+
+    fn sides(&self) -> [&'static str; 2] {
+        self.source.sides()
     }
 
     fn capture_rows(&self) -> u32 {

@@ -15,8 +15,6 @@ const CLEAR: f64 = 6.0;
 /// The whole histogram of a pixel, and what it comes to.
 #[derive(Clone, Debug, Default)]
 pub struct OfPixel {
-    /// Laser cycles.
-    pub cycles: u64,
     /// Background photons a bin and laser cycle, of bins away from the highest window.
     pub background: f64,
     /// Photons a laser cycle in the highest window above the background.
@@ -87,7 +85,6 @@ fn of_pixel(bins: &[u64], cycles: u64, sigma: f64) -> OfPixel {
     let above = in_window as f64 - expected;
     let cycles_f = cycles.max(1) as f64;
     OfPixel {
-        cycles,
         background: each / cycles_f,
         signal: above.max(0.0) / cycles_f,
         position: (above > CLEAR * expected.max(1.0).sqrt()).then(|| {

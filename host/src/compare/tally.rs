@@ -1,14 +1,22 @@
 //! What the reports of one method come to: how often they come, and how far off they are.
 
+use anyhow::Result;
 use dtof_core::{DepthEvent, PixelAddress, RangeScale};
 
 use super::stress::Stress;
 use super::truth::Truth;
+use crate::engine::settings::Settings;
 use crate::events::events_csv::range_mm;
 use crate::input::source::Geometry;
+use crate::simulate::MM_PER_PS;
 
 /// A report farther off than so many bins is wrong.
 pub const WRONG_BEYOND_BINS: f64 = 3.0;
+
+/// How long a bin is.
+pub fn mm_per_bin(settings: &Settings) -> f64 {
+    settings.bin_width_ps.to_num::<f64>() * MM_PER_PS
+}
 
 /// Reports that are kept for their errors, of all pixels together.
 const MOST_KEPT: usize = 400_000;
@@ -81,28 +89,29 @@ pub struct Figures {
 }
 
 impl<'a> Tally<'a> {
-    /// Of an array, in bins of `mm_per_bin`, for a run of `cycles` laser cycles.
-    #[must_use]
+    /// Of an array, for a run of `cycles` laser cycles.
+    ///
+    /// # Errors
+    /// If bins have no range.
     pub fn new(
         truth: &'a Truth,
         stress: &'a Stress,
         geometry: Geometry,
-        scale: RangeScale,
-        mm_per_bin: f64,
+        settings: &Settings,
         cycles: u64,
-    ) -> Self {
+    ) -> Result<Self> {
         let pixels = geometry.addresses();
-        Self {
+        Ok(Self {
             truth,
             stress,
             geometry,
-            scale,
-            mm_per_bin,
+            scale: settings.range_scale()?,
+            mm_per_bin: mm_per_bin(settings),
             cycles,
             most: (MOST_KEPT / pixels.max(1)).clamp(8, 1024),
             pixels: vec![Reports::default(); pixels],
             stray: 0,
-        }
+        })
     }
 
     /// Takes events into account: one of a block for each of its pixels.
@@ -119,7 +128,8 @@ impl<'a> Tally<'a> {
         if self.stress.is_hot(pixel, self.geometry.columns) {
             return;
         }
-        if !self.truth.has_target(pixel, cycle) {
+        let ranges = self.truth.ranges(pixel, cycle);
+        if ranges[0].is_none() {
             self.stray += 1;
             return;
         }
@@ -127,10 +137,8 @@ impl<'a> Tally<'a> {
         let middle = cycle.saturating_sub(u64::from(event.exposure) / 2);
         let moved = self.stress.moved(middle, self.cycles) * self.mm_per_bin;
         let range = range_mm(event, &self.scale) - moved;
-        let ranges = self.truth.ranges(pixel, cycle).into_iter().flatten();
-        let error = ranges
-            .map(|truth| range - truth)
-            .min_by(|one, other| one.abs().total_cmp(&other.abs()));
+        let errors = ranges.into_iter().flatten().map(|truth| range - truth);
+        let error = errors.min_by(|one, other| one.abs().total_cmp(&other.abs()));
         let limit = WRONG_BEYOND_BINS * self.mm_per_bin;
         let reports = &mut self.pixels[usize::from(pixel.0)];
         let Some(error) = error else { return };
