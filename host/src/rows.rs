@@ -17,6 +17,19 @@ pub fn grouped(value: u64) -> String {
     text
 }
 
+/// A number other than 0 with at least so many digits from its first, and at most 12 decimals.
+#[must_use]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "0 to 12"
+)]
+pub fn significant(value: f64, digits: u8) -> String {
+    let decimals = f64::from(digits) - 1.0 - value.abs().log10().floor();
+    let decimals = decimals.clamp(0.0, 12.0) as usize;
+    format!("{value:.decimals$}")
+}
+
 /// Rows as lines of text, names to the left, values aligned.
 #[must_use]
 pub fn aligned(rows: &[Row]) -> String {
@@ -28,4 +41,25 @@ pub fn aligned(rows: &[Row]) -> String {
     rows.iter()
         .map(|(name, value)| format!("  {name:width$}  {value}\n"))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_count_from_the_first_that_is_not_0() {
+        for (value, digits, text) in [
+            (1234.5, 3, "1234"),
+            (123.45, 3, "123"),
+            (1.0, 3, "1.00"),
+            (-0.012_345, 3, "-0.0123"),
+            (0.999_9, 3, "1.000"),
+            (0.012_344, 4, "0.01234"),
+            (1e-11, 3, "0.000000000010"),
+            (1e-30, 3, "0.000000000000"),
+        ] {
+            assert_eq!(significant(value, digits), text);
+        }
+    }
 }

@@ -5,7 +5,7 @@ use dtof_draw::chart::{Axis, Chart, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::{AVERAGE, EVENTS, PAPER, REFERENCE};
 
 use super::{Calibration, Length, Nearest, remarks};
-use crate::rows::{Row, grouped};
+use crate::rows::{Row, grouped, significant};
 use crate::settings::SettingsFile;
 use crate::view::report::{Figure, Section, still};
 
@@ -327,7 +327,5 @@ fn short(value: f64) -> String {
     if !(1e-4..1e5).contains(&value.abs()) {
         return format!("{value:.2e}");
     }
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    let decimals = (2.0 - value.abs().log10().floor()).max(0.0) as usize;
-    format!("{value:.decimals$}")
+    significant(value, 3)
 }

@@ -9,6 +9,7 @@ use std::io::{self, Write};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::cli::arguments::{MOST_WHOLE, bins, positive, shortest, whole};
+use dtof::rows::significant;
 use dtof::settings::RuleName;
 use dtof::simulate::MM_PER_PS;
 use dtof_core::BlockLevel;
@@ -283,9 +284,7 @@ fn number(value: f64) -> String {
     if value == value.round() && value.abs() < 1e6 {
         format!("{value}")
     } else if (0.001..1e6).contains(&value) {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let decimals = (3.0 - value.log10().floor()).max(0.0) as usize;
-        format!("{value:.decimals$}")
+        significant(value, 4)
     } else {
         format!("{value:.3e}")
     }

@@ -8,6 +8,7 @@
 
 pub mod answer;
 pub mod bound;
+mod chart;
 pub mod cost;
 pub mod measure;
 pub mod method;
@@ -16,6 +17,7 @@ mod selected;
 pub mod stress;
 pub mod survey;
 mod tally;
+mod text;
 pub mod thresholds;
 pub mod truth;
 

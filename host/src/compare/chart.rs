@@ -1,0 +1,107 @@
+//! The chart of a comparison: time to a report against its error.
+
+use anyhow::Result;
+use dtof_draw::chart::{Axis, Chart, Panel, Point, Series, Style, chart};
+use dtof_draw::palette;
+
+use super::Comparison;
+use super::method::Kind;
+
+impl Comparison {
+    /// Laser cycles in the unit of the chart.
+    pub(super) fn time(&self, cycles: f64) -> f64 {
+        self.laser_hz.map_or(cycles, |hz| cycles * 1e6 / hz as f64)
+    }
+
+    /// That unit.
+    const fn unit(&self) -> &'static str {
+        match self.laser_hz {
+            Some(_) => "µs",
+            None => "laser cycles",
+        }
+    }
+
+    /// The chart: time to a report against its error, a curve a method.
+    ///
+    /// # Errors
+    /// If there is nothing to draw.
+    pub fn chart(&self) -> Result<String> {
+        let panel = |title: &str, single: bool| {
+            let numbers = 0..self.methods.len();
+            let mut series: Vec<Series> = numbers
+                .filter(|&number| {
+                    let method = &self.methods[number];
+                    method.kind == Kind::Frames || method.is_single() == single
+                })
+                .filter_map(|number| self.series(number))
+                .collect();
+            series.extend(self.bound_series());
+            Panel {
+                title: title.to_owned(),
+                series,
+            }
+        };
+        let mut panels = vec![panel("each pixel and exposure by itself", true)];
+        let has_more = self.methods.iter().any(|method| !method.is_single());
+        if has_more {
+            panels.push(panel("with blocks, and with tracking", false));
+        }
+        let (finding, holds) = self.finding();
+        chart(&Chart {
+            finding,
+            holds,
+            note: self.note(),
+            x: Axis::logarithmic(format!("time to a report, {}", self.unit())),
+            y: Axis::logarithmic("error of a report, mm"),
+            key: Vec::new(),
+            columns: 1,
+            panels,
+        })
+    }
+
+    /// What dots and names of the chart are.
+    fn note(&self) -> String {
+        format!(
+            "A dot is a least count of photons, or a length of frames; all rules have at most \
+             the same false alarms. Beside a name: instructions a laser cycle and pixel on a Cortex-M4F. \
+             Times are of the middle half of the pixels; {}, 68 % of which are smaller.",
+            self.truth.told()
+        )
+    }
+
+    fn series(&self, number: usize) -> Option<Series> {
+        let method = &self.methods[number];
+        let drawn = self
+            .of(number)
+            .filter(|outcome| outcome.figures.error_mm > 0.0);
+        let points: Vec<Point> = drawn
+            .map(|outcome| {
+                Point::exact(self.time(outcome.figures.cycles), outcome.figures.error_mm)
+            })
+            .collect();
+        let cost = self.of(number).next()?.instructions;
+        let name = format!("{} ({cost:.0})", method.name);
+        (!points.is_empty()).then(|| Series::named(name, method.pen, Style::JoinedDots, points))
+    }
+
+    fn bound_series(&self) -> Option<Series> {
+        let bound = self.bound?;
+        let longest = self.outcomes.iter().map(|outcome| outcome.figures.cycles);
+        let longest = longest
+            .filter(|cycles| cycles.is_finite())
+            .fold(0.0, f64::max);
+        let steps = 24;
+        let each = (longest / bound.cycles)
+            .max(1.0)
+            .powf(1.0 / f64::from(steps));
+        let cycles = (0..=steps).map(|step| bound.cycles * each.powi(step));
+        let points = cycles.map(|cycles| Point::exact(self.time(cycles), bound.error_mm(cycles)));
+        let name = "bound of a pixel";
+        Some(Series::named(
+            name,
+            palette::REFERENCE,
+            Style::Line,
+            points.collect(),
+        ))
+    }
+}
