@@ -4,6 +4,8 @@
 mod common;
 
 mod engine;
+mod map;
+mod masked;
 mod monitor;
 mod recording;
 

@@ -1,7 +1,7 @@
 //! `dtof monitor` on the firmware's sidecar with a simulated sensor, behind a TCP
 //! port of this computer.
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::num::NonZeroU16;
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{self, Receiver};
@@ -14,11 +14,11 @@ use anyhow::Result;
 use dtof::device::Client;
 use dtof::device::monitor::{Outputs, Task, monitor};
 use dtof::engine::host::host_engine;
-use dtof::engine::settings::{AdaptiveBinning, Settings};
+use dtof::engine::settings::Settings;
 use dtof::events::events_csv;
 use dtof::input::source::{Geometry, Photon, PixelPhotons, Slice};
 use dtof_core::fixed::types::{U0F32, U8F24, U16F16, U24F8};
-use dtof_core::{BlockLevel, DepthEvent, DynamicDepthPixel, PixelAddress, Reference};
+use dtof_core::{DepthEvent, DynamicDepthPixel, PixelAddress, Reference};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::DynamicDepth;
 use dtof_sensors::simulated::{self, Pulse, Simulated, SimulatedPixel};
@@ -26,7 +26,7 @@ use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
 
 const PIXELS: u16 = 4;
 /// Longer than any test.
-const LONG: Duration = Duration::from_secs(60);
+pub const LONG: Duration = Duration::from_secs(60);
 const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
 
 /// Four pixels, each with a target of its own.
@@ -76,7 +76,7 @@ impl Sensor for Noted {
 }
 
 /// A device that hangs up after `lives`.
-fn device(has_sensor: bool, lives: Duration) -> String {
+pub fn device(has_sensor: bool, lives: Duration) -> String {
     device_of(Some(sensor()), has_sensor, lives).0
 }
 
@@ -145,7 +145,7 @@ fn reference_events() -> Vec<DepthEvent> {
 }
 
 /// The same as CSV.
-fn reference() -> String {
+pub fn reference() -> String {
     let mut csv = Vec::new();
     let scale = settings().range_scale().unwrap();
     writeln!(csv, "{}", events_csv::HEADER).unwrap();
@@ -183,7 +183,7 @@ fn watch(
     )
 }
 
-fn watch_with(
+pub fn watch_with(
     settings: &Settings,
     client: &mut Client,
     dynamic_depth: Option<DynamicDepth>,
@@ -204,49 +204,6 @@ fn watch_with(
         masked: 0,
     };
     monitor(client, &task, |elapsed| elapsed >= length, &mut outputs)
-}
-
-#[test]
-fn events_of_masked_pixels_are_left_out_and_counted() {
-    let mut client = client(&device(true, LONG));
-    let (mut events, mut statistics) = (Vec::new(), Vec::new());
-    let masked = Settings {
-        masked: vec![1],
-        ..settings()
-    };
-    let outputs: [&mut dyn Write; 2] = [&mut events, &mut statistics];
-    let length = Duration::from_millis(1_600);
-    watch_with(&masked, &mut client, None, length, outputs).unwrap();
-    let [events, statistics] = [events, statistics].map(|text| String::from_utf8(text).unwrap());
-    let pixel = |row: &str| row.split(',').nth(1).unwrap().to_owned();
-    let is_masked = |row: &&str| pixel(row) == "1";
-    assert!(events.lines().count() > 20 && !events.lines().any(|row| is_masked(&row)));
-    assert!(statistics.contains(", events left out "), "{statistics}");
-    // Those of the other pixels are all there.
-    let others = reference();
-    let others: Vec<&str> = others.lines().filter(|row| !is_masked(row)).collect();
-    assert!(
-        events
-            .lines()
-            .zip(&others)
-            .all(|(row, other)| row == *other)
-    );
-
-    // Blocks would hold their photons.
-    let blocks = Settings {
-        binning: Some(AdaptiveBinning {
-            levels: BlockLevel::saturating(1),
-            patience: 64,
-        }),
-        ..masked
-    };
-    let outputs: [&mut dyn Write; 2] = [&mut Vec::new(), &mut Vec::new()];
-    let refused = watch_with(&blocks, &mut client, None, length, outputs).unwrap_err();
-    assert!(
-        refused
-            .to_string()
-            .contains("leave out --mask or --binning")
-    );
 }
 
 #[test]
@@ -408,46 +365,4 @@ fn the_command_prints_rows_and_says_when_the_device_is_gone() {
     let error = String::from_utf8(output.stderr).unwrap();
     says(&error, "error: tcp:127.0.0.1:");
     assert!(output.stdout.len() > 200);
-}
-
-#[test]
-fn a_map_needs_a_terminal() {
-    let output = Scratch::new().run("monitor --device tcp:127.0.0.1:1 --map");
-    assert_eq!(output.status.code(), Some(1));
-    let error = b"error: --map draws on standard error, which is no terminal here\n";
-    assert_eq!(output.stderr, error);
-}
-
-/// `script` of util-linux gives the command a terminal. Its shell is replaced by the
-/// command: some, interrupted with it, say so whatever the command returns.
-#[cfg(target_os = "linux")]
-#[test]
-fn a_map_is_drawn_on_a_terminal_and_ctrl_c_gives_the_cursor_back() {
-    let name = device(true, LONG);
-    let dtof = env!("CARGO_BIN_EXE_dtof");
-    let command = format!("exec '{dtof}' monitor --pixels 4 --map --device {name}");
-    let mut terminal = Command::new("script")
-        .args(["--quiet", "--return", "--flush", "--command"])
-        .args([&command, "/dev/null"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut screen = BufReader::new(terminal.stdout.take().unwrap());
-    let mut drawn = String::new();
-    // Until a second has passed.
-    while !drawn.contains("events/s ") {
-        assert!(screen.read_line(&mut drawn).unwrap() > 0, "{drawn}");
-    }
-    // Ctrl-C.
-    terminal.stdin.as_mut().unwrap().write_all(b"\x03").unwrap();
-    screen.read_to_string(&mut drawn).unwrap();
-    let status = terminal.wait().unwrap();
-    assert!(status.success(), "{status}: {drawn}");
-
-    assert!(drawn.contains("4 of 4 pixels"), "{drawn}");
-    assert!(drawn.contains("\x1b[3A"), "drawn in place: {drawn}");
-    assert!(drawn.contains('▀') && !drawn.contains("cycle,pixel"));
-    let (_, end) = drawn.rsplit_once("\x1b[?25l").unwrap();
-    assert!(end.ends_with("\x1b[?25h"), "{end}");
 }

@@ -1,0 +1,96 @@
+use super::*;
+
+/// A capture of pixels in a row.
+fn recorded(capture: Capture, cycles: u64, seed: u64) -> Result<RecordedHistograms> {
+    let geometry = Geometry::new(u32::try_from(capture.len())?, 1);
+    let length = RecordingLength::Cycles(cycles);
+    RecordedHistograms::new(geometry, &[capture], length, u64::MAX, seed)
+}
+
+fn replay(counts: &[u64], cycles: u64) -> Vec<Photon> {
+    let mut source = recorded(vec![counts.to_vec()], cycles, 7).unwrap();
+    let slice = source.next_slice(u16::MAX).unwrap();
+    assert_eq!(u64::from(slice.pixels[0].cycles), cycles);
+    slice.pixels[0].photons.clone()
+}
+
+#[test]
+fn every_recorded_photon_is_used_exactly_once() {
+    let counts = [3, 0, 500, 1, 0, 0, 77, 2];
+    let photons = replay(&counts, 100);
+    let mut replayed = [0; 8];
+    for photon in &photons {
+        replayed[usize::from(photon.code)] += 1;
+    }
+    assert_eq!(replayed, counts);
+    assert!(photons.is_sorted_by_key(|photon| photon.cycle));
+}
+
+/// Of two captures, one of which ends first.
+#[test]
+fn slices_of_any_length_hold_the_same_photons() {
+    let photons = |lengths: &[u16]| {
+        let captures = [vec![vec![700; 8]], vec![vec![90; 8]]];
+        let length = RecordingLength::PhotonsPerCycle(0.9);
+        let geometry = Geometry::new(1, 2);
+        let mut source = RecordedHistograms::new(geometry, &captures, length, u64::MAX, 3).unwrap();
+        let mut all = [(); 2].map(|()| Vec::new());
+        for &length in lengths.iter().cycle().take(9_000) {
+            let before = source.not_replayed();
+            let slice = source.next_slice(length).unwrap();
+            let mut given = 0;
+            for (all, pixel) in all.iter_mut().zip(&slice.pixels) {
+                given += pixel.photons.len() as u64;
+                let at = |photon: &Photon| {
+                    assert!(photon.cycle < pixel.cycles);
+                    (slice.first_cycle + u64::from(photon.cycle), photon.code)
+                };
+                all.extend(pixel.photons.iter().map(at));
+            }
+            assert_eq!(source.not_replayed() + given, before);
+        }
+        assert_eq!(source.not_replayed(), 0);
+        all
+    };
+    let expected = photons(&[7000]);
+    assert_eq!([expected[0].len(), expected[1].len()], [5600, 720]);
+    for lengths in [&[1][..], &[256], &[3, 2048, 1, 700], &[2049]] {
+        assert!(photons(lengths) == expected, "{lengths:?}");
+    }
+}
+
+#[test]
+fn equal_pixels_and_other_seeds_receive_other_photons() {
+    let photons = |seed| {
+        let mut source = recorded(vec![vec![100; 8]; 2], 1000, seed).unwrap();
+        source.next_slice(1000).unwrap().pixels
+    };
+    let (one, other) = (photons(1), photons(2));
+    let all = [&one[0], &one[1], &other[0], &other[1]];
+    for (index, pixel) in all.iter().enumerate() {
+        assert_eq!(pixel.photons.len(), 800);
+        assert!(all[..index].iter().all(|before| before != pixel));
+    }
+}
+
+#[test]
+fn what_does_not_fit_into_memory_is_refused() {
+    let refused = |count: u64, cycles| recorded(vec![vec![count; 8]], cycles, 1).is_err();
+    assert!(refused(1 << 38, 1 << 40));
+    assert!(refused(1 << 30, 1));
+    assert!(refused(1, (1 << 40) + 1));
+    assert!(!refused(1 << 30, 1 << 20));
+}
+
+#[test]
+fn photons_fall_evenly_over_the_laser_cycles_whatever_their_bin() {
+    // 100,000 photons over 10 laser cycles: 5,000 a bin and laser cycle in
+    // two bins, standard deviation 67; five of them are 335.
+    let mut cells = [[0i64; 2]; 10];
+    for photon in replay(&[50_000, 0, 0, 0, 0, 0, 0, 50_000], 10) {
+        cells[usize::from(photon.cycle)][usize::from(photon.code) / 7] += 1;
+    }
+    for cell in cells.as_flattened() {
+        assert!((cell - 5_000).abs() < 335, "{cells:?}");
+    }
+}
