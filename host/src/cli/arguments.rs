@@ -40,8 +40,18 @@ where
 /// # Errors
 /// If there is no such histogram.
 pub fn bins(text: &str) -> Result<u16, String> {
-    let bins = whole(8..=1024)(text).ok();
-    bins.filter(|bins: &u16| bins.is_power_of_two())
+    // What is no number is refused as 0 is.
+    bins_of(whole(0..=u16::MAX)(text).unwrap_or(0))
+}
+
+/// `bins`, if a histogram can have so many.
+///
+/// # Errors
+/// If there is no such histogram.
+pub fn bins_of(bins: u16) -> Result<u16, String> {
+    let is_known = (8..=1024).contains(&bins) && bins.is_power_of_two();
+    is_known
+        .then_some(bins)
         .ok_or("must be a power of two from 8 to 1024".to_owned())
 }
 

@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use dtof::cli::arguments::{fixed, path, whole};
-use dtof::settings::{Detection, Sensor, SettingsFile};
-use dtof_core::CentredWindow;
+use dtof::settings::{Detection, Sensor, SettingsFile, pulse};
 use dtof_core::fixed::types::U8F8;
 
 /// What is known of the sensor.
@@ -93,10 +92,5 @@ fn gate(text: &str) -> Result<(u16, u16), String> {
 }
 
 fn sigma(text: &str) -> Result<U8F8, String> {
-    const WIDEST: U8F8 = CentredWindow::WIDEST_PULSE;
-    let sigma = fixed::<U8F8>(text)?;
-    if sigma == U8F8::ZERO || sigma > WIDEST {
-        return Err(format!("must be above 0 and at most {WIDEST}"));
-    }
-    Ok(sigma)
+    pulse(fixed(text)?)
 }

@@ -1,6 +1,6 @@
 //! How pixels decide: options of the command line, and the section `[detection]` of a file.
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::{Args, ValueEnum};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::half_widths::half_widths;
 use super::sections::{decimal, first_of};
-use crate::cli::arguments::{fixed, positive, whole};
+use crate::cli::arguments::{fixed, real, whole};
 use crate::input::range::within;
 
 /// What is not given has its default.
@@ -165,10 +165,7 @@ impl Detection {
             }
         }
         if let Some(share) = self.false_alarm {
-            ensure!(
-                share > 0.0 && share <= 0.1,
-                "false_alarm {share}: must be above 0, at most 0.1"
-            );
+            share_of(share).map_err(|reason| anyhow!("false_alarm {share}: {reason}"))?;
             ensure!(self.z.is_none(), "z and false_alarm: give one of them");
         }
         Ok(())
@@ -261,6 +258,13 @@ impl Detection {
 /// # Errors
 /// If it is not above 0 and at most 0.1.
 pub fn share(text: &str) -> Result<f64, String> {
-    let share = positive(text).ok().filter(|share| *share <= 0.1);
-    share.ok_or("must be a number above 0, at most 0.1".to_owned())
+    share_of(real(text).unwrap_or(0.0))
+}
+
+/// `share`, if so many false alarms can be asked for.
+fn share_of(share: f64) -> Result<f64, String> {
+    let is_share = share > 0.0 && share <= 0.1;
+    is_share
+        .then_some(share)
+        .ok_or("must be a number above 0, at most 0.1".to_owned())
 }

@@ -324,7 +324,7 @@ rebin = 2
             ("[detection]\nz = 4\nfalse_alarm = 0.01", "give one of them"),
             (
                 "[detection]\nfalse_alarm = 0.5",
-                "must be above 0, at most 0.1",
+                "false_alarm 0.5: must be a number above 0, at most 0.1",
             ),
             ("[detection]\nwindow = 8", "window 8: must be from 1 to 7"),
             ("[detection]\nechoes = 0", "echoes 0: must be from 1 to 4"),

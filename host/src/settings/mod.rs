@@ -13,4 +13,4 @@ mod sections;
 pub use detection::{Detection, EstimatorName, RuleName, share};
 pub(crate) use file::MARK;
 pub use file::SettingsFile;
-pub use sections::{Rays, Run, Sensor};
+pub use sections::{Rays, Run, Sensor, pulse};

@@ -1,10 +1,11 @@
 //! The other sections of a settings file.
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, anyhow, ensure};
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use serde::{Deserialize, Serialize};
 
+use crate::cli::arguments::bins_of;
 use crate::geometry::FieldOfView;
 use crate::input::axes::Axes;
 use crate::input::range::within;
@@ -101,18 +102,10 @@ impl Sensor {
             within("columns", columns.into(), 1.0..=65_536.0)?;
         }
         if let Some(bins) = self.bins {
-            let is_known = (8..=1024).contains(&bins) && bins.is_power_of_two();
-            ensure!(
-                is_known,
-                "bins {bins}: must be a power of two from 8 to 1024"
-            );
+            bins_of(bins).map_err(|reason| anyhow!("bins {bins}: {reason}"))?;
         }
         if let Some(sigma) = self.sigma_bins {
-            const WIDEST: U8F8 = CentredWindow::WIDEST_PULSE;
-            ensure!(
-                sigma > U8F8::ZERO && sigma <= WIDEST,
-                "sigma_bins {sigma}: must be above 0 and at most {WIDEST}"
-            );
+            pulse(sigma).map_err(|reason| anyhow!("sigma_bins {sigma}: {reason}"))?;
         }
         for (key, value) in [("background", self.background), ("glass", self.glass)] {
             if let Some(value) = value {
@@ -126,6 +119,18 @@ impl Sensor {
     }
 }
 
+/// `sigma`, if a pulse can be so wide: its standard deviation in bins.
+///
+/// # Errors
+/// If there is no such pulse.
+pub fn pulse(sigma: U8F8) -> Result<U8F8, String> {
+    const WIDEST: U8F8 = CentredWindow::WIDEST_PULSE;
+    if sigma == U8F8::ZERO || sigma > WIDEST {
+        return Err(format!("must be above 0 and at most {WIDEST}"));
+    }
+    Ok(sigma)
+}
+
 impl Rays {
     pub(super) fn check(&self) -> Result<()> {
         let both = self.field_of_view_degrees.is_some() && self.calibration.is_some();
@@ -135,7 +140,7 @@ impl Rays {
         );
         if let Some(degrees) = self.field_of_view_degrees {
             FieldOfView::new(degrees)
-                .map_err(|error| anyhow::anyhow!("field_of_view_degrees {degrees:?}: {error}"))?;
+                .map_err(|error| anyhow!("field_of_view_degrees {degrees:?}: {error}"))?;
         }
         Ok(())
     }
