@@ -58,6 +58,7 @@ impl Calibration {
             detection: detection.unwrap_or_default().or(before.detection),
             rays: before.rays,
             run: before.run,
+            origin: before.origin,
         };
         Ok(found.of_any_file())
     }

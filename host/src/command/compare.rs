@@ -83,9 +83,22 @@ impl Compare {
         let name = self.input.as_deref().or(self.scene.as_deref());
         let name = name.context("--input or --scene is needed")?;
         page::may_write(&self.out, &self.inputs())?;
+        let said = match &self.scene {
+            Some(_) => self.known.said(self.options()),
+            None => self
+                .recording
+                .said(|options| self.known.said(options.or(self.options()))),
+        }?;
+        let mut asked = said.clone();
+        asked.detection.false_alarm = Some(self.share(&said));
+        let compared = self.compare(name, said);
+        compared.map_err(|error| asked.name_origin(error))
+    }
+
+    fn compare(&self, name: &Path, said: SettingsFile) -> Result<()> {
         let subject = match &self.scene {
-            Some(file) => self.of_scene(file)?,
-            None => self.of_recording(name)?,
+            Some(file) => Self::of_scene(file, said)?,
+            None => self.of_recording(name, said)?,
         };
         let Subject {
             said,
@@ -174,9 +187,8 @@ impl Compare {
     }
 
     /// A scene knows everything of itself.
-    fn of_scene(&self, file: &Path) -> Result<Subject> {
+    fn of_scene(file: &Path, said: SettingsFile) -> Result<Subject> {
         let scene = Scene::read(file)?;
-        let said = self.known.said(self.options())?;
         let mut said = of_scene(said, &scene).with_context(|| file.display().to_string())?;
         let sigma = U8F8::checked_from_num(scene.pulse_sigma_bins);
         let known = sigma.filter(|sigma| *sigma <= CentredWindow::WIDEST_PULSE);
@@ -189,10 +201,7 @@ impl Compare {
     }
 
     /// What is not said of a recording is found in it.
-    fn of_recording(&self, file: &Path) -> Result<Subject> {
-        let said = self
-            .recording
-            .said(|options| self.known.said(options.or(self.options())))?;
+    fn of_recording(&self, file: &Path, said: SettingsFile) -> Result<Subject> {
         let counts = counts(file, &opening(&said))?;
         self.recording.suits(file, &counts.known)?;
         warn(file, &counts.known, self.quiet);

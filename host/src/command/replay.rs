@@ -12,7 +12,7 @@ use dtof::events::output::Output;
 use dtof::input::masked::Masked;
 use dtof::input::open::open;
 use dtof::input::source::{PhotonSource, has_only_neighbours};
-use dtof::settings::Run;
+use dtof::settings::{Run, SettingsFile};
 
 use super::dynamic_depth::Shown;
 use super::operation::{Frames, Operation};
@@ -56,7 +56,6 @@ pub struct Replay {
 
 impl Replay {
     pub fn run(&self) -> Result<()> {
-        let changes = self.changes.wanted()?;
         let options = Run {
             cycles: self.cycles,
             seed: self.seed,
@@ -66,10 +65,15 @@ impl Replay {
         let said = self
             .recording
             .said(|recording| self.operation.said(recording.or(options.into())))?;
-        let recording = open(&self.input, &opening(&said))?;
+        self.replay(&said).map_err(|error| said.name_origin(error))
+    }
+
+    fn replay(&self, said: &SettingsFile) -> Result<()> {
+        let changes = self.changes.wanted()?;
+        let recording = open(&self.input, &opening(said))?;
         let (photons, known) = (recording.photons, recording.known);
         self.recording.suits(&self.input, &known)?;
-        let said = said.or(of_file(&known, photons.geometry()));
+        let said = said.clone().or(of_file(&known, photons.geometry()));
         let settings = said.settings(known.bins)?;
         ensure!(
             known.has_shape || settings.binning.is_none(),

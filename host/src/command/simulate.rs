@@ -77,11 +77,6 @@ pub struct Simulate {
 
 impl Simulate {
     pub fn run(&self) -> Result<()> {
-        let mut scene = self.view.scene(self.scene.as_deref())?;
-        scene.geometry = self.array.unwrap_or(scene.geometry);
-        if self.laser_off {
-            scene = scene.with_laser_off();
-        }
         let run = Run {
             cycles: self.cycles,
             seed: self.seed,
@@ -89,6 +84,16 @@ impl Simulate {
             ..Run::default()
         };
         let said = self.operation.said(run.into())?;
+        let simulated = self.simulate(said.clone());
+        simulated.map_err(|error| said.name_origin(error))
+    }
+
+    fn simulate(&self, said: SettingsFile) -> Result<()> {
+        let mut scene = self.view.scene(self.scene.as_deref())?;
+        scene.geometry = self.array.unwrap_or(scene.geometry);
+        if self.laser_off {
+            scene = scene.with_laser_off();
+        }
         let said =
             of_scene(said, &scene).with_context(|| match &self.operation.known.settings {
                 Some(file) => file.display().to_string(),

@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::{Context, Result, anyhow};
 use serde::{Deserialize, Serialize};
 
-use super::{Detection, Rays, Run, Sensor};
+use super::{Detection, Origin, Rays, Run, Sensor};
 
 /// The first line of every file that this program writes.
 pub(crate) const MARK: &str = "# dtof settings";
@@ -101,6 +101,9 @@ pub struct SettingsFile {
     pub rays: Rays,
     /// What is replayed or simulated.
     pub run: Run,
+    /// The file that some of it comes from.
+    #[serde(skip)]
+    pub origin: Option<Origin>,
 }
 
 impl SettingsFile {
@@ -117,7 +120,7 @@ impl SettingsFile {
             let whole = std::path::absolute(folder.join(&rays)).with_context(name)?;
             *rays = whole.display().to_string();
         }
-        Ok(file)
+        file.with_origin(path)
     }
 
     /// The text of a file.
@@ -155,6 +158,7 @@ impl SettingsFile {
             detection: self.detection.or(other.detection),
             rays,
             run: self.run.or(other.run),
+            origin: self.origin.or(other.origin),
         }
     }
 

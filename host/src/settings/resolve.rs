@@ -12,8 +12,12 @@ impl SettingsFile {
     /// What holds for histograms of `bins` bins.
     ///
     /// # Errors
-    /// What contradicts itself, by the names of options.
+    /// What contradicts itself, by the names of options, or of a file and its keys.
     pub fn settings(&self, bins: usize) -> Result<Settings> {
+        self.resolved(bins).map_err(|error| self.name_origin(error))
+    }
+
+    fn resolved(&self, bins: usize) -> Result<Settings> {
         let Self {
             sensor, detection, ..
         } = self;
@@ -91,6 +95,7 @@ impl SettingsFile {
                 frame: settings.frame,
                 ..self.run.clone()
             },
+            origin: self.origin.clone(),
         }
     }
 }

@@ -101,7 +101,7 @@ fn what_contradicts_the_file_is_refused() {
         "replay --input photons.csv --out out",
         "--settings missing.toml | missing.toml: No such file
         --settings key.toml | key.toml: line 2: unknown field `l_1`
-        --settings z.toml | --rule window needs --window or --sigma-bins
+        --settings z.toml | error: z.toml: rule window needs --window or --sigma-bins
         --mask 4 | --mask 4: there are 4 pixels
         --mask x | must be a whole number from 0 to 65535
         --patience 8 | --patience is for --binning
@@ -116,5 +116,29 @@ fn what_contradicts_the_file_is_refused() {
     scratch.all_refused(
         "simulate --scene scene.toml --out out",
         "--settings wide.toml | wide.toml: 64 bins of 250 ps, but the scene has 128 of 250 ps",
+    );
+
+    // What a file says is named by file and key, what an option says by the option.
+    scratch.file("gate.toml", "[sensor]\ngate = [100, 200]\n");
+    scratch.file("mask.toml", "[sensor]\nmasked = [4]\n");
+    scratch.file("l2.toml", "[detection]\nl2 = 20\nfalse_alarm = 1e-5\n");
+    scratch.file("list.toml", "[run]\naxes = 'rows,bins'\n");
+    let window = "--settings l2.toml --l2 2000 --rule window --window 3";
+    scratch.all_refused(
+        "replay --input photons.csv --out out",
+        &format!(
+            "--settings gate.toml | error: gate.toml: gate 100..200 with 128 bins
+            --settings gate.toml --gate 9..200 | error: --gate 9..200 with 128 bins
+            --settings mask.toml | error: mask.toml: masked 4: there are 4 pixels
+            --settings l2.toml --alpha 3 | error: l2.toml: false_alarm is for --rule window
+            {window} --false-alarm 1e-9 | error: --false-alarm 0.000000001: there is no z
+            --settings l2.toml --rule window --window 3 | error: l2.toml: --x 4 --l1 40 l2 20:
+            {window} --l1 3000 | error: --x 4 --l1 3000 --l2 2000:
+            --settings list.toml | error: list.toml: axes is for arrays of histograms"
+        ),
+    );
+    scratch.all_refused(
+        "compare --scene scene.toml --out out --cycles 100",
+        "--settings gate.toml | error: gate.toml: scene.toml: gate 100..200 with 128 bins",
     );
 }
