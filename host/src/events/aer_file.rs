@@ -4,7 +4,7 @@
 use std::io::{self, Read, Write};
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
-use crc::{CRC_32_ISO_HDLC, Crc, Digest};
+use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
     AER_VERSION, AerDecoder, AerEncoder, AerRecord, AerWord, BinPosition, BlockLevel, DepthEvent,
@@ -16,7 +16,9 @@ use crate::input::source::Geometry;
 pub(crate) const MAGIC: &str = "DTOF-AER";
 /// The header without the settings that may follow it.
 const HEADER_BYTES: u16 = 64;
-static CRC_32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+/// Of 16 bytes at a time, as long as a word.
+type Checksum = Table<16>;
+static CRC_32: Crc<u32, Checksum> = Crc::<u32, Checksum>::new(&CRC_32_ISO_HDLC);
 
 /// An event of either kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -202,7 +204,7 @@ fn addresses(array: Geometry) -> u64 {
 /// Writes a file; it is complete once [`Writer::finish`] has returned.
 pub struct Writer<W: Write> {
     out: W,
-    digest: Digest<'static, u32>,
+    digest: Digest<'static, u32, Checksum>,
     encoder: AerEncoder,
     events: u64,
 }
@@ -258,7 +260,7 @@ impl<W: Write> Writer<W> {
 /// Reads a file, event by event.
 pub struct Reader<R: Read> {
     input: R,
-    digest: Digest<'static, u32>,
+    digest: Digest<'static, u32, Checksum>,
     decoder: AerDecoder,
     header: Header,
     offset: u64,
