@@ -247,18 +247,15 @@ impl RecordedPixel {
             }
             let taken = (self.chunk.cycles - self.given).min(cycles - received.cycles);
             let end = self.given + taken;
-            // About as many as on average, and some more.
-            let all = self.chunk.photons.len();
-            let share = all * usize::from(taken) / usize::from(self.chunk.cycles);
-            received.photons.reserve(share + share / 4 + 4);
-            for &Photon { cycle, code } in &self.chunk.photons[self.given_photons..] {
-                if cycle >= end {
-                    break;
-                }
-                let cycle = received.cycles + (cycle - self.given);
-                received.photons.push(Photon { cycle, code });
-                self.given_photons += 1;
-            }
+            let left = &self.chunk.photons[self.given_photons..];
+            let next = left.iter().take_while(|photon| photon.cycle < end).count();
+            let next = &left[..next];
+            let (from, to) = (self.given, received.cycles);
+            received.photons.extend(next.iter().map(|photon| Photon {
+                cycle: to + (photon.cycle - from),
+                code: photon.code,
+            }));
+            self.given_photons += next.len();
             self.given = end;
             received.cycles += taken;
         }
