@@ -19,26 +19,26 @@ pub const PAPER: f64 = 90.68;
 /// With the average of all bins (`average; no event`).
 pub const AVERAGE: f64 = 32.0;
 /// With tracking (`look; tracking; no event`).
-pub const TRACKING: f64 = 405.34;
+pub const TRACKING: f64 = 404.45;
 /// Of a block (`look; block; no event`).
-pub const BLOCK_LOOK: f64 = 244.34;
+pub const BLOCK_LOOK: f64 = 250.28;
 /// An exposure that L2 ends (`look at L2`).
 pub const EXPIRY: f64 = 107.0;
 /// Peak and depth of three bins of an event (`kept peak; event and depth`), and its word (`encode
 /// and to_le_bytes`).
 pub const EVENT: f64 = 517.0 + 49.0;
 /// More of the depth from a centred window (`centred window, σ 1`, less `centroid`).
-pub const CENTRED: f64 = 731.47 - 68.0;
+pub const CENTRED: f64 = 728.13 - 68.0;
 
 /// With a window of so many bins (`window of N; no event`).
 #[must_use]
 pub const fn window(bins: u8) -> f64 {
     match bins {
-        0 | 1 => 111.88,
-        2 => 135.78,
-        3 => 142.81,
-        4 | 5 => 198.88,
-        _ => 220.97,
+        0 | 1 => 110.88,
+        2 => 136.72,
+        3 => 143.75,
+        4 | 5 => 202.70,
+        _ => 224.80,
     }
 }
 
