@@ -2,7 +2,7 @@
 //!
 //! Source: `docs/results/bench/instructions.csv`. A test holds these numbers against it.
 
-use dtof_core::Statistics;
+use dtof_core::{DepthEstimator, Statistics};
 
 use super::method::{Kind, Method, Rule};
 use crate::engine::settings::Settings;
@@ -29,6 +29,8 @@ pub const EXPIRY: f64 = 107.0;
 pub const EVENT: f64 = 517.0 + 49.0;
 /// More of the depth from a centred window (`centred window, σ 1`, less `centroid`).
 pub const CENTRED: f64 = 728.13 - 68.0;
+/// The same of one with two half widths (`centred window, 1.75 before and 4 after`).
+pub const SKEW: f64 = 1039.84 - 68.0;
 
 /// With a window of so many bins (`window of N; no event`).
 #[must_use]
@@ -80,7 +82,11 @@ pub fn instructions(
     } else {
         0.0
     };
-    let depth = if method.centroid { 0.0 } else { CENTRED };
+    let depth = match settings.estimator() {
+        DepthEstimator::Centroid3 => 0.0,
+        DepthEstimator::CentredWindow(window) if window.before() == window.after() => CENTRED,
+        DepthEstimator::CentredWindow(_) => SKEW,
+    };
     let events = pixels.events + blocks.events;
     let sum = PHOTON * pixels.photons() as f64
         + look(method) * looks
