@@ -25,11 +25,11 @@
 //! and holds the table.
 //!
 //! A pulse that falls more slowly than it rises, as many do, has a wider window after the
-//! place than before it. Photons of the wider side then count less, by the square of how
-//! much wider it is. So both sides of an even background still balance. It moves five
-//! times. Where it comes to rest the sum of squares of `distance / half width` is least, with a
-//! photon farther away than its half width counted as 1. What is found is a place in the pulse that depends on both half widths: the
-//! offset of a range belongs to them.
+//! place than before it ([`CentredWindow::with_sides`]). Photons of the wider side count
+//! less, by the square of how much wider it is. So both sides of an even background still
+//! balance. Such a window moves five times. It comes to rest where the sum of the squares of
+//! `distance / half width` has a minimum, if each photon outside counts as 1. That place in
+//! the pulse depends on both half widths, and so does the offset of ranges.
 //!
 //! ```
 //! use dtof_core::fixed::types::{U8F8, U24F8};
