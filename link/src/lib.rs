@@ -10,8 +10,8 @@
 //! ```
 //!
 //! [`message`] has the kinds of messages; [`Configuration`], [`Token`], [`Refusal`],
-//! [`Report`] and [`SensorRecord`] are their bodies. Neither a board nor a host is
-//! known here.
+//! [`Report`], [`SensorRecord`] and [`HistogramPart`] are their bodies. Neither a board
+//! nor a host is known here.
 //!
 //! The example `two_ends` is a host and a device in one process.
 
@@ -30,6 +30,7 @@ mod configuration;
 mod dynamic_depth;
 pub mod endpoint;
 pub mod frame;
+mod histogram;
 pub mod message;
 mod numbered;
 mod refusal;
@@ -40,6 +41,7 @@ mod token;
 pub use self::adaptive_binning::AdaptiveBinning;
 pub use self::configuration::{Configuration, Source};
 pub use self::dynamic_depth::DynamicDepth;
+pub use self::histogram::{HistogramHead, HistogramMessage, HistogramPart, NoHistogram};
 pub use self::refusal::Refusal;
 pub use self::report::Report;
 pub use self::sensor::{FaultRecord, SensorRecord};

@@ -7,15 +7,16 @@
 //! | 0x03 | device | synchronise | anything |
 //! | 0x04 | device | statistics request | none |
 //! | 0x05 | device | sensor request | none |
+//! | 0x06 | device | histogram request | address of a pixel, 2 bytes |
 //! | 0x81 | host | configured | none |
 //! | 0x82 | host | refused | a [`Refusal`](crate::Refusal), 1 byte |
 //! | 0x83 | host | events | AER words of 16 bytes |
 //! | 0x84 | host | synchronised | the same, after all that came before it |
 //! | 0x85 | host | statistics | [`Report`](crate::Report), 201 bytes |
 //! | 0x86 | host | sensor | [`SensorRecord`](crate::SensorRecord), 18 bytes |
+//! | 0x87 | host | histogram | [`HistogramPart`](crate::HistogramPart), or why there is none |
 //!
-//! Reserved: 0x06 and 0x87 for a histogram request and the histogram, 0x07 and 0x88 for a
-//! settings request and the settings.
+//! Reserved: 0x07 and 0x88 for a settings request and the settings.
 
 use dtof_core::AER_VERSION;
 
@@ -34,6 +35,8 @@ pub const SYNCHRONISE: u8 = 0x03;
 pub const STATISTICS_REQUEST: u8 = 0x04;
 /// Host to device: say what the sensor is.
 pub const SENSOR_REQUEST: u8 = 0x05;
+/// Host to device: send the histogram of a pixel.
+pub const HISTOGRAM_REQUEST: u8 = 0x06;
 /// Device to host: the configuration is in force.
 pub const CONFIGURED: u8 = 0x81;
 /// Device to host: the configuration is not; a [`Refusal`](crate::Refusal).
@@ -46,6 +49,9 @@ pub const SYNCHRONISED: u8 = 0x84;
 pub const STATISTICS: u8 = 0x85;
 /// Device to host: a [`SensorRecord`](crate::SensorRecord).
 pub const SENSOR: u8 = 0x86;
+/// Device to host: a [`HistogramPart`](crate::HistogramPart), or a
+/// [`NoHistogram`](crate::NoHistogram).
+pub const HISTOGRAM: u8 = 0x87;
 
 /// The greeting of an end: versions of link and AER words, and of a device its bins
 /// and pixels.

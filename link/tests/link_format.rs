@@ -15,32 +15,13 @@ use dtof_link::{
 };
 use proptest::prelude::*;
 
-/// The golden frame whose line in the document begins so.
-fn golden(begins: &str) -> Vec<u8> {
-    let document = include_str!("../../docs/link-format.md");
-    let line = document
-        .lines()
-        .find(|line| line.starts_with(&format!("| {begins}")))
-        .unwrap();
-    let hex = line.split('`').nth(1).unwrap();
-    hex.split(' ')
-        .map(|byte| u8::from_str_radix(byte, 16).unwrap())
-        .collect()
-}
+mod common;
+use common::{give, golden};
 
 fn next(end: &mut Endpoint, now: u32) -> Vec<u8> {
     let mut wire = [0; WIRE_BYTES];
     let length = end.transmit(now, &mut wire);
     wire[..length].to_vec()
-}
-
-fn give(end: &mut Endpoint, wire: &[u8]) {
-    let mut deframer = Deframer::new();
-    for &byte in wire {
-        if let Some(frame) = deframer.push(byte) {
-            end.receive(frame, 0);
-        }
-    }
 }
 
 #[test]

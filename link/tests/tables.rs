@@ -5,7 +5,7 @@ use std::fmt::Display;
 
 use dtof_core::Statistics;
 use dtof_link::endpoint::LinkCounters;
-use dtof_link::{Configuration, FaultRecord, Refusal, Report, SensorRecord};
+use dtof_link::{Configuration, FaultRecord, NoHistogram, Refusal, Report, SensorRecord};
 
 /// The table of the document under this heading describes each of so many bytes once, in
 /// order.
@@ -100,4 +100,11 @@ fn every_sensor_fault_has_its_own_number_and_words() {
     let all: Vec<FaultRecord> = (0..=255).filter_map(FaultRecord::from_number).collect();
     assert_eq!(all.len(), 9);
     are_documented(&all, |&fault| fault as u8, "\n| last sensor error | |\n");
+}
+
+#[test]
+fn every_reason_for_no_histogram_has_its_own_number_and_words() {
+    let all: Vec<NoHistogram> = (0..=255).filter_map(NoHistogram::from_number).collect();
+    assert_eq!(all.len(), 4);
+    are_documented(&all, |&reason| reason as u8, "\n| no histogram | |\n");
 }

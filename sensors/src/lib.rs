@@ -98,6 +98,8 @@ pub struct About {
     pub bin_width: Option<U16F16>,
     /// The range of the start of bin 0 in millimetres, as far as it is known.
     pub offset: I24F8,
+    /// It gives whole histograms, not photons.
+    pub is_whole: bool,
 }
 
 impl About {
@@ -108,6 +110,7 @@ impl About {
             pixels,
             bin_width: None,
             offset: I24F8::ZERO,
+            is_whole: false,
         }
     }
 

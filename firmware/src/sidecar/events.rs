@@ -13,10 +13,11 @@ use super::{QUEUE, Sidecar};
 const WORDS: usize = BODY_BYTES / AerWord::BYTES;
 
 impl Sidecar<'_> {
-    /// What the host asks, if that is what it has sent next.
+    /// What the host asks, if that is what it has sent next. Histograms come after all events,
+    /// and no event comes sooner or later for them.
     pub(super) fn question(&self) -> Option<u8> {
         let next = self.endpoint.peek()?.kind;
-        (next != message::PHOTONS).then_some(next)
+        (!matches!(next, message::PHOTONS | message::HISTOGRAM_REQUEST)).then_some(next)
     }
 
     /// Whether events stay in their slots for now: photons of a sensor do not

@@ -14,6 +14,7 @@
 
 mod configuration;
 mod events;
+mod histograms;
 mod photons;
 mod records;
 mod sensor;
@@ -136,6 +137,8 @@ pub struct Sidecar<'a> {
     block_statistics: Statistics,
     /// The pixel, or behind them the block, whose slot is emptied next.
     turn: usize,
+    /// The host waits for the histogram of this pixel.
+    wanted: Option<PixelAddress>,
     unaddressed: u64,
     unknown: u32,
     sensor_errors: u32,
@@ -182,6 +185,7 @@ impl<'a> Sidecar<'a> {
             statistics: Statistics::default(),
             block_statistics: Statistics::default(),
             turn: 0,
+            wanted: None,
             unaddressed: 0,
             unknown: 0,
             sensor_errors: 0,
@@ -267,6 +271,7 @@ impl<'a> Sidecar<'a> {
                 self.answer = None;
             }
             self.drain();
+            self.send_exposure();
             if self.photons.is_some() {
                 self.work_through(&mut looks);
                 if self.photons.is_some() {
@@ -276,16 +281,23 @@ impl<'a> Sidecar<'a> {
             }
             // What the host asks next is answered after all events before it.
             let drained = self.is_drained();
-            let Some(next) = self.endpoint.peek() else {
+            let Some(next) = self.endpoint.peek().map(|next| next.kind) else {
                 return;
             };
-            if next.kind != message::PHOTONS && !drained {
+            if !drained && !matches!(next, message::PHOTONS | message::HISTOGRAM_REQUEST) {
                 return;
+            }
+            if matches!(next, message::CONFIGURE | message::HISTOGRAM_REQUEST) && self.give_up() {
+                continue;
             }
             let Some(message) = self.endpoint.take() else {
                 return;
             };
-            self.answer = self.act(message, overrun);
+            if next == message::HISTOGRAM_REQUEST {
+                self.histogram_of(&message.body);
+            } else {
+                self.answer = self.act(message, overrun);
+            }
         }
     }
 
@@ -326,6 +338,7 @@ impl<'a> Sidecar<'a> {
         self.source = Source::Link;
         self.photons = None;
         self.answer = None;
+        self.wanted = None;
         self.encoder = AerEncoder::new();
         self.restart_counts();
         while self.words.dequeue().is_some() {}

@@ -1,6 +1,6 @@
 //! Photons and histograms of a sensor, which does not wait.
 
-use dtof_core::{Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, PixelConfig};
+use dtof_core::{AnyRule, Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, PixelConfig};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
 use super::events::has_room_for_events;
@@ -65,9 +65,37 @@ impl Sidecar<'_> {
         }
     }
 
+    /// Decides on a whole histogram.
+    // The host may be sent the histogram then: not with this on the stack.
+    #[inline(never)]
+    fn decide_whole(
+        &mut self,
+        pixel: PixelAddress,
+        cycle: LaserCycle,
+        counts: &[u32; BINS],
+        config: &PixelConfig<BINS, AnyRule>,
+    ) {
+        let mut histogram = Histogram::<BINS, Count24>::new();
+        let gated_out = histogram.add_frame(counts, config.gate());
+        self.statistics.add_photons_of(&histogram, gated_out);
+        if has_room_for_events(&self.words, config.echoes().raw().into()) {
+            let mut events = 0;
+            config.detect_echoes(&mut histogram, |echo, detection| {
+                let event = detection.event(pixel, cycle, 1);
+                self.enqueue(&DepthEvent { echo, ..event });
+                events += 1;
+            });
+            self.statistics.events += events;
+            self.statistics.expired += u64::from(events == 0);
+        } else {
+            self.statistics.deferred += 1;
+        }
+    }
+
     /// Counts an error, and logs one of another kind than the last.
     fn sensor_failed(&mut self, fault: SensorFault) {
         self.sensor_errors = self.sensor_errors.saturating_add(1);
+        self.no_whole_histogram();
         if self.sensor_fault.replace(fault) != Some(fault) {
             #[cfg(all(target_os = "none", feature = "defmt"))]
             defmt::warn!("sensor: {}", fault);
@@ -115,21 +143,8 @@ impl PhotonSink for Sidecar<'_> {
             self.unaddressed += photons.sum::<u64>();
             return;
         }
-        let mut histogram = Histogram::<BINS, Count24>::new();
-        let gated_out = histogram.add_frame(counts, config.gate());
-        self.statistics.add_photons_of(&histogram, gated_out);
-        if has_room_for_events(&self.words, config.echoes().raw().into()) {
-            let mut events = 0;
-            config.detect_echoes(&mut histogram, |echo, detection| {
-                let event = detection.event(pixel, cycle, 1);
-                self.enqueue(&DepthEvent { echo, ..event });
-                events += 1;
-            });
-            self.statistics.events += events;
-            self.statistics.expired += u64::from(events == 0);
-        } else {
-            self.statistics.deferred += 1;
-        }
+        self.decide_whole(pixel, cycle, counts, &config);
         self.drain();
+        self.send_whole(pixel, cycle, counts);
     }
 }

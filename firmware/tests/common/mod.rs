@@ -2,6 +2,7 @@
 
 #![allow(dead_code, reason = "no test uses all of it")]
 
+pub mod histograms;
 pub mod host;
 /// Mocked buses and pins.
 #[path = "../../../sensors/tests/common/mod.rs"]

@@ -227,7 +227,13 @@ impl Endpoint {
     /// Whether [`Self::offer`] has room.
     #[must_use]
     pub fn has_room(&self) -> bool {
-        !self.outbox.is_full()
+        self.room() > 0
+    }
+
+    /// Messages that [`Self::offer`] has room for.
+    #[must_use]
+    pub fn room(&self) -> usize {
+        WINDOW - self.outbox.len()
     }
 
     /// Whether the other end has everything that was offered.
@@ -242,10 +248,23 @@ impl Endpoint {
     /// # Errors
     /// [`Full`] while the window is; nothing was taken.
     pub fn offer(&mut self, kind: u8, body: &[u8]) -> Result<(), Full> {
-        let body = body.iter().copied().take(BODY_BYTES).collect();
+        let taken = body.get(..body.len().min(BODY_BYTES)).unwrap_or_default();
+        // There is room for them.
+        let _ = self.offer_empty(kind)?.extend_from_slice(taken);
+        Ok(())
+    }
+
+    /// The same for a body that the caller writes in its place, before anything else is done.
+    ///
+    /// # Errors
+    /// [`Full`] while the window is.
+    pub fn offer_empty(&mut self, kind: u8) -> Result<&mut Vec<u8, BODY_BYTES>, Full> {
+        let body = Vec::new();
         self.outbox
             .push_back(Message { kind, body })
-            .map_err(|_| Full)
+            .map_err(|_| Full)?;
+        let message = self.outbox.back_mut().ok_or(Full)?;
+        Ok(&mut message.body)
     }
 
     /// The next message from the other end, left where it is.

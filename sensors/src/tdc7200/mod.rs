@@ -339,6 +339,7 @@ where
             pixels: settings.pixel.0.saturating_add(1),
             bin_width: None,
             offset: self.config.offset(),
+            is_whole: false,
         }
     }
 

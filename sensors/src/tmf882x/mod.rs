@@ -327,6 +327,7 @@ where
             pixels: self.config.settings().first_pixel.0.saturating_add(ZONES),
             bin_width: Some(BIN_WIDTH),
             offset: OFFSET,
+            is_whole: true,
         }
     }
 
