@@ -31,6 +31,7 @@ fn found(scene: &Scene, cycles: u64, seed: u64) -> Calibration {
         geometry: scene.geometry,
         captures: &captures,
         length: Length::Cycles(cycles),
+        cycles: None,
         bin_width_ps: 250.0,
         truth_mm: None,
     };

@@ -20,6 +20,7 @@ fn found(background: f64, more: &str, length: impl Fn(u64) -> Length) -> Calibra
         geometry: scene.geometry,
         captures: &captures,
         length: length(20_000),
+        cycles: None,
         bin_width_ps: 250.0,
         truth_mm: None,
     };

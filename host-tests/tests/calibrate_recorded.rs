@@ -108,6 +108,7 @@ fn a_recording_with_distances_calibrates_itself() {
         geometry: Geometry::new(9, 1),
         captures: &counts.captures,
         length: Length::PhotonsPerCycle(PHOTONS_PER_CYCLE),
+        cycles: None,
         bin_width_ps: counts.known.bin_width_ps.to_num(),
         truth_mm: counts.truth_mm.as_deref(),
     };

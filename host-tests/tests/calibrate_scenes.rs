@@ -18,6 +18,7 @@ fn judge(number: u64) -> (Vec<String>, String) {
         geometry: drawn.scene.geometry,
         captures: &captures,
         length: Length::Cycles(drawn.cycles),
+        cycles: None,
         bin_width_ps: drawn.scene.bin_width_ps,
         truth_mm: None,
     };
@@ -141,6 +142,7 @@ fn a_wall_alone_may_be_a_glass_and_is_asked_for() {
         geometry: drawn.scene.geometry,
         captures: &captures,
         length: Length::Cycles(drawn.cycles),
+        cycles: None,
         bin_width_ps: drawn.scene.bin_width_ps,
         truth_mm: None,
     };

@@ -2,6 +2,7 @@
 //! error is one line and a failure.
 
 pub mod arguments;
+pub mod interrupt;
 
 use std::io::{self, Write};
 use std::process::ExitCode;

@@ -2,14 +2,13 @@
 
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::PathBuf;
-use std::process;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use console::Term;
 use dtof::cli::arguments::{fixed, path, whole};
+use dtof::cli::interrupt;
 use dtof::device::monitor::map::{LiveMap, SHOW_CURSOR};
 use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::device::{self, Client};
@@ -20,9 +19,6 @@ use dtof_link::SensorRecord;
 
 use super::dynamic_depth;
 use super::operation::Operation;
-
-/// Ctrl-C was pressed, or the program is asked to end in another way.
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 #[derive(Args)]
 pub struct Monitor {
@@ -88,13 +84,9 @@ impl Monitor {
         let name = || self.device.clone();
         let mut client =
             Client::new(device::open(&self.device, self.image.as_deref())?).with_context(name)?;
-        ctrlc::set_handler(|| {
-            // Who asks a second time does not wait for the device.
-            if INTERRUPTED.swap(true, Ordering::Relaxed) {
-                if io::stderr().is_terminal() {
-                    eprint!("{SHOW_CURSOR}");
-                }
-                process::exit(130);
+        interrupt::listen(|| {
+            if io::stderr().is_terminal() {
+                eprint!("{SHOW_CURSOR}");
             }
         })?;
         // A device without a sensor says so when it is configured.
@@ -167,10 +159,7 @@ impl Monitor {
         let monitored = monitor(
             &mut client,
             &task,
-            |elapsed| {
-                INTERRUPTED.load(Ordering::Relaxed)
-                    || length.is_some_and(|length| elapsed >= length)
-            },
+            |elapsed| interrupt::is_interrupted() || length.is_some_and(|length| elapsed >= length),
             &mut Outputs {
                 events: &mut events,
                 statistics: &mut io::stderr(),

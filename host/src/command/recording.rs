@@ -98,14 +98,35 @@ impl Recording {
         Ok(said)
     }
 
+    /// Options that say nothing about a device are refused.
+    ///
+    /// # Errors
+    /// If there are any.
+    pub fn suits_device(&self) -> Result<()> {
+        let of_files = [
+            ("--axes", self.axes.is_some()),
+            ("--array", self.array.is_some()),
+            ("--rebin", self.rebin.is_some()),
+            ("--bins", self.bins.is_some()),
+        ];
+        for (option, is_there) in of_files {
+            ensure!(!is_there, "{option} is of recordings, not of a device");
+        }
+        Ok(())
+    }
+
+    /// Whether they say how long a recording is.
+    pub fn has_length(&self) -> bool {
+        self.photons_per_cycle.is_some() || self.recorded_cycles.is_some()
+    }
+
     /// Options that say nothing about a list of photons are refused.
     ///
     /// # Errors
     /// If there are any, and it is one.
     pub fn suits(&self, file: &Path, known: &Known) -> Result<()> {
-        let has_length = self.photons_per_cycle.is_some() || self.recorded_cycles.is_some();
         ensure!(
-            !(known.is_list && has_length),
+            !(known.is_list && self.has_length()),
             "--photons-per-cycle and --recorded-cycles are for histograms; {} holds photons",
             file.display()
         );

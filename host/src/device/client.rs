@@ -3,17 +3,20 @@
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail, ensure};
-use dtof_core::{AER_VERSION, AerDecoder, AerRecord, AerWord};
+use dtof_core::{AER_VERSION, AerDecoder, AerRecord, AerWord, PixelAddress};
 use dtof_link::endpoint::{Endpoint, LinkCounters, Message};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::{self, LINK_VERSION, greeting};
 use dtof_link::{Configuration, Refusal, Report, SensorRecord};
 
+use super::assembly::{Assembly, HistogramAnswer};
 use super::port::Port;
 use crate::events::aer_file::Event;
 
 /// A device that says nothing for so long is gone.
 const SILENCE: Duration = Duration::from_secs(5);
+/// So is one that speaks, and does not answer for so long, nor sends an event.
+const ANSWER: Duration = Duration::from_secs(30);
 
 /// A session with a device.
 pub struct Client {
@@ -23,6 +26,7 @@ pub struct Client {
     decoder: AerDecoder,
     started: Instant,
     events: Vec<Event>,
+    histograms: Assembly,
     /// Messages are taken no more often than this: a slow reader, for tests.
     pub reads_every: Duration,
     read: Instant,
@@ -51,6 +55,7 @@ impl Client {
             decoder: AerDecoder::new(),
             started: now,
             events: Vec::new(),
+            histograms: Assembly::default(),
             reads_every: Duration::ZERO,
             read: now,
             bins: 0,
@@ -165,6 +170,32 @@ impl Client {
         self.next()?.map(|answer| report(&answer)).transpose()
     }
 
+    /// Asks for the histogram of a pixel. [`Self::poll_histogram`] gives the answer, also when
+    /// other questions are asked meanwhile.
+    ///
+    /// # Errors
+    /// If the device is gone.
+    pub fn request_histogram(&mut self, pixel: PixelAddress) -> Result<()> {
+        self.histograms.asked(pixel);
+        self.send(message::HISTOGRAM_REQUEST, &pixel.0.to_le_bytes())
+    }
+
+    /// The next answer to [`Self::request_histogram`], in their order. Without one
+    /// [`Self::exchange`], and `None`.
+    ///
+    /// # Errors
+    /// If the device is gone, or sends what nobody asked for.
+    pub fn poll_histogram(&mut self) -> Result<Option<HistogramAnswer>> {
+        if let Some(message) = self.next()? {
+            bail!("the device sends message {:#04x} unasked", message.kind);
+        }
+        let answer = self.histograms.next();
+        if answer.is_none() {
+            self.exchange()?;
+        }
+        Ok(answer)
+    }
+
     /// The events that have arrived.
     pub fn take_events(&mut self) -> Vec<Event> {
         std::mem::take(&mut self.events)
@@ -198,21 +229,34 @@ impl Client {
 
     /// Waits for the next message that is not events.
     fn answer(&mut self) -> Result<Message> {
+        let (mut since, mut events) = (Instant::now(), self.events.len());
         loop {
             if let Some(message) = self.next()? {
                 return Ok(message);
             }
+            if self.events.len() > events {
+                (since, events) = (Instant::now(), self.events.len());
+            }
+            ensure!(
+                since.elapsed() < ANSWER,
+                "the device does not answer for {} seconds",
+                ANSWER.as_secs()
+            );
             self.exchange()?;
         }
     }
 
-    /// Takes messages until one is not events.
+    /// Takes messages until one is not events and no histogram.
     fn next(&mut self) -> Result<Option<Message>> {
         if self.read.elapsed() < self.reads_every {
             return Ok(None);
         }
         self.read = Instant::now();
         while let Some(message) = self.endpoint.take() {
+            if message.kind == message::HISTOGRAM {
+                self.histograms.take(&message.body, self.bins)?;
+                continue;
+            }
             if message.kind != message::EVENTS {
                 return Ok(Some(message));
             }

@@ -1,7 +1,10 @@
 //! The engine on a device: the same photons over the link, the same events
-//! back.
+//! back. [`monitor`] and [`histograms`] are of a device with a sensor.
 
+mod assembly;
 mod client;
+mod exposures;
+pub mod histograms;
 pub mod monitor;
 mod open;
 mod port;
@@ -12,6 +15,7 @@ use dtof_core::{DepthEvent, PixelAddress, Statistics};
 use dtof_link::endpoint::BODY_BYTES;
 use dtof_link::{Configuration, DynamicDepth, Report, Source, Token, message};
 
+pub use assembly::{HistogramAnswer, PixelHistogram};
 pub use client::Client;
 pub use open::open;
 pub use port::Port;

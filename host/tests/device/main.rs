@@ -1,8 +1,11 @@
-//! Devices at the other end of a port: the engine, the monitor and its recordings.
+//! Devices at the other end of a port: the engine, the monitor and its recordings, calibration.
 
 #[path = "../common/mod.rs"]
 mod common;
 
+mod calibrate;
+mod calibrate_refused;
+mod desk;
 mod engine;
 mod map;
 mod masked;

@@ -1,6 +1,6 @@
 //! What calibration looks at: whole histograms, and what is known of them.
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 
 use crate::input::recorded::Capture;
 use crate::input::source::Geometry;
@@ -44,6 +44,9 @@ pub struct Observed<'a> {
     pub captures: &'a [Capture],
     /// How long each capture lasted.
     pub length: Length,
+    /// Laser cycles of each pixel of each capture, where they differ, in the order of the pixels:
+    /// then they count, and `length` is what is said of them.
+    pub cycles: Option<&'a [u64]>,
     /// Picoseconds a bin.
     pub bin_width_ps: f64,
     /// The true distance of each pixel of each capture in millimetres, where it is known: the
@@ -84,6 +87,12 @@ impl Observed<'_> {
             let totals = capture.iter().map(|counts| counts.iter().sum::<u64>());
             let cycles = self.length.cycles(totals.max().unwrap_or(0));
             for (pixel, counts) in capture.iter().enumerate() {
+                let own = self.cycles.map(|cycles| cycles.get(traces.len()).copied());
+                let cycles = match own {
+                    None => cycles,
+                    Some(Some(own @ 1..)) => own as f64,
+                    Some(_) => bail!("capture {index}, pixel {pixel} lasted no laser cycle"),
+                };
                 let found = counts.len();
                 ensure!(
                     found == bins,

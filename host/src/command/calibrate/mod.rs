@@ -1,4 +1,6 @@
-//! `dtof calibrate`: the settings of a sensor from a recording.
+//! `dtof calibrate`: the settings of a sensor from a recording, or from the sensor itself.
+
+mod desk;
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -15,21 +17,25 @@ use dtof::input::source::Geometry;
 use dtof::rows::aligned;
 use dtof::settings::{SettingsFile, share};
 
+use self::desk::{Desk, Gathered};
 use super::recording::{Recording, of_file, opening, warn, warn_of_width};
 
 #[derive(Args)]
 pub struct Calibrate {
     /// A recording, of any format that `replay` reads
-    #[arg(long, value_name = "FILE", value_parser = path())]
-    input: PathBuf,
+    #[arg(long, value_name = "FILE", value_parser = path(), required_unless_present = "device",
+        conflicts_with = "device")]
+    input: Option<PathBuf>,
+    #[command(flatten)]
+    desk: Desk,
     /// The settings file to write
     #[arg(long, value_name = "FILE", value_parser = path())]
     out: PathBuf,
     /// The report to write [default: as the settings file, with .html]
     #[arg(long, value_name = "FILE", value_parser = path())]
     report: Option<PathBuf>,
-    /// Older settings of the sensor: what this recording does not tell is taken from them, and the
-    /// report says what has changed
+    /// Older settings of the sensor: what is not found now is taken from them, and the report says
+    /// what has changed
     #[arg(long, value_name = "FILE", value_parser = path())]
     settings: Option<PathBuf>,
     #[command(flatten)]
@@ -64,24 +70,28 @@ impl Calibrate {
         let older = older.transpose()?;
         let before = older.clone().unwrap_or_default();
         let said = self.recording.said(|options| Ok(options.or(before)))?;
-        let mut opening = opening(&said);
-        opening.cycles = u64::MAX;
-        let counts = counts(&self.input, &opening)?;
-        self.recording.suits(&self.input, &counts.known)?;
         let asked = Asked {
             glass: self.glass.map(|answer| answer == Answer::Yes),
             target_mm: self.target_mm,
             false_alarm: self.false_alarm,
             seed: self.seed,
         };
-        let found = look(&said, &counts, &asked);
-        let found = found.with_context(|| self.input.display().to_string())?;
-        warn(&self.input, &counts.known, self.quiet);
-        warn_of_width(&self.input, &counts.known, &said, self.quiet);
-        let before = said.or(of_file(&counts.known, counts.geometry));
-        let settings = found.settings(before)?;
+        let name = self.input.as_ref().map(|input| input.display().to_string());
+        let name = name.or(self.desk.device.clone()).unwrap_or_default();
+        let Gathered {
+            found,
+            known,
+            rows: collected,
+        } = match &self.input {
+            Some(input) => self.of_file(input, &said, &asked)?,
+            None => {
+                let (desk, recording) = (&self.desk, &self.recording);
+                let found = desk.calibrate(&name, &said, recording, &asked, self.quiet);
+                found.with_context(|| name.clone())?
+            }
+        };
+        let settings = found.settings(said.or(known))?;
         let changes = older.map_or(Vec::new(), |older| report::changes(&settings, &older));
-        let name = self.input.display().to_string();
         let page = report::page(&found, &settings, &changes, &name)?;
         let place = self.report.clone();
         let place = place.unwrap_or_else(|| self.out.with_extension("html"));
@@ -90,8 +100,8 @@ impl Calibrate {
             "{}: settings and report need two names",
             place.display()
         );
-        let mut inputs: Vec<&Path> = vec![&self.input];
-        inputs.extend(self.settings.as_deref());
+        let inputs = [self.input.as_deref(), self.settings.as_deref()];
+        let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
         // The settings last: where they are, the report is.
         let text = settings.to_toml()?;
         let of = |place, text, mark| Marked { place, text, mark };
@@ -102,7 +112,8 @@ impl Calibrate {
         write_marked(&files, &inputs)?;
         if !self.quiet {
             let mut out = io::stdout().lock();
-            write!(out, "{}", aligned(&report::rows(&found)))?;
+            let rows = [collected, report::rows(&found)].concat();
+            write!(out, "{}", aligned(&rows))?;
             if !changes.is_empty() {
                 write!(out, "\nSince the older settings:\n{}", aligned(&changes))?;
             }
@@ -113,6 +124,23 @@ impl Calibrate {
             out.flush()?;
         }
         Ok(())
+    }
+
+    fn of_file(&self, input: &Path, said: &SettingsFile, asked: &Asked) -> Result<Gathered> {
+        self.desk.suits_file()?;
+        let mut opening = opening(said);
+        opening.cycles = u64::MAX;
+        let counts = counts(input, &opening)?;
+        self.recording.suits(input, &counts.known)?;
+        let found = look(said, &counts, asked);
+        let found = found.with_context(|| input.display().to_string())?;
+        warn(input, &counts.known, self.quiet);
+        warn_of_width(input, &counts.known, said, self.quiet);
+        Ok(Gathered {
+            found,
+            known: of_file(&counts.known, counts.geometry),
+            rows: Vec::new(),
+        })
     }
 }
 
@@ -131,6 +159,7 @@ pub fn look(said: &SettingsFile, counts: &Counts, asked: &Asked) -> Result<Calib
         geometry,
         captures: &counts.captures,
         length,
+        cycles: None,
         bin_width_ps: counts.known.bin_width_ps.to_num(),
         truth_mm: counts.truth_mm.as_deref(),
     };

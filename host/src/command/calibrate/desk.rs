@@ -1,0 +1,208 @@
+//! Calibration of the sensor on the desk: the device's histograms in place of a recording.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use dtof::calibrate::{Asked, Calibration, Length, Observed, calibrate};
+use dtof::cli::arguments::{MOST_WHOLE, whole};
+use dtof::cli::interrupt;
+use dtof::device::histograms::{Collected, SoFar, collect};
+use dtof::device::monitor::array;
+use dtof::device::{self, Client};
+use dtof::input::open::BIN_WIDTH_PS;
+use dtof::input::recorded::RecordingLength;
+use dtof::progress::Progress;
+use dtof::rows::{Row, grouped};
+use dtof::settings::{Sensor, SettingsFile};
+
+use super::super::recording::{Recording, opening};
+
+/// How long photons are collected, unless somebody says.
+const SECONDS: u32 = 10;
+
+#[derive(Args)]
+pub struct Desk {
+    /// Calibrate the sensor of this device: tcp:HOST:PORT, a serial port, or `qemu`, which starts an
+    /// emulated device
+    #[arg(long, value_name = "DEVICE")]
+    pub device: Option<String>,
+    /// Image that `--device qemu` runs [default: what `cargo xtask image mps2-an386` has built]
+    #[arg(long, value_name = "FILE")]
+    image: Option<PathBuf>,
+    /// Collect photons of the device for so many seconds, or until Ctrl-C [default: 10]
+    #[arg(long, value_name = "S", value_parser = whole(1..=86_400_u32))]
+    seconds: Option<u32>,
+    /// End sooner, when the median pixel of the device has so many photons
+    #[arg(long, value_name = "N", value_parser = whole(1..=MOST_WHOLE))]
+    photons: Option<u64>,
+}
+
+/// What was found, from whatever it is.
+pub struct Gathered {
+    pub found: Calibration,
+    /// What file or device say of the sensor.
+    pub known: SettingsFile,
+    /// How much was collected.
+    pub rows: Vec<Row>,
+}
+
+impl Desk {
+    /// Options that say nothing about a recording are refused.
+    ///
+    /// # Errors
+    /// If there are any.
+    pub fn suits_file(&self) -> Result<()> {
+        let of_devices = [
+            ("--image", self.image.is_some()),
+            ("--seconds", self.seconds.is_some()),
+            ("--photons", self.photons.is_some()),
+        ];
+        for (option, is_there) in of_devices {
+            ensure!(!is_there, "{option} is of --device, not of recordings");
+        }
+        Ok(())
+    }
+
+    /// Collects and calibrates.
+    ///
+    /// # Errors
+    /// If the device or an option does not suit, or nothing comes.
+    pub fn calibrate(
+        &self,
+        name: &str,
+        said: &SettingsFile,
+        recording: &Recording,
+        asked: &Asked,
+        quiet: bool,
+    ) -> Result<Gathered> {
+        recording.suits_device()?;
+        let port = device::open(name, self.image.as_deref())?;
+        let mut client = Client::new(port)?;
+        interrupt::listen(|| ())?;
+        let sensor = client.sensor()?.context("the device has no sensor")?;
+        let pixels = sensor.pixels.min(client.pixels());
+        let bins = client.bins();
+        ensure!(
+            said.sensor.bins.is_none_or(|said| said == bins),
+            "the settings are for {} bins, the device has {bins}",
+            said.sensor.bins.unwrap_or_default(),
+        );
+        let geometry = array(pixels, said.sensor.columns);
+        ensure!(
+            geometry.addresses() == usize::from(pixels),
+            "--columns {}: the device has {pixels} pixels, which do not fill such rows",
+            geometry.columns
+        );
+        let known = SettingsFile {
+            sensor: Sensor {
+                laser_hz: Some(sensor.laser_millihertz / 1000).filter(|&hz| hz > 0),
+                columns: Some(geometry.columns),
+                bins: Some(bins),
+                bin_width_ps: Some(sensor.bin_width.unwrap_or(BIN_WIDTH_PS)),
+                offset_mm: Some(sensor.offset).filter(|offset| !offset.is_zero()),
+                ..Sensor::default()
+            },
+            ..SettingsFile::default()
+        };
+        let bin_width_ps = said.sensor.bin_width_ps.or(known.sensor.bin_width_ps);
+        // Bins alone: how pixels decide is not for this.
+        let settings = SettingsFile {
+            sensor: Sensor {
+                bin_width_ps,
+                ..Sensor::default()
+            },
+            ..SettingsFile::default()
+        };
+        let settings = settings.settings(bins.into())?;
+        let collected =
+            self.collect(quiet, |done| collect(&mut client, &settings, pixels, done))?;
+        drop(client);
+        if collected.full > 0 && !quiet {
+            let full = grouped(collected.full);
+            eprintln!("warning: {name}: {full} exposures with a full counter were left out");
+        }
+        let (length, cycles) = length(&collected, said, recording)?;
+        let captures = [collected.histograms];
+        let observed = Observed {
+            geometry,
+            captures: &captures,
+            length,
+            cycles: cycles.as_deref(),
+            bin_width_ps: settings.bin_width_ps.to_num(),
+            truth_mm: None,
+        };
+        Ok(Gathered {
+            found: calibrate(&observed, asked)?,
+            known,
+            rows: vec![row(&collected.cycles, collected.is_whole)],
+        })
+    }
+
+    /// Shows how far `collect` is, and tells it when to end.
+    fn collect(
+        &self,
+        quiet: bool,
+        collect: impl FnOnce(&mut dyn FnMut(&SoFar) -> bool) -> Result<Collected>,
+    ) -> Result<Collected> {
+        let seconds = self.seconds.unwrap_or(SECONDS);
+        let progress = match self.photons {
+            None => Progress::new(seconds.into(), "seconds", quiet),
+            Some(photons) => Progress::new(photons, "photons in the median pixel", quiet),
+        };
+        let length = Duration::from_secs(seconds.into());
+        let collected = collect(&mut |so_far| {
+            let done = self
+                .photons
+                .map_or(so_far.elapsed.as_secs(), |_| so_far.photons);
+            progress.at(done);
+            interrupt::is_interrupted()
+                || so_far.elapsed >= length
+                || self.photons.is_some_and(|most| so_far.photons >= most)
+        });
+        progress.finish();
+        collected
+    }
+}
+
+/// How long it took, all in all and for each pixel.
+fn length(
+    collected: &Collected,
+    said: &SettingsFile,
+    recording: &Recording,
+) -> Result<(Length, Option<Vec<u64>>)> {
+    let median = |mut cycles: Vec<u64>| {
+        cycles.sort_unstable();
+        let middle = cycles.get(cycles.len() / 2);
+        Length::Cycles(middle.copied().unwrap_or(0))
+    };
+    let cycles = collected.cycles.clone();
+    if !collected.is_whole {
+        ensure!(
+            !recording.has_length(),
+            "--recorded-cycles and --photons-per-cycle: this device counts its laser cycles"
+        );
+        return Ok((median(cycles.clone()), Some(cycles)));
+    }
+    Ok(match opening(said).length {
+        Some(RecordingLength::Cycles(each)) => {
+            let cycles: Vec<u64> = cycles.iter().map(|of| of.saturating_mul(each)).collect();
+            (median(cycles.clone()), Some(cycles))
+        }
+        Some(RecordingLength::PhotonsPerCycle(rate)) => (Length::PhotonsPerCycle(rate), None),
+        None => (Length::Unknown, None),
+    })
+}
+
+/// How much was collected.
+fn row(cycles: &[u64], is_whole: bool) -> Row {
+    let name = if is_whole {
+        "histograms"
+    } else {
+        "laser cycles"
+    };
+    let [least, most] = [cycles.iter().min(), cycles.iter().max()];
+    let [least, most] = [least, most].map(|end| grouped(end.copied().unwrap_or(0)));
+    (name.to_owned(), format!("{least} to {most} a pixel"))
+}

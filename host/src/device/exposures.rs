@@ -1,0 +1,233 @@
+//! Histograms of exposures, added up so that no photon counts twice.
+//!
+//! A device is asked again and again. Of two histograms of one exposure the later holds the photons
+//! of the earlier and takes its place. An exposure with a full counter is left out: its other
+//! photons would say that there is less light than there is.
+
+use dtof_link::HistogramHead;
+
+use super::assembly::PixelHistogram;
+
+/// A counter of a pixel is full at it.
+const FULL: u32 = 1023;
+/// A sensor's.
+const FULL_WHOLE: u32 = (1 << 24) - 1;
+
+/// What was counted in some exposures of each pixel.
+#[derive(Clone, Debug)]
+pub struct Exposures {
+    pixels: Vec<Pixel>,
+    full: u64,
+}
+
+#[derive(Clone, Debug)]
+struct Pixel {
+    sums: Vec<u64>,
+    cycles: u64,
+    /// The last histogram, whose exposure may go on.
+    latest: Option<PixelHistogram>,
+}
+
+impl Exposures {
+    /// Nothing yet, of so many pixels and bins.
+    #[must_use]
+    pub fn new(pixels: u16, bins: u16) -> Self {
+        let empty = Pixel {
+            sums: vec![0; bins.into()],
+            cycles: 0,
+            latest: None,
+        };
+        Self {
+            pixels: vec![empty; pixels.into()],
+            full: 0,
+        }
+    }
+
+    /// Takes a histogram of a pixel that there is, and says whether it has laser cycles that none
+    /// before it had.
+    pub fn add(&mut self, histogram: PixelHistogram) -> bool {
+        let head = histogram.head;
+        let Some(pixel) = self.pixels.get_mut(usize::from(head.pixel.0)) else {
+            return false;
+        };
+        let before = pixel.latest.as_ref().map(|latest| latest.head);
+        if before.is_some_and(|before| began(&before) != began(&head)) {
+            self.full += pixel.close();
+        }
+        let before = pixel.latest.as_ref().map(|latest| latest.head.cycle);
+        let is_news = head.exposure > 0 && before.is_none_or(|before| before < head.cycle);
+        if is_news {
+            pixel.latest = Some(histogram);
+        }
+        is_news
+    }
+
+    /// No exposure goes on: the device is configured anew, or no longer asked.
+    pub fn close(&mut self) {
+        self.full += self.pixels.iter_mut().map(Pixel::close).sum::<u64>();
+    }
+
+    /// Exposures with a full counter. They are left out.
+    #[must_use]
+    pub fn full(&self) -> u64 {
+        let latest = self.pixels.iter().filter_map(|pixel| pixel.latest.as_ref());
+        self.full + latest.filter(|latest| latest.is_full()).count() as u64
+    }
+
+    /// Photons of each bin of each pixel, of exposures that are closed.
+    pub fn sums(&self) -> impl Iterator<Item = &[u64]> {
+        self.pixels.iter().map(|pixel| pixel.sums.as_slice())
+    }
+
+    /// Their laser cycles; histograms of a sensor that gives whole ones.
+    pub fn cycles(&self) -> impl Iterator<Item = u64> {
+        self.pixels.iter().map(|pixel| pixel.cycles)
+    }
+
+    /// Photons of the median pixel so far.
+    #[must_use]
+    pub fn median_photons(&self) -> u64 {
+        let latest = |pixel: &Pixel| pixel.latest.as_ref().map_or(0, PixelHistogram::photons);
+        let photons = |pixel: &Pixel| pixel.sums.iter().sum::<u64>() + latest(pixel);
+        let mut photons: Vec<u64> = self.pixels.iter().map(photons).collect();
+        photons.sort_unstable();
+        photons.get(photons.len() / 2).copied().unwrap_or(0)
+    }
+
+    /// Photons a laser cycle that the brightest bin has, at most: by three standard deviations,
+    /// and five photons more where there are few. `None` as long as a pixel has fewer than `least`
+    /// laser cycles.
+    #[must_use]
+    pub fn brightest(&self, least: u16) -> Option<f64> {
+        let mut brightest = 0.0;
+        for pixel in &self.pixels {
+            let latest = pixel.latest.as_ref().filter(|latest| !latest.is_full());
+            let count = |bin| latest.map_or(0, |latest| u64::from(latest.counts[bin]));
+            let counts = pixel.sums.iter().enumerate();
+            let highest = counts.map(|(bin, sum)| sum + count(bin)).max().unwrap_or(0) as f64;
+            let cycles = pixel.cycles + latest.map_or(0, |latest| latest.head.exposure.into());
+            if cycles < u64::from(least) {
+                return None;
+            }
+            let most = highest + 3.0 * highest.sqrt() + 5.0;
+            brightest = f64::max(brightest, most / cycles as f64);
+        }
+        Some(brightest)
+    }
+}
+
+impl PixelHistogram {
+    /// Whether a counter is full.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        let full = if self.head.is_whole { FULL_WHOLE } else { FULL };
+        self.counts.iter().any(|&count| count >= full)
+    }
+
+    fn photons(&self) -> u64 {
+        self.counts.iter().map(|&count| u64::from(count)).sum()
+    }
+}
+
+impl Pixel {
+    /// Counts the last histogram; 1 if it is left out.
+    fn close(&mut self) -> u64 {
+        let Some(latest) = self.latest.take() else {
+            return 0;
+        };
+        if latest.is_full() {
+            return 1;
+        }
+        self.cycles += u64::from(latest.head.exposure);
+        for (sum, count) in self.sums.iter_mut().zip(&latest.counts) {
+            *sum += u64::from(*count);
+        }
+        0
+    }
+}
+
+/// The laser cycle at which an exposure began.
+fn began(head: &HistogramHead) -> u64 {
+    head.cycle.0.saturating_sub(head.exposure.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dtof_core::{LaserCycle, PixelAddress};
+    use proptest::prelude::*;
+
+    fn histogram(pixel: u16, cycle: u64, exposure: u16, counts: &[u32]) -> PixelHistogram {
+        PixelHistogram {
+            head: HistogramHead {
+                pixel: PixelAddress(pixel),
+                is_whole: false,
+                cycle: LaserCycle(cycle),
+                exposure,
+            },
+            counts: counts.to_vec(),
+        }
+    }
+
+    #[test]
+    fn a_later_look_at_an_exposure_replaces_an_earlier_one() {
+        let mut exposures = Exposures::new(2, 2);
+        assert!(exposures.add(histogram(0, 10, 10, &[1, 0])));
+        assert!(exposures.add(histogram(0, 20, 20, &[1, 2])));
+        // The same once more, and one that has no laser cycle yet.
+        assert!(!exposures.add(histogram(0, 20, 20, &[1, 2])));
+        assert!(!exposures.add(histogram(0, 24, 0, &[0, 0])));
+        assert!(exposures.add(histogram(0, 30, 6, &[0, 5])));
+        assert!(!exposures.add(histogram(9, 30, 6, &[0, 5])));
+        assert_eq!(exposures.brightest(1), None);
+        exposures.close();
+        let sums: Vec<&[u64]> = exposures.sums().collect();
+        assert_eq!(sums, [[1, 7], [0, 0]]);
+        assert!(exposures.cycles().eq([26, 0]));
+    }
+
+    #[test]
+    fn an_exposure_with_a_full_counter_is_left_out_and_counted() {
+        let mut exposures = Exposures::new(1, 2);
+        exposures.add(histogram(0, 10, 10, &[1022, 9]));
+        exposures.add(histogram(0, 20, 20, &[1023, 19]));
+        exposures.add(histogram(0, 30, 6, &[1022, 5]));
+        exposures.close();
+        assert_eq!(exposures.full(), 1);
+        assert!(exposures.sums().eq([[1022, 5]]));
+        assert!(exposures.cycles().eq([6]));
+        let most = (1022.0 + 3.0 * f64::sqrt(1022.0) + 5.0) / 6.0;
+        assert!((exposures.brightest(6).unwrap() - most).abs() < 1e-9);
+        assert_eq!(exposures.brightest(7), None);
+        // A sensor's counters hold more.
+        let mut whole = histogram(0, 1, 1, &[1023, 0]);
+        whole.head.is_whole = true;
+        exposures.add(whole);
+        exposures.close();
+        assert_eq!((exposures.full(), exposures.cycles().next()), (1, Some(7)));
+    }
+
+    proptest! {
+        /// A photon a laser cycle, looked at whenever: as many photons as laser cycles, and none
+        /// twice.
+        #[test]
+        fn photons_and_laser_cycles_belong_together(
+            looks in prop::collection::vec((1u64..400, 0u16..2), 1..60), length in 8u64..200,
+        ) {
+            let mut exposures = Exposures::new(2, 1);
+            let (mut cycle, mut seen) = (0, std::collections::BTreeMap::new());
+            for (wait, pixel) in looks {
+                cycle += wait;
+                let exposure = u16::try_from(cycle % length).unwrap();
+                if u32::from(exposure) < FULL {
+                    seen.insert((pixel, cycle - u64::from(exposure)), u64::from(exposure));
+                }
+                exposures.add(histogram(pixel, cycle, exposure, &[exposure.into()]));
+            }
+            exposures.close();
+            let photons: u64 = exposures.sums().map(|sums| sums[0]).sum();
+            prop_assert_eq!(photons, seen.values().sum::<u64>());
+            prop_assert_eq!(exposures.cycles().sum::<u64>(), photons);
+        }
+    }
+}
