@@ -23,7 +23,7 @@ use dtof_core::{BlockLevel, Count, EchoNumber, PaperRule, WindowRule};
 use dtof_link::{AdaptiveBinning, FaultRecord, Source};
 
 use crate::emulator::{Board, Emulator, End, QEMU};
-use crate::{dtof, root, skipped, stack, succeed, target_folder, version, wanted};
+use crate::{dtof, histograms, root, skipped, stack, succeed, target_folder, version, wanted};
 
 /// Decodes what an image logs.
 const DEFMT_PRINT: &str = "defmt-print";
@@ -337,6 +337,7 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
     // Less their header.
     let events = events.split(|&byte| byte == b'\n').count() - 2;
     ensure!(events > 0, "no event of the simulated sensor");
+    histograms::are_those_of_the_scene(&mut client, &settings())?;
     let stack = emulator.stop()?;
     println!("{board:?}: {events} events of the simulated sensor; {stack} bytes of stack");
     Ok(stack)

@@ -12,6 +12,7 @@
 mod boards;
 mod debugger;
 mod emulator;
+mod histograms;
 mod readers;
 mod report;
 mod stack;
