@@ -25,7 +25,7 @@ enum Command {
     Simulate(Box<command::simulate::Simulate>),
     /// Turn recorded photons into events.
     Replay(Box<command::replay::Replay>),
-    /// Find the settings of a sensor from a recording.
+    /// Find the settings of a sensor from a recording, or from a device with the sensor.
     Calibrate(Box<command::calibrate::Calibrate>),
     /// Try all methods on a recording or a scene, and say which one to take.
     Compare(Box<command::compare::Compare>),

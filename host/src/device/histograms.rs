@@ -48,10 +48,9 @@ pub struct Collected {
     pub cycles: Vec<u64>,
     /// Whether it does.
     pub is_whole: bool,
-    /// Exposures with a full counter, which were left out.
+    /// Exposures with a full counter, which were left out: as they were seen, or as many as there
+    /// were events, which only a full counter brings.
     pub full: u64,
-    /// Events that left all the same: where counters were full, or histograms are whole.
-    pub events: u64,
 }
 
 /// Collects histograms of `pixels` pixels, addresses 0 up, until `done`, asked again and again,
@@ -85,18 +84,18 @@ pub fn collect(
     }
     exposures.close();
     work.configure(Source::Link)?;
-    let (is_whole, events) = (work.is_whole, work.events);
+    let is_whole = work.is_whole;
+    let events = if is_whole { 0 } else { work.events };
     let collected = Collected {
         histograms: exposures.sums().map(<[u64]>::to_vec).collect(),
         cycles: exposures.cycles().collect(),
         is_whole,
-        full: exposures.full(),
-        events,
+        full: exposures.full().max(events),
     };
     if let Some(pixel) = collected.cycles.iter().position(|&cycles| cycles == 0) {
         ensure!(
             collected.full == 0,
-            "pixel {pixel} has a full counter after {SHORTEST} laser cycles: too much light"
+            "pixel {pixel} has no histogram without a full counter: too much light"
         );
         bail!("no histogram of pixel {pixel} came in this time");
     }
@@ -109,6 +108,7 @@ struct Collecting<'a> {
     pixels: u16,
     l2: u16,
     is_whole: bool,
+    /// Of a sensor that gives whole histograms they mean nothing.
     events: u64,
     /// Exposures with a full counter that are known.
     full: u64,
@@ -131,7 +131,9 @@ impl Collecting<'_> {
             ..self.settings.clone()
         };
         let wanted = configuration(&settings, self.pixels, self.pixels.into(), source, None)?;
-        self.client.configure(&wanted)
+        self.client.configure(&wanted)?;
+        self.news = Instant::now();
+        Ok(())
     }
 
     /// Asks every pixel once. Says whether that is all.

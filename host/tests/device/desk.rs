@@ -58,7 +58,7 @@ pub const WALL: Rates = |pixel| {
 pub const BRIGHT: Rates = |pixel| (if pixel == 0 { 3.5 } else { SIGNAL }, BACKGROUND);
 
 /// 20,000 laser cycles a second.
-fn photons(rates: Rates) -> Simulated<'static> {
+pub fn photons(rates: Rates) -> Simulated<'static> {
     let rate = U8F24::from_num::<f64>;
     let pixel = |pixel| {
         let (signal, background) = rates(pixel);
@@ -81,6 +81,8 @@ fn photons(rates: Rates) -> Simulated<'static> {
 #[derive(Clone)]
 pub struct Desk {
     pub photons: Simulated<'static>,
+    /// What it sees after a second.
+    pub later: Option<Simulated<'static>>,
     pub is_there: bool,
     /// Laser cycles of a histogram, and those that have ended.
     pub whole: Option<(u32, u32)>,
@@ -91,6 +93,7 @@ impl Desk {
     pub fn new(rates: Rates) -> Self {
         Self {
             photons: photons(rates),
+            later: None,
             is_there: true,
             whole: None,
             counts: vec![[0; 128]; PIXELS.into()],
@@ -131,6 +134,9 @@ impl Sensor for Desk {
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, SensorFault> {
         if !self.is_there {
             return Err(SensorFault::NoAnswer);
+        }
+        if let Some(later) = self.later.take_if(|_| now_ms > 1_000) {
+            self.photons = later;
         }
         let Some((length, ended)) = &mut self.whole else {
             let Ok(polled) = self.photons.poll(now_ms, sink);
