@@ -124,14 +124,14 @@ fn a_recording_with_distances_calibrates_itself() {
     let suited = pulse.suited.unwrap();
     let (before, after) = (suited.window.before(), suited.window.after());
     assert_eq!((before, after), (U8F8::lit("1.75"), U8F8::lit("4")));
-    assert!(suited.error < 0.92 * suited.of_core, "{suited:?}");
+    assert!(suited.error < 0.95 * suited.equal, "{suited:?}");
     assert_eq!(found.nearest, Nearest::NotCommon);
     // The authors state 91 ps, and a centroid 92.1.
     assert!((91.0..=92.5).contains(&found.bin_width_ps));
 
     let truth = ground_truth(&log);
     // Other photons than those of the calibration.
-    for seed in 2..5 {
+    for seed in 2..12 {
         let (distances, photons, error) = judged(&found, &counts.captures, &truth, seed);
         tell(&format!(
             "{distances} distances, {photons:.1} photons an event, median error {error:.2} mm"

@@ -1,6 +1,6 @@
 //! What a recording leaves open, and which option answers it.
 
-use super::{Calibration, Length, Nearest, Pulse, Tdc};
+use super::{Calibration, Length, Nearest, Tdc};
 use crate::rows::Row;
 
 /// What a reader of the settings has to know: a topic, and a sentence or two on it.
@@ -70,12 +70,24 @@ pub fn remarks(found: &Calibration) -> Vec<Row> {
             "pulse",
             format!(
                 "The pulse is no Gaussian: {:.1} % of its photons come more than three standard \
-             deviations late. The standard deviation is that of its core.{}",
-                pulse.tail * 100.0,
-                of_window(pulse)
+             deviations late. The standard deviation is that of its core.",
+                pulse.tail * 100.0
             ),
         ),
         Some(_) => {}
+    }
+    if let Some(suited) = found.pulse.as_ref().and_then(|pulse| pulse.suited) {
+        say(
+            "depth",
+            format!(
+                "The depth comes from a window that reaches {} bins before its place and {} after it: 16 \
+                 photons of the pulse are off by {:.2} bins in the mean, with equal half widths by {:.2}.",
+                suited.window.before(),
+                suited.window.after(),
+                suited.error,
+                suited.equal
+            ),
+        );
     }
     match found.tdc {
         Some(Tdc::OneHit(lost)) => {
@@ -126,17 +138,4 @@ pub fn remarks(found: &Calibration) -> Vec<Row> {
         );
     }
     remarks
-}
-
-/// What a window with two half widths is better by.
-fn of_window(pulse: &Pulse) -> String {
-    pulse.suited.map_or_else(String::new, |suited| {
-        let [before, after] = [suited.window.before(), suited.window.after()];
-        format!(
-            " The depth comes from a window of {before} bins before and {after} after its place: 16 \
-             photons of the pulse are off by {:.3} bins in the mean, with equal half widths by \
-             {:.3}.",
-            suited.error, suited.of_core
-        )
-    })
 }

@@ -1,10 +1,10 @@
 //! How many photons an event is worth, where true distances are known.
 //!
 //! The recording is replayed. More photons an event make its distance better and come later. As
-//! many are spent as the paper's rule takes with its own minimum, 5 in the highest bin. Of the
-//! windows that suit the pulse or are wider, each with the highest minimum that spends no more, the
-//! one with the least error is taken. What events are off by in the median is taken off the range offset:
-//! the place of a few photons of a pulse that is not symmetric differs from that of many.
+//! many are spent as the paper's rule takes with its own minimum, 5 in the highest bin. The window
+//! is the one that suits the pulse, or a wider one if that does more with as many photons. What
+//! events are off by in the median is taken off the range offset: the place of a few photons of
+//! a pulse that is not symmetric differs from that of many.
 
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
@@ -23,6 +23,8 @@ const CYCLES: u16 = 10_000;
 const PHOTONS: f64 = 2e7;
 /// Fewer events say nothing.
 const LEAST: usize = 200;
+/// A wider window costs more a look: its error has to be below this share.
+const WIDER: f64 = 0.97;
 /// The highest minimum that is tried.
 const MOST: u16 = 200;
 
@@ -41,6 +43,13 @@ pub struct Spent {
     pub offset_mm: f64,
     /// Events it was found from.
     pub events: usize,
+}
+
+impl Spent {
+    /// The error, as if one photon decided: with more it falls by their square root.
+    fn for_a_photon(&self) -> f64 {
+        self.error_mm * self.photons.sqrt()
+    }
 }
 
 /// Replays the pixels with a true distance.
@@ -122,22 +131,26 @@ impl<'a> Replay<'a> {
             };
             // A wider window holds more.
             first = found.min_count;
-            if best.is_none_or(|best| found.error_mm < best.error_mm) {
+            let is_better = |best: Spent| {
+                found.photons <= papers.photons
+                    && found.for_a_photon() < WIDER * best.for_a_photon()
+            };
+            if best.is_none_or(is_better) {
                 best = Some(found);
             }
         }
         Ok(best)
     }
 
-    /// With the highest minimum, from `first` on, whose events take no more than `most` photons;
-    /// `None` if there is none.
+    /// With the highest minimum, from `first` on, whose events take no more than `most` photons, or
+    /// with `first`; `None` if there are too few events.
     fn of_window(&self, window: u8, first: u16, most: f64) -> Result<Option<Spent>> {
         let mut best = None;
         for minimum in first..=MOST {
             let z = U4F12::saturating_from_num(self.detection.z.unwrap_or(0.0));
             let rule = WindowRule::new(window, z, Count::saturating(minimum.into()))?;
             let found = self.replay(rule.into(), (window, minimum))?;
-            if found.is_none_or(|found| found.photons > most) {
+            if found.is_none_or(|found| best.is_some() && found.photons > most) {
                 break;
             }
             best = found;

@@ -53,9 +53,14 @@ impl Calibration {
             x: Some(detection.x),
             ..Detection::default()
         });
+        // The offset was found with the window of this pulse.
+        let mut older = before.detection;
+        if detection.is_some() {
+            (older.estimator, older.half_widths) = (None, None);
+        }
         let found = SettingsFile {
             sensor,
-            detection: detection.unwrap_or_default().or(before.detection),
+            detection: detection.unwrap_or_default().or(older),
             rays: before.rays,
             run: before.run,
             origin: before.origin,

@@ -144,9 +144,11 @@ impl SettingsFile {
     #[must_use]
     pub fn or(self, mut other: Self) -> Self {
         // Half widths are those of a pulse.
-        if self.sensor.sigma_bins.is_some() {
+        let sigma = self.sensor.sigma_bins;
+        if sigma.is_some() && sigma != other.sensor.sigma_bins {
             other.detection.half_widths = None;
         }
+        let origin = self.origin_of_rest(&other);
         // A field of view replaces a calibration, and the other way round.
         let rays = if self.rays == Rays::default() {
             other.rays
@@ -158,7 +160,7 @@ impl SettingsFile {
             detection: self.detection.or(other.detection),
             rays,
             run: self.run.or(other.run),
-            origin: self.origin.or(other.origin),
+            origin: self.origin.or(origin),
         }
     }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Error, Result, anyhow};
-use toml::Table;
+use toml::{Table, Value};
 
 use super::SettingsFile;
 
@@ -26,8 +26,21 @@ impl SettingsFile {
         Ok(self)
     }
 
-    /// An error that names options. Where a value of these settings is that of the file, it names
-    /// the file, and the key instead of the option. Another error stays what it is.
+    /// Where the values of `other` come from that these settings do not say.
+    pub(super) fn origin_of_rest(&self, other: &Self) -> Option<Origin> {
+        let mut origin = other.origin.clone()?;
+        let these = Table::try_from(self).ok()?;
+        for (section, keys) in &mut origin.said {
+            if let (Some(keys), Some(these)) = (keys.as_table_mut(), these.get(section)) {
+                keys.retain(|key, _| these.get(key).is_none());
+            }
+        }
+        Some(origin)
+    }
+
+    /// An error that names options. Where it is about a value that the file has said, it names
+    /// the file, and the key instead of the option: the first option it names, and others that
+    /// stand before their value of the file. Another error stays what it is.
     #[must_use]
     pub fn name_origin(&self, error: Error) -> Error {
         let (Some(origin), Ok(all)) = (&self.origin, Table::try_from(self)) else {
@@ -38,7 +51,7 @@ impl SettingsFile {
         for (section, keys) in &origin.said {
             for (key, value) in keys.as_table().into_iter().flatten() {
                 if all.get(section).and_then(|keys| keys.get(key)) == Some(value) {
-                    text = replaced(&text, &option(key), key);
+                    text = replaced(&text, &option(key), key, value);
                 }
             }
         }
@@ -57,15 +70,22 @@ fn option(key: &str) -> String {
     }
 }
 
-/// `text` with `key` for each `option` that stands by itself.
-fn replaced(text: &str, option: &str, key: &str) -> String {
+/// `text` with `key` for each `option` that stands by itself, if it is the first of all or stands
+/// before `value`.
+fn replaced(text: &str, option: &str, key: &str, value: &Value) -> String {
+    let value = match value {
+        Value::String(text) => text.clone(),
+        value => value.to_string(),
+    };
     let mut parts = text.split(option);
     let mut done = parts.next().unwrap_or_default().to_owned();
     for part in parts {
         let goes_on = |next: char| next.is_alphanumeric() || "-_./".contains(next);
         let is_option = done.is_empty() || done.ends_with(' ');
         let is_whole = is_option && !part.starts_with(goes_on);
-        done += if is_whole { key } else { option };
+        let next = part.split([' ', ':', ';']).nth(1).unwrap_or_default();
+        let is_meant = next == value || !done.contains(" --") && !done.starts_with("--");
+        done += if is_whole && is_meant { key } else { option };
         done += part;
     }
     done
@@ -98,7 +118,10 @@ mod tests {
             ),
             ("detection.l2 = 2", "--l2 2: no", "--l2 2: no"),
             // The file and an option say the same.
-            ("detection.l2 = 3", "--l2 3: no", "my.toml: l2 3: no"),
+            ("detection.l2 = 3", "--l2 3: no", "--l2 3: no"),
+            // It is about what an option says.
+            ("detection.x = 2", "--x is for --l2 4", "--x is for --l2 4"),
+            ("", "--l2 is for --x", "my.toml: l2 is for --x"),
             ("", "--mask 9: no", "my.toml: masked 9: no"),
             (
                 "",

@@ -31,8 +31,8 @@ pub struct Suited {
     pub window: CentredWindow,
     /// What 16 photons of the pulse are off by in the mean, in bins.
     pub error: f64,
-    /// The same of a window that suits the pulse's core.
-    pub of_core: f64,
+    /// The same of the best window with equal half widths.
+    pub equal: f64,
 }
 
 /// Photons of a peak among its background, and where all of them lie.
@@ -42,7 +42,8 @@ struct Drawn {
     position: f64,
 }
 
-/// The best half widths for these peaks; `None` if those for `sigma` do as well.
+/// The best half widths for these peaks, whose core has the deviation `sigma`; `None` if equal ones
+/// do as well.
 #[must_use]
 pub fn suited(peaks: &[Window], sigma: U8F8, seed: u64) -> Option<Suited> {
     let each = DRAWS.div_ceil(peaks.len().max(1));
@@ -62,18 +63,28 @@ pub fn suited(peaks: &[Window], sigma: U8F8, seed: u64) -> Option<Suited> {
         let sum: f64 = errors.iter().map(|error| (error - off).abs()).sum();
         sum / errors.len().max(1) as f64
     };
-    let of_core = error(CentredWindow::for_pulse(sigma));
-    let bits = CentredWindow::MIN.to_bits()..=CentredWindow::MAX.to_bits();
-    let widths = || bits.clone().step_by(STEP).map(U8F8::from_bits);
+    let core = CentredWindow::for_pulse(sigma);
+    let widths = || {
+        let bits = CentredWindow::MIN.to_bits()..=CentredWindow::MAX.to_bits();
+        bits.step_by(STEP).map(U8F8::from_bits)
+    };
     let pairs = widths().flat_map(|before| widths().map(move |after| (before, after)));
     let windows = pairs.filter_map(|(before, after)| CentredWindow::with_sides(before, after));
-    let tried = windows.map(|window| Suited {
+    let (mut equal, mut best) = (error(core), (f64::INFINITY, core));
+    for window in windows {
+        let error = error(window);
+        if window.before() == window.after() {
+            equal = equal.min(error);
+        } else if error < best.0 {
+            best = (error, window);
+        }
+    }
+    let (error, window) = best;
+    (error < BETTER * equal).then_some(Suited {
         window,
-        error: error(window),
-        of_core,
-    });
-    let best = tried.min_by(|one, other| one.error.total_cmp(&other.error))?;
-    (best.error < BETTER * of_core).then_some(best)
+        error,
+        equal,
+    })
 }
 
 /// Photons of one peak, `each` times.
@@ -120,26 +131,68 @@ mod tests {
 
     const SIGMA: f64 = 0.7;
 
-    /// Peaks at all places in their bins; `fall` is the standard deviation after the highest
-    /// place, `SIGMA` that before.
-    fn peaks(fall: f64) -> Vec<Window> {
+    /// A pulse `number` sixteenths of a bin behind bin 20; `fall` is its standard deviation after
+    /// the highest place, `SIGMA` that before.
+    fn counts(number: u32, fall: f64) -> Vec<f64> {
         let below = |z: f64| {
             let sigma = if z < 0.0 { SIGMA } else { fall };
             2.0 / (SIGMA + fall) * sigma * (normal::below(z / sigma) - 0.5)
         };
-        let of = |number: u32| {
-            let place = 20.0 + f64::from(number) / 16.0;
-            let share =
-                |bin: u32| below(f64::from(bin + 1) - place) - below(f64::from(bin) - place);
-            let counts: Vec<f64> = (0..64).map(|bin| 12.0 + 4000.0 * share(bin)).collect();
-            Window::new(&counts, 12.0, 100.0, (0, 20, 63))
-        };
+        let place = 20.0 + f64::from(number) / 16.0;
+        let share = |bin: u32| below(f64::from(bin + 1) - place) - below(f64::from(bin) - place);
+        (0..64).map(|bin| 12.0 + 4000.0 * share(bin)).collect()
+    }
+
+    /// Peaks at all places in their bins.
+    fn peaks(fall: f64) -> Vec<Window> {
+        let of = |number| Window::new(&counts(number, fall), 12.0, 100.0, (0, 20, 63));
         (0..16).map(of).collect()
     }
 
     #[test]
     fn an_even_pulse_has_equal_half_widths() {
         assert_eq!(suited(&peaks(SIGMA), U8F8::from_num(SIGMA), 1), None);
+    }
+
+    /// Two Gaussians about one place are no Gaussian, and even.
+    #[test]
+    fn an_even_pulse_with_tails_has_equal_half_widths() {
+        let of = |number: u32| {
+            let place = 20.0 + f64::from(number) / 16.0;
+            let share = |bin: u32| {
+                let of = |sigma: f64| {
+                    let z = (f64::from(bin) - place) / sigma;
+                    normal::below(z + 1.0 / sigma) - normal::below(z)
+                };
+                0.6 * of(0.4) + 0.4 * of(2.6)
+            };
+            let counts: Vec<f64> = (0..64).map(|bin| 12.0 + 4000.0 * share(bin)).collect();
+            Window::new(&counts, 12.0, 100.0, (0, 20, 63))
+        };
+        let peaks: Vec<Window> = (0..16).map(of).collect();
+        for seed in 1..7 {
+            assert_eq!(suited(&peaks, U8F8::from_num(0.5), seed), None, "{seed}");
+        }
+    }
+
+    /// A glass nearby, of ten times the photons, changes nothing.
+    #[test]
+    fn other_peaks_have_no_part_in_it() {
+        let alone = peaks(2.5 * SIGMA);
+        let with_glass: Vec<Window> = (0..16u32)
+            .map(|number| {
+                let mut counts = counts(number, 2.5 * SIGMA);
+                counts[8] += 40_000.0;
+                Window::new(&counts, 12.0, 100.0, (11, 20, 63))
+            })
+            .collect();
+        let found = suited(&with_glass, U8F8::from_num(SIGMA), 1).unwrap();
+        let alone = suited(&alone, U8F8::from_num(SIGMA), 1).unwrap();
+        assert!(
+            (found.error / alone.error - 1.0).abs() < 0.05,
+            "{found:?} {alone:?}"
+        );
+        assert!(found.window.after() > found.window.before() + U8F8::ONE);
     }
 
     #[test]
@@ -149,7 +202,7 @@ mod tests {
             let found = suited(&peaks, U8F8::from_num(SIGMA), seed).unwrap();
             let window = found.window;
             assert!(window.after() > window.before() + U8F8::ONE, "{window:?}");
-            assert!(found.error < BETTER * found.of_core);
+            assert!(found.error < 0.95 * found.equal, "{found:?}");
             assert_eq!(suited(&peaks, U8F8::from_num(SIGMA), seed), Some(found));
         }
     }

@@ -19,7 +19,7 @@ pub struct Window {
     pub background: f64,
     /// Photons of the peak, about.
     pub photons: f64,
-    /// Photons of so many bins about the top, with those of other peaks.
+    /// Photons of so many bins about the top, in place of those of other peaks the background.
     pub about_top: Vec<f64>,
     /// Photons of the bins around it, up to the next peak.
     counts: Vec<f64>,
@@ -40,7 +40,16 @@ impl Window {
         (first, top, last): (usize, usize, usize),
     ) -> Self {
         let from = top.saturating_sub(ABOUT / 2);
-        let about_top = counts[from..counts.len().min(from + ABOUT)].to_vec();
+        let of_peak = |bin: usize| (first..=last).contains(&bin);
+        let about_top = (from..from + ABOUT)
+            .map(|bin| {
+                if of_peak(bin) {
+                    counts[bin]
+                } else {
+                    background
+                }
+            })
+            .collect();
         let counts = counts[first..=last].to_vec();
         let top = top - first;
         // Half of the height on either side, and as much again three times.
