@@ -129,8 +129,23 @@ fn a_recording_with_distances_calibrates_itself() {
     // The authors state 91 ps, and a centroid 92.1.
     assert!((91.0..=92.5).contains(&found.bin_width_ps));
 
+    // Whatever settings were before, those that are written hold, with the window that the offset
+    // was found with.
+    let older = "[sensor]\nsigma_bins = 0.5\n[detection]\nestimator = 'centroid'\n";
+    for older in [older, "[detection]\nhalf_widths = [1, 3]\n"] {
+        let before = || SettingsFile::parse(older).unwrap();
+        let settings = found.settings(before()).unwrap();
+        let settings = settings.settings(found.bins).unwrap();
+        assert_eq!(settings.half_widths, Some(suited.window));
+        let mut even = found.clone();
+        even.detection.as_mut().unwrap().half_widths = None;
+        let settings = even.settings(before()).unwrap();
+        let settings = settings.settings(found.bins).unwrap();
+        assert_eq!((settings.half_widths, settings.centroid), (None, false));
+    }
+
     let truth = ground_truth(&log);
-    // Other photons than those of the calibration.
+    // In other laser cycles than those that the minimum was chosen by.
     for seed in 2..12 {
         let (distances, photons, error) = judged(&found, &counts.captures, &truth, seed);
         tell(&format!(

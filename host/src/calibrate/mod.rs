@@ -133,19 +133,19 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
     let mut offset = offset_of(&scene, &numbers, truth, gate, window, observed, asked);
     let cycles = scene.cycles();
     let (counts, _) = scene.pooled();
-    let known = |window| {
+    let known = |spent| {
         pulse.as_ref().map(|pulse| settle::Known {
             bins,
             gate,
             pulse,
             pixels: &pixels,
             is_absolute: observed.length != Length::Unknown,
-            window,
+            spent,
             asked,
         })
     };
-    let decide = |window| known(window).map(|known| settle::detection(&known));
-    let mut detection = decide((None, settle::MIN_COUNT)).transpose()?;
+    let decide = |spent| known(spent).map(|known| settle::detection(&known));
+    let mut detection = decide(None).transpose()?;
     let mut spent = None;
     let bin_width_ps = offset
         .and_then(|offset| offset.bin_width_ps)
@@ -157,7 +157,7 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
         }
         if let Some(spent) = spent {
             offset.mm += spent.offset_mm;
-            detection = decide((Some(spent.window), spent.min_count)).transpose()?;
+            detection = decide(Some(spent)).transpose()?;
         }
     }
     Ok(Calibration {

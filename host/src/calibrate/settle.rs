@@ -9,6 +9,7 @@ use super::Asked;
 use super::false_alarms;
 use super::find::pixels::Pixels;
 use super::find::pulse::Pulse;
+use super::spend::Spent;
 
 /// Laser cycles of an exposure, if the counters hold the background of so many.
 const L2: u16 = 2000;
@@ -63,8 +64,8 @@ pub struct Known<'a> {
     pub pixels: &'a Pixels,
     /// Whether rates are a laser cycle's.
     pub is_absolute: bool,
-    /// Bins of the rule's window, if not as suits the pulse, and photons in it, at least.
-    pub window: (Option<u8>, u16),
+    /// What was found to be best, if true distances are known.
+    pub spent: Option<Spent>,
     /// What is wanted.
     pub asked: &'a Asked,
 }
@@ -108,17 +109,19 @@ pub fn detection(known: &Known) -> Result<Detection> {
     let l2 = l2(background);
     let sigma = sigma(known.pulse.sigma);
     let asked = known.asked;
-    let (window, min_count) = known.window;
+    let spent = known.spent;
+    let suits = || WindowRule::width_for_pulse(sigma);
+    let x = spent.map_or(X, |spent| spent.x);
     let mut detection = Detection {
-        window: window.unwrap_or_else(|| WindowRule::width_for_pulse(sigma)),
+        window: spent.map_or_else(suits, |spent| spent.window),
         z: None,
         is_by_count: false,
         exposures: 0,
         false_alarm: asked.false_alarm,
-        min_count,
+        min_count: spent.map_or(MIN_COUNT, |spent| spent.min_count),
         l1: L1.min(l2 / 2),
         l2,
-        x: X,
+        x,
         sigma_bins: sigma,
         half_widths: known.pulse.suited.map(|suited| suited.window),
     };
@@ -132,7 +135,7 @@ pub fn detection(known: &Known) -> Result<Detection> {
         sigma: known.pulse.sigma.min(f64::from(bins) / 4.0),
         bins,
         minimum_count: MIN_COUNT,
-        x: X,
+        x,
         l1: None,
         l2,
         wanted: Wanted::PerExposure(asked.false_alarm),
@@ -149,7 +152,7 @@ pub fn detection(known: &Known) -> Result<Detection> {
         gate: known.gate,
         window: detection.window,
         min_count: detection.min_count,
-        looks: (detection.l1, l2, X),
+        looks: (detection.l1, l2, x),
         share: asked.false_alarm,
         seed: asked.seed,
     })?;

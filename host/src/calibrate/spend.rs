@@ -1,9 +1,9 @@
 //! How many photons an event is worth, where true distances are known.
 //!
 //! The recording is replayed. More photons an event make its distance better and come later. As
-//! many are spent as the paper's rule takes with its own minimum, 5 in the highest bin. The window
-//! is the one that suits the pulse, or a wider one if that does more with as many photons. What
-//! events are off by in the median is taken off the range offset: the place of a few photons of
+//! many are spent as the paper's rule takes with its own minimum, 5 in the highest bin: the minimum
+//! goes up, then looks become fewer. The window is the one that suits the pulse, or a wider one if
+//! that does more with as many photons. What events are off by in the median is taken off the range offset: the place of a few photons of
 //! a pulse that is not symmetric differs from that of many.
 
 use anyhow::{Context, Result};
@@ -35,6 +35,8 @@ pub struct Spent {
     pub window: u8,
     /// Photons in it, at least.
     pub min_count: u16,
+    /// Laser cycles between looks.
+    pub x: u16,
     /// Photons that an event takes, of all bins.
     pub photons: f64,
     /// Median of what single events are off by, in millimetres.
@@ -120,7 +122,7 @@ impl<'a> Replay<'a> {
     pub fn best(&self) -> Result<Option<Spent>> {
         let least = self.detection.min_count;
         let papers = PaperRule::new(const { U8F8::lit("4") }, Count::saturating(least.into()));
-        let Some(papers) = self.replay(papers.into(), (1, least))? else {
+        let Some(papers) = self.replay(papers.into(), (1, least, self.settings.x))? else {
             return Ok(None);
         };
         let mut best: Option<Spent> = None;
@@ -146,11 +148,22 @@ impl<'a> Replay<'a> {
     /// with `first`; `None` if there are too few events.
     fn of_window(&self, window: u8, first: u16, most: f64) -> Result<Option<Spent>> {
         let mut best = None;
-        for minimum in first..=MOST {
-            let z = U4F12::saturating_from_num(self.detection.z.unwrap_or(0.0));
+        let z = U4F12::saturating_from_num(self.detection.z.unwrap_or(0.0));
+        let with = |minimum: u16, x: u16| {
             let rule = WindowRule::new(window, z, Count::saturating(minimum.into()))?;
-            let found = self.replay(rule.into(), (window, minimum))?;
+            self.replay(rule.into(), (window, minimum, x))
+        };
+        for minimum in first..=MOST {
+            let found = with(minimum, self.settings.x)?;
             if found.is_none_or(|found| best.is_some() && found.photons > most) {
+                break;
+            }
+            best = found;
+        }
+        // What is left goes into fewer looks.
+        while let Some(last) = best.filter(|last| last.x < self.settings.l2 / 4) {
+            let found = with(last.min_count, last.x + 1)?;
+            if found.is_none_or(|found| found.photons > most) {
                 break;
             }
             best = found;
@@ -158,9 +171,15 @@ impl<'a> Replay<'a> {
         Ok(best)
     }
 
-    fn replay(&self, rule: AnyRule, (window, min_count): (u8, u16)) -> Result<Option<Spent>> {
+    fn replay(
+        &self,
+        rule: AnyRule,
+        (window, min_count, x): (u8, u16, u16),
+    ) -> Result<Option<Spent>> {
         let settings = Settings {
             rule,
+            x,
+            l1: self.settings.l1.max(x),
             ..self.settings.clone()
         };
         let pixels = u16::try_from(self.truth.len())?;
@@ -183,6 +202,7 @@ impl<'a> Replay<'a> {
         Ok(Some(Spent {
             window,
             min_count,
+            x,
             photons: statistics.photons() as f64 / events.len() as f64,
             error_mm: median(errors().map(|error| (error - off).abs())),
             offset_mm: -off,

@@ -62,11 +62,6 @@ pub struct Monitor {
 
 impl Monitor {
     pub fn run(&self) -> Result<()> {
-        let dynamic_depth = self.of_dynamic_depth.wanted(self.dynamic_depth)?;
-        ensure!(
-            !self.map || io::stderr().is_terminal(),
-            "--map draws on standard error, which is no terminal here"
-        );
         let said = self.operation.said(SettingsFile {
             sensor: Sensor {
                 columns: self.columns.map(u32::from),
@@ -76,6 +71,16 @@ impl Monitor {
             },
             ..SettingsFile::default()
         })?;
+        let watched = self.watch(said.clone());
+        watched.map_err(|error| said.name_origin(error))
+    }
+
+    fn watch(&self, said: SettingsFile) -> Result<()> {
+        let dynamic_depth = self.of_dynamic_depth.wanted(self.dynamic_depth)?;
+        ensure!(
+            !self.map || io::stderr().is_terminal(),
+            "--map draws on standard error, which is no terminal here"
+        );
         let has_blocks = said.detection.binning.is_some_and(|levels| levels > 0);
         ensure!(
             self.columns.is_none() || self.map || self.record.is_some() || has_blocks,

@@ -44,7 +44,12 @@ impl Known {
         };
         let file = self.settings.as_deref().map(SettingsFile::read);
         let mut file = file.transpose()?.unwrap_or_default();
-        if more.detection != Detection::default() {
+        let decides = Detection {
+            estimator: None,
+            half_widths: None,
+            ..more.detection.clone()
+        };
+        if decides != Detection::default() {
             // Frames have none of these options.
             file.run.frame = None;
         }
@@ -66,7 +71,7 @@ pub struct Frames {
     /// Simulate a frame-based sensor for comparison: every N laser cycles each pixel reads its
     /// highest bin, if that stands above the background
     #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX),
-        conflicts_with_all = ["rule", "alpha", "window", "z", "false_alarm", "half_widths", "min_count", "l1", "l2", "x", "binning", "patience", "tracking", "echoes", "echo_wait"])]
+        conflicts_with_all = ["rule", "alpha", "window", "z", "false_alarm", "min_count", "l1", "l2", "x", "binning", "patience", "tracking", "echoes", "echo_wait"])]
     pub frame: Option<u16>,
 }
 

@@ -38,7 +38,7 @@ pub struct Detection {
     /// event, at most 0.1 [default: 0.01]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub false_alarm: Option<f64>,
-    /// Where in its bins a peak lies [default: window if --sigma-bins is known, else centroid]
+    /// Where in its bins a peak lies [default: window if --sigma-bins or --half-widths are known, else centroid]
     #[arg(long, value_enum)]
     pub estimator: Option<EstimatorName>,
     /// How far the window that the depth comes from reaches before and after its place, in bins:

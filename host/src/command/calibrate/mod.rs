@@ -70,6 +70,11 @@ impl Calibrate {
         let older = older.transpose()?;
         let before = older.clone().unwrap_or_default();
         let said = self.recording.said(|options| Ok(options.or(before)))?;
+        let calibrated = self.calibrate(&said, older);
+        calibrated.map_err(|error| said.name_origin(error))
+    }
+
+    fn calibrate(&self, said: &SettingsFile, older: Option<SettingsFile>) -> Result<()> {
         let asked = Asked {
             glass: self.glass.map(|answer| answer == Answer::Yes),
             target_mm: self.target_mm,
@@ -83,14 +88,14 @@ impl Calibrate {
             known,
             rows: collected,
         } = match &self.input {
-            Some(input) => self.of_file(input, &said, &asked)?,
+            Some(input) => self.of_file(input, said, &asked)?,
             None => {
                 let (desk, recording) = (&self.desk, &self.recording);
-                let found = desk.calibrate(&name, &said, recording, &asked, self.quiet);
+                let found = desk.calibrate(&name, said, recording, &asked, self.quiet);
                 found.with_context(|| name.clone())?
             }
         };
-        let settings = found.settings(said.or(known))?;
+        let settings = found.settings(said.clone().or(known))?;
         let changes = older.map_or(Vec::new(), |older| report::changes(&settings, &older));
         let page = report::page(&found, &settings, &changes, &name)?;
         let place = self.report.clone();
