@@ -39,8 +39,8 @@ fn without_an_option_it_is_the_papers_rule_and_centroid() {
     assert_eq!(replayed("--rule paper --alpha 4").1, events);
 }
 
-/// Equal half widths are what a pulse has; others give the same events at other depths. A pulse
-/// that is said in an option has its own.
+/// Equal half widths are what a pulse has; others give the same events at other depths. Another
+/// pulse that is said in an option has its own.
 #[test]
 fn half_widths_move_the_depth() {
     let (settings, even) = replayed("--half-widths 2.5,2.5");
@@ -59,7 +59,9 @@ fn half_widths_move_the_depth() {
     );
     let with = |options: &str| replayed(&format!("--settings {} {options}", file.display())).1;
     assert_eq!(with(""), skew);
-    assert_eq!(with("--sigma-bins 1"), even);
+    // The file's own pulse changes nothing, another has windows of its own.
+    assert_eq!(with("--sigma-bins 1"), skew);
+    assert_eq!(with("--sigma-bins 0.9"), replayed("--sigma-bins 0.9").1);
     assert_eq!(with("--estimator centroid"), replayed("").1);
 }
 
