@@ -1,0 +1,240 @@
+//! Settings, and the configuration that is made of them.
+
+use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::{
+    AnyRule, AverageRule, CentredWindow, Count, DepthEstimator, EchoNumber, PaperRule, PixelConfig,
+    RangeGate, WindowRule, z_for,
+};
+
+use crate::memory::{Tagged, holds, initialise, plain, put, status};
+use crate::status::dtof_status_t;
+use crate::status::dtof_status_t::{
+    DTOF_ERROR_ECHOES, DTOF_ERROR_ESTIMATOR, DTOF_ERROR_HALF_WIDTH, DTOF_ERROR_MINIMUM_COUNT,
+    DTOF_ERROR_RULE, DTOF_ERROR_TRACKING, DTOF_ERROR_ZERO_X,
+};
+use crate::version::DTOF_BINS;
+
+/// The paper's rule: the highest bin against the background and its square root.
+pub const DTOF_RULE_PAPER: u8 = 0;
+/// A window around the peak against all other photons: a CFAR test.
+pub const DTOF_RULE_WINDOW: u8 = 1;
+/// The paper's threshold over the average of all bins.
+pub const DTOF_RULE_AVERAGE: u8 = 2;
+
+/// The paper's depth: the centroid of three bins.
+pub const DTOF_ESTIMATOR_CENTROID: u8 = 0;
+/// The centroid of a window that lies about the pulse.
+pub const DTOF_ESTIMATOR_CENTRED_WINDOW: u8 = 1;
+
+/// How pixels operate, as a program writes it down. Fill it in with dtof_config_paper, change
+/// what you want, and check it with dtof_config_check. Fields of another rule or estimator are
+/// not looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub struct dtof_config_t {
+    /// The fewest photons in a reported peak, with the window rule in the window: 1 to
+    /// 16,777,215. The counters of pixels hold 1023.
+    pub minimum_count: u32,
+    /// Standard deviations above the background, in 1/256. Of the rules paper and average.
+    pub alpha_q8: u16,
+    /// Standard deviations above the background, in 1/4096. Of the window rule.
+    pub z_q12: u16,
+    /// Laser cycles between looks: at least 1.
+    pub x: u16,
+    /// The exposure that a decision must exceed, in laser cycles: at least X.
+    pub l1: u16,
+    /// The exposure at which a pixel starts over, in laser cycles: above L1, and a multiple of X
+    /// lies strictly between the two.
+    pub l2: u16,
+    /// The first bin that may hold the peak.
+    pub gate_first: u16,
+    /// The last bin that may hold the peak: at least 7 more, below DTOF_BINS.
+    pub gate_last: u16,
+    /// How far the centred window reaches before its place, in 1/256 bin: 256 to 1024.
+    pub before_q8: u16,
+    /// How far it reaches after its place, in 1/256 bin: 256 to 1024.
+    pub after_q8: u16,
+    /// DTOF_RULE_...
+    pub rule: u8,
+    /// The window of the window rule, in bins: 1 to 7.
+    pub window: u8,
+    /// DTOF_ESTIMATOR_...
+    pub estimator: u8,
+    /// Not 0: the TDC takes one photon a laser cycle, and events say when it piles up.
+    pub one_hit_tdc: u8,
+    /// Not 0: pixels expect their next event where the last was. With the window rule.
+    pub tracking: u8,
+    /// The last echo that a pixel reports in an exposure: 1 to 4.
+    pub echoes: u8,
+    /// Bins to either side of an echo's peak that are left out once it is reported: any.
+    pub peel_reach: u8,
+    /// An exposure ends once it is so many times as long as it was at its last echo; with 255
+    /// at L2.
+    pub echo_wait: u8,
+}
+
+/// Bytes of a dtof_checked_config_t.
+pub const DTOF_CHECKED_CONFIG_SIZE: usize = 64;
+/// The same in words of 64 bits.
+pub const DTOF_CHECKED_CONFIG_WORDS: usize = DTOF_CHECKED_CONFIG_SIZE / 8;
+/// Its alignment.
+pub const DTOF_CHECKED_CONFIG_ALIGN: usize = 8;
+
+/// A configuration that was checked: dtof_config_check makes it. It is read only from then on,
+/// so that any number of threads may use it at once. It may be copied.
+#[repr(C)]
+pub struct dtof_checked_config_t {
+    opaque: [u64; DTOF_CHECKED_CONFIG_WORDS],
+}
+
+/// The configuration of this library's pixels.
+pub(crate) type Config = PixelConfig<DTOF_BINS, AnyRule>;
+
+holds!(dtof_checked_config_t, Tagged<Config>,
+    size DTOF_CHECKED_CONFIG_SIZE, align DTOF_CHECKED_CONFIG_ALIGN, waste 8);
+
+/// Fills in the paper's settings: its rule with an alpha of 4 and at least 5 photons, its depth,
+/// X = 4, L1 = 40, L2 = 2000, all bins, one echo. Those of the other rules are z = 4.47 and a
+/// window of 3 bins; of the centred window 2.5 bins to either side.
+///
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+/// Threads: nobody else uses `config` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_config_paper(config: *mut dtof_config_t) -> dtof_status_t {
+    #[allow(clippy::cast_possible_truncation, reason = "at most 256")]
+    let settings = dtof_config_t {
+        minimum_count: 5,
+        alpha_q8: const { U8F8::lit("4").to_bits() },
+        z_q12: const { U4F12::lit("4.47").to_bits() },
+        x: 4,
+        l1: 40,
+        l2: 2000,
+        gate_first: 0,
+        gate_last: DTOF_BINS as u16 - 1,
+        before_q8: const { U8F8::lit("2.5").to_bits() },
+        after_q8: const { U8F8::lit("2.5").to_bits() },
+        rule: DTOF_RULE_PAPER,
+        window: 3,
+        estimator: DTOF_ESTIMATOR_CENTROID,
+        one_hit_tdc: 0,
+        tracking: 0,
+        echoes: 1,
+        peel_reach: 0,
+        echo_wait: u8::MAX,
+    };
+    // SAFETY: the caller's promise, see the crate.
+    status(|| unsafe { put(config, settings) })
+}
+
+/// Sets the window rule's width and the centred window to a pulse whose standard deviation is
+/// `sigma_q8`, in 1/256 bin. It suits pulses of 0.4 to 1.75 bins. It does not choose the rule or
+/// the estimator.
+///
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+/// Threads: nobody else uses `config` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_config_for_pulse(
+    config: *mut dtof_config_t,
+    sigma_q8: u16,
+) -> dtof_status_t {
+    status(|| {
+        let sigma = U8F8::from_bits(sigma_q8);
+        let window = CentredWindow::for_pulse(sigma);
+        // SAFETY: the caller's promise, see the crate.
+        let settings = *unsafe { plain(config)? };
+        let settings = dtof_config_t {
+            window: WindowRule::width_for_pulse(sigma),
+            before_q8: window.before().to_bits(),
+            after_q8: window.after().to_bits(),
+            ..settings
+        };
+        // SAFETY: the same promise.
+        unsafe { put(config, settings) }
+    })
+}
+
+/// Sets the window rule's z so that one in `one_in` exposures without a target brings a false
+/// alarm: 100 for 1 %. It goes by the gate, X, L1 and L2 of `config`, so set these before. z gets
+/// 2.15 to 6.44.
+///
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_ZERO_X,
+/// DTOF_ERROR_GATE_PAST_LAST_BIN, DTOF_ERROR_GATE_TOO_NARROW.
+/// Threads: nobody else uses `config` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_config_false_alarms(
+    config: *mut dtof_config_t,
+    one_in: u32,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let settings = *unsafe { plain(config)? };
+        if settings.x == 0 {
+            return Err(DTOF_ERROR_ZERO_X);
+        }
+        let gate = RangeGate::<DTOF_BINS>::new(settings.gate_first, settings.gate_last)?;
+        let z = z_for(one_in, &gate, settings.x, settings.l1, settings.l2);
+        let z_q12 = z.to_bits();
+        // SAFETY: the same promise.
+        unsafe { put(config, dtof_config_t { z_q12, ..settings }) }
+    })
+}
+
+/// Checks settings and makes the configuration of them.
+///
+/// Errors: each of DTOF_ERROR_RULE to DTOF_ERROR_ECHOES, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+/// `checked` stays as it was.
+/// Threads: nobody else uses `checked` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_config_check(
+    config: *const dtof_config_t,
+    checked: *mut dtof_checked_config_t,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let config = config_of(unsafe { plain(config)? })?;
+        // SAFETY: the same promise.
+        unsafe { initialise(checked, DTOF_CHECKED_CONFIG_SIZE, Tagged::new(config)) }
+    })
+}
+
+fn config_of(settings: &dtof_config_t) -> Result<Config, dtof_status_t> {
+    let count = Count::new(settings.minimum_count).filter(|count| count.raw() > 0);
+    let count = count.ok_or(DTOF_ERROR_MINIMUM_COUNT)?;
+    let alpha = U8F8::from_bits(settings.alpha_q8);
+    let rule: AnyRule = match settings.rule {
+        DTOF_RULE_PAPER => PaperRule::new(alpha, count).into(),
+        DTOF_RULE_AVERAGE => AverageRule::new(alpha, count).into(),
+        DTOF_RULE_WINDOW => {
+            let z = U4F12::from_bits(settings.z_q12);
+            WindowRule::new(settings.window, z, count)?.into()
+        }
+        _ => return Err(DTOF_ERROR_RULE),
+    };
+    let estimator = match settings.estimator {
+        DTOF_ESTIMATOR_CENTROID => DepthEstimator::Centroid3,
+        DTOF_ESTIMATOR_CENTRED_WINDOW => {
+            let [before, after] = [settings.before_q8, settings.after_q8].map(U8F8::from_bits);
+            let window = CentredWindow::with_sides(before, after);
+            DepthEstimator::CentredWindow(window.ok_or(DTOF_ERROR_HALF_WIDTH)?)
+        }
+        _ => return Err(DTOF_ERROR_ESTIMATOR),
+    };
+    let gate = RangeGate::new(settings.gate_first, settings.gate_last)?;
+    let tracking = if settings.tracking == 0 {
+        None
+    } else {
+        Some(rule.tracking(&gate).ok_or(DTOF_ERROR_TRACKING)?)
+    };
+    let echoes = EchoNumber::new(settings.echoes).ok_or(DTOF_ERROR_ECHOES)?;
+    let config = PixelConfig::with_rule(rule)
+        .x(settings.x)
+        .l1(settings.l1)
+        .l2(settings.l2)
+        .gate(gate)
+        .estimator(estimator)
+        .one_hit_tdc(settings.one_hit_tdc != 0)
+        .tracking(tracking)
+        .echoes(echoes, settings.peel_reach)
+        .echo_wait(settings.echo_wait);
+    Ok(config.build()?)
+}

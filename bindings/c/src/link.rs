@@ -1,0 +1,302 @@
+//! The device's end of the link: messages arrive whole, once and in order.
+
+use dtof_link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
+use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_link::message;
+
+use crate::memory::{
+    Tagged, all_plain, array_mut, check, holds, initialise, put, status, tagged, tagged_mut,
+};
+use crate::status::dtof_status_t;
+use crate::status::dtof_status_t::{
+    DTOF_ERROR_FULL, DTOF_ERROR_MESSAGE_KIND, DTOF_ERROR_MESSAGE_LENGTH, DTOF_ERROR_NO_MESSAGE,
+};
+use crate::version::dtof_bins;
+
+/// Bytes of a frame on the wire, at most.
+pub const DTOF_WIRE_BYTES: usize = 256;
+const _: () = assert!(DTOF_WIRE_BYTES == WIRE_BYTES);
+/// Bytes of a message, at most: 15 words of events.
+pub const DTOF_BODY_BYTES: usize = 244;
+const _: () = assert!(DTOF_BODY_BYTES == BODY_BYTES);
+
+/// From the host: a configuration, for dtof_device_config_read. Answer it with CONFIGURED or
+/// REFUSED.
+pub const DTOF_MESSAGE_CONFIGURE: u8 = 0x01;
+/// From the host: photons. A device with a sensor has no use for them.
+pub const DTOF_MESSAGE_PHOTONS: u8 = 0x02;
+/// From the host: answer it with SYNCHRONISED and the same body, after all events before it.
+pub const DTOF_MESSAGE_SYNCHRONISE: u8 = 0x03;
+/// From the host: answer it with STATISTICS and what dtof_report_write gives.
+pub const DTOF_MESSAGE_STATISTICS_REQUEST: u8 = 0x04;
+/// From the host: answer it with SENSOR and what dtof_sensor_write gives.
+pub const DTOF_MESSAGE_SENSOR_REQUEST: u8 = 0x05;
+/// To the host: the configuration is in force. No body.
+pub const DTOF_MESSAGE_CONFIGURED: u8 = 0x81;
+/// To the host: it is not. One byte, from dtof_refusal_of.
+pub const DTOF_MESSAGE_REFUSED: u8 = 0x82;
+/// To the host: words of 16 bytes, up to 15 of them, as dtof_aer_encode gives them.
+pub const DTOF_MESSAGE_EVENTS: u8 = 0x83;
+/// To the host: all before is done.
+pub const DTOF_MESSAGE_SYNCHRONISED: u8 = 0x84;
+/// To the host: statistics.
+pub const DTOF_MESSAGE_STATISTICS: u8 = 0x85;
+/// To the host: what the sensor is.
+pub const DTOF_MESSAGE_SENSOR: u8 = 0x86;
+const _: () = assert!(
+    DTOF_MESSAGE_CONFIGURE == message::CONFIGURE
+        && DTOF_MESSAGE_PHOTONS == message::PHOTONS
+        && DTOF_MESSAGE_SYNCHRONISE == message::SYNCHRONISE
+        && DTOF_MESSAGE_STATISTICS_REQUEST == message::STATISTICS_REQUEST
+        && DTOF_MESSAGE_SENSOR_REQUEST == message::SENSOR_REQUEST
+        && DTOF_MESSAGE_CONFIGURED == message::CONFIGURED
+        && DTOF_MESSAGE_REFUSED == message::REFUSED
+        && DTOF_MESSAGE_EVENTS == message::EVENTS
+        && DTOF_MESSAGE_SYNCHRONISED == message::SYNCHRONISED
+        && DTOF_MESSAGE_STATISTICS == message::STATISTICS
+        && DTOF_MESSAGE_SENSOR == message::SENSOR
+);
+
+/// Kinds from here on are no messages.
+const FIRST_UNNUMBERED: u8 = 0xf0;
+
+/// Bytes of a dtof_link_t.
+pub const DTOF_LINK_SIZE: usize = 2520;
+/// The same in words of 64 bits.
+pub const DTOF_LINK_WORDS: usize = DTOF_LINK_SIZE / 8;
+/// Its alignment.
+pub const DTOF_LINK_ALIGN: usize = 8;
+
+/// The device's end of a link to a host such as `dtof monitor`. dtof_link_init makes it. It must
+/// not be copied while it is in use. One thread or interrupt at a time may use it.
+#[repr(C)]
+pub struct dtof_link_t {
+    opaque: [u64; DTOF_LINK_WORDS],
+}
+
+/// What a dtof_link_t holds.
+pub(crate) struct Link {
+    pub(crate) endpoint: Endpoint,
+    deframer: Deframer,
+}
+
+// Of 32 bits it is smaller.
+holds!(dtof_link_t, Tagged<Link>, size DTOF_LINK_SIZE, align DTOF_LINK_ALIGN, waste 160);
+
+/// A message of the host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub struct dtof_message_t {
+    /// DTOF_MESSAGE_...
+    pub kind: u8,
+    /// Bytes of the body.
+    pub length: u8,
+    /// The body; 0 after its end.
+    pub body: [u8; DTOF_BODY_BYTES],
+}
+
+/// How a link is. The counters are since it was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub struct dtof_link_state_t {
+    /// Frames received whole.
+    pub frames: u32,
+    /// Frames that were damaged.
+    pub corrupt: u32,
+    /// Frames longer than a frame can be.
+    pub oversized: u32,
+    /// Frames of another session.
+    pub foreign: u32,
+    /// Messages dropped because one before them is missing; they come again.
+    pub out_of_order: u32,
+    /// Messages that had arrived before.
+    pub duplicate: u32,
+    /// Messages sent again.
+    pub retransmitted: u32,
+    /// 1 if there is a session.
+    pub is_open: u8,
+    /// 1 if dtof_link_offer has room.
+    pub has_room: u8,
+    /// 1 if the host has everything that was offered.
+    pub is_settled: u8,
+}
+
+/// Waits for a host. `pixels` is how many this device has room for. `size` is `sizeof *link`.
+///
+/// Errors: DTOF_ERROR_SIZE, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+/// Threads: nobody else uses `link` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_link_init(
+    link: *mut dtof_link_t,
+    size: usize,
+    pixels: u16,
+) -> dtof_status_t {
+    status(|| {
+        let made = Link {
+            endpoint: Endpoint::device(message::greeting(dtof_bins(), pixels)),
+            deframer: Deframer::new(),
+        };
+        // SAFETY: the caller's promise, see the crate.
+        unsafe { initialise(link, size, Tagged::new(made)) }
+    })
+}
+
+/// Takes `length` bytes that have come over the wire. `now_ms` is a clock of milliseconds that
+/// may wrap. `began` gets 1 if a session has begun: forget configuration, events and statistics
+/// of the one before. Else it gets 0.
+///
+/// Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: nobody else uses `link` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_link_receive(
+    link: *mut dtof_link_t,
+    bytes: *const u8,
+    length: usize,
+    now_ms: u32,
+    began: *mut u8,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let (link, bytes) = unsafe { (tagged_mut(link)?, all_plain(bytes, length)?) };
+        // Before a byte is taken.
+        check(began)?;
+        for &byte in bytes {
+            if let Some(frame) = link.deframer.push(byte) {
+                link.endpoint.receive(frame, now_ms);
+            }
+        }
+        // SAFETY: the same promise.
+        unsafe { put(began, link.endpoint.take_began().into()) }
+    })
+}
+
+/// The next bytes to put on the wire: `wire` has room for DTOF_WIRE_BYTES, `length` gets how
+/// many there are, 0 if none are due. Call it until then, and again at least every 10 ms.
+///
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: nobody else uses `link` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_link_transmit(
+    link: *mut dtof_link_t,
+    now_ms: u32,
+    wire: *mut u8,
+    length: *mut usize,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let (link, wire) = unsafe { (tagged_mut(link)?, array_mut(wire)?) };
+        // Before a frame is taken for sent.
+        check(length)?;
+        let number = link.endpoint.transmit(now_ms, wire);
+        // SAFETY: the same promise.
+        unsafe { put(length, number) }
+    })
+}
+
+/// The kind of the host's next message, which stays where it is.
+///
+/// Errors: DTOF_ERROR_NO_MESSAGE, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
+/// DTOF_ERROR_NOT_INITIALISED.
+/// Threads: nobody else uses `link` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_link_peek(link: *const dtof_link_t, kind: *mut u8) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let next = unsafe { tagged(link)? }.endpoint.peek();
+        // SAFETY: the same promise.
+        unsafe { put(kind, next.ok_or(DTOF_ERROR_NO_MESSAGE)?.kind) }
+    })
+}
+
+/// Takes the host's next message. The host sends no more than four that are not taken.
+///
+/// Errors: DTOF_ERROR_NO_MESSAGE, DTOF_ERROR_NULL, DTOF_ERROR_NOT_INITIALISED,
+/// DTOF_ERROR_ALIGNMENT.
+/// Threads: nobody else uses `link` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_link_take(
+    link: *mut dtof_link_t,
+    message: *mut dtof_message_t,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let link = unsafe { tagged_mut(link)? };
+        let next = link.endpoint.peek().ok_or(DTOF_ERROR_NO_MESSAGE)?;
+        let mut taken = dtof_message_t {
+            kind: next.kind,
+            length: u8::try_from(next.body.len()).unwrap_or(u8::MAX),
+            body: [0; DTOF_BODY_BYTES],
+        };
+        for (place, &byte) in taken.body.iter_mut().zip(&next.body) {
+            *place = byte;
+        }
+        // SAFETY: the same promise. Before the message is gone.
+        unsafe { put(message, taken)? };
+        let _ = link.endpoint.take();
+        Ok(())
+    })
+}
+
+/// Sends a message, sooner or later, whole, once and in order. `kind` is one of
+/// DTOF_MESSAGE_..., `body` has `length` bytes, up to DTOF_BODY_BYTES.
+///
+/// Errors: DTOF_ERROR_FULL if four are under way: offer it again later. DTOF_ERROR_MESSAGE_KIND,
+/// DTOF_ERROR_MESSAGE_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: nobody else uses `link` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_link_offer(
+    link: *mut dtof_link_t,
+    kind: u8,
+    body: *const u8,
+    length: usize,
+) -> dtof_status_t {
+    status(|| {
+        if kind >= FIRST_UNNUMBERED {
+            return Err(DTOF_ERROR_MESSAGE_KIND);
+        }
+        if length > DTOF_BODY_BYTES {
+            return Err(DTOF_ERROR_MESSAGE_LENGTH);
+        }
+        // SAFETY: the caller's promise, see the crate.
+        let (link, body) = unsafe { (tagged_mut(link)?, all_plain(body, length)?) };
+        link.endpoint.offer(kind, body).map_err(|_| DTOF_ERROR_FULL)
+    })
+}
+
+/// How the link is.
+///
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: nobody else uses `link` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_link_state(
+    link: *const dtof_link_t,
+    state: *mut dtof_link_state_t,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let endpoint = &unsafe { tagged(link)? }.endpoint;
+        let LinkCounters {
+            frames,
+            corrupt,
+            oversized,
+            foreign,
+            out_of_order,
+            duplicate,
+            retransmitted,
+        } = *endpoint.counters();
+        let now = dtof_link_state_t {
+            frames,
+            corrupt,
+            oversized,
+            foreign,
+            out_of_order,
+            duplicate,
+            retransmitted,
+            is_open: endpoint.is_open().into(),
+            has_room: endpoint.has_room().into(),
+            is_settled: endpoint.is_settled().into(),
+        };
+        // SAFETY: the same promise.
+        unsafe { put(state, now) }
+    })
+}

@@ -1,0 +1,250 @@
+//! Pixels: they count photons, look at the end of laser cycles, and report events.
+
+use dtof_core::{AsyncPixel, LaserCycle, Look, PixelAddress};
+
+use crate::config::dtof_checked_config_t;
+use crate::event::dtof_event_t;
+use crate::memory::{
+    all_exclusive, all_plain, check, exclusive, holds, initialise, put, shared, status, tagged,
+};
+use crate::statistics::dtof_statistics_t;
+use crate::status::dtof_status_t;
+use crate::status::dtof_status_t::{DTOF_ERROR_LENGTH, DTOF_ERROR_NO_EVENT};
+use crate::version::DTOF_BINS;
+
+/// Bytes of a dtof_pixel_t.
+pub const DTOF_PIXEL_SIZE: usize = 72 + 2 * DTOF_BINS;
+/// The same in words of 64 bits.
+pub const DTOF_PIXEL_WORDS: usize = DTOF_PIXEL_SIZE / 8;
+/// Its alignment.
+pub const DTOF_PIXEL_ALIGN: usize = 8;
+
+/// A macropixel: a histogram of DTOF_BINS counters of 10 bits, its exposure, and a slot for one
+/// event. dtof_pixel_init makes it.
+///
+/// One thread or interrupt at a time may use a pixel. Different pixels are independent.
+#[repr(C)]
+pub struct dtof_pixel_t {
+    opaque: [u64; DTOF_PIXEL_WORDS],
+}
+
+type Pixel = AsyncPixel<DTOF_BINS>;
+
+// Any bytes are a pixel: all of its fields are integers.
+holds!(dtof_pixel_t, Pixel, size DTOF_PIXEL_SIZE, align DTOF_PIXEL_ALIGN, waste 1);
+
+/// What the end of laser cycles brought.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum dtof_look_t {
+    /// Fewer than X laser cycles since the last look: none was taken.
+    DTOF_LOOK_NOT_DUE = 0,
+    /// The exposure has not exceeded L1.
+    DTOF_LOOK_TOO_EARLY = 1,
+    /// The peak does not stand clear; the exposure goes on.
+    DTOF_LOOK_NO_PEAK = 2,
+    /// The slot still holds an event: the decision is put off by X laser cycles.
+    DTOF_LOOK_DEFERRED = 3,
+    /// An event is in the slot.
+    DTOF_LOOK_EVENT = 4,
+    /// The exposure reached L2 without an event: a new one begins.
+    DTOF_LOOK_EXPIRED = 5,
+    /// The pixel has waited for another echo long enough: a new exposure begins.
+    DTOF_LOOK_ENDED = 6,
+}
+
+impl From<Look> for dtof_look_t {
+    #[inline(always)]
+    fn from(look: Look) -> Self {
+        match look {
+            Look::NotDue => Self::DTOF_LOOK_NOT_DUE,
+            Look::TooEarly => Self::DTOF_LOOK_TOO_EARLY,
+            Look::NoPeak => Self::DTOF_LOOK_NO_PEAK,
+            Look::Deferred => Self::DTOF_LOOK_DEFERRED,
+            Look::Event => Self::DTOF_LOOK_EVENT,
+            Look::Expired => Self::DTOF_LOOK_EXPIRED,
+            Look::Ended => Self::DTOF_LOOK_ENDED,
+        }
+    }
+}
+
+/// Makes an empty pixel at the beginning of its first exposure. `size` is `sizeof *pixel`.
+///
+/// Errors: DTOF_ERROR_SIZE if the library was built for another number of bins,
+/// DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+/// Threads: nobody else uses `pixel` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_pixel_init(
+    pixel: *mut dtof_pixel_t,
+    size: usize,
+    address: u16,
+) -> dtof_status_t {
+    // SAFETY: the caller's promise, see the crate.
+    status(|| unsafe { initialise(pixel, size, Pixel::new(PixelAddress(address))) })
+}
+
+/// Counts one photon of the present laser cycle. `code` is its bin, as the TDC gives it. One of
+/// DTOF_BINS or more is counted as rejected, one outside the gate as gated out, one that meets a
+/// full counter as saturated.
+///
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED (of `config`).
+/// Threads: nobody else uses `pixel` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_pixel_count(
+    pixel: *mut dtof_pixel_t,
+    config: *const dtof_checked_config_t,
+    code: u16,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let (pixel, config) = unsafe { (exclusive(pixel)?, tagged(config)?) };
+        pixel.count(config, code);
+        Ok(())
+    })
+}
+
+/// Counts `number` photons as dtof_pixel_count does, in a third of the time.
+///
+/// Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
+/// DTOF_ERROR_NOT_INITIALISED (of `config`). `codes` may be null if `number` is 0.
+/// Threads: nobody else uses `pixel` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_pixel_count_batch(
+    pixel: *mut dtof_pixel_t,
+    config: *const dtof_checked_config_t,
+    codes: *const u16,
+    number: usize,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let (pixel, config) = unsafe { (exclusive(pixel)?, tagged(config)?) };
+        // SAFETY: the same promise.
+        let codes = unsafe { all_plain(codes, number)? };
+        pixel.count_batch(config, codes);
+        Ok(())
+    })
+}
+
+/// Counts a histogram over one or more laser cycles: `counts` are DTOF_BINS numbers of photons.
+/// End as many laser cycles after it.
+///
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED (of `config`).
+/// Threads: nobody else uses `pixel` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_pixel_count_frame(
+    pixel: *mut dtof_pixel_t,
+    config: *const dtof_checked_config_t,
+    counts: *const u16,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let (pixel, config) = unsafe { (exclusive(pixel)?, tagged(config)?) };
+        // SAFETY: the same promise.
+        let counts = unsafe { all_plain(counts, DTOF_BINS)? };
+        let counts = counts.as_array().ok_or(DTOF_ERROR_LENGTH)?;
+        pixel.count_frame(config, counts);
+        Ok(())
+    })
+}
+
+/// Ends `cycles` laser cycles of a pixel, the last of which is number `last`, and looks at its
+/// histogram if X or more have passed since the last look. `look` gets what that brought; it may
+/// be null.
+///
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED (of `config`).
+/// Threads: nobody else uses `pixel` or `statistics` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_pixel_end_laser_cycles(
+    pixel: *mut dtof_pixel_t,
+    config: *const dtof_checked_config_t,
+    last: u64,
+    statistics: *mut dtof_statistics_t,
+    cycles: u16,
+    look: *mut dtof_look_t,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let (pixel, config) = unsafe { (exclusive(pixel)?, tagged(config)?) };
+        // SAFETY: the same promise; any bytes are statistics.
+        let statistics = unsafe { exclusive(statistics)? };
+        let brought = pixel.end_laser_cycles(config, statistics, LaserCycle(last), cycles);
+        if look.is_null() {
+            return Ok(());
+        }
+        // SAFETY: the same promise.
+        unsafe { put(look, brought.into()) }
+    })
+}
+
+/// The same for `number` pixels in a row: checks once for all of them. `fired` gets how many
+/// have a new event in their slot; it may be null.
+///
+/// Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
+/// DTOF_ERROR_NOT_INITIALISED (of `config`).
+/// Threads: nobody else uses the pixels or `statistics` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_pixels_end_laser_cycles(
+    pixels: *mut dtof_pixel_t,
+    number: usize,
+    last: u64,
+    config: *const dtof_checked_config_t,
+    statistics: *mut dtof_statistics_t,
+    cycles: u16,
+    fired: *mut usize,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let (pixels, config) = unsafe { (all_exclusive(pixels, number)?, tagged(config)?) };
+        // SAFETY: the same promise; any bytes are statistics.
+        let statistics = unsafe { exclusive(statistics)? };
+        let mut events = 0;
+        for pixel in pixels {
+            let look = pixel.end_laser_cycles(config, statistics, LaserCycle(last), cycles);
+            events += usize::from(look == Look::Event);
+        }
+        if fired.is_null() {
+            return Ok(());
+        }
+        // SAFETY: the same promise.
+        unsafe { put(fired, events) }
+    })
+}
+
+/// Takes the event that waits in the slot, so that the pixel may fire again. Until then the
+/// pixel counts on and puts its decisions off.
+///
+/// Errors: DTOF_ERROR_NO_EVENT, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+/// Threads: nobody else uses `pixel` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_pixel_take_event(
+    pixel: *mut dtof_pixel_t,
+    event: *mut dtof_event_t,
+) -> dtof_status_t {
+    status(|| {
+        // Before an event is taken.
+        check(event)?;
+        // SAFETY: the caller's promise, see the crate.
+        let pixel = unsafe { exclusive(pixel)? };
+        let taken = pixel.acknowledge().ok_or(DTOF_ERROR_NO_EVENT)?;
+        // SAFETY: the same promise.
+        unsafe { put(event, (&taken).into()) }
+    })
+}
+
+/// Adds the photons of the present exposure to `statistics`: those of exposures that have ended
+/// are there already. Do that in a copy, or once at the very end.
+///
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+/// Threads: nobody else uses `pixel` or `statistics` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_pixel_add_photons(
+    pixel: *const dtof_pixel_t,
+    statistics: *mut dtof_statistics_t,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let (pixel, statistics) = unsafe { (shared(pixel)?, exclusive(statistics)?) };
+        pixel.add_photons_to(statistics);
+        Ok(())
+    })
+}

@@ -1,0 +1,263 @@
+//! A device in C and a host of `dtof-link`.
+
+use dtof_c::dtof_status_t::*;
+use dtof_c::*;
+use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
+use dtof_core::{
+    AnyRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, WindowRule,
+};
+use dtof_link::endpoint::Endpoint;
+use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_link::message::{self, greeting};
+use dtof_link::{AdaptiveBinning, Configuration, DynamicDepth, Report, SensorRecord, Source};
+
+use crate::{OK, checked, zeroed};
+
+/// A host, a device, and the wire between them.
+struct Pair {
+    host: Endpoint,
+    deframer: Deframer,
+    device: dtof_link_t,
+    began: u32,
+    now_ms: u32,
+}
+
+impl Pair {
+    fn new() -> Self {
+        let mut device = zeroed();
+        // SAFETY: the pointer leads to a link.
+        let status = unsafe { dtof_link_init(&mut device, size_of::<dtof_link_t>(), 64) };
+        assert_eq!(status, OK);
+        let mut pair = Self {
+            host: Endpoint::host(7, greeting(0, 0), 0),
+            deframer: Deframer::new(),
+            device,
+            began: 0,
+            now_ms: 0,
+        };
+        pair.carry();
+        assert!(pair.host.is_open());
+        assert_eq!(
+            (pair.began, pair.host.peer_greeting()),
+            (1, &greeting(128, 64))
+        );
+        pair
+    }
+
+    /// Lets half a second pass.
+    fn carry(&mut self) {
+        for _ in 0..50 {
+            self.now_ms += 10;
+            let (mut wire, mut began) = ([0; WIRE_BYTES], 0);
+            let length = self.host.transmit(self.now_ms, &mut wire);
+            // SAFETY: each pointer leads to what it should.
+            unsafe {
+                let (device, bytes) = (&mut self.device, wire.as_ptr());
+                let status = dtof_link_receive(device, bytes, length, self.now_ms, &mut began);
+                assert_eq!(status, OK);
+                self.began += u32::from(began);
+                let mut length = 0;
+                let (device, room) = (&mut self.device, wire.as_mut_ptr());
+                assert_eq!(
+                    dtof_link_transmit(device, self.now_ms, room, &mut length),
+                    OK
+                );
+                for &byte in &wire[..length] {
+                    if let Some(frame) = self.deframer.push(byte) {
+                        self.host.receive(frame, self.now_ms);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The next message of the host.
+    fn take(&mut self) -> Option<(u8, Vec<u8>)> {
+        let (mut message, mut kind) = (zeroed::<dtof_message_t>(), 0);
+        // SAFETY: each pointer leads to what it should.
+        unsafe {
+            let peeked = dtof_link_peek(&self.device, &mut kind);
+            let status = dtof_link_take(&mut self.device, &mut message);
+            assert_eq!(peeked, status);
+            if status == DTOF_ERROR_NO_MESSAGE {
+                return None;
+            }
+            assert_eq!((status, kind), (OK, message.kind));
+        }
+        Some((kind, message.body[..message.length.into()].to_vec()))
+    }
+
+    fn offer(&mut self, kind: u8, body: &[u8]) -> dtof_status_t {
+        // SAFETY: both pointers lead to what they should.
+        unsafe { dtof_link_offer(&mut self.device, kind, body.as_ptr(), body.len()) }
+    }
+
+    fn state(&self) -> dtof_link_state_t {
+        let mut state = dtof_link_state_t::default();
+        // SAFETY: both pointers lead to what they should.
+        assert_eq!(unsafe { dtof_link_state(&self.device, &mut state) }, OK);
+        state
+    }
+}
+
+fn configuration() -> Configuration {
+    let rule = WindowRule::new(3, U4F12::lit("4.47"), Count::saturating(5)).unwrap();
+    let window = CentredWindow::with_sides(U8F8::lit("1.75"), U8F8::lit("4")).unwrap();
+    Configuration {
+        rule: AnyRule::Window(rule),
+        estimator: DepthEstimator::CentredWindow(window),
+        x: 5,
+        l1: 41,
+        l2: 1999,
+        gate: (3, 120),
+        one_hit_tdc: true,
+        pixels: 9,
+        columns: 3,
+        binning: None,
+        tracking: true,
+        echoes: EchoNumber::LAST,
+        peel_reach: 6,
+        echo_wait: 4,
+        bin_width_ps: U16F16::lit("97.5"),
+        offset_mm: I24F8::lit("-12.5"),
+        source: Source::Sensor,
+        dynamic_depth: None,
+    }
+}
+
+fn read(body: &[u8]) -> Result<dtof_device_config_t, dtof_status_t> {
+    let mut config = dtof_device_config_t::default();
+    // SAFETY: both pointers lead to what they should.
+    match unsafe { dtof_device_config_read(body.as_ptr(), body.len(), &mut config) } {
+        OK => Ok(config),
+        error => Err(error),
+    }
+}
+
+#[test]
+fn messages_go_both_ways_whole_once_and_in_order() {
+    let mut pair = Pair::new();
+    for number in 0..4 {
+        assert_eq!(pair.offer(DTOF_MESSAGE_EVENTS, &[number; 240]), OK);
+    }
+    assert_eq!(pair.offer(DTOF_MESSAGE_EVENTS, &[4]), DTOF_ERROR_FULL);
+    assert_eq!((pair.state().has_room, pair.state().is_settled), (0, 0));
+    let record = configuration().to_le_bytes();
+    pair.host.offer(message::CONFIGURE, &record).unwrap();
+    pair.host.offer(message::SYNCHRONISE, &[1, 2, 3]).unwrap();
+    pair.carry();
+    for number in 0..4 {
+        let message = pair.host.take().unwrap();
+        assert_eq!(
+            (message.kind, &message.body[..]),
+            (message::EVENTS, &[number; 240][..])
+        );
+    }
+    assert_eq!(
+        pair.take().unwrap(),
+        (DTOF_MESSAGE_CONFIGURE, record.to_vec())
+    );
+    assert_eq!(
+        pair.take().unwrap(),
+        (DTOF_MESSAGE_SYNCHRONISE, vec![1, 2, 3])
+    );
+    assert_eq!(pair.take(), None);
+    pair.carry();
+    let state = pair.state();
+    assert_eq!((state.is_open, state.has_room, state.is_settled), (1, 1, 1));
+    assert!(state.frames > 2 && state.corrupt == 0);
+}
+
+#[test]
+fn the_hosts_configuration_becomes_settings() {
+    let config = read(&configuration().to_le_bytes()).unwrap();
+    let expected = dtof_device_config_t {
+        pixel: dtof_config_t {
+            minimum_count: 5,
+            alpha_q8: 0,
+            z_q12: U4F12::lit("4.47").to_bits(),
+            x: 5,
+            l1: 41,
+            l2: 1999,
+            gate_first: 3,
+            gate_last: 120,
+            before_q8: 448,
+            after_q8: 1024,
+            rule: DTOF_RULE_WINDOW,
+            window: 3,
+            estimator: DTOF_ESTIMATOR_CENTRED_WINDOW,
+            one_hit_tdc: 1,
+            tracking: 1,
+            echoes: 4,
+            peel_reach: 6,
+            echo_wait: 4,
+        },
+        bin_width_ps_q16: 97 * 65536 + 32768,
+        offset_mm_q8: -3200,
+        pixels: 9,
+        source: DTOF_SOURCE_SENSOR,
+    };
+    assert_eq!(config, expected);
+    assert!(checked(&config.pixel).is_ok());
+}
+
+#[test]
+fn what_this_library_does_not_have_is_refused() {
+    let good = configuration();
+    let binning = Some(AdaptiveBinning {
+        levels: BlockLevel::MAX,
+        patience: 64,
+    });
+    let dynamic_depth = Some(DynamicDepth::default());
+    let blocks = Configuration { binning, ..good };
+    let changes = Configuration {
+        dynamic_depth,
+        ..good
+    };
+    assert_eq!(read(&blocks.to_le_bytes()), Err(DTOF_ERROR_BLOCKS));
+    assert_eq!(read(&changes.to_le_bytes()), Err(DTOF_ERROR_CONFIGURATION));
+    assert_eq!(
+        read(&good.to_le_bytes()[1..]),
+        Err(DTOF_ERROR_CONFIGURATION)
+    );
+}
+
+#[test]
+fn records_are_those_of_the_link() {
+    let mut pair = Pair::new();
+    pair.carry();
+    let (mut sensor, mut body) = ([9; DTOF_SENSOR_BYTES], [9; DTOF_REPORT_BYTES]);
+    let report = dtof_report_t {
+        cycles: 1 << 40,
+        unaddressed: 2,
+        overrun: 3,
+        unknown: 4,
+        sensor_errors: 5,
+        last_sensor_error: 6,
+    };
+    let done: dtof_statistics_t = zeroed();
+    // SAFETY: each pointer leads to what it should.
+    unsafe {
+        let room = sensor.as_mut_ptr();
+        assert_eq!(dtof_sensor_write(9, 250 << 16, 1_000_000, -256, room), OK);
+        let room = body.as_mut_ptr();
+        assert_eq!(dtof_report_write(&report, &done, &pair.device, room), OK);
+    }
+    let expected = SensorRecord {
+        pixels: 9,
+        bin_width: Some(U16F16::lit("250")),
+        offset: I24F8::lit("-1"),
+        laser_millihertz: 1_000_000,
+    };
+    assert_eq!(SensorRecord::from_le_bytes(&sensor), Some(Some(expected)));
+    let read = Report::from_le_bytes(&body).unwrap();
+    assert_eq!(
+        (read.cycles, read.unaddressed, read.overrun),
+        (1 << 40, 2, 3)
+    );
+    assert_eq!(
+        (read.unknown, read.sensor_errors, read.last_sensor_error),
+        (4, 5, 6)
+    );
+    assert_eq!(read.link.frames, pair.state().frames);
+}

@@ -1,0 +1,48 @@
+//! The header is that of the sources, and its sizes are those of the types.
+
+use std::env;
+use std::fs;
+use std::path::Path;
+
+use cbindgen::{Builder, Config};
+
+/// In the order of the header.
+const SOURCES: [&str; 11] = [
+    "version",
+    "status",
+    "config",
+    "event",
+    "statistics",
+    "range",
+    "pixel",
+    "histogram",
+    "aer",
+    "link",
+    "records",
+];
+fn made() -> String {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let config = Config::from_file(here.join("cbindgen.toml")).unwrap();
+    let mut builder = Builder::new().with_config(config);
+    for source in SOURCES {
+        builder = builder.with_src(here.join("src").join(format!("{source}.rs")));
+    }
+    let mut header = Vec::new();
+    builder.generate().unwrap().write(&mut header);
+    String::from_utf8(header).unwrap()
+}
+
+#[test]
+fn the_header_is_made_of_the_sources() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("include/dtof.h");
+    let made = made();
+    if env::var_os("DTOF_BLESS").is_some() {
+        fs::write(&path, made).unwrap();
+        return;
+    }
+    let committed = fs::read_to_string(&path).unwrap();
+    assert!(
+        committed == made,
+        "include/dtof.h is not that of src: `cargo xtask c-bindings --bless` writes it"
+    );
+}
