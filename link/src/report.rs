@@ -87,7 +87,12 @@ impl Report {
         let (wide, narrow) = self.numbers();
         let wide = wide.into_iter().flat_map(|number| number.to_le_bytes());
         let narrow = narrow.into_iter().flat_map(|number| number.to_le_bytes());
-        wide.chain(narrow).chain(last).collect()
+        let mut bytes = Vec::new();
+        for byte in wide.chain(narrow).chain(last) {
+            // There is room for each. `collect` would panic otherwise.
+            let _ = bytes.push(byte);
+        }
+        bytes
     }
 
     /// Reads the record. `None` if the length is wrong.

@@ -1,16 +1,15 @@
 //! `cargo xtask`: what set-up, images and their checks need beyond cargo itself.
 
 mod bench;
+mod c_bindings;
 mod emulate;
 mod firmware;
 mod flash;
 mod image;
-mod panics;
 mod python;
 mod qemu;
 mod self_test;
 mod sizes;
-mod symbols;
 mod toolchain;
 mod tools;
 
@@ -48,6 +47,9 @@ cargo xtask <command>
   bench [--check]
                 count the instructions of the core's operations in QEMU and write
                 docs/results/bench/instructions.csv; --check compares with the file instead
+  c-bindings [--bless]
+                build bindings/c and its examples, run them here and in QEMU, and compare
+                them with Rust; --bless writes the header and the figures of its README
   python FILE   install the packages of a requirements file below the build folder
                 and print the path of a Python that has them";
 
@@ -83,7 +85,7 @@ fn run() -> Result<()> {
     let mut words = Vec::new();
     while let Some(argument) = parser.next()? {
         match (&*command, argument) {
-            ("self-test", Long("bless")) => options.bless = true,
+            ("self-test" | "c-bindings", Long("bless")) => options.bless = true,
             ("bench", Long("check")) => options.check = true,
             ("flash", Long("chip")) => options.chip = Some(parser.value()?.string()?),
             ("image", Long("emulator")) => options.emulator = true,
@@ -120,6 +122,7 @@ fn run() -> Result<()> {
         ("self-test", []) => self_test::check(root)?,
         ("bench", []) if options.check => bench::check(root)?,
         ("bench", []) => bench::run(root)?,
+        ("c-bindings", []) => c_bindings::check(root, options.bless)?,
         ("python", &[requirements]) => {
             println!("{}", python::environment(root, requirements)?.display());
         }

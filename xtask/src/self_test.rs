@@ -9,7 +9,7 @@ use anyhow::{Context, Result, ensure};
 use crate::firmware::{Board, Build};
 use crate::qemu;
 
-const EXPECTED: &str = "firmware/self-test.out";
+pub const EXPECTED: &str = "firmware/self-test.out";
 
 /// Runs the image of each board in QEMU and compares.
 pub fn check(root: &Path) -> Result<()> {
@@ -53,7 +53,7 @@ fn lines(board: Board, root: &Path) -> Result<String> {
 }
 
 /// Lines that differ, each as it should be and as it is.
-fn differences(expected: &str, found: &str) -> Vec<String> {
+pub fn differences(expected: &str, found: &str) -> Vec<String> {
     let (mut expected_lines, mut found_lines) = (expected.lines(), found.lines());
     let mut differences = Vec::new();
     for number in 1.. {

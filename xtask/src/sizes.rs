@@ -104,13 +104,14 @@ fn memory(path: &Path, name: &str) -> Result<u64> {
 
 /// Bytes an image takes.
 #[derive(Default)]
-struct Sizes {
-    flash: u64,
-    ram: u64,
+pub struct Sizes {
+    pub flash: u64,
+    pub ram: u64,
 }
 
 impl Sizes {
-    fn read(path: &Path) -> Result<Self> {
+    /// Those of an image.
+    pub fn read(path: &Path) -> Result<Self> {
         let bytes = fs::read(path).with_context(|| path.display().to_string())?;
         let file = ElfFile32::<object::Endianness>::parse(&*bytes)
             .with_context(|| path.display().to_string())?;

@@ -36,6 +36,11 @@ pub const QEMU: Tool = tool("qemu-system-arm", Packages("qemu-system-arm"));
 pub const DEFMT_PRINT: Tool = tool("defmt-print", Crate("defmt-print"));
 pub const PROBE_RS: Tool = tool("probe-rs", LargeCrate("probe-rs-tools"));
 
+/// For `cargo xtask c-bindings`.
+pub const CXX: Tool = tool("g++", Packages("g++"));
+pub const CMAKE: Tool = tool("cmake", Packages("cmake make"));
+pub const ARM_GCC: Tool = tool("arm-none-eabi-gcc", Packages("gcc-arm-none-eabi"));
+
 /// For the readers of exported files: with what makes virtual environments, and the headers
 /// that a package may be compiled with, which Debian has apart.
 pub const PYTHON: Tool = Tool {
@@ -47,8 +52,11 @@ pub const PYTHON: Tool = Tool {
 };
 
 /// Every tool that [`set_up`] installs.
-const ALL: [Tool; 8] = [
+const ALL: [Tool; 11] = [
     QEMU,
+    CXX,
+    CMAKE,
+    ARM_GCC,
     // For `cargo softcore`, the last for whether a memory becomes block RAM.
     tool("qemu-system-riscv32", Packages("qemu-system-misc")),
     tool("verilator", Packages("verilator g++ make")),

@@ -3,7 +3,7 @@
 //! A type of the header whose fields are nobody's business holds one of Rust's. [`holds`] says
 //! which, and does not compile if that does not fit.
 
-use core::slice;
+use core::{hint, slice};
 
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{
@@ -35,6 +35,7 @@ macro_rules! holds {
 pub(crate) use holds;
 
 /// A value that is only valid if it was written as a whole: its memory may hold anything before.
+#[repr(C)]
 pub(crate) struct Tagged<T> {
     tag: u32,
     value: T,
@@ -49,14 +50,21 @@ impl<T> Tagged<T> {
     }
 }
 
+/// An error, by a way that costs the usual one nothing: the compiler puts it elsewhere.
+#[cold]
+#[inline(never)]
+fn refused(error: dtof_status_t) -> dtof_status_t {
+    hint::black_box(error)
+}
+
 /// Whether a value may lie there.
 #[inline(always)]
 pub(crate) fn check<T>(pointer: *const T) -> Result<(), dtof_status_t> {
     if pointer.is_null() {
-        return Err(DTOF_ERROR_NULL);
+        return Err(refused(DTOF_ERROR_NULL));
     }
     if !pointer.is_aligned() {
-        return Err(DTOF_ERROR_ALIGNMENT);
+        return Err(refused(DTOF_ERROR_ALIGNMENT));
     }
     Ok(())
 }
@@ -112,7 +120,7 @@ pub(crate) unsafe fn all_exclusive<'a, C: Holds>(
 fn check_number<T>(number: usize) -> Result<(), dtof_status_t> {
     let bytes = number.checked_mul(size_of::<T>());
     if bytes.is_none_or(|bytes| isize::try_from(bytes).is_err()) {
-        return Err(DTOF_ERROR_LENGTH);
+        return Err(refused(DTOF_ERROR_LENGTH));
     }
     Ok(())
 }
@@ -129,7 +137,7 @@ pub(crate) unsafe fn tagged<'a, T: 'a, C: Holds<Inside = Tagged<T>>>(
     check(inside)?;
     // SAFETY: as in `shared`; only the tag is read, which any bytes are a value of.
     if unsafe { (&raw const (*inside).tag).read() } != TAG {
-        return Err(DTOF_ERROR_NOT_INITIALISED);
+        return Err(refused(DTOF_ERROR_NOT_INITIALISED));
     }
     // SAFETY: with its tag the whole value was written.
     Ok(unsafe { &(*inside).value })

@@ -8,6 +8,9 @@
 //! search through the instructions of thumbv7em would, and needs no
 //! disassembler.
 
+mod panics;
+pub mod symbols;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -15,7 +18,7 @@ use anyhow::{Context, Result, bail, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
 
 use crate::toolchain::{self, Toolchain};
-use crate::{cargo, panics, symbols, target_folder};
+use crate::{cargo, target_folder};
 
 const PROFILES: [&str; 2] = ["firmware", "firmware-small"];
 

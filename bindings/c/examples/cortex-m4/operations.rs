@@ -1,0 +1,206 @@
+//! The operations of `operations.h` in Rust, to compare with those in C.
+
+#![cfg_attr(target_os = "none", no_std)]
+#![allow(unsafe_code, reason = "C calls it")]
+#![allow(clippy::cast_possible_truncation, reason = "small numbers of C's")]
+
+use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
+
+use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::{
+    AerEncoder, AnyRule, AsyncPixel, AverageRule, CentredWindow, Count, DepthEstimator, LaserCycle,
+    Look, PaperRule, PixelAddress, PixelConfig, Statistics, WindowRule,
+};
+
+const PIXELS: usize = 16;
+const PHOTONS: usize = 256;
+
+/// As in `operations.h`.
+#[repr(C)]
+pub struct Settings {
+    rule: u32,
+    window: u32,
+    estimator: u32,
+    alpha_q8: u32,
+    z_q12: u32,
+    minimum_count: u32,
+    x: u32,
+    l1: u32,
+    l2: u32,
+}
+
+unsafe extern "C" {
+    static codes: [u16; PHOTONS];
+    static mut packed: [u8; 32];
+}
+
+struct State {
+    pixels: [AsyncPixel<128>; PIXELS],
+    config: Option<PixelConfig<128, AnyRule>>,
+    statistics: Statistics,
+    encoder: AerEncoder,
+}
+
+struct Shared(UnsafeCell<MaybeUninit<State>>);
+
+// SAFETY: there is one thread, and no interrupt.
+unsafe impl Sync for Shared {}
+
+static STATE: Shared = Shared(UnsafeCell::new(MaybeUninit::zeroed()));
+
+fn state() -> &'static mut State {
+    // SAFETY: there is one thread; no operation calls another with the state in its hands.
+    // `configure` has written it before.
+    unsafe { (*STATE.0.get()).assume_init_mut() }
+}
+
+fn photons_of() -> &'static [u16; PHOTONS] {
+    // SAFETY: count.c writes it between operations only.
+    unsafe { &codes }
+}
+
+fn config_of(settings: &Settings) -> Option<PixelConfig<128, AnyRule>> {
+    let count = Count::new(settings.minimum_count)?;
+    let alpha = U8F8::from_bits(settings.alpha_q8 as u16);
+    let z = U4F12::from_bits(settings.z_q12 as u16);
+    let rule: AnyRule = match settings.rule {
+        0 => PaperRule::new(alpha, count).into(),
+        1 => WindowRule::new(settings.window as u8, z, count)
+            .ok()?
+            .into(),
+        2 => AverageRule::new(alpha, count).into(),
+        _ => return None,
+    };
+    let estimator = match settings.estimator {
+        0 => DepthEstimator::Centroid3,
+        1 => DepthEstimator::CentredWindow(CentredWindow::new(const { U8F8::lit("2.5") })?),
+        _ => return None,
+    };
+    let config = PixelConfig::with_rule(rule).estimator(estimator);
+    let [x, l1, l2] = [settings.x, settings.l1, settings.l2].map(|cycles| cycles as u16);
+    config.x(x).l1(l1).l2(l2).build().ok()
+}
+
+fn empty() -> [AsyncPixel<128>; PIXELS] {
+    core::array::from_fn(|address| AsyncPixel::new(PixelAddress(address as u16)))
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn pixel_bytes() -> u32 {
+    size_of::<AsyncPixel<128>>() as u32
+}
+
+/// Comes before all others.
+///
+/// # Safety
+/// `settings` leads to settings.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn configure(settings: *const Settings) -> u32 {
+    // SAFETY: the caller's promise.
+    let config = unsafe { settings.as_ref() }.and_then(config_of);
+    let is_none = config.is_none();
+    // SAFETY: there is one thread.
+    let state = unsafe { &mut *STATE.0.get() };
+    state.write(State {
+        pixels: empty(),
+        config,
+        statistics: Statistics::new(),
+        encoder: AerEncoder::new(),
+    });
+    is_none.into()
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn begin(number: u32) -> u32 {
+    let state = state();
+    for (address, pixel) in (0..).zip(&mut state.pixels) {
+        *pixel = AsyncPixel::new(PixelAddress(address));
+    }
+    state.encoder = AerEncoder::new();
+    number
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn photon(code: u32) -> u32 {
+    let State { pixels, config, .. } = state();
+    if let Some(config) = config {
+        pixels[0].count(config, code as u16);
+    }
+    0
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn photons(number: u32) -> u32 {
+    let State { pixels, config, .. } = state();
+    if let Some(config) = config {
+        pixels[number as usize % PIXELS].count_batch(config, photons_of());
+    }
+    0
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn end_one(cycle: u32) -> u32 {
+    let state = state();
+    let Some(config) = &state.config else {
+        return 0;
+    };
+    let cycle = LaserCycle(cycle.into());
+    state.pixels[0].end_laser_cycle(config, &mut state.statistics, cycle) as u32
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn end_all(cycle: u32) -> u32 {
+    let state = state();
+    let Some(config) = &state.config else {
+        return 0;
+    };
+    let mut fired = 0;
+    for pixel in &mut state.pixels {
+        let cycle = LaserCycle(cycle.into());
+        let look = pixel.end_laser_cycle(config, &mut state.statistics, cycle);
+        fired += u32::from(look == Look::Event);
+    }
+    fired
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn pack(_: u32) -> u32 {
+    let state = state();
+    let Some(event) = state.pixels[0].acknowledge() else {
+        return 0;
+    };
+    let (time, word) = state.encoder.encode(&event);
+    // SAFETY: count.c reads it between operations only.
+    let (places, _) = unsafe { &mut *(&raw mut packed) }.as_chunks_mut();
+    let mut length = 0;
+    for (place, word) in places.iter_mut().zip(time.into_iter().chain([word])) {
+        *place = word.to_le_bytes();
+        length += 16;
+    }
+    length
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn exposure(number: u32) -> u32 {
+    let mut photons = photons_of().chunks(6);
+    for cycle in 0..44 {
+        let State { pixels, config, .. } = state();
+        let arrived = photons.next().unwrap_or_default();
+        if let Some(config) = config {
+            for pixel in pixels {
+                pixel.count_batch(config, arrived);
+            }
+        }
+        end_all(cycle);
+    }
+    pack(number)
+}
+
+#[cfg(target_os = "none")]
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    loop {
+        core::hint::spin_loop();
+    }
+}

@@ -1,0 +1,288 @@
+/* A device with a simulated sensor, for `dtof monitor --device tcp:127.0.0.1:PORT`:
+ *
+ *     device [PORT]     0 or none: a free port, which it prints
+ *
+ * On a microcontroller a UART takes the place of the socket, and a TDC that of `simulate`. It
+ * ends when the host has gone. */
+#define _POSIX_C_SOURCE 200809L
+#include <errno.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <dtof.h>
+
+#define PIXELS 64u
+#define BIN_WIDTH_PS_Q16 (250u << 16)
+#define LASER_HZ 1000u
+
+static dtof_link_t link_to_host;
+static dtof_pixel_t pixels[PIXELS];
+static dtof_checked_config_t config;
+static dtof_statistics_t statistics;
+static dtof_aer_encoder_t encoder;
+static dtof_report_t report;
+static int is_configured, sensor_runs;
+
+/* Words that wait for the link. */
+static uint8_t words[15 * DTOF_WORD_BYTES];
+static size_t filled;
+
+/* An answer that waits for the link; nothing else is done before it. */
+static uint8_t answer_kind, answer[DTOF_BODY_BYTES];
+static size_t answer_length;
+static int has_answer;
+
+static void fail(const char *where, const char *why)
+{
+    fprintf(stderr, "error: %s: %s\n", where, why);
+    exit(EXIT_FAILURE);
+}
+
+static void check(const char *what, dtof_status_t status)
+{
+    if (status != DTOF_OK) {
+        fail(what, dtof_status_text(status));
+    }
+}
+
+static uint32_t now_ms(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint32_t)now.tv_sec * 1000u + (uint32_t)(now.tv_nsec / 1000000);
+}
+
+/* Takes the host's configuration on, or says why not. The one before stays then. */
+static dtof_status_t configure(const dtof_message_t *message)
+{
+    dtof_device_config_t wanted;
+    dtof_checked_config_t checked;
+    dtof_scale_t scale;
+    dtof_status_t status = dtof_device_config_read(message->body, message->length, &wanted);
+    if (status == DTOF_OK && (wanted.pixels == 0 || wanted.pixels > PIXELS)) {
+        status = DTOF_ERROR_PIXELS;
+    }
+    if (status == DTOF_OK && wanted.source == DTOF_SOURCE_SENSOR
+        && wanted.bin_width_ps_q16 != BIN_WIDTH_PS_Q16) {
+        status = DTOF_ERROR_BIN_WIDTH;
+    }
+    if (status == DTOF_OK) {
+        status = dtof_scale_init(&scale, wanted.bin_width_ps_q16, wanted.offset_mm_q8);
+    }
+    if (status == DTOF_OK) {
+        status = dtof_config_check(&wanted.pixel, &checked);
+    }
+    if (status != DTOF_OK) {
+        return status;
+    }
+    config = checked;
+    for (uint16_t pixel = 0; pixel < PIXELS; pixel++) {
+        check("pixel", dtof_pixel_init(&pixels[pixel], sizeof pixels[pixel], pixel));
+    }
+    memset(&statistics, 0, sizeof statistics);
+    report.cycles = 0;
+    /* A host that wants photons from the link wants the sensor to stop: that is how it leaves. */
+    sensor_runs = wanted.source == DTOF_SOURCE_SENSOR;
+    is_configured = 1;
+    return DTOF_OK;
+}
+
+/* Works on a message of the host; its answer waits. */
+static void act(const dtof_message_t *message)
+{
+    has_answer = 1;
+    answer_length = 0;
+    switch (message->kind) {
+    case DTOF_MESSAGE_CONFIGURE: {
+        dtof_status_t status = configure(message);
+        answer_kind = status == DTOF_OK ? DTOF_MESSAGE_CONFIGURED : DTOF_MESSAGE_REFUSED;
+        answer[0] = dtof_refusal_of(status);
+        answer_length = status != DTOF_OK;
+        break;
+    }
+    case DTOF_MESSAGE_SYNCHRONISE:
+        answer_kind = DTOF_MESSAGE_SYNCHRONISED;
+        answer_length = message->length;
+        memcpy(answer, message->body, answer_length);
+        break;
+    case DTOF_MESSAGE_STATISTICS_REQUEST: {
+        dtof_statistics_t done = statistics;
+        for (size_t pixel = 0; pixel < PIXELS && is_configured; pixel++) {
+            check("photons", dtof_pixel_add_photons(&pixels[pixel], &done));
+        }
+        answer_kind = DTOF_MESSAGE_STATISTICS;
+        answer_length = DTOF_REPORT_BYTES;
+        check("report", dtof_report_write(&report, &done, &link_to_host, answer));
+        break;
+    }
+    case DTOF_MESSAGE_SENSOR_REQUEST:
+        answer_kind = DTOF_MESSAGE_SENSOR;
+        answer_length = DTOF_SENSOR_BYTES;
+        check("sensor", dtof_sensor_write(PIXELS, BIN_WIDTH_PS_Q16, LASER_HZ * 1000u, 0, answer));
+        break;
+    default:
+        report.unknown++;
+        has_answer = 0;
+    }
+}
+
+/* Offers a message: 1 if the link has taken it. */
+static int offer(uint8_t kind, const uint8_t *body, size_t length)
+{
+    dtof_status_t status = dtof_link_offer(&link_to_host, kind, body, length);
+    if (status == DTOF_ERROR_FULL) {
+        return 0;
+    }
+    check("offer", status);
+    return 1;
+}
+
+/* Events from the pixels' slots into messages, as far as there is room: 1 if none is left. An
+ * event that has no room stays in its slot. */
+static int send_events(void)
+{
+    for (size_t pixel = 0; pixel < PIXELS && is_configured; pixel++) {
+        for (;;) {
+            dtof_event_t event;
+            size_t length;
+            if (filled + DTOF_EVENT_BYTES > sizeof words) {
+                if (!offer(DTOF_MESSAGE_EVENTS, words, filled)) {
+                    return 0;
+                }
+                filled = 0;
+            }
+            if (dtof_pixel_take_event(&pixels[pixel], &event) != DTOF_OK) {
+                break;
+            }
+            check("event", dtof_aer_encode(&encoder, &event, words + filled, &length));
+            filled += length;
+        }
+    }
+    if (filled > 0 && !offer(DTOF_MESSAGE_EVENTS, words, filled)) {
+        return 0;
+    }
+    filled = 0;
+    return 1;
+}
+
+/* All that can be done without waiting. A question is answered after the events before it. */
+static void work(void)
+{
+    dtof_message_t message;
+    for (;;) {
+        if (has_answer && !offer(answer_kind, answer, answer_length)) {
+            return;
+        }
+        has_answer = 0;
+        if (!send_events() || dtof_link_take(&link_to_host, &message) != DTOF_OK) {
+            return;
+        }
+        act(&message);
+    }
+}
+
+/* A laser cycle: a target in each pixel, two bins a row farther, and background. */
+static void simulate(void)
+{
+    static uint32_t drawn = 1;
+    for (uint16_t pixel = 0; pixel < PIXELS; pixel++) {
+        uint16_t code;
+        drawn = drawn * 1664525u + 1013904223u;
+        code = (drawn >> 31) ? (uint16_t)(30 + 2 * (pixel / 8))
+                             : (uint16_t)((drawn >> 16) % DTOF_BINS);
+        if ((drawn >> 28) % 4 == 0) {
+            check("photon", dtof_pixel_count(&pixels[pixel], &config, code));
+        }
+    }
+    check("laser cycle", dtof_pixels_end_laser_cycles(pixels, PIXELS, report.cycles, &config,
+                                                     &statistics, 1, NULL));
+    report.cycles++;
+}
+
+/* Waits for the host: a socket that is connected. */
+static int connected(uint16_t port)
+{
+    struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons(port)};
+    socklen_t size = sizeof address;
+    int listener = socket(AF_INET, SOCK_STREAM, 0);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (listener < 0 || bind(listener, (struct sockaddr *)&address, size) != 0
+        || listen(listener, 1) != 0
+        || getsockname(listener, (struct sockaddr *)&address, &size) != 0) {
+        fail("port", strerror(errno));
+    }
+    printf("tcp:127.0.0.1:%u\n", (unsigned)ntohs(address.sin_port));
+    fflush(stdout);
+    int host = accept(listener, NULL, NULL);
+    if (host < 0) {
+        fail("port", strerror(errno));
+    }
+    close(listener);
+    return host;
+}
+
+/* Whether all of a frame has gone. */
+static int sent(int host, const uint8_t *bytes, size_t length)
+{
+    while (length > 0) {
+        ssize_t gone = send(host, bytes, length, MSG_NOSIGNAL);
+        if (gone < 0) {
+            return 0;
+        }
+        bytes += gone;
+        length -= (size_t)gone;
+    }
+    return 1;
+}
+
+int main(int arguments, char **argument)
+{
+    char *end = "";
+    unsigned long port = arguments == 2 ? strtoul(argument[1], &end, 10) : 0;
+    if (arguments > 2 || *end != 0 || port > UINT16_MAX) {
+        fail("usage", "device [PORT]");
+    }
+    check("link", dtof_link_init(&link_to_host, sizeof link_to_host, PIXELS));
+    int host = connected((uint16_t)port);
+    uint32_t simulated_ms = now_ms();
+    for (;;) {
+        uint8_t bytes[DTOF_WIRE_BYTES], began = 0;
+        size_t length;
+        struct pollfd wait = {.fd = host, .events = POLLIN};
+        if (poll(&wait, 1, 1) > 0) {
+            ssize_t received = recv(host, bytes, sizeof bytes, 0);
+            if (received <= 0) {
+                break;
+            }
+            check("bytes", dtof_link_receive(&link_to_host, bytes, (size_t)received, now_ms(),
+                                             &began));
+        }
+        if (began) {
+            /* Nothing is left of the session before. */
+            is_configured = sensor_runs = has_answer = 0;
+            filled = 0;
+            check("encoder", dtof_aer_encoder_init(&encoder));
+        }
+        for (uint32_t now = now_ms(); simulated_ms != now; simulated_ms++) {
+            if (sensor_runs) {
+                simulate();
+            }
+        }
+        work();
+        do {
+            check("frame", dtof_link_transmit(&link_to_host, now_ms(), bytes, &length));
+            if (!sent(host, bytes, length)) {
+                return EXIT_SUCCESS;
+            }
+        } while (length > 0);
+    }
+    return EXIT_SUCCESS;
+}

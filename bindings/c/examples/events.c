@@ -1,0 +1,185 @@
+/* Photons to an AER file, which `dtof decode` reads:
+ *
+ *     events OUT.aer                  photons of a small generator
+ *     events OUT.aer < PHOTONS.csv    with the word `-` behind OUT.aer: pixel,cycle,bin lines,
+ *                                     laser cycles in order
+ */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <dtof.h>
+
+#define PIXELS 64u
+#define BIN_WIDTH_PS 250u
+#define GENERATED_CYCLES 2000u
+
+static dtof_pixel_t pixels[PIXELS];
+static dtof_checked_config_t config;
+static dtof_statistics_t statistics;
+static dtof_aer_encoder_t encoder;
+
+/* The file, and what of it was written. */
+static FILE *file;
+static const char *file_name;
+static uint32_t checksum;
+static uint64_t events;
+
+static void fail(const char *where, const char *why)
+{
+    fprintf(stderr, "error: %s: %s\n", where, why);
+    exit(EXIT_FAILURE);
+}
+
+static void check(const char *what, dtof_status_t status)
+{
+    if (status != DTOF_OK) {
+        fail(what, dtof_status_text(status));
+    }
+}
+
+static void put(const uint8_t *bytes, size_t length)
+{
+    check("checksum", dtof_crc32(&checksum, bytes, length));
+    if (fwrite(bytes, 1, length, file) != length) {
+        fail(file_name, strerror(errno));
+    }
+}
+
+static void put_u32(uint8_t *at, uint32_t number)
+{
+    for (int byte = 0; byte < 4; byte++) {
+        at[byte] = (uint8_t)(number >> (8 * byte));
+    }
+}
+
+/* The header of docs/aer-format.md, without settings. */
+static void put_header(void)
+{
+    uint8_t header[64] = "DTOF-AER";
+    header[8] = DTOF_AER_VERSION;
+    header[10] = sizeof header;
+    put_u32(header + 12, DTOF_BINS);
+    put_u32(header + 16, PIXELS);
+    put_u32(header + 20, 1);
+    put_u32(header + 24, BIN_WIDTH_PS << 16);
+    put(header, sizeof header);
+}
+
+/* Ends laser cycles up to `next`, and writes the events. */
+static void end_laser_cycles(uint64_t *cycle, uint64_t next)
+{
+    for (; *cycle < next; ++*cycle) {
+        size_t fired;
+        check("laser cycle", dtof_pixels_end_laser_cycles(pixels, PIXELS, *cycle, &config,
+                                                         &statistics, 1, &fired));
+        for (size_t pixel = 0; fired > 0; pixel++) {
+            dtof_event_t event;
+            uint8_t bytes[DTOF_EVENT_BYTES];
+            size_t length;
+            if (dtof_pixel_take_event(&pixels[pixel], &event) == DTOF_OK) {
+                check("event", dtof_aer_encode(&encoder, &event, bytes, &length));
+                put(bytes, length);
+                events++;
+                fired--;
+            }
+        }
+    }
+}
+
+/* A target in each pixel, three bins a row farther, and as much background. */
+static void generate(void)
+{
+    uint32_t drawn = 1;
+    uint64_t cycle = 0;
+    while (cycle < GENERATED_CYCLES) {
+        for (uint16_t pixel = 0; pixel < PIXELS; pixel++) {
+            for (int photon = 0; photon < 2; photon++) {
+                drawn = drawn * 1664525u + 1013904223u;
+                uint16_t code = photon == 0 ? (uint16_t)(20 + 3 * (pixel / 8) + (drawn >> 31))
+                                            : (uint16_t)((drawn >> 16) % DTOF_BINS);
+                if ((drawn >> 8) % 8 == 0) {
+                    check("photon", dtof_pixel_count(&pixels[pixel], &config, code));
+                }
+            }
+        }
+        end_laser_cycles(&cycle, cycle + 1);
+    }
+}
+
+static void read_photons(void)
+{
+    char line[80], place[40];
+    uint64_t cycle = 0;
+    for (unsigned long number = 1; fgets(line, sizeof line, stdin) != NULL; number++) {
+        unsigned long long at;
+        unsigned pixel, code;
+        char rest;
+        snprintf(place, sizeof place, "standard input, line %lu", number);
+        if (number == 1) {
+            if (strcmp(line, "pixel,cycle,bin\n") != 0) {
+                fail(place, "the header is not pixel,cycle,bin");
+            }
+            continue;
+        }
+        if (sscanf(line, "%u,%llu,%u%c", &pixel, &at, &code, &rest) != 4 || rest != '\n') {
+            fail(place, "not three numbers");
+        }
+        if (pixel >= PIXELS || code > UINT16_MAX) {
+            fail(place, "no such pixel or bin");
+        }
+        if (at < cycle) {
+            fail(place, "an earlier laser cycle than the line before");
+        }
+        end_laser_cycles(&cycle, at);
+        check("photon", dtof_pixel_count(&pixels[pixel], &config, (uint16_t)code));
+    }
+    if (ferror(stdin)) {
+        fail("standard input", strerror(errno));
+    }
+    end_laser_cycles(&cycle, cycle + 1);
+}
+
+int main(int arguments, char **argument)
+{
+    int from_input = arguments == 3 && strcmp(argument[2], "-") == 0;
+    if (arguments != 2 && !from_input) {
+        fail("usage", "events OUT.aer [- < PHOTONS.csv]");
+    }
+    file_name = argument[1];
+
+    dtof_config_t settings;
+    check("settings", dtof_config_paper(&settings));
+    check("settings", dtof_config_check(&settings, &config));
+    check("encoder", dtof_aer_encoder_init(&encoder));
+    for (uint16_t pixel = 0; pixel < PIXELS; pixel++) {
+        check("pixel", dtof_pixel_init(&pixels[pixel], sizeof pixels[pixel], pixel));
+    }
+
+    /* Never in place of a file that is there. */
+    file = fopen(file_name, "wbx");
+    if (file == NULL) {
+        fail(file_name, strerror(errno));
+    }
+    put_header();
+    if (from_input) {
+        read_photons();
+    } else {
+        generate();
+    }
+    uint8_t last[DTOF_WORD_BYTES];
+    check("end", dtof_aer_end(events, checksum, last));
+    put(last, sizeof last);
+    if (fclose(file) != 0) {
+        fail(file_name, strerror(errno));
+    }
+
+    dtof_counts_t counts;
+    check("statistics", dtof_statistics_read(&statistics, &counts));
+    printf("%s: %llu events; photons rejected %llu, saturated %llu; exposures without an event "
+           "%llu\n",
+           file_name, (unsigned long long)events, (unsigned long long)counts.rejected,
+           (unsigned long long)counts.saturated, (unsigned long long)counts.expired);
+    return EXIT_SUCCESS;
+}

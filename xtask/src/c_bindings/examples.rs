@@ -1,0 +1,140 @@
+//! The examples of the host: photons to a file, and a device for `dtof monitor`.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, ensure};
+
+use super::{printed, succeed};
+use crate::cargo;
+
+/// Pixels of both examples.
+const PIXELS: u32 = 64;
+const CYCLES: u32 = 1000;
+
+/// Runs both and compares with the program of this workspace, which it builds.
+pub fn check(root: &Path, host: &Path, target: &Path) -> Result<()> {
+    let mut build = cargo();
+    build
+        .current_dir(root)
+        .args(["build", "--quiet", "--locked"]);
+    build.args(["--release", "--package", "dtof", "--target-dir"]);
+    succeed(build.arg(target))?;
+    let dtof = target.join("release/dtof");
+    let folder = target.join("c-bindings/out");
+    if folder.exists() {
+        fs::remove_dir_all(&folder)?;
+    }
+    fs::create_dir_all(&folder)?;
+    events(&dtof, host, &folder)?;
+    monitor(&dtof, host)
+}
+
+/// The photons of a file become the events that `dtof replay` makes of them.
+fn events(dtof: &Path, host: &Path, folder: &Path) -> Result<()> {
+    let (photons, c, rust) = (
+        folder.join("photons.csv"),
+        folder.join("events.aer"),
+        folder.join("replay"),
+    );
+    fs::write(&photons, list())?;
+    let mut example = Command::new(host.join("events"));
+    let example = example.arg(&c).arg("-");
+    let status = example
+        .stdin(fs::File::open(&photons)?)
+        .stdout(Stdio::null())
+        .status()?;
+    ensure!(status.success(), "events: {status}");
+    let mut replay = Command::new(dtof);
+    replay.arg("replay").arg("--input").arg(&photons);
+    replay
+        .arg("--out")
+        .arg(&rust)
+        .args(["--bin-width-ps", "250", "--quiet"]);
+    succeed(&mut replay)?;
+    let found = printed(Command::new(dtof).arg("decode").arg(&c))?;
+    let expected = fs::read_to_string(rust.join("events.csv"))?;
+    let events = expected.lines().count() - 1;
+    ensure!(events > 1000, "only {events} events of the photons");
+    ensure!(found == expected, "events: not those of `dtof replay`");
+    println!("events: {events} as `dtof replay` has them");
+
+    // What is there stays, and bad input is one line.
+    let again = Command::new(host.join("events")).arg(&c).output()?;
+    let why = String::from_utf8_lossy(&again.stderr).into_owned();
+    ensure!(
+        !again.status.success() && why.lines().count() == 1,
+        "events: writes over a file that is there"
+    );
+    Ok(())
+}
+
+/// Photons of targets and background, by a generator.
+fn list() -> String {
+    let mut text = "pixel,cycle,bin\n".to_owned();
+    let mut drawn = 1u32;
+    let mut below = |limit: u32| {
+        drawn = drawn.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        ((drawn >> 16) * limit) >> 16
+    };
+    for cycle in 0..CYCLES {
+        for pixel in 0..PIXELS {
+            if below(3) == 0 {
+                let bin = 40 + pixel / 8 + u32::from(below(4) == 0);
+                let _ = writeln!(text, "{pixel},{cycle},{bin}");
+            }
+            if below(4) == 0 {
+                let _ = writeln!(text, "{pixel},{cycle},{}", below(128));
+            }
+        }
+    }
+    text
+}
+
+/// A host watches the device for a second.
+fn monitor(dtof: &Path, host: &Path) -> Result<()> {
+    let mut device = Command::new(host.join("device"))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn()?;
+    let stdout = device.stdout.take().context("no output of the device")?;
+    let mut port = String::new();
+    BufReader::new(stdout).read_line(&mut port)?;
+    let mut watch = Command::new(dtof);
+    watch.args(["monitor", "--seconds", "1", "--device", port.trim()]);
+    let watched = watch.stdin(Stdio::null()).output()?;
+    if !watched.status.success() {
+        device.kill()?;
+    }
+    let ended = device.wait()?;
+    let why = String::from_utf8_lossy(&watched.stderr).into_owned();
+    ensure!(watched.status.success(), "monitor: {}", why.trim());
+    ensure!(ended.success(), "device: {ended}");
+    let text = String::from_utf8(watched.stdout)?;
+    let events: Vec<Vec<u32>> = text.lines().skip(1).map(numbers).collect();
+    ensure!(events.len() > 100, "monitor: only {} events", events.len());
+    let right = |event: &&Vec<u32>| {
+        // Laser cycle, pixel, exposure, highest bin.
+        matches!(event[..], [_, pixel, _, bin] if bin == 30 + 2 * (pixel / 8))
+    };
+    let right = events.iter().filter(right).count();
+    ensure!(
+        right * 100 > events.len() * 98,
+        "monitor: {right} of {} events at their target",
+        events.len()
+    );
+    println!(
+        "device: {} events, {right} of them at their target",
+        events.len()
+    );
+    Ok(())
+}
+
+/// The whole numbers at the beginning of a line of events.
+fn numbers(line: &str) -> Vec<u32> {
+    let numbers = line.split(',').take(4);
+    numbers.filter_map(|number| number.parse().ok()).collect()
+}

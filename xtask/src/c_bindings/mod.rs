@@ -1,0 +1,191 @@
+//! `cargo xtask c-bindings`: the header, the library and the examples of `bindings/c`, here and
+//! in QEMU, held against what Rust gives.
+
+mod examples;
+mod figures;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::firmware::Board;
+use crate::image::symbols;
+use crate::self_test;
+use crate::sizes::Sizes;
+use crate::tools::{ARM_GCC, CMAKE, CXX, QEMU, Tool};
+use crate::{cargo, qemu, target_folder, toolchain};
+
+use self::figures::Figures;
+
+const FOLDER: &str = "bindings/c";
+const HEADER: &str = "bindings/c/include/dtof.h";
+const TARGET: &str = "thumbv7em-none-eabihf";
+/// An instruction takes 256 ns of the emulator's clock.
+const COUNT_INSTRUCTIONS: [&str; 2] = ["-icount", "shift=8"];
+/// The parts of the self-test that C has, from the first line to the line after the last.
+const PARTS: [&str; 2] = ["stream of 128 bins\n", "stream of a block\n"];
+
+/// Builds, runs and compares all. With `bless` the header and the figures are written first.
+pub fn check(root: &Path, bless: bool) -> Result<()> {
+    let missing = [CXX, CMAKE, ARM_GCC, QEMU];
+    let missing: Vec<String> = missing
+        .iter()
+        .filter(|tool| !tool.is_there())
+        .map(Tool::missing)
+        .collect();
+    ensure!(missing.is_empty(), "{}", missing.join("\n"));
+    toolchain::ensure_target(TARGET)?;
+    if bless {
+        let mut test = cargo();
+        test.current_dir(root).env("DTOF_BLESS", "1");
+        succeed(test.args(["test", "--quiet", "--package", "dtof-c", "--test", "header"]))?;
+    }
+    header(root)?;
+
+    let target = fs::canonicalize(target_folder(root)).context("no target folder")?;
+    let host = build(root, &target, "host", &[])?;
+    let expected = expected(root)?;
+    let golden = printed(&mut Command::new(host.join("golden")))?;
+    same("golden vectors here", &expected, &golden)?;
+    examples::check(root, &host, &target)?;
+
+    let board = build_for_board(root, &target)?;
+    let golden = in_emulator(&board.join("golden"), &[])?;
+    same("golden vectors in QEMU", &expected, &golden)?;
+    for image in ["golden", "count-c", "all-functions"] {
+        no_panic(&board.join(image))?;
+    }
+    let [c, rust] = ["count-c", "count-rust"].map(|image| {
+        let path = board.join(image);
+        let text = in_emulator(&path, &COUNT_INSTRUCTIONS)?;
+        Figures::read(&text, &Sizes::read(&path)?)
+    });
+    figures::check(root, &c?, &rust?, bless)
+}
+
+/// The header is C99 and C++17 without a warning.
+fn header(root: &Path) -> Result<()> {
+    let strict = "-Wall -Wextra -Wpedantic -Werror -fsyntax-only -I";
+    for (compiler, language) in [
+        ("gcc", "-std=c99 -x c"),
+        ("g++", "-std=c++17 -x c++"),
+        ("arm-none-eabi-gcc", "-std=c99 -x c"),
+    ] {
+        let mut command = Command::new(compiler);
+        command.current_dir(root).args(strict.split(' '));
+        command.arg("bindings/c/include").args(language.split(' '));
+        // Not the header itself: of the main file some compilers warn less, some more.
+        let mut compiler = command.arg("-").stdin(Stdio::piped()).spawn()?;
+        let stdin = compiler.stdin.take().context("no standard input")?;
+        std::io::Write::write_all(&mut { stdin }, b"#include <dtof.h>\nint main(void);\n")?;
+        let status = compiler.wait()?;
+        ensure!(status.success(), "{HEADER}: {language}: see above");
+    }
+    println!("{HEADER}: C99 and C++17 without a warning");
+    Ok(())
+}
+
+/// Builds with `CMake`; gives the folder of the examples.
+fn build(root: &Path, target: &Path, name: &str, options: &[String]) -> Result<PathBuf> {
+    let folder = target.join("c-bindings").join(name);
+    let mut configure = Command::new(CMAKE.program);
+    configure.current_dir(root).args(["-S", FOLDER, "-B"]);
+    configure.arg(&folder).args(options);
+    configure.arg(format!("-DDTOF_CARGO_DIR={}", target.display()));
+    succeed(configure.stdout(Stdio::null()))?;
+    let mut build = Command::new(CMAKE.program);
+    build.arg("--build").arg(&folder);
+    succeed(build.stdout(Stdio::null()))?;
+    Ok(folder.join("examples"))
+}
+
+/// The same for the Cortex-M4, and the operations in Rust.
+fn build_for_board(root: &Path, target: &Path) -> Result<PathBuf> {
+    let mut twin = cargo();
+    twin.current_dir(root)
+        .args(["build", "--quiet", "--locked"]);
+    twin.args(["--package", "dtof-c", "--example", "operations"]);
+    twin.args(["--target", TARGET, "--profile", "firmware", "--target-dir"]);
+    succeed(twin.arg(target))?;
+    let twin = target
+        .join(TARGET)
+        .join("firmware/examples/liboperations.a");
+    let file = root
+        .join(FOLDER)
+        .join("examples/cortex-m4/arm-none-eabi.cmake");
+    let options = [
+        format!("-DCMAKE_TOOLCHAIN_FILE={}", file.display()),
+        format!("-DDTOF_TWIN={}", twin.display()),
+    ];
+    Ok(build(root, target, "cortex-m4", &options)?.join("cortex-m4"))
+}
+
+/// The lines of the self-test that the example has as well.
+fn expected(root: &Path) -> Result<String> {
+    let name = self_test::EXPECTED;
+    let text = fs::read_to_string(root.join(name)).context(name)?;
+    let [first, after] = PARTS.map(|line| text.find(line));
+    let part = first.zip(after).and_then(|(from, to)| text.get(from..to));
+    let part = part.with_context(|| format!("{name}: not the parts that there were"))?;
+    Ok(format!("{part}end\n"))
+}
+
+fn same(what: &str, expected: &str, found: &str) -> Result<()> {
+    let differences = self_test::differences(expected, found);
+    for line in &differences {
+        println!("{line}");
+    }
+    ensure!(
+        differences.is_empty(),
+        "{what}: not those of Rust, see above"
+    );
+    println!("{what}: {} lines as in Rust", expected.lines().count());
+    Ok(())
+}
+
+/// Neither panics nor floating point nor a heap is in an image.
+fn no_panic(path: &Path) -> Result<()> {
+    use object::{Object, ObjectSymbol};
+    let bytes = fs::read(path).with_context(|| path.display().to_string())?;
+    let file = object::File::parse(&*bytes)?;
+    let name = path.file_name().unwrap_or_default().display();
+    let mut functions = 0;
+    for symbol in file.symbols() {
+        let symbol = symbol.name()?;
+        if let Some(why) = symbols::forbidden(symbol) {
+            bail!("{name}: {why}: {symbol}");
+        }
+        functions += u32::from(symbol.starts_with("dtof_"));
+    }
+    ensure!(
+        functions > 5,
+        "{name}: only {functions} functions are in it"
+    );
+    println!("{name}: {functions} functions; no panic, no floating point, no heap");
+    Ok(())
+}
+
+fn in_emulator(image: &Path, arguments: &[&str]) -> Result<String> {
+    let (status, output) = qemu::run(Board::Mps2An386, image, arguments)?;
+    ensure!(status.success(), "QEMU: {status}: {}", output.trim());
+    Ok(output)
+}
+
+/// Runs a command that must succeed; what it prints.
+fn printed(command: &mut Command) -> Result<String> {
+    let name = command.get_program().display().to_string();
+    let command = command.stdin(Stdio::null()).stderr(Stdio::inherit());
+    let output = command.output().context(name.clone())?;
+    ensure!(output.status.success(), "{name}: {}", output.status);
+    Ok(String::from_utf8(output.stdout)?)
+}
+
+fn succeed(command: &mut Command) -> Result<()> {
+    let name = command.get_program().display().to_string();
+    let status = command.stdin(Stdio::null()).status();
+    let status = status.with_context(|| format!("{name} does not start"))?;
+    ensure!(status.success(), "{name}: {status}, see above");
+    Ok(())
+}
