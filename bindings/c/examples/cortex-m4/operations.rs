@@ -171,8 +171,9 @@ extern "C" fn pack(_: u32) -> u32 {
         return 0;
     };
     let (time, word) = state.encoder.encode(&event);
+    let room = &raw mut packed;
     // SAFETY: count.c reads it between operations only.
-    let (places, _) = unsafe { &mut *(&raw mut packed) }.as_chunks_mut();
+    let (places, _) = unsafe { &mut *room }.as_chunks_mut();
     let mut length = 0;
     for (place, word) in places.iter_mut().zip(time.into_iter().chain([word])) {
         *place = word.to_le_bytes();
