@@ -40,6 +40,11 @@ static uint8_t answer_kind, answer[DTOF_BODY_BYTES];
 static size_t answer_length;
 static int has_answer;
 
+/* The histogram that the host asks for goes part by part. */
+static uint16_t histogram_of;
+static size_t histogram_part;
+static int sends_histogram;
+
 static void fail(const char *where, const char *why)
 {
     fprintf(stderr, "error: %s: %s\n", where, why);
@@ -95,6 +100,12 @@ static dtof_status_t configure(const dtof_message_t *message)
     return DTOF_OK;
 }
 
+static void not_understood(void)
+{
+    report.unknown++;
+    has_answer = 0;
+}
+
 /* Works on a message of the host; its answer waits. */
 static void act(const dtof_message_t *message)
 {
@@ -128,10 +139,42 @@ static void act(const dtof_message_t *message)
         answer_length = DTOF_SENSOR_BYTES;
         check("sensor", dtof_sensor_write(PIXELS, BIN_WIDTH_PS_Q16, LASER_HZ * 1000u, 0, answer));
         break;
-    default:
-        report.unknown++;
-        has_answer = 0;
+    case DTOF_MESSAGE_HISTOGRAM_REQUEST: {
+        uint8_t reason = is_configured ? DTOF_NO_HISTOGRAM_PIXEL : DTOF_NO_HISTOGRAM_CONFIGURATION;
+        if (message->length != 2) {
+            not_understood();
+            break;
+        }
+        histogram_of = (uint16_t)(message->body[0] | message->body[1] << 8);
+        if (is_configured && histogram_of < PIXELS) {
+            sends_histogram = 1;
+            histogram_part = 0;
+            has_answer = 0;
+            break;
+        }
+        answer_kind = DTOF_MESSAGE_HISTOGRAM;
+        check("histogram",
+              dtof_no_histogram_write(histogram_of, reason, answer, &answer_length));
+        break;
     }
+    default:
+        not_understood();
+    }
+}
+
+/* The next part of the histogram becomes the answer that waits; 0 if there is none. */
+static int next_part(void)
+{
+    if (!sends_histogram) {
+        return 0;
+    }
+    answer_kind = DTOF_MESSAGE_HISTOGRAM;
+    check("histogram",
+          dtof_pixel_histogram_write(&pixels[histogram_of], histogram_part, report.cycles, answer,
+                                     &answer_length));
+    histogram_part++;
+    sends_histogram = has_answer = answer_length > 0;
+    return has_answer;
 }
 
 /* Offers a message: 1 if the link has taken it. */
@@ -182,6 +225,9 @@ static void work(void)
             return;
         }
         has_answer = 0;
+        if (next_part()) {
+            continue;
+        }
         if (!send_events() || dtof_link_take(&link_to_host, &message) != DTOF_OK) {
             return;
         }
@@ -267,12 +313,13 @@ int main(int arguments, char **argument)
         }
         if (began) {
             /* Nothing is left of the session before. */
-            is_configured = sensor_runs = has_answer = 0;
+            is_configured = sensor_runs = has_answer = sends_histogram = 0;
             filled = 0;
             check("encoder", dtof_aer_encoder_init(&encoder));
         }
         for (uint32_t now = now_ms(); simulated_ms != now; simulated_ms++) {
-            if (sensor_runs) {
+            /* A histogram stays as it is until all of it has gone. */
+            if (sensor_runs && !sends_histogram) {
                 simulate();
             }
         }

@@ -159,6 +159,9 @@
 // From the host: answer it with SENSOR and what dtof_sensor_write gives.
 #define DTOF_MESSAGE_SENSOR_REQUEST 5
 
+// From the host: the address of a pixel, 2 bytes, the lower first. Answer it with HISTOGRAM.
+#define DTOF_MESSAGE_HISTOGRAM_REQUEST 6
+
 // To the host: the configuration is in force. No body.
 #define DTOF_MESSAGE_CONFIGURED 129
 
@@ -176,6 +179,10 @@
 
 // To the host: what the sensor is.
 #define DTOF_MESSAGE_SENSOR 134
+
+// To the host: what dtof_pixel_histogram_write, dtof_counts_write or dtof_no_histogram_write
+// gives.
+#define DTOF_MESSAGE_HISTOGRAM 135
 
 // Bytes of a dtof_link_t.
 #define DTOF_LINK_SIZE 2520
@@ -197,6 +204,18 @@
 
 // Photons come from the sensor.
 #define DTOF_SOURCE_SENSOR 1
+
+// There is no histogram: no configuration is in force.
+#define DTOF_NO_HISTOGRAM_CONFIGURATION 1
+
+// There is none: the device has no such pixel.
+#define DTOF_NO_HISTOGRAM_PIXEL 2
+
+// There is none: another request came before the answer.
+#define DTOF_NO_HISTOGRAM_GIVEN_UP 3
+
+// There is none: the sensor failed.
+#define DTOF_NO_HISTOGRAM_SENSOR 4
 
 // What a function returns. All but DTOF_OK are errors: nothing was done.
 enum dtof_status_t
@@ -271,6 +290,8 @@ enum dtof_status_t
     DTOF_ERROR_MESSAGE_LENGTH = 62,
     // The kind of a message is below 240.
     DTOF_ERROR_MESSAGE_KIND = 63,
+    // The reason is none of DTOF_NO_HISTOGRAM_...
+    DTOF_ERROR_REASON = 64,
     // The configuration of the host is not one this library knows.
     DTOF_ERROR_CONFIGURATION = 70,
     // The device does not have that many pixels.
@@ -875,6 +896,40 @@ dtof_status_t dtof_report_write(const struct dtof_report_t *report,
                                 const struct dtof_statistics_t *statistics,
                                 const struct dtof_link_t *link,
                                 uint8_t *body);
+
+// Writes a body of HISTOGRAM: the exposure that a pixel is in, so far. `cycles` is how many
+// laser cycles have ended, `part` counts from 0. `body` has room for DTOF_BODY_BYTES; `length`
+// gets how many there are, 0 after the last part. No photon may come between two parts.
+//
+// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+// Threads: nobody else changes `pixel` meanwhile.
+dtof_status_t dtof_pixel_histogram_write(const struct dtof_pixel_t *pixel,
+                                         size_t part,
+                                         uint64_t cycles,
+                                         uint8_t *body,
+                                         size_t *length);
+
+// The same of a histogram that came whole from the sensor: `counts` are DTOF_BINS numbers of
+// photons. A count above 16,777,215 is written as that.
+//
+// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+// Threads: any.
+dtof_status_t dtof_counts_write(const uint32_t *counts,
+                                size_t part,
+                                uint64_t cycles,
+                                uint16_t pixel,
+                                uint8_t *body,
+                                size_t *length);
+
+// Writes a body of HISTOGRAM that says why there is none: `reason` is one of
+// DTOF_NO_HISTOGRAM_... `body` has room for DTOF_BODY_BYTES; `length` gets how many there are.
+//
+// Errors: DTOF_ERROR_REASON, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+// Threads: any.
+dtof_status_t dtof_no_histogram_write(uint16_t pixel,
+                                      uint8_t reason,
+                                      uint8_t *body,
+                                      size_t *length);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -23,7 +23,7 @@
 //! | `event`, `statistics`, `range` | plain values, counts, millimetres |
 //! | `pixel`, `histogram` | pixels, and histograms that arrive whole |
 //! | `aer` | events as words of 16 bytes |
-//! | `link`, `records` | the device's end of the link, and the bodies of its messages |
+//! | `link`, `records`, `histogram_message` | the device's end of the link, and the bodies of its messages |
 
 #![cfg_attr(target_os = "none", no_std)]
 #![allow(unsafe_code, reason = "pointers of C's")]
@@ -42,6 +42,7 @@ mod aer;
 mod config;
 mod event;
 mod histogram;
+mod histogram_message;
 mod link;
 mod memory;
 mod pixel;
@@ -55,6 +56,7 @@ pub use aer::*;
 pub use config::*;
 pub use event::*;
 pub use histogram::*;
+pub use histogram_message::*;
 pub use link::*;
 pub use pixel::*;
 pub use range::*;

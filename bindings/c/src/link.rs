@@ -31,6 +31,8 @@ pub const DTOF_MESSAGE_SYNCHRONISE: u8 = 0x03;
 pub const DTOF_MESSAGE_STATISTICS_REQUEST: u8 = 0x04;
 /// From the host: answer it with SENSOR and what dtof_sensor_write gives.
 pub const DTOF_MESSAGE_SENSOR_REQUEST: u8 = 0x05;
+/// From the host: the address of a pixel, 2 bytes, the lower first. Answer it with HISTOGRAM.
+pub const DTOF_MESSAGE_HISTOGRAM_REQUEST: u8 = 0x06;
 /// To the host: the configuration is in force. No body.
 pub const DTOF_MESSAGE_CONFIGURED: u8 = 0x81;
 /// To the host: it is not. One byte, from dtof_refusal_of.
@@ -43,18 +45,23 @@ pub const DTOF_MESSAGE_SYNCHRONISED: u8 = 0x84;
 pub const DTOF_MESSAGE_STATISTICS: u8 = 0x85;
 /// To the host: what the sensor is.
 pub const DTOF_MESSAGE_SENSOR: u8 = 0x86;
+/// To the host: what dtof_pixel_histogram_write, dtof_counts_write or dtof_no_histogram_write
+/// gives.
+pub const DTOF_MESSAGE_HISTOGRAM: u8 = 0x87;
 const _: () = assert!(
     DTOF_MESSAGE_CONFIGURE == message::CONFIGURE
         && DTOF_MESSAGE_PHOTONS == message::PHOTONS
         && DTOF_MESSAGE_SYNCHRONISE == message::SYNCHRONISE
         && DTOF_MESSAGE_STATISTICS_REQUEST == message::STATISTICS_REQUEST
         && DTOF_MESSAGE_SENSOR_REQUEST == message::SENSOR_REQUEST
+        && DTOF_MESSAGE_HISTOGRAM_REQUEST == message::HISTOGRAM_REQUEST
         && DTOF_MESSAGE_CONFIGURED == message::CONFIGURED
         && DTOF_MESSAGE_REFUSED == message::REFUSED
         && DTOF_MESSAGE_EVENTS == message::EVENTS
         && DTOF_MESSAGE_SYNCHRONISED == message::SYNCHRONISED
         && DTOF_MESSAGE_STATISTICS == message::STATISTICS
         && DTOF_MESSAGE_SENSOR == message::SENSOR
+        && DTOF_MESSAGE_HISTOGRAM == message::HISTOGRAM
 );
 
 /// Kinds from here on are no messages.

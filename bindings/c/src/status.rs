@@ -81,6 +81,8 @@ pub enum dtof_status_t {
     DTOF_ERROR_MESSAGE_LENGTH = 62,
     /// The kind of a message is below 240.
     DTOF_ERROR_MESSAGE_KIND = 63,
+    /// The reason is none of DTOF_NO_HISTOGRAM_...
+    DTOF_ERROR_REASON = 64,
 
     /// The configuration of the host is not one this library knows.
     DTOF_ERROR_CONFIGURATION = 70,
@@ -200,7 +202,7 @@ pub extern "C" fn dtof_status_text(status: u8) -> *const c_char {
 }
 
 /// Every status. A test reads the enum and finds none missing.
-const TEXTS: [(dtof_status_t, &CStr); 40] = [
+const TEXTS: [(dtof_status_t, &CStr); 41] = [
     (DTOF_OK, c"done"),
     (DTOF_ERROR_NULL, c"a pointer is null"),
     (DTOF_ERROR_ALIGNMENT, c"a pointer is not aligned"),
@@ -267,6 +269,7 @@ const TEXTS: [(dtof_status_t, &CStr); 40] = [
         DTOF_ERROR_MESSAGE_KIND,
         c"the kind of a message is below 240",
     ),
+    (DTOF_ERROR_REASON, c"unknown reason"),
     (
         DTOF_ERROR_CONFIGURATION,
         c"the configuration is not one this library knows",

@@ -7,7 +7,7 @@ use std::path::Path;
 use cbindgen::{Builder, Config};
 
 /// In the order of the header.
-const SOURCES: [&str; 11] = [
+const SOURCES: [&str; 12] = [
     "version",
     "status",
     "config",
@@ -19,6 +19,7 @@ const SOURCES: [&str; 11] = [
     "aer",
     "link",
     "records",
+    "histogram_message",
 ];
 fn made() -> String {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));

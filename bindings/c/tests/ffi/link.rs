@@ -4,12 +4,15 @@ use dtof_c::dtof_status_t::*;
 use dtof_c::*;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
 use dtof_core::{
-    AnyRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, WindowRule,
+    AnyRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, PixelAddress, WindowRule,
 };
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
-use dtof_link::{AdaptiveBinning, Configuration, DynamicDepth, Report, SensorRecord, Source};
+use dtof_link::{
+    AdaptiveBinning, Configuration, DynamicDepth, HistogramPart, NoHistogram, Report, SensorRecord,
+    Source,
+};
 
 use crate::{OK, checked, zeroed};
 
@@ -260,4 +263,75 @@ fn records_are_those_of_the_link() {
         (4, 5, 6)
     );
     assert_eq!(read.link.frames, pair.state().frames);
+}
+
+/// The counts of all parts, which begin where the one before ended.
+fn counts_of(mut part: impl FnMut(usize, &mut [u8; DTOF_BODY_BYTES]) -> usize) -> Vec<u32> {
+    let mut counts = Vec::new();
+    for number in 0.. {
+        let mut body = [9; DTOF_BODY_BYTES];
+        let length = part(number, &mut body);
+        if length == 0 {
+            break;
+        }
+        let read = HistogramPart::from_le_bytes(&body[..length])
+            .unwrap()
+            .unwrap();
+        assert_eq!(usize::from(read.first_bin()), counts.len());
+        assert_eq!((read.head().pixel.0, read.head().cycle.0), (5, 1 << 40));
+        counts.extend(read.counts());
+    }
+    counts
+}
+
+#[test]
+fn histograms_go_out_as_the_host_reads_them() {
+    let config = checked(&crate::paper()).unwrap();
+    let mut pixel = zeroed();
+    let codes = [3, 60, 60, 127];
+    let mut expected = [0; 128];
+    for code in codes {
+        expected[usize::from(code)] += 1;
+    }
+    // SAFETY: each pointer leads to what it should.
+    unsafe {
+        assert_eq!(
+            dtof_pixel_init(&mut pixel, size_of::<dtof_pixel_t>(), 5),
+            OK
+        );
+        assert_eq!(
+            dtof_pixel_count_batch(&mut pixel, &config, codes.as_ptr(), 4),
+            OK
+        );
+    }
+    let of_pixel = counts_of(|part, body| {
+        let mut length = 9;
+        let room = body.as_mut_ptr();
+        // SAFETY: each pointer leads to what it should.
+        let status =
+            unsafe { dtof_pixel_histogram_write(&pixel, part, 1 << 40, room, &mut length) };
+        assert_eq!(status, OK);
+        length
+    });
+    assert_eq!(of_pixel, expected);
+
+    // Of 24 bits: two parts.
+    expected[60] = 16_777_215;
+    let whole = counts_of(|part, body| {
+        let (counts, room, mut length) = (expected.as_ptr(), body.as_mut_ptr(), 9);
+        // SAFETY: each pointer leads to what it should.
+        let status = unsafe { dtof_counts_write(counts, part, 1 << 40, 5, room, &mut length) };
+        assert_eq!(status, OK);
+        length
+    });
+    assert_eq!(whole, expected);
+
+    let (mut body, mut length) = ([0; DTOF_BODY_BYTES], 0);
+    // SAFETY: each pointer leads to what it should.
+    let mut none =
+        |reason| unsafe { dtof_no_histogram_write(5, reason, body.as_mut_ptr(), &mut length) };
+    assert_eq!(none(0), DTOF_ERROR_REASON);
+    assert_eq!(none(DTOF_NO_HISTOGRAM_PIXEL), OK);
+    let read = HistogramPart::from_le_bytes(&body[..length]).unwrap();
+    assert_eq!(read, Err((PixelAddress(5), NoHistogram::NoPixel)));
 }

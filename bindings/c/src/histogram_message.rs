@@ -1,0 +1,134 @@
+//! The histogram of a pixel, as a host asks for it.
+
+use dtof_core::{LaserCycle, PixelAddress};
+use dtof_link::endpoint::BODY_BYTES;
+use dtof_link::{HistogramHead, NoHistogram};
+use heapless::Vec;
+
+use crate::memory::{all_plain, array_mut, check, put, shared, status};
+use crate::pixel::dtof_pixel_t;
+use crate::status::dtof_status_t;
+use crate::status::dtof_status_t::{DTOF_ERROR_LENGTH, DTOF_ERROR_REASON};
+use crate::version::DTOF_BINS;
+
+/// There is no histogram: no configuration is in force.
+pub const DTOF_NO_HISTOGRAM_CONFIGURATION: u8 = 1;
+/// There is none: the device has no such pixel.
+pub const DTOF_NO_HISTOGRAM_PIXEL: u8 = 2;
+/// There is none: another request came before the answer.
+pub const DTOF_NO_HISTOGRAM_GIVEN_UP: u8 = 3;
+/// There is none: the sensor failed.
+pub const DTOF_NO_HISTOGRAM_SENSOR: u8 = 4;
+const _: () = assert!(
+    DTOF_NO_HISTOGRAM_CONFIGURATION == NoHistogram::NoConfiguration as u8
+        && DTOF_NO_HISTOGRAM_PIXEL == NoHistogram::NoPixel as u8
+        && DTOF_NO_HISTOGRAM_GIVEN_UP == NoHistogram::GivenUp as u8
+        && DTOF_NO_HISTOGRAM_SENSOR == NoHistogram::Sensor as u8
+);
+
+/// Writes a body of HISTOGRAM: the exposure that a pixel is in, so far. `cycles` is how many
+/// laser cycles have ended, `part` counts from 0. `body` has room for DTOF_BODY_BYTES; `length`
+/// gets how many there are, 0 after the last part. No photon may come between two parts.
+///
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+/// Threads: nobody else changes `pixel` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_pixel_histogram_write(
+    pixel: *const dtof_pixel_t,
+    part: usize,
+    cycles: u64,
+    body: *mut u8,
+    length: *mut usize,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let pixel = unsafe { shared(pixel)? };
+        let head = HistogramHead {
+            pixel: pixel.address(),
+            is_whole: false,
+            cycle: LaserCycle(cycles),
+            exposure: pixel.exposure(),
+        };
+        let counts = pixel.histogram().counts().map(u32::from);
+        // SAFETY: the same promise.
+        unsafe { part_of(head, &counts, part, body, length) }
+    })
+}
+
+/// The same of a histogram that came whole from the sensor: `counts` are DTOF_BINS numbers of
+/// photons. A count above 16,777,215 is written as that.
+///
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+/// Threads: any.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_counts_write(
+    counts: *const u32,
+    part: usize,
+    cycles: u64,
+    pixel: u16,
+    body: *mut u8,
+    length: *mut usize,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let counts = unsafe { all_plain(counts, DTOF_BINS)? };
+        let counts: &[u32; DTOF_BINS] = counts.as_array().ok_or(DTOF_ERROR_LENGTH)?;
+        let head = HistogramHead {
+            pixel: PixelAddress(pixel),
+            is_whole: true,
+            cycle: LaserCycle(cycles),
+            exposure: 1,
+        };
+        // SAFETY: the same promise.
+        unsafe { part_of(head, counts, part, body, length) }
+    })
+}
+
+/// Writes a body of HISTOGRAM that says why there is none: `reason` is one of
+/// DTOF_NO_HISTOGRAM_... `body` has room for DTOF_BODY_BYTES; `length` gets how many there are.
+///
+/// Errors: DTOF_ERROR_REASON, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+/// Threads: any.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_no_histogram_write(
+    pixel: u16,
+    reason: u8,
+    body: *mut u8,
+    length: *mut usize,
+) -> dtof_status_t {
+    status(|| {
+        let reason = NoHistogram::from_number(reason).ok_or(DTOF_ERROR_REASON)?;
+        // SAFETY: the caller's promise, see the crate.
+        unsafe { put_bytes(&reason.message(PixelAddress(pixel)), body, length) }
+    })
+}
+
+/// # Safety
+/// As those of C's functions.
+unsafe fn part_of(
+    head: HistogramHead,
+    counts: &[u32; DTOF_BINS],
+    part: usize,
+    body: *mut u8,
+    length: *mut usize,
+) -> Result<(), dtof_status_t> {
+    let mut bytes = Vec::new();
+    if let Some(message) = head.messages(counts).nth(part) {
+        message.write(&mut bytes);
+    }
+    // SAFETY: the same promise.
+    unsafe { put_bytes(&bytes, body, length) }
+}
+
+/// # Safety
+/// As those of C's functions.
+unsafe fn put_bytes(bytes: &[u8], body: *mut u8, length: *mut usize) -> Result<(), dtof_status_t> {
+    check(length)?;
+    // SAFETY: the same promise.
+    let room: &mut [u8; BODY_BYTES] = unsafe { array_mut(body)? };
+    for (place, byte) in room.iter_mut().zip(bytes) {
+        *place = *byte;
+    }
+    // SAFETY: the same promise.
+    unsafe { put(length, bytes.len()) }
+}
