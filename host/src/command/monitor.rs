@@ -4,7 +4,7 @@ use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::PathBuf;
 use std::time::Duration;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use console::Term;
 use dtof::cli::arguments::{fixed, path, whole};
@@ -119,6 +119,16 @@ impl Monitor {
             client.bins()
         );
         let settings = said.settings(client.bins().into())?;
+        if let Some(past) = settings.masked.iter().find(|&&masked| masked >= pixels) {
+            bail!("--mask {past}: there are {pixels} pixels");
+        }
+        if let Some(columns) = said
+            .sensor
+            .columns
+            .filter(|&columns| columns > u32::from(pixels))
+        {
+            bail!("--columns {columns}: there are {pixels} pixels");
+        }
         let length = self
             .seconds
             .map(|seconds| Duration::from_secs(seconds.into()));

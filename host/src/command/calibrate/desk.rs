@@ -133,8 +133,13 @@ impl Desk {
             bin_width_ps: settings.bin_width_ps.to_num(),
             truth_mm: None,
         };
+        let found = calibrate(&observed, asked)?;
+        ensure!(
+            found.pulse.is_some() || !interrupt::is_interrupted(),
+            "ended too soon: no peak is bright enough to measure the pulse; nothing is written"
+        );
         Ok(Gathered {
-            found: calibrate(&observed, asked)?,
+            found,
             known,
             rows: vec![row(&collected.cycles, collected.is_whole)],
         })
