@@ -80,6 +80,8 @@ pub struct Calibration {
     pub nearest: Nearest,
     /// The pulse, if a peak is bright enough.
     pub pulse: Option<Pulse>,
+    /// How far away the target is, as the user says.
+    pub target_mm: Option<f64>,
     /// The range offset, if a distance is known.
     pub offset: Option<Offset>,
     /// First and last bin that may hold a peak.
@@ -167,6 +169,7 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
         tdc,
         nearest,
         pulse,
+        target_mm: asked.target_mm,
         offset,
         gate,
         detection,

@@ -68,11 +68,17 @@ pub fn remarks(found: &Calibration) -> Vec<Row> {
         ),
         Some(pulse) if pulse.is_core => say(
             "pulse",
-            format!(
-                "The pulse is no Gaussian: {:.1} % of its photons come more than three standard \
-             deviations late. The standard deviation is that of its core.",
-                pulse.tail * 100.0
-            ),
+            if pulse.tail < 0.005 {
+                "The pulse is no Gaussian: its sides fall faster or more slowly. The standard deviation \
+                 is that of its core."
+                    .to_owned()
+            } else {
+                format!(
+                    "The pulse is no Gaussian: {:.1} % of its photons come more than three standard \
+                     deviations late. The standard deviation is that of its core.",
+                    pulse.tail * 100.0
+                )
+            },
         ),
         Some(_) => {}
     }
@@ -130,12 +136,18 @@ pub fn remarks(found: &Calibration) -> Vec<Row> {
         );
     }
     if found.offset.is_none() {
-        say(
-            "offset",
-            "The range offset is not known: put a flat target at a known distance before more than \
-             half of the pixels, and say --target-mm D."
-                .to_owned(),
-        );
+        let what = match found.target_mm {
+            Some(distance) => format!(
+                "--target-mm {distance} was not used: no more than half of the pixels see a surface at \
+                 one range. Put a flat target before more of them."
+            ),
+            None => {
+                "The range offset is not known: put a flat target at a known distance before more \
+                     than half of the pixels, and say --target-mm D."
+                    .to_owned()
+            }
+        };
+        say("offset", what);
     }
     remarks
 }

@@ -41,9 +41,12 @@ fn serial_ports() -> String {
     let mut names: Vec<String> = ports.into_iter().map(|port| port.port_name).collect();
     names.sort();
     if names.is_empty() {
-        return "no serial port is here".to_owned();
+        return "no serial port is here; or say tcp:HOST:PORT, or qemu".to_owned();
     }
-    format!("serial ports here: {}", names.join(", "))
+    format!(
+        "serial ports here: {}; or say tcp:HOST:PORT, or qemu",
+        names.join(", ")
+    )
 }
 
 /// A connection that waits no longer than a port should.

@@ -105,8 +105,26 @@ fn the_help_of_monitor_has_no_option_that_it_refuses() {
 #[test]
 fn a_serial_port_that_is_not_there_is_answered_with_those_that_are() {
     let scratch = Scratch::new();
-    for command in ["monitor", "demo --cycles 10 --out out"] {
+    for command in [
+        "monitor",
+        "demo --cycles 10 --out out",
+        "calibrate --out dtof.toml",
+    ] {
         let output = scratch.run(&format!("{command} --device /dev/ttyNOWHERE"));
-        scratch.refused(&output, &["/dev/ttyNOWHERE: ", "serial port"]);
+        scratch.refused(
+            &output,
+            &[
+                "error: /dev/ttyNOWHERE: No",
+                "serial port",
+                "or say tcp:HOST:PORT, or qemu",
+            ],
+        );
     }
+}
+
+#[test]
+fn a_calibration_of_nothing_says_what_it_takes() {
+    let scratch = Scratch::new();
+    let output = scratch.run("calibrate --out dtof.toml");
+    scratch.refused(&output, &["--input FILE or --device DEVICE is needed"]);
 }

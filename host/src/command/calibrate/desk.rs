@@ -10,7 +10,7 @@ use dtof::cli::arguments::{MOST_WHOLE, whole};
 use dtof::cli::interrupt;
 use dtof::device::histograms::{Collected, SoFar, collect};
 use dtof::device::monitor::array;
-use dtof::device::{self, Client};
+use dtof::device::{self, Client, Port};
 use dtof::input::open::BIN_WIDTH_PS;
 use dtof::input::recorded::RecordingLength;
 use dtof::progress::Progress;
@@ -65,20 +65,29 @@ impl Desk {
         Ok(())
     }
 
+    /// Opens the device.
+    ///
+    /// # Errors
+    /// If none is named, there is none, or options of `recording` do not suit it.
+    pub fn open(&self, recording: &Recording) -> Result<Box<dyn Port>> {
+        let name = self.device.as_deref();
+        let name = name.context("--input FILE or --device DEVICE is needed")?;
+        recording.suits_device()?;
+        device::open(name, self.image.as_deref())
+    }
+
     /// Collects and calibrates.
     ///
     /// # Errors
     /// If the device or an option does not suit, or nothing comes.
     pub fn calibrate(
         &self,
-        name: &str,
+        (name, port): (&str, Box<dyn Port>),
         said: &SettingsFile,
         recording: &Recording,
         asked: &Asked,
         quiet: bool,
     ) -> Result<Gathered> {
-        recording.suits_device()?;
-        let port = device::open(name, self.image.as_deref())?;
         let mut client = Client::new(port)?;
         interrupt::listen(|| ())?;
         let sensor = client.sensor()?.context("the device has no sensor")?;

@@ -23,8 +23,7 @@ use super::recording::{Recording, of_file, opening, warn, warn_of_width};
 #[derive(Args)]
 pub struct Calibrate {
     /// A recording, of any format that `replay` reads
-    #[arg(long, value_name = "FILE", value_parser = path(), required_unless_present = "device",
-        conflicts_with = "device")]
+    #[arg(long, value_name = "FILE", value_parser = path(), conflicts_with = "device")]
     input: Option<PathBuf>,
     #[command(flatten)]
     desk: Desk,
@@ -91,7 +90,8 @@ impl Calibrate {
             Some(input) => self.of_file(input, said, &asked)?,
             None => {
                 let (desk, recording) = (&self.desk, &self.recording);
-                let found = desk.calibrate(&name, said, recording, &asked, self.quiet);
+                let port = desk.open(recording)?;
+                let found = desk.calibrate((&name, port), said, recording, &asked, self.quiet);
                 found.with_context(|| name.clone())?
             }
         };
