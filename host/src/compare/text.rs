@@ -110,6 +110,7 @@ impl Comparison {
             row("take", self.methods[taken.method].name.clone()),
             row("photons of a peak", format!("at least {}", taken.effort)),
             row("time to a report", self.told(taken.cycles)),
+            row("slowest tenth", self.slowest(taken)),
             row("error", format!("{} mm", short(taken.error_mm))),
             row(
                 "cost",
@@ -135,6 +136,17 @@ impl Comparison {
             rows.push(row("does not hold with", broken.join("; ")));
         }
         rows
+    }
+
+    /// How long the pixels take that nine of ten are faster than.
+    fn slowest(&self, taken: &Choice) -> String {
+        let mut trials = self.of(taken.method);
+        let slow = trials.find(|outcome| outcome.trial.effort == taken.effort);
+        let slow = slow.map_or(f64::INFINITY, |outcome| outcome.figures.slow_cycles);
+        if slow.is_finite() {
+            return format!("of the pixels: {} or more", self.told(slow));
+        }
+        "of the pixels: never report; a larger --within takes what reports sooner".to_owned()
     }
 
     /// How exact the answer has to be.

@@ -100,6 +100,7 @@ fn a_recording_without_truth_is_held_against_itself() {
     let line = "compare --input photons.csv --columns 2 --sigma-bins 0.7 --within 9 --out out";
     let printed = scratch.printed(line);
     says(&printed, "take ");
+    says(&printed, "slowest tenth       of the pixels: ");
     says(&scratch.read("out/compare.svg"), "laser cycles");
     let own = "errors are against the range of all photons of the pixel";
     says(&scratch.read("out/report.html"), own);
