@@ -208,7 +208,7 @@ impl Compare {
         warn_of_width(file, &counts.known, &said, self.quiet);
         let geometry = counts.geometry;
         let truth = match (&self.truth, &counts.truth_mm) {
-            (Some(file), _) => Some(Truth::read(file, geometry)?),
+            (Some(file), _) => Some(Truth::read(&file.into(), geometry)?),
             (None, ranges) => ranges.clone().map(Truth::Ranges),
         };
         let said = if said.sensor.sigma_bins.is_some() {

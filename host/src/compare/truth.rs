@@ -1,10 +1,9 @@
 //! What is true of the pixels of a recording or a scene.
 
-use std::path::Path;
-
 use anyhow::{Result, ensure};
 use dtof_core::PixelAddress;
 
+use crate::input::medium::Medium;
 use crate::input::npy::numbers;
 use crate::input::source::Geometry;
 use crate::simulate::scene::Scene;
@@ -21,25 +20,25 @@ pub enum Truth {
 }
 
 impl Truth {
-    /// Reads ranges in millimetres, an `.npy` array with as many numbers as pixels. A pixel
+    /// Reads ranges in millimetres, an `.npy` array with as many numbers as pixels, a file or in
+    /// memory. A pixel
     /// without a target is 0, negative or not a number.
     ///
     /// # Errors
-    /// What is wrong with the file, its name first.
-    pub fn read(path: &Path, geometry: Geometry) -> Result<Self> {
-        let numbers = numbers::read(path)?;
+    /// What is wrong with it, its name first.
+    pub fn read(medium: &Medium, geometry: Geometry) -> Result<Self> {
+        let numbers = numbers::read(medium)?;
         let (there, pixels) = (numbers.values.len(), geometry.addresses());
         ensure!(
             there == pixels,
-            "{}: {there} ranges, but there are {pixels} pixels",
-            path.display()
+            "{medium}: {there} ranges, but there are {pixels} pixels"
         );
         let ranges = numbers.values.into_iter();
         let ranges: Vec<_> = ranges
             .map(|range| Some(range).filter(|range| range.is_finite() && *range > 0.0))
             .collect();
         let any = ranges.iter().any(Option::is_some);
-        ensure!(any, "{}: no pixel has a range", path.display());
+        ensure!(any, "{medium}: no pixel has a range");
         Ok(Self::Ranges(ranges))
     }
 

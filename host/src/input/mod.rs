@@ -4,6 +4,7 @@ pub mod axes;
 pub mod bins;
 pub mod capture_log;
 pub mod masked;
+pub mod medium;
 pub mod npy;
 pub mod open;
 pub mod photon_csv;

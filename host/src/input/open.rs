@@ -8,6 +8,7 @@ use dtof_core::fixed::types::{I24F8, U16F16};
 use crate::input::axes::Axes;
 use crate::input::bins::Fit;
 use crate::input::capture_log::{self, CaptureLog};
+use crate::input::medium::Medium;
 use crate::input::npy::histograms::Histograms;
 use crate::input::npy::records::{self, Records};
 use crate::input::npy::{archive, histograms};
@@ -143,29 +144,30 @@ enum Kind {
     Csv,
 }
 
-/// Opens `path` as photons. Everything in it is checked.
+/// Opens a recording, a file or an array in memory, as photons. Everything in it is checked.
 ///
 /// # Errors
-/// What is wrong with the file or what was said of it; the file's name first.
-pub fn open(path: &Path, opening: &Opening) -> Result<Recording> {
-    match read(path, opening)? {
+/// What is wrong with it or what was said of it; its name first.
+pub fn open(input: impl Into<Medium>, opening: &Opening) -> Result<Recording> {
+    let medium = input.into();
+    match read(&medium, opening)? {
         Content::Photons(photons, known) => Ok(Recording { photons, known }),
         Content::Histograms(counts) => {
             let photons = counts.photons(opening);
             Ok(Recording {
-                photons: Box::new(photons.with_context(|| path.display().to_string())?),
+                photons: Box::new(photons.with_context(|| medium.to_string())?),
                 known: counts.known,
             })
         }
     }
 }
 
-/// Reads `path` as histograms. Those of photon lists are summed over their laser cycles.
+/// Reads a recording, a file or an array in memory, as histograms. Those of photon lists are summed over their laser cycles.
 ///
 /// # Errors
-/// What is wrong with the file or what was said of it; the file's name first.
-pub fn counts(path: &Path, opening: &Opening) -> Result<Counts> {
-    let (mut photons, known) = match read(path, opening)? {
+/// What is wrong with it or what was said of it; its name first.
+pub fn counts(input: impl Into<Medium>, opening: &Opening) -> Result<Counts> {
+    let (mut photons, known) = match read(&input.into(), opening)? {
         Content::Histograms(counts) => return Ok(counts),
         Content::Photons(photons, known) => (photons, known),
     };
@@ -179,16 +181,16 @@ pub fn counts(path: &Path, opening: &Opening) -> Result<Counts> {
     })
 }
 
-fn read(path: &Path, opening: &Opening) -> Result<Content> {
-    let kind = kind(path)?;
+fn read(medium: &Medium, opening: &Opening) -> Result<Content> {
+    let kind = medium.file().map_or(Ok(Kind::Array), kind)?;
     let has_records = match kind {
-        Kind::Array => records::other_fields(path)?,
+        Kind::Array => records::other_fields(medium)?,
         _ => None,
     };
     let is_list = kind == Kind::Csv || has_records.is_some();
-    suits(path, opening, kind, is_list)?;
+    suits(medium, opening, kind, is_list)?;
     if let Some(others) = has_records {
-        let mut content = list::<Records>(path, opening)?;
+        let mut content = list::<Records>(medium, opening)?;
         if let (false, Content::Photons(_, known)) = (others.is_empty(), &mut content) {
             let row = ("fields not read".to_owned(), others.join(", "));
             known.rows.push(row);
@@ -197,17 +199,19 @@ fn read(path: &Path, opening: &Opening) -> Result<Content> {
     }
     let (axes, name) = (opening.axes.as_ref(), opening.array.as_deref());
     let content = match kind {
-        Kind::Csv => list::<CsvRows>(path, opening)?,
-        Kind::Log => log(path, opening)?,
-        Kind::Array => array(path, opening, histograms::read(path, axes)?)?,
-        Kind::Archive => array(path, opening, archive::read(path, name, axes)?)?,
+        Kind::Csv => list::<CsvRows>(medium, opening)?,
+        Kind::Log => log(medium.file().context("a log is a file")?, opening)?,
+        Kind::Array => array(medium, opening, histograms::read(medium, axes)?)?,
+        Kind::Archive => {
+            let path = medium.file().context("an archive is a file")?;
+            array(medium, opening, archive::read(path, name, axes)?)?
+        }
     };
     if let (Content::Histograms(counts), Some(columns)) = (&content, opening.columns) {
         let has = counts.geometry.columns;
         ensure!(
             columns == has,
-            "{} has {has} columns, not {columns}; --columns is for photon lists",
-            path.display()
+            "{medium} has {has} columns, not {columns}; --columns is for photon lists"
         );
     }
     Ok(content)
@@ -235,28 +239,26 @@ fn kind(path: &Path) -> Result<Kind> {
 }
 
 /// Options that say nothing about such a file are refused.
-fn suits(path: &Path, opening: &Opening, kind: Kind, is_list: bool) -> Result<()> {
-    let path = path.display();
+fn suits(medium: &Medium, opening: &Opening, kind: Kind, is_list: bool) -> Result<()> {
     ensure!(
         opening.axes.is_none() || (matches!(kind, Kind::Array | Kind::Archive) && !is_list),
-        "--axes is for arrays of histograms; {path} is none"
+        "--axes is for arrays of histograms; {medium} is none"
     );
     ensure!(
         opening.array.is_none() || kind == Kind::Archive,
-        "--array is for .npz files; {path} is none"
+        "--array is for .npz files; {medium} is none"
     );
     Ok(())
 }
 
-fn list<R: Rows + 'static>(path: &Path, opening: &Opening) -> Result<Content> {
+fn list<R: Rows + 'static>(medium: &Medium, opening: &Opening) -> Result<Content> {
     let shape = Shape {
         bins: opening.bins.unwrap_or(LIST_BINS),
         rebin: opening.rebin.max(1),
         columns: opening.columns,
     };
-    let mut known =
-        known(shape.bins.into(), None, opening).with_context(|| path.display().to_string())?;
-    let photons = PhotonList::<R>::open(path, shape, opening.cycles)?;
+    let mut known = known(shape.bins.into(), None, opening).with_context(|| medium.to_string())?;
+    let photons = PhotonList::<R>::open(medium, shape, opening.cycles)?;
     known.is_list = true;
     known.has_shape = shape.columns.is_some() || photons.geometry().addresses() == 1;
     if shape.rebin > 1 {
@@ -266,7 +268,7 @@ fn list<R: Rows + 'static>(path: &Path, opening: &Opening) -> Result<Content> {
     Ok(Content::Photons(Box::new(photons), known))
 }
 
-fn array(path: &Path, opening: &Opening, read: Histograms) -> Result<Content> {
+fn array(medium: &Medium, opening: &Opening, read: Histograms) -> Result<Content> {
     let Histograms {
         layout,
         first,
@@ -279,7 +281,7 @@ fn array(path: &Path, opening: &Opening, read: Histograms) -> Result<Content> {
     let bins = layout.bins();
     let captures = pixels.chunks(layout.capture).map(<[_]>::to_vec).collect();
     let counts = fitted(captures, [bins, bins], None, opening);
-    let mut counts = counts.with_context(|| path.display().to_string())?;
+    let mut counts = counts.with_context(|| medium.to_string())?;
     counts.geometry = layout.geometry;
     counts.sides = layout.sides;
     counts.known.warnings.extend(axes);

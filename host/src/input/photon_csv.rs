@@ -1,11 +1,10 @@
 //! Recorded photons from a CSV file with the header `pixel,cycle,bin`.
 
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
-use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 
+use crate::input::medium::Medium;
 use crate::input::photon_list::{Row, Rows};
 
 /// Longer than any row can be; a longer line is not read to its end.
@@ -13,18 +12,18 @@ const LINE_BYTES: u64 = 256;
 
 /// The rows of a file.
 pub struct CsvRows {
-    path: PathBuf,
-    file: BufReader<File>,
+    medium: Medium,
+    file: BufReader<Box<dyn Read>>,
     line: Vec<u8>,
     line_number: u64,
 }
 
 impl Rows for CsvRows {
-    fn open(path: &Path) -> Result<Self> {
-        let name = path.display();
-        let file = File::open(path).with_context(|| name.to_string())?;
+    fn open(medium: &Medium) -> Result<Self> {
+        let name = medium;
+        let (file, _) = medium.open().with_context(|| name.to_string())?;
         let mut rows = Self {
-            path: path.to_owned(),
+            medium: medium.clone(),
             file: BufReader::new(file),
             line: Vec::new(),
             line_number: 0,
@@ -54,7 +53,7 @@ impl Rows for CsvRows {
     }
 
     fn place(&self) -> String {
-        format!("{}:{}", self.path.display(), self.line_number)
+        format!("{}:{}", self.medium, self.line_number)
     }
 }
 

@@ -4,11 +4,10 @@
 //! which pixels there are and when the recording ends; once to replay it, without ever
 //! holding more than a slice.
 
-use std::path::{Path, PathBuf};
-
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::PixelAddress;
 
+use crate::input::medium::Medium;
 use crate::input::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
 
 /// A photon as a file has it: the numbers of its pixel, laser cycle and bin.
@@ -16,11 +15,11 @@ pub type Row = [u64; 3];
 
 /// The photons of a file, whatever its format.
 pub trait Rows: Sized {
-    /// Opens the file at its first photon.
+    /// Opens `medium` at its first photon.
     ///
     /// # Errors
     /// What is wrong with the file; its name first.
-    fn open(path: &Path) -> Result<Self>;
+    fn open(medium: &Medium) -> Result<Self>;
 
     /// The next photon.
     ///
@@ -89,9 +88,9 @@ struct Checks<R> {
 }
 
 impl<R: Rows> Checks<R> {
-    fn open(path: &Path, shape: Shape) -> Result<Self> {
+    fn open(medium: &Medium, shape: Shape) -> Result<Self> {
         Ok(Self {
-            rows: R::open(path)?,
+            rows: R::open(medium)?,
             shape,
             last_cycle: 0,
         })
@@ -136,7 +135,7 @@ impl<R: Rows> Checks<R> {
 
 /// A checked photon list.
 pub struct PhotonList<R> {
-    path: PathBuf,
+    medium: Medium,
     addresses: Vec<PixelAddress>,
     /// Of each address up to the last, its place in `addresses`.
     places: Vec<Option<u16>>,
@@ -151,21 +150,18 @@ pub struct PhotonList<R> {
 }
 
 impl<R: Rows> PhotonList<R> {
-    /// Checks all of `path`, to replay its first `cycles` laser cycles. The recording lasts
+    /// Checks all of `medium`, to replay its first `cycles` laser cycles. The recording lasts
     /// until the laser cycle of its last photon.
     ///
     /// # Errors
     /// What is wrong with the file; its name and the place first.
-    pub fn open(path: &Path, shape: Shape, cycles: u64) -> Result<Self> {
-        let kind = path
-            .metadata()
-            .with_context(|| path.display().to_string())?;
+    pub fn open(medium: &Medium, shape: Shape, cycles: u64) -> Result<Self> {
+        let can_be = medium.can_be_read_twice();
         ensure!(
-            kind.is_file(),
-            "{}: not a file that can be read twice",
-            path.display()
+            can_be.with_context(|| medium.to_string())?,
+            "{medium}: not a file that can be read twice"
         );
-        let mut rows = Checks::<R>::open(path, shape)?;
+        let mut rows = Checks::<R>::open(medium, shape)?;
         let mut is_there = vec![false; 1 << 16];
         let (mut photons, mut not_replayed, mut recorded) = (0u64, 0, 0u64);
         // Of the span in which the last photon was, and the most of one.
@@ -192,9 +188,9 @@ impl<R: Rows> PhotonList<R> {
         }
         let pixels_in_file = addresses.last().map_or(0, |last| u32::from(last.0) + 1);
         let columns = shape.columns.unwrap_or(pixels_in_file);
-        let rows = Checks::<R>::open(path, shape)?;
+        let rows = Checks::<R>::open(medium, shape)?;
         Ok(Self {
-            path: path.to_owned(),
+            medium: medium.clone(),
             geometry: Geometry {
                 columns,
                 rows: pixels_in_file.div_ceil(columns),
@@ -222,7 +218,7 @@ impl<R: Rows> Listed for PhotonList<R> {
             let histogram = counts.get_mut(row.pixel());
             let Some(count) = histogram.and_then(|bins| bins.get_mut(usize::from(row.bin())))
             else {
-                bail!("{} changed while it was read", self.path.display());
+                bail!("{} changed while it was read", self.medium);
             };
             *count += 1;
         }
@@ -278,7 +274,7 @@ impl<R: Rows> PhotonSource for PhotonList<R> {
             // Also where the file has changed since it was checked.
             let cycle = row.cycle.checked_sub(first_cycle);
             let (Some(cycle), Some(place)) = (cycle, self.places[row.pixel()]) else {
-                bail!("{} changed while it was read", self.path.display());
+                bail!("{} changed while it was read", self.medium);
             };
             if cycle >= u64::from(cycles) {
                 self.ahead = Some(row);

@@ -1,12 +1,12 @@
 //! The header of an array, held against the length of its file before anything is allocated
 //! for what it claims.
 
-use std::fs::File;
 use std::io::{BufReader, Read};
-use std::path::Path;
 
 use anyhow::{Result, anyhow, bail, ensure};
 use npyz::{DType, NpyFile, NpyHeader, Order, TypeStr};
+
+use crate::input::medium::Medium;
 
 /// A header that agrees with the length of its file.
 pub struct Header {
@@ -86,14 +86,13 @@ impl<R: Read> Array<R> {
     }
 }
 
-impl Array<BufReader<File>> {
-    /// The array of an `.npy` file.
+impl Array<BufReader<Box<dyn Read>>> {
+    /// The array of an `.npy` file, or one in memory.
     ///
     /// # Errors
     /// If it is not that of an array of plain elements.
-    pub fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path)?;
-        let length = file.metadata()?.len();
+    pub fn open(medium: &Medium) -> Result<Self> {
+        let (file, length) = medium.open()?;
         Self::read(BufReader::new(file), length)
     }
 }

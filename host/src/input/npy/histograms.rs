@@ -1,7 +1,6 @@
 //! Recorded histograms: an array of whole numbers, one axis of which is the bins.
 
 use std::io::Read;
-use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use npyz::{Deserialize, NpyFile, TypeChar};
@@ -9,6 +8,7 @@ use npyz::{Deserialize, NpyFile, TypeChar};
 use super::header::Array;
 use crate::input::axes::{Axes, Layout, index_of};
 use crate::input::bins::MOST_BINS;
+use crate::input::medium::Medium;
 
 /// The histograms of one array.
 #[derive(Clone, Debug)]
@@ -21,14 +21,14 @@ pub struct Histograms {
     pub pixels: Vec<Vec<u64>>,
 }
 
-/// Reads the array of an `.npy` file. Integers of every size and floats that are whole
+/// Reads the array of an `.npy` file, or one in memory. Integers of every size and floats that are whole
 /// numbers are read, little- and big-endian, in C and in Fortran order.
 ///
 /// # Errors
 /// What is wrong with the file, its name first.
-pub fn read(path: &Path, axes: Option<&Axes>) -> Result<Histograms> {
-    let array = Array::open(path).and_then(|array| of_array(array, axes));
-    array.with_context(|| path.display().to_string())
+pub fn read(medium: &Medium, axes: Option<&Axes>) -> Result<Histograms> {
+    let array = Array::open(medium).and_then(|array| of_array(array, axes));
+    array.with_context(|| medium.to_string())
 }
 
 /// The same of an array whose header has been read.

@@ -1,13 +1,12 @@
 //! Pictures: integers or floats of an `.npy` file.
 
-use std::path::Path;
-
 use anyhow::{Context, Result, bail, ensure};
 use npyz::TypeChar;
 
 use super::header::Array;
+use crate::input::medium::Medium;
 
-/// The numbers of a file that is a picture.
+/// The numbers of a picture.
 #[derive(Clone, Debug)]
 pub struct Numbers {
     /// Lengths of the axes, the first that of the rows.
@@ -36,11 +35,11 @@ const MOST_NUMBERS: u64 = 3 << 24;
 ///
 /// # Errors
 /// What is wrong with the file, its name first.
-pub fn read(path: &Path) -> Result<Numbers> {
-    numbers_of(path).with_context(|| path.display().to_string())
+pub fn read(medium: &Medium) -> Result<Numbers> {
+    numbers_of(medium).with_context(|| medium.to_string())
 }
 
-fn numbers_of(path: &Path) -> Result<Numbers> {
+fn numbers_of(medium: &Medium) -> Result<Numbers> {
     fn widened<T: Into<f64>>(values: Vec<T>) -> Vec<f64> {
         values.into_iter().map(T::into).collect()
     }
@@ -49,7 +48,7 @@ fn numbers_of(path: &Path) -> Result<Numbers> {
         fortran,
         element,
         npy,
-    } = Array::open(path)?;
+    } = Array::open(medium)?;
     ensure!(
         !fortran || shape.len() < 2,
         "the array is in Fortran order; write it with numpy.ascontiguousarray"

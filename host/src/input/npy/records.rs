@@ -1,14 +1,13 @@
 //! Recorded photons from a structured `.npy` array with the fields `pixel`, `cycle` and
 //! `bin`: integers of any type, in any order. Other fields are not read.
 
-use std::fs::File;
 use std::io::{BufReader, Read};
-use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use npyz::{DType, Endianness, Field, TypeChar};
 
 use super::header::Header;
+use crate::input::medium::Medium;
 use crate::input::photon_list::{Row, Rows};
 
 /// The fields of a photon.
@@ -64,8 +63,8 @@ impl Number {
 
 /// The records of a file.
 pub struct Records {
-    path: PathBuf,
-    file: BufReader<File>,
+    medium: Medium,
+    file: BufReader<Box<dyn Read>>,
     numbers: [Number; 3],
     record: usize,
     /// Some records, and eight bytes.
@@ -83,13 +82,12 @@ pub struct Records {
 ///
 /// # Errors
 /// If it is no `.npy` file; its name first.
-pub fn other_fields(path: &Path) -> Result<Option<Vec<String>>> {
+pub fn other_fields(medium: &Medium) -> Result<Option<Vec<String>>> {
     let header = || {
-        let file = File::open(path)?;
-        let length = file.metadata()?.len();
+        let (file, length) = medium.open()?;
         Header::read(&mut BufReader::new(file), length)
     };
-    let header = header().with_context(|| path.display().to_string())?;
+    let header = header().with_context(|| medium.to_string())?;
     let DType::Record(fields) = header.elements else {
         return Ok(None);
     };
@@ -100,9 +98,8 @@ pub fn other_fields(path: &Path) -> Result<Option<Vec<String>>> {
 }
 
 impl Records {
-    fn of_file(path: &Path) -> Result<Self> {
-        let file = File::open(path)?;
-        let length = file.metadata()?.len();
+    fn of_medium(medium: &Medium) -> Result<Self> {
+        let (file, length) = medium.open()?;
         let mut file = BufReader::with_capacity(1 << 16, file);
         let header = Header::read(&mut file, length)?;
         let &[records] = &header.shape[..] else {
@@ -113,7 +110,7 @@ impl Records {
         };
         let record = size(&fields)?;
         Ok(Self {
-            path: path.to_owned(),
+            medium: medium.clone(),
             file,
             numbers: numbers(&fields)?,
             record,
@@ -141,8 +138,8 @@ impl Records {
 }
 
 impl Rows for Records {
-    fn open(path: &Path) -> Result<Self> {
-        Self::of_file(path).with_context(|| path.display().to_string())
+    fn open(medium: &Medium) -> Result<Self> {
+        Self::of_medium(medium).with_context(|| medium.to_string())
     }
 
     #[inline(always)]
@@ -162,7 +159,7 @@ impl Rows for Records {
     fn place(&self) -> String {
         let read = self.before + (self.next / self.record) as u64;
         let last = read.saturating_sub(1);
-        format!("{}: record {last}", self.path.display())
+        format!("{}: record {last}", self.medium)
     }
 }
 

@@ -42,7 +42,7 @@ impl DepthMap {
     /// # Errors
     /// One line with the name of the file and what is wrong with it.
     pub fn read(path: &Path, along: Along) -> Result<Self> {
-        let numbers = numbers::read(path)?;
+        let numbers = numbers::read(&path.into())?;
         Self::of(&numbers, along).with_context(|| path.display().to_string())
     }
 
@@ -78,7 +78,7 @@ impl DepthMap {
     /// # Errors
     /// One line with the name of the file and what is wrong with it.
     pub fn with_picture(mut self, path: &Path) -> Result<Self> {
-        let numbers = numbers::read(path)?;
+        let numbers = numbers::read(&path.into())?;
         let reflectivity = reflectivity(&numbers, self.size);
         self.reflectivity = reflectivity.with_context(|| path.display().to_string())?;
         Ok(self)

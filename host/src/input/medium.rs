@@ -1,0 +1,144 @@
+//! What a recording is read from: a file, or an `.npy` array in memory.
+
+use std::fmt;
+use std::fs::File;
+use std::io::{self, Cursor, Read};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Bytes that are read, more than once.
+#[derive(Clone, Debug)]
+pub enum Medium {
+    /// A file.
+    File(PathBuf),
+    /// An array in memory.
+    Array(Arc<NpyArray>),
+}
+
+/// What an `.npy` file would hold.
+pub struct NpyArray {
+    /// What errors call it.
+    pub name: String,
+    /// The header, as `numpy.lib.format` writes it.
+    pub header: Vec<u8>,
+    /// The elements.
+    pub data: Box<dyn AsRef<[u8]> + Send + Sync>,
+}
+
+impl fmt::Debug for NpyArray {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter.write_str(&self.name)
+    }
+}
+
+/// The elements of an array, from one of them on.
+struct Elements {
+    array: Arc<NpyArray>,
+    next: usize,
+}
+
+impl Read for Elements {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let all: &[u8] = (*self.array.data).as_ref();
+        let mut left = all.get(self.next..).unwrap_or_default();
+        let read = left.read(buffer)?;
+        self.next += read;
+        Ok(read)
+    }
+}
+
+impl Medium {
+    /// All bytes from the first on, and how many they are.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn open(&self) -> io::Result<(Box<dyn Read>, u64)> {
+        match self {
+            Self::File(path) => {
+                let file = File::open(path)?;
+                let length = file.metadata()?.len();
+                Ok((Box::new(file), length))
+            }
+            Self::Array(array) => {
+                let length = array.header.len() + (*array.data).as_ref().len();
+                let header = Cursor::new(array.header.clone());
+                let elements = Elements {
+                    array: Arc::clone(array),
+                    next: 0,
+                };
+                Ok((Box::new(header.chain(elements)), length as u64))
+            }
+        }
+    }
+
+    /// Whether it holds the same when it is read once more.
+    ///
+    /// # Errors
+    /// If there is no such file.
+    pub fn can_be_read_twice(&self) -> io::Result<bool> {
+        match self {
+            Self::File(path) => Ok(path.metadata()?.is_file()),
+            Self::Array(_) => Ok(true),
+        }
+    }
+
+    /// The file, if it is one.
+    #[must_use]
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::File(path) => Some(path),
+            Self::Array(_) => None,
+        }
+    }
+}
+
+/// As errors call it.
+impl fmt::Display for Medium {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::File(path) => path.display().fmt(formatter),
+            Self::Array(array) => formatter.write_str(&array.name),
+        }
+    }
+}
+
+impl From<&Path> for Medium {
+    fn from(path: &Path) -> Self {
+        Self::File(path.to_owned())
+    }
+}
+
+impl From<&PathBuf> for Medium {
+    fn from(path: &PathBuf) -> Self {
+        Self::File(path.clone())
+    }
+}
+
+impl From<&Medium> for Medium {
+    fn from(medium: &Self) -> Self {
+        medium.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_array_reads_as_its_file_would_again_and_again() {
+        let medium = Medium::Array(Arc::new(NpyArray {
+            name: "counts".to_owned(),
+            header: b"header".to_vec(),
+            data: Box::new(b"elements".to_vec()),
+        }));
+        for _ in 0..2 {
+            let (mut bytes, length) = medium.open().unwrap();
+            let mut all = Vec::new();
+            bytes.read_to_end(&mut all).unwrap();
+            assert_eq!(all, b"headerelements");
+            assert_eq!(length, 14);
+        }
+        assert_eq!(medium.to_string(), "counts");
+        assert!(medium.can_be_read_twice().unwrap() && medium.file().is_none());
+    }
+}
