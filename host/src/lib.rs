@@ -19,6 +19,7 @@ pub mod export;
 pub mod files;
 pub mod geometry;
 pub mod input;
+pub mod jobs;
 pub mod progress;
 pub mod rows;
 pub mod settings;

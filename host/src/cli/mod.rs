@@ -35,13 +35,20 @@ fn refuse(error: &clap::Error) -> ExitCode {
             .print()
             .map_or(ExitCode::FAILURE, |()| ExitCode::SUCCESS);
     }
+    complain(&format!("error: {}", reason(error)));
+    ExitCode::from(2)
+}
+
+/// Why options are refused, with hints, as one line.
+#[must_use]
+pub fn reason(error: &clap::Error) -> String {
     let text = error.to_string();
     let lines = text.lines().map(str::trim);
     let reason: Vec<&str> = lines
         .filter(|line| !line.is_empty() && !line.starts_with("Usage:"))
         .collect();
-    complain(&reason.join(" "));
-    ExitCode::from(2)
+    let reason = reason.join(" ");
+    reason.strip_prefix("error: ").unwrap_or(&reason).to_owned()
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

@@ -6,10 +6,11 @@ use anyhow::Result;
 use clap::Parser;
 use dtof::cli::arguments::{MOST_WHOLE, path, whole};
 use dtof::input::source::Geometry;
+use dtof::jobs::simulate::{array, of_scene};
 use dtof::settings::Run;
 use dtof::simulate::demo;
 
-use super::simulate::{Simulation, array, of_scene};
+use super::simulate::Simulation;
 
 #[derive(Parser)]
 pub struct Demo {

@@ -7,8 +7,6 @@ pub mod demo;
 mod dynamic_depth;
 pub mod export;
 pub mod monitor;
-mod operation;
-mod recording;
 pub mod replay;
 pub mod simulate;
 pub mod tune;
@@ -37,6 +35,13 @@ fn watch_glass(said: &SettingsFile, output: &Output, summary: &mut Summary) {
         if let Change::Brighter(times, least) = glass_change(&run, glass, *first) {
             summary.cover_glass = Some([times, least]);
         }
+    }
+}
+
+/// Says on standard error what to know of `file`, a line each, unless `quiet`.
+fn warn(file: &Path, warnings: impl IntoIterator<Item = String>, quiet: bool) {
+    for warning in warnings.into_iter().filter(|_| !quiet) {
+        eprintln!("warning: {}: {warning}", file.display());
     }
 }
 

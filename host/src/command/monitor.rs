@@ -13,12 +13,12 @@ use dtof::device::monitor::map::{LiveMap, SHOW_CURSOR};
 use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::device::{self, Client};
 use dtof::events::aer_file::Header;
+use dtof::jobs::operation::Operation;
 use dtof::settings::{Sensor, SettingsFile};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_link::SensorRecord;
 
 use super::dynamic_depth;
-use super::operation::Operation;
 
 #[derive(Args)]
 pub struct Monitor {

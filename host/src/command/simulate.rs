@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::cli::arguments::{MOST_WHOLE, path, whole};
+use dtof::cli::arguments::path;
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::Engine;
 use dtof::engine::host::host_engine;
@@ -15,16 +15,15 @@ use dtof::events::output::Output;
 use dtof::geometry::FieldOfView;
 use dtof::input::masked::Masked;
 use dtof::input::source::{Geometry, PhotonSource};
+use dtof::jobs::simulate::{Options, of_scene};
 use dtof::rows::Row;
-use dtof::settings::{Rays, Run, Sensor, SettingsFile};
+use dtof::settings::SettingsFile;
 use dtof::simulate::scene::Scene;
 use dtof::view::report::Section;
 use dtof_core::PixelAddress;
-use dtof_core::fixed::types::U16F16;
 use dtof_link::DynamicDepth;
 
 use super::dynamic_depth::Shown;
-use super::operation::{Frames, Operation};
 use super::view::View;
 use super::{print_summary, watch_glass};
 
@@ -38,16 +37,8 @@ pub struct Simulate {
     /// The folder of the results
     #[arg(long, value_name = "DIR", value_parser = path())]
     out: PathBuf,
-    /// Macropixels of the array that looks at the scene [default: the file's]
-    #[arg(long, value_name = "COLUMNSxROWS", value_parser = array)]
-    array: Option<Geometry>,
-    /// Without signal: photon-counts.svg is then a passive image
-    #[arg(long)]
-    laser_off: bool,
     #[command(flatten)]
-    operation: Operation,
-    #[command(flatten)]
-    frames: Frames,
+    options: Options,
     #[command(flatten)]
     changes: Shown,
     /// The echo of each exposure that maps and report show; the files of events hold all
@@ -64,12 +55,6 @@ pub struct Simulate {
     /// Do not write events.csv
     #[arg(long)]
     no_csv: bool,
-    /// Laser cycles [default: the file's]
-    #[arg(long, value_name = "N", value_parser = whole(1..=MOST_WHOLE))]
-    cycles: Option<u64>,
-    /// Seed of the simulated photons [default: 1]
-    #[arg(long, value_name = "N", value_parser = whole(0..=MOST_WHOLE))]
-    seed: Option<u64>,
     /// Print nothing but errors
     #[arg(long)]
     quiet: bool,
@@ -77,32 +62,23 @@ pub struct Simulate {
 
 impl Simulate {
     pub fn run(&self) -> Result<()> {
-        let run = Run {
-            cycles: self.cycles,
-            seed: self.seed,
-            frame: self.frames.frame,
-            ..Run::default()
-        };
-        let said = self.operation.said(run.into())?;
+        let said = self.options.said()?;
         let simulated = self.simulate(said.clone());
         simulated.map_err(|error| said.name_origin(error))
     }
 
     fn simulate(&self, said: SettingsFile) -> Result<()> {
-        let mut scene = self.view.scene(self.scene.as_deref())?;
-        scene.geometry = self.array.unwrap_or(scene.geometry);
-        if self.laser_off {
-            scene = scene.with_laser_off();
-        }
-        let said =
-            of_scene(said, &scene).with_context(|| match &self.operation.known.settings {
+        let scene = self.options.seen(self.view.scene(self.scene.as_deref())?);
+        let said = of_scene(said, &scene).with_context(|| {
+            match &self.options.operation.known.settings {
                 Some(file) => file.display().to_string(),
                 None => "the scene".to_owned(),
-            })?;
+            }
+        })?;
         let settings = said.settings(scene.bins.into())?;
         let file = self.view.input(self.scene.as_deref());
         let Geometry { columns, rows } = scene.geometry;
-        let laser = if self.laser_off {
+        let laser = if self.options.laser_off {
             ", the laser off"
         } else {
             ""
@@ -115,7 +91,7 @@ impl Simulate {
             cycles: said.run.cycles.unwrap_or(scene.cycles),
             settings: &settings,
             said: &said,
-            file: self.operation.known.settings.as_deref(),
+            file: self.options.operation.known.settings.as_deref(),
             changes: self.changes.wanted()?,
             echo: self.echo,
             device: self.device.as_deref(),
@@ -205,55 +181,6 @@ impl Simulation<'_> {
     }
 }
 
-/// What is said, on a scene: it has histograms, a TDC and rays of its own.
-///
-/// # Errors
-/// If what is said is for other histograms.
-pub fn of_scene(said: SettingsFile, scene: &Scene) -> Result<SettingsFile> {
-    let bin_width_ps = U16F16::from_num(scene.bin_width_ps);
-    let Sensor {
-        bins: said_bins,
-        bin_width_ps: said_width,
-        ..
-    } = said.sensor;
-    let (bins, width) = (
-        said_bins.unwrap_or(scene.bins),
-        said_width.unwrap_or(bin_width_ps),
-    );
-    ensure!(
-        (bins, width) == (scene.bins, bin_width_ps),
-        "{bins} bins of {width} ps, but the scene has {} of {bin_width_ps} ps",
-        scene.bins
-    );
-    Ok(SettingsFile {
-        sensor: Sensor {
-            laser_hz: Some(scene.laser_hz()),
-            columns: Some(scene.geometry.columns),
-            bins: Some(bins),
-            bin_width_ps: Some(width),
-            // Simulated photons come at their distance.
-            offset_mm: None,
-            one_hit_tdc: scene.effects.one_hit_tdc().then_some(true),
-            ..said.sensor
-        },
-        rays: Rays {
-            // As written: 60 is not 59.99999999999999.
-            field_of_view_degrees: Some(
-                scene
-                    .view()
-                    .degrees()
-                    .map(|angle| (angle * 1e9).round() / 1e9),
-            ),
-            calibration: None,
-        },
-        run: Run {
-            cycles: said.run.cycles.or(Some(scene.cycles)),
-            ..said.run
-        },
-        ..said
-    })
-}
-
 /// The options without which `dtof export` takes the scene for another, if any.
 fn export_with(scene: &Scene) -> Option<String> {
     let view = format!("{:.6}", scene.view());
@@ -280,14 +207,4 @@ fn engine(
     Ok(Box::new(DeviceEngine::new(
         client, settings, array, addresses,
     )?))
-}
-
-/// As `64x32`.
-pub fn array(text: &str) -> Result<Geometry, String> {
-    let sides = text.split_once('x').and_then(|(columns, rows)| {
-        let side = whole(1..=u16::MAX);
-        Some((side(columns).ok()?, side(rows).ok()?))
-    });
-    let (columns, rows) = sides.ok_or("must be COLUMNSxROWS, as 64x32")?;
-    Ok(Geometry::new(columns.into(), rows.into()))
 }

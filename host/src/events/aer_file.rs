@@ -168,7 +168,10 @@ impl Header {
     }
 
     /// Can an array with this header have sent the event?
-    fn check(&self, event: &Event) -> Result<()> {
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn check(&self, event: &Event) -> Result<()> {
         let (pixel, pixels) = (event.pixel().0, addresses(self.geometry));
         ensure!(u64::from(pixel) < pixels, "pixel {pixel} of {pixels}");
         let mut block = self.geometry.block(event.pixel(), event.level());

@@ -26,7 +26,7 @@ use dtof_core::RangeScale;
 use dtof_link::DynamicDepth;
 use tempfile::NamedTempFile;
 
-use crate::events::aer_file::{Event, EventKind};
+use crate::events::aer_file::{Event, EventKind, Header};
 use crate::events::echoes::Echo;
 use crate::files::{aside, flushed, place_of};
 use crate::geometry::{FieldOfView, Rays};
@@ -230,6 +230,29 @@ pub fn export(
         damage: survey.damage,
         assumed,
     })
+}
+
+/// `events` of an array with this header as points: the records of the `pcd` format, without its
+/// header.
+///
+/// # Errors
+/// If there are no such rays, or the header gives no range.
+pub fn points<'a>(
+    events: impl IntoIterator<Item = &'a Event>,
+    header: &Header,
+    options: &Options,
+) -> Result<Vec<u8>> {
+    let clock = options.clock.or_else(|| LaserClock::of(header));
+    let projection = Projection {
+        rays: options.optics.rays(header.geometry)?.0,
+        scale: RangeScale::new(header.bin_width_ps, header.offset_mm)?,
+        clock: clock.unwrap_or_default(),
+    };
+    let mut records = Vec::new();
+    for event in events {
+        records.extend(points::record(event, &projection)?);
+    }
+    Ok(records)
 }
 
 fn boxed<S: Sink + 'static>(sink: S) -> Box<dyn Sink> {

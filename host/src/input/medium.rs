@@ -114,7 +114,7 @@ impl From<&PathBuf> for Medium {
     }
 }
 
-impl From<&Medium> for Medium {
+impl From<&Self> for Medium {
     fn from(medium: &Self) -> Self {
         medium.clone()
     }

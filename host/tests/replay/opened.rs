@@ -2,7 +2,9 @@
 
 use std::fs::File;
 use std::io::Write;
+use std::sync::Arc;
 
+use dtof::input::medium::{Medium, NpyArray};
 use dtof::input::open::{BIN_WIDTH_PS, Counts, Opening, counts, open};
 use dtof::input::source::Geometry;
 use dtof::input::{tmf8820, tmf8829};
@@ -133,4 +135,43 @@ fn logs_that_are_damaged_are_refused() {
             odd.json | odd.json: frame 0 is not of 3 rows and 1 columns as frame 0
         ",
     );
+}
+
+/// A photon list that is held in memory gives the photons of its file, and the same errors.
+#[test]
+fn an_array_in_memory_is_read_as_its_file_is() {
+    let scratch = Scratch::new();
+    let descr = "[('pixel', '<u2'), ('cycle', '<u2'), ('bin', '|u1')]";
+    let list = |rows: &[[u8; 5]]| {
+        let text = format!(
+            "{{'descr': {descr}, 'fortran_order': False, 'shape': ({},), }}\n",
+            rows.len()
+        );
+        let mut header = b"\x93NUMPY\x01\x00".to_vec();
+        header.extend(u16::try_from(text.len()).unwrap().to_le_bytes());
+        header.extend(text.as_bytes());
+        let path = scratch.path("list.npy");
+        std::fs::write(&path, [&header[..], rows.as_flattened()].concat()).unwrap();
+        let array = NpyArray {
+            name: path.display().to_string(),
+            header,
+            data: Box::new(rows.concat()),
+        };
+        [Medium::File(path), Medium::Array(Arc::new(array))]
+    };
+    let photons = list(&[[0, 0, 0, 0, 9], [3, 0, 1, 1, 127], [0, 0, 2, 1, 5]]);
+    let [file, memory] = photons.map(|medium| {
+        let mut recording = open(&medium, &Opening::default()).unwrap();
+        let slice = recording.photons.next_slice(300).unwrap();
+        (recording.known, recording.photons.cycles(), slice.pixels)
+    });
+    assert_eq!(file, memory);
+    assert_eq!(file.1, 259);
+    let refused = list(&[[0, 0, 1, 1, 0], [0, 0, 0, 1, 0]]);
+    let [file, memory] = refused.map(|medium| {
+        let error = open(&medium, &Opening::default()).err().unwrap();
+        format!("{error:#}")
+    });
+    assert_eq!(file, memory);
+    assert!(file.ends_with("record 1: cycle 256 comes after cycle 257"));
 }

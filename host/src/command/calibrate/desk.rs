@@ -13,11 +13,10 @@ use dtof::device::monitor::array;
 use dtof::device::{self, Client, Port};
 use dtof::input::open::BIN_WIDTH_PS;
 use dtof::input::recorded::RecordingLength;
+use dtof::jobs::recording::{Recording, opening};
 use dtof::progress::Progress;
 use dtof::rows::{Row, grouped};
 use dtof::settings::{Sensor, SettingsFile};
-
-use super::super::recording::{Recording, opening};
 
 /// How long photons are collected, unless somebody says.
 const SECONDS: u32 = 10;

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
+use crate::cli::arguments::{fixed, path, whole};
+use crate::settings::{Detection, Sensor, SettingsFile, pulse};
 use anyhow::Result;
 use clap::Args;
-use dtof::cli::arguments::{fixed, path, whole};
-use dtof::settings::{Detection, Sensor, SettingsFile, pulse};
 use dtof_core::fixed::types::U8F8;
 
 /// What is known of the sensor.
@@ -57,8 +57,10 @@ impl Known {
     }
 }
 
+/// How pixels operate.
 #[derive(Args)]
 pub struct Operation {
+    /// What is known of the sensor.
     #[command(flatten)]
     pub known: Known,
     #[command(flatten)]

@@ -1,13 +1,13 @@
 //! The window rule.
 
+use crate::cli::arguments::shortest;
 use anyhow::{Result, ensure};
-use dtof::cli::arguments::shortest;
 use dtof_core::{CentredWindow, DepthEstimator};
 use dtof_theory::tune::{Request, window};
 
-use super::{Line, Tune, number};
+use super::{Line, Options, number};
 
-impl Tune {
+impl Options {
     /// z, L1 and what to expect of them; the options for it.
     pub(super) fn window(&self, request: &Request) -> Result<(Vec<Line>, String)> {
         let widest = CentredWindow::WIDEST_PULSE;

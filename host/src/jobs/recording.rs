@@ -1,18 +1,18 @@
 //! The options that say what a recording is, the same for every command.
 
-use std::path::Path;
-
+use crate::cli::arguments::{MOST_WHOLE, bins, fixed, positive, whole};
+use crate::input::axes::Axes;
+use crate::input::medium::Medium;
+use crate::input::open::{BIN_WIDTH_PS, Known, Opening};
+use crate::input::recorded::RecordingLength;
+use crate::input::source::Geometry;
+use crate::rows::grouped;
+use crate::settings::{Run, Sensor, SettingsFile};
 use anyhow::{Result, ensure};
 use clap::Args;
-use dtof::cli::arguments::{MOST_WHOLE, bins, fixed, positive, whole};
-use dtof::input::axes::Axes;
-use dtof::input::open::{BIN_WIDTH_PS, Known, Opening};
-use dtof::input::recorded::RecordingLength;
-use dtof::input::source::Geometry;
-use dtof::rows::grouped;
-use dtof::settings::{Run, Sensor, SettingsFile};
 use dtof_core::fixed::types::{I24F8, U16F16};
 
+/// What a recording is.
 #[derive(Args)]
 pub struct Recording {
     /// Arrays of histograms: what each axis is, of captures, rows, columns and bins
@@ -116,6 +116,7 @@ impl Recording {
     }
 
     /// Whether they say how long a recording is.
+    #[must_use]
     pub fn has_length(&self) -> bool {
         self.photons_per_cycle.is_some() || self.recorded_cycles.is_some()
     }
@@ -124,17 +125,17 @@ impl Recording {
     ///
     /// # Errors
     /// If there are any, and it is one.
-    pub fn suits(&self, file: &Path, known: &Known) -> Result<()> {
+    pub fn suits(&self, input: &Medium, known: &Known) -> Result<()> {
         ensure!(
             !(known.is_list && self.has_length()),
-            "--photons-per-cycle and --recorded-cycles are for histograms; {} holds photons",
-            file.display()
+            "--photons-per-cycle and --recorded-cycles are for histograms; {input} holds photons"
         );
         Ok(())
     }
 }
 
 /// How a recording is opened, as is said.
+#[must_use]
 pub fn opening(said: &SettingsFile) -> Opening {
     let Run {
         cycles,
@@ -164,6 +165,7 @@ pub fn opening(said: &SettingsFile) -> Opening {
 }
 
 /// What the file says.
+#[must_use]
 pub fn of_file(known: &Known, geometry: Geometry) -> SettingsFile {
     SettingsFile {
         sensor: Sensor {
@@ -178,27 +180,19 @@ pub fn of_file(known: &Known, geometry: Geometry) -> SettingsFile {
     }
 }
 
-/// Says on standard error what is surely wrong with the recording, and what of it is left out,
-/// unless `quiet`.
-pub fn warn(file: &Path, known: &Known, quiet: bool) {
-    let cut_off = match known.cut_off {
-        0 => None,
-        photons => Some(format!(
-            "{} photons in bins that were cut off",
-            grouped(photons)
-        )),
-    };
-    for warning in known.warnings.iter().chain(&cut_off).filter(|_| !quiet) {
-        eprintln!("warning: {}: {warning}", file.display());
-    }
+/// What is surely wrong with the recording, and what of it is left out: a line each.
+pub fn warnings(known: &Known) -> impl Iterator<Item = String> + '_ {
+    let cut_off = Some(known.cut_off).filter(|&photons| photons > 0);
+    let cut_off =
+        cut_off.map(|photons| format!("{} photons in bins that were cut off", grouped(photons)));
+    known.warnings.iter().cloned().chain(cut_off)
 }
 
-/// Says that nobody has told how wide a bin is, unless `quiet`.
-pub fn warn_of_width(file: &Path, known: &Known, said: &SettingsFile, quiet: bool) {
-    if said.sensor.bin_width_ps.is_none() && known.bin_width_ps == BIN_WIDTH_PS && !quiet {
-        eprintln!(
-            "warning: {}: bins are taken to be {BIN_WIDTH_PS} ps wide; --bin-width-ps says otherwise",
-            file.display()
-        );
-    }
+/// That nobody has told how wide a bin is, if nobody has.
+#[must_use]
+pub fn warning_of_width(known: &Known, said: &SettingsFile) -> Option<String> {
+    let is_known = said.sensor.bin_width_ps.is_some() || known.bin_width_ps != BIN_WIDTH_PS;
+    (!is_known).then(|| {
+        format!("bins are taken to be {BIN_WIDTH_PS} ps wide; --bin-width-ps says otherwise")
+    })
 }

@@ -1,12 +1,12 @@
 //! The average rule.
 
+use crate::cli::arguments::shortest;
 use anyhow::Result;
-use dtof::cli::arguments::shortest;
 use dtof_theory::tune::{Request, average};
 
-use super::{Line, Tune};
+use super::{Line, Options};
 
-impl Tune {
+impl Options {
     /// α, L1 and what to expect of them; the options for it.
     pub(super) fn average(&self, request: &Request) -> Result<(Vec<Line>, String)> {
         let tuned = average::tune(request)?;
