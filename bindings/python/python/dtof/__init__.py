@@ -1,0 +1,46 @@
+"""Depth events from single photons.
+
+Photons or histograms of a single-photon (SPAD) LiDAR become depth events, by the integers that a
+microcontroller or an FPGA would compute. Arrays come in and go out as numpy arrays; settings are
+keyword arguments with the names of the command line.
+
+>>> import dtof, numpy
+>>> counts = numpy.random.default_rng(1).poisson(0.2, size=(8, 8, 128))
+>>> counts[..., 60] += 50
+>>> events = dtof.replay(counts, bin_width_ps=250).events
+>>> bool(abs(numpy.median(events["range_mm"]) - 2267) < 20)
+True
+"""
+
+from ._arrays import EVENT, POINT, Array
+from ._files import Recording, load, read_events, write_events
+from ._find import Calibration, Comparison, calibrate, compare, tune
+from ._maps import depth_map, points, reflectivity
+from ._native import Error, __version__
+from ._pixel import Pixel
+from ._run import Replay, photons, replay, simulate
+
+__all__ = [
+    "EVENT",
+    "POINT",
+    "Array",
+    "Calibration",
+    "Comparison",
+    "Error",
+    "Pixel",
+    "Recording",
+    "Replay",
+    "__version__",
+    "calibrate",
+    "compare",
+    "depth_map",
+    "load",
+    "photons",
+    "points",
+    "read_events",
+    "reflectivity",
+    "replay",
+    "simulate",
+    "tune",
+    "write_events",
+]

@@ -1,0 +1,151 @@
+"""Arrays as the native part takes them, and as it gives them."""
+
+from __future__ import annotations
+
+import io
+import os
+from typing import Any, NamedTuple, Union
+
+import numpy
+
+from ._native import Error
+
+EVENT = numpy.dtype(
+    [
+        ("cycle", "<u8"),
+        ("pixel", "<u2"),
+        ("exposure", "<u2"),
+        ("peak_bin", "<u2"),
+        ("depth_bins", "<f4"),
+        ("range_mm", "<f8"),
+        ("peak_count", "<u4"),
+        ("background", "<u4"),
+        ("flags", "u1"),
+        ("level", "u1"),
+        ("echo", "u1"),
+    ],
+    align=True,
+)
+
+POINT = numpy.dtype(
+    [
+        ("x", "<f4"),
+        ("y", "<f4"),
+        ("z", "<f4"),
+        ("intensity", "<f4"),
+        ("pixel", "<u4"),
+        ("flags", "u1"),
+        ("level", "u1"),
+        ("echo", "u1"),
+        ("t_ns", "<f8"),
+    ]
+)
+
+Given = Union[str, "tuple[str, bytes, bytes]"]
+
+
+class Array(NamedTuple):
+    """The array of pixels that events come from, as an AER file has it in its header.
+
+    ``bin_width_ps`` is in picoseconds, a multiple of 1/65536. ``offset_mm`` is in millimetres, a
+    multiple of 1/256, and added to every range. ``laser_millihertz`` counts laser cycles in 1000
+    seconds; 0 is not known.
+    """
+
+    bins: int
+    rows: int
+    columns: int
+    bin_width_ps: float
+    offset_mm: float
+    laser_millihertz: int = 0
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.rows, self.columns
+
+
+def recording(given: Any, name: str) -> Given:
+    """A recording, a file or an array, for the native part. ``name`` is what errors call it."""
+    if isinstance(given, (str, os.PathLike)):
+        return os.fspath(given)
+    if isinstance(given, numpy.ma.MaskedArray):
+        raise Error(f"{name}: a masked array; fill it first, as with .filled(0)")
+    try:
+        array = numpy.asarray(given)
+    except (TypeError, ValueError) as error:
+        raise Error(f"{name}: no array: {_line(error)}") from error
+    if array.dtype.hasobject:
+        raise Error(f"{name}: an array of {array.dtype}: must be numbers")
+    header = io.BytesIO()
+    described = numpy.lib.format.header_data_from_array_1_0(array)
+    try:
+        numpy.lib.format.write_array_header_1_0(header, described)
+    except ValueError as error:
+        raise Error(f"{name}: {_line(error)}") from error
+    order = "F" if described["fortran_order"] else "C"
+    return name, header.getvalue(), array.tobytes(order)
+
+
+def photon_list(pixel: Any, cycle: Any, bin: Any) -> numpy.ndarray:
+    """A photon list, as small as it can be."""
+    columns = {"pixel": pixel, "cycle": cycle, "bin": bin}
+    columns = {name: _integers(name, values) for name, values in columns.items()}
+    lengths = {values.size for values in columns.values() if values.ndim == 1}
+    if len(lengths) != 1:
+        shapes = ", ".join(f"{name} {values.shape}" for name, values in columns.items())
+        raise Error(f"photons: must be as long as each other and have one axis: {shapes}")
+    fields = [(name, _smallest(values)) for name, values in columns.items()]
+    photons = numpy.empty(lengths.pop(), dtype=fields)
+    for name, values in columns.items():
+        photons[name] = values
+    return photons
+
+
+def _integers(name: str, values: Any) -> numpy.ndarray:
+    if isinstance(values, numpy.ma.MaskedArray):
+        raise Error(f"photons: {name} is a masked array; leave the masked photons out first")
+    try:
+        array = numpy.asarray(values)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise Error(f"photons: {name} is no array: {_line(error)}") from error
+    if array.dtype.kind not in "iu" or array.ndim > 1:
+        raise Error(
+            f"photons: {name} is {array.dtype} with {array.ndim} axes: must be integers with one"
+        )
+    return array
+
+
+def _smallest(values: numpy.ndarray) -> numpy.dtype:
+    """A type that holds all of them. Those that cannot be keep theirs, and are refused later."""
+    if values.size and values.min() >= 0:
+        for small in ("<u2", "<u4"):
+            if values.max() <= numpy.iinfo(small).max:
+                return numpy.dtype(small)
+    return values.dtype
+
+
+def events_of(records: bytearray) -> numpy.ndarray:
+    """Events, from the native part."""
+    return numpy.frombuffer(records, dtype=EVENT)
+
+
+def records_of(events: Any) -> bytes:
+    """Events, for the native part."""
+    events = numpy.asarray(events)
+    if events.dtype.names is None or not set(EVENT.names or ()) <= set(events.dtype.names):
+        raise Error(f"events: an array of {events.dtype}: must have the fields of dtof.EVENT")
+    if events.ndim != 1:
+        raise Error(f"events: an array of {events.ndim} axes: must have one")
+    if events.dtype == EVENT:
+        return events.tobytes()
+    records = numpy.zeros(events.size, dtype=EVENT)
+    for name in EVENT.names or ():
+        records[name] = events[name]
+        if not (records[name] == events[name]).all():
+            raise Error(f"events: {name} does not fit {EVENT[name]}")
+    return records.tobytes()
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,38 @@
+"""Keyword arguments as options of the command line, so that names, ranges and errors are its own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from typing import Any
+
+import numpy
+
+
+def arguments(options: dict[str, Any], flags: Iterable[str] = ()) -> list[str]:
+    """Each option that is not None as ``--name=value``; one of ``flags`` as ``--name``."""
+    said = []
+    for key, value in options.items():
+        name = "--" + key.replace("_", "-")
+        if value is None:
+            continue
+        if key not in flags:
+            said.append(f"{name}={_text(key, value)}")
+        elif value:
+            said.append(name)
+    return said
+
+
+def _text(key: str, value: Any) -> str:
+    if key == "glass" and isinstance(value, (bool, numpy.bool_)):
+        return "yes" if value else "no"
+    if isinstance(value, (bool, numpy.bool_)):
+        return "true" if value else "false"
+    if isinstance(value, numpy.generic):
+        value = value.item()
+    if isinstance(value, (str, os.PathLike)):
+        return os.fspath(value)
+    if isinstance(value, Iterable):
+        separator = {"gate": "..", "array": "x", "fov": "x"}.get(key, ",")
+        return separator.join(_text("", part) for part in value)
+    return str(value)

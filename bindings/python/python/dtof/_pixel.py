@@ -1,0 +1,81 @@
+"""One pixel, step by step."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Optional
+
+import numpy
+
+from . import _native
+from ._arrays import events_of
+from ._options import arguments
+
+
+class Pixel:
+    """One pixel as firmware has it, to look at while it decides.
+
+    Options are those that say how pixels operate: ``rule``, ``alpha``, ``sigma_bins``, ``l1``,
+    ``l2``, ``x``, ``gate``, ``bin_width_ps``, ``offset_mm`` and so on.
+
+    >>> pixel = Pixel(l1=40, l2=2000, x=4)
+    >>> for cycle in range(44):
+    ...     pixel.count(60)
+    ...     event = pixel.end_laser_cycles()
+    >>> float(event["depth_bins"]), pixel.exposure
+    (60.5, 0)
+    """
+
+    def __init__(self, *, bins: int = 128, address: int = 0, **options: Any) -> None:
+        for name, value, most in (("bins", bins, 1024), ("address", address, 65535)):
+            _whole(name, value, most)
+        self._native = _native.Pixel(int(bins), int(address), arguments(options))
+
+    def count(self, bin: Any) -> None:
+        """Counts a photon in ``bin``, or one in each of several. One past the last is rejected."""
+        bins = numpy.atleast_1d(numpy.asarray(bin))
+        if bins.size == 0:
+            return
+        if bins.dtype.kind not in "iu" or bins.ndim > 1:
+            raise _native.Error(f"bin: {bins.dtype} with {bins.ndim} axes: must be integers with one")
+        if bins.min() < 0 or bins.max() > 65535:
+            raise _native.Error("bin: must be from 0 to 65535")
+        self._native.count(bins.tolist())
+
+    def end_laser_cycles(self, cycles: int = 1) -> Optional[numpy.void]:
+        """Ends so many laser cycles, 1 to 65,535, and looks once if X have passed since the last
+        look. Gives the event, a record of :data:`dtof.EVENT`, or None."""
+        record = self._native.end_laser_cycles(_whole("cycles", cycles, 65535))
+        return None if record is None else events_of(record)[0]
+
+    @property
+    def histogram(self) -> numpy.ndarray:
+        """The photons of each bin since the exposure began."""
+        return numpy.array(self._native.counts(), dtype=numpy.uint32)
+
+    @property
+    def exposure(self) -> int:
+        """Laser cycles since the histogram was cleared."""
+        return self._native.exposure
+
+    @property
+    def cycle(self) -> int:
+        """Laser cycles that have ended."""
+        return self._native.cycle
+
+    @property
+    def statistics(self) -> dict[str, int]:
+        """Photons by what became of them, events, and exposures that expired."""
+        return dict(self._native.statistics())
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """How it operates, as in a settings file."""
+        return json.loads(self._native.settings)
+
+
+def _whole(name: str, value: Any, most: int) -> int:
+    is_whole = isinstance(value, (int, numpy.integer)) and not isinstance(value, bool)
+    if not is_whole or not 0 <= value <= most:
+        raise _native.Error(f"{name} {value!r}: must be a whole number from 0 to {most}")
+    return int(value)

@@ -1,0 +1,140 @@
+"""Photons through the engine."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from dataclasses import dataclass
+from typing import Any, Callable, Optional
+
+import numpy
+
+from . import _native
+from ._arrays import Array, events_of, photon_list, recording
+from ._maps import depth_map, points, reflectivity
+from ._options import arguments
+
+Progress = Optional[Callable[[int, int], Any]]
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What came of a run.
+
+    ``events`` is an array of :data:`dtof.EVENT`, in order of laser cycle, level and pixel.
+    ``statistics`` holds what ``summary.json`` holds; every loss is counted there. ``settings`` are
+    those of the run, ``toml`` the text of a settings file that says them.
+    """
+
+    events: numpy.ndarray
+    array: Array
+    statistics: dict[str, Any]
+    settings: dict[str, Any]
+    toml: str
+
+    def __repr__(self) -> str:
+        photons, (rows, columns) = self.statistics["photons"], self.array.shape
+        return f"<dtof.Replay: {self.events.size} events of {photons} photons, {rows}x{columns} pixels>"
+
+    def depth_map(self, **options: Any) -> numpy.ndarray:
+        """See :func:`dtof.depth_map`."""
+        return depth_map(self.events, self.array, **options)
+
+    def reflectivity(self, **options: Any) -> numpy.ndarray:
+        """See :func:`dtof.reflectivity`."""
+        return reflectivity(self.events, self.array, **options)
+
+    def points(self, **options: Any) -> numpy.ndarray:
+        """See :func:`dtof.points`."""
+        return points(self.events, self.array, **options)
+
+
+def replay(
+    recorded: Any, *, axis: int = -1, progress: Progress = None, **options: Any
+) -> Replay:
+    """Turns a recording into depth events.
+
+    ``recorded`` is the name of a file (``.npy``, ``.npz``, ``.csv``, or the ``.json`` log of a
+    TMF8820 or TMF8829), an array of histograms, or an array of photons with the fields ``pixel``,
+    ``cycle`` and ``bin``. Counts are whole numbers from 0, of any type. The bins of an array are
+    its axis ``axis``; the one before it are columns and all others rows. ``axes`` names all of
+    them instead: ``axes="captures,rows,columns,bins"``. At most 65,536 pixels and 4096 bins.
+
+    ``photons_per_cycle`` (1.0, in the brightest pixel) or ``recorded_cycles`` say how long
+    histograms were recorded. ``cycles`` (10,000) are replayed with the random numbers of ``seed``
+    (1). Every other option of ``dtof replay`` is a keyword, ``-`` being ``_``: ``rule="window",
+    sigma_bins=0.8, gate=(12, 119), mask=[3, 70]``. ``settings`` names a settings file.
+
+    ``progress(done, total)`` is called about 20 times a second with laser cycles. What it raises
+    ends the work, as Ctrl-C does.
+
+    Raises :class:`dtof.Error` with the line that the program prints.
+    """
+    if axis != -1:
+        recorded = _bins_last(recorded, axis, options)
+    given = recording(recorded, "the array")
+    return ran(_native.replay(given, arguments(options), progress))
+
+
+def photons(
+    pixel: Any, cycle: Any, bin: Any, *, progress: Progress = None, **options: Any
+) -> Replay:
+    """Turns single photons into depth events.
+
+    ``pixel``, ``cycle`` and ``bin`` are integers from 0, one a photon, or one number for all;
+    laser cycles do not decrease. ``columns`` says how wide the array is (one row), ``bins`` how
+    many there are (128). Further options are those of :func:`replay`. The photons are copied
+    twice; for more than fits, save them with ``numpy.save`` and replay the file.
+    """
+    given = recording(photon_list(pixel, cycle, bin), "photons")
+    return ran(_native.replay(given, arguments(options), progress))
+
+
+def simulate(scene: Any, *, progress: Progress = None, **options: Any) -> Replay:
+    """Simulates a scene.
+
+    ``scene`` is the name of a scene file, or the text of one, which has several lines.
+    ``array=(columns, rows)``, ``laser_off=True``, ``cycles`` and ``seed`` are those of ``dtof
+    simulate``, further options those of :func:`replay`. ``statistics["against_truth"]`` compares
+    the events with the scene.
+    """
+    given = arguments(options, flags=("laser_off",))
+    return ran(_native.simulate(scene_of(scene), given, progress))
+
+
+def scene_of(scene: Any) -> Any:
+    """A scene for the native part: a text has more lines than one, a name has not."""
+    if isinstance(scene, str) and "\n" in scene:
+        return "the scene", scene
+    return os.fspath(scene)
+
+
+def ran(done: dict[str, Any]) -> Replay:
+    """What the native part gives."""
+    warn(done["warnings"])
+    statistics = json.loads(done["summary"])
+    return Replay(
+        events=events_of(done["events"]),
+        array=Array(**done["array"]),
+        statistics=statistics,
+        settings=json.loads(done["settings"]),
+        toml=done["toml"],
+    )
+
+
+def warn(lines: list[str]) -> None:
+    """Says what is surely wrong with a recording."""
+    for line in lines:
+        warnings.warn(line, UserWarning, stacklevel=4)
+
+
+def _bins_last(recorded: Any, axis: int, options: dict[str, Any]) -> numpy.ndarray:
+    if options.get("axes") is not None:
+        raise _native.Error("axis and axes: give one of them")
+    if isinstance(recorded, (str, os.PathLike)):
+        raise _native.Error("axis is for arrays; axes names those of a file")
+    try:
+        return numpy.moveaxis(numpy.asanyarray(recorded), axis, -1)
+    except (TypeError, ValueError) as error:
+        raise _native.Error(f"axis {axis}: {error}") from error

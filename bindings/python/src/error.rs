@@ -1,0 +1,37 @@
+//! Every error is one line, as the program prints it.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use pyo3::exceptions::PyValueError;
+use pyo3::{PyErr, PyResult};
+
+pyo3::create_exception!(
+    dtof,
+    Error,
+    PyValueError,
+    "What is wrong with a recording or an option, in the line that the program prints."
+);
+
+/// The exception for an error.
+pub fn raised(error: &anyhow::Error) -> PyErr {
+    let line: Vec<String> = format!("{error:#}").lines().map(str::to_owned).collect();
+    Error::new_err(line.join(" "))
+}
+
+/// What `job` gives. A panic in it becomes an error, which says that it is none of the caller's.
+pub fn guarded<T>(job: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
+    catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| Err(of_panic(panic.as_ref())))
+}
+
+/// The same, as an exception.
+pub fn checked<T>(job: impl FnOnce() -> anyhow::Result<T>) -> PyResult<T> {
+    guarded(job).map_err(|error| raised(&error))
+}
+
+fn of_panic(panic: &(dyn Any + Send)) -> anyhow::Error {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+    let text = text.unwrap_or("no reason given");
+    anyhow::anyhow!("a fault of dtof, not of what it was given: {text}")
+}

@@ -1,0 +1,154 @@
+//! Depth events as records of an array, and back.
+
+use anyhow::{Context, Result, ensure};
+use dtof::events::aer_file::{Event, Header};
+use dtof::events::events_csv::range_mm;
+use dtof::input::source::Geometry;
+use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_core::{
+    BinIndex, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress,
+    RangeScale, SubBinOffset,
+};
+use pyo3::prelude::*;
+
+/// Bytes of a record: that of `dtof.EVENT`, little-endian, with gaps.
+pub const RECORD: usize = 48;
+
+/// Appends the record of `event`.
+pub fn push(records: &mut Vec<u8>, event: &DepthEvent, scale: &RangeScale) {
+    let mut record = [0; RECORD];
+    let mut put = |at: usize, bytes: &[u8]| record[at..at + bytes.len()].copy_from_slice(bytes);
+    // 18 bits, a multiple of 1/256: exact.
+    #[allow(clippy::cast_precision_loss, reason = "18 bits")]
+    let depth_bins = event.position().raw() as f32 / 256.0;
+    put(0, &event.cycle.0.to_le_bytes());
+    put(8, &event.pixel.0.to_le_bytes());
+    put(10, &event.exposure.to_le_bytes());
+    put(12, &event.peak_bin.raw().to_le_bytes());
+    put(16, &depth_bins.to_le_bytes());
+    put(24, &range_mm(event, scale).to_le_bytes());
+    put(32, &event.peak_count.raw().to_le_bytes());
+    put(36, &event.background.raw().to_le_bytes());
+    put(
+        40,
+        &[event.flags.bits(), event.level.raw(), event.echo.raw()],
+    );
+    records.extend(record);
+}
+
+/// The array that events come from, as Python has it.
+#[derive(FromPyObject, IntoPyObject, Clone, Copy, Debug)]
+pub struct Array {
+    pub bins: u32,
+    pub rows: u32,
+    pub columns: u32,
+    pub bin_width_ps: f64,
+    pub offset_mm: f64,
+    pub laser_millihertz: u64,
+}
+
+impl Array {
+    pub fn of(header: &Header) -> Self {
+        Self {
+            bins: header.bins,
+            rows: header.geometry.rows,
+            columns: header.geometry.columns,
+            bin_width_ps: header.bin_width_ps.to_num(),
+            offset_mm: header.offset_mm.to_num(),
+            laser_millihertz: header.laser_millihertz,
+        }
+    }
+
+    /// As the header of a file of events.
+    ///
+    /// # Errors
+    /// If no array is so.
+    pub fn header(&self) -> Result<Header> {
+        let pixels = u64::from(self.columns) * u64::from(self.rows);
+        ensure!(
+            (1..=1 << 16).contains(&pixels),
+            "{} columns and {} rows: must be 1 to 65,536 pixels",
+            self.columns,
+            self.rows
+        );
+        let width = self.bin_width_ps;
+        let offset = self.offset_mm;
+        Ok(Header {
+            bins: self.bins,
+            geometry: Geometry::new(self.columns, self.rows),
+            bin_width_ps: fixed(width, U16F16::checked_from_num)
+                .with_context(|| format!("bin_width_ps {width}: cannot be"))?,
+            offset_mm: fixed(offset, I24F8::checked_from_num)
+                .with_context(|| format!("offset_mm {offset}: cannot be"))?,
+            laser_millihertz: self.laser_millihertz,
+        })
+    }
+}
+
+/// A fixed-point number of a finite one.
+fn fixed<T>(number: f64, of: impl FnOnce(f64) -> Option<T>) -> Option<T> {
+    Some(number)
+        .filter(|number| number.is_finite())
+        .and_then(of)
+}
+
+/// The events of records, each of which an array with this header can have sent.
+///
+/// # Errors
+/// Which is none, and why.
+pub fn events(records: &[u8], header: &Header) -> Result<Vec<Event>> {
+    let (records, rest) = records.as_chunks::<RECORD>();
+    ensure!(rest.is_empty(), "not whole records of events");
+    let all = records.iter().enumerate().map(|(index, record)| {
+        let event = event(record).and_then(|event| {
+            let event = Event::Depth(event);
+            header.check(&event).map(|()| event)
+        });
+        event.with_context(|| format!("event {index}"))
+    });
+    all.collect()
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "a number of bins that is checked"
+)]
+fn event(record: &[u8; RECORD]) -> Result<DepthEvent> {
+    let two = |at: usize| u16::from_le_bytes([record[at], record[at + 1]]);
+    let four = |at: usize| {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|next| record[at + next]);
+        [a, b, c, d]
+    };
+    let count = |name: &str, at: usize| {
+        let raw = u32::from_le_bytes(four(at));
+        Count::new(raw).with_context(|| format!("{name} {raw}: must be at most {}", Count::MAX))
+    };
+    let peak_bin = two(12);
+    let depth_bins = f32::from_le_bytes(four(16));
+    let steps = (depth_bins - f32::from(peak_bin)) * 256.0;
+    let offset = (steps.fract() == 0.0 && steps.abs() < 1024.0)
+        .then(|| SubBinOffset::new(steps as i16))
+        .flatten();
+    let [flags, level, echo] = [record[40], record[41], record[42]];
+    let cycle =
+        u64::from(u32::from_le_bytes(four(0))) | u64::from(u32::from_le_bytes(four(4))) << 32;
+    Ok(DepthEvent {
+        pixel: PixelAddress(two(8)),
+        level: BlockLevel::new(level)
+            .with_context(|| format!("level {level}: must be 0 to {}", BlockLevel::MAX))?,
+        echo: EchoNumber::new(echo).with_context(|| format!("echo {echo}: must be 1 to 4"))?,
+        cycle: LaserCycle(cycle),
+        exposure: two(10),
+        peak_bin: BinIndex::new(peak_bin)
+            .with_context(|| format!("peak_bin {peak_bin}: must be 0 to {}", BinIndex::MAX))?,
+        offset: offset.with_context(|| {
+            format!(
+                "depth_bins {depth_bins}: must be a multiple of 1/256, and at most two bins from \
+                 peak_bin {peak_bin}"
+            )
+        })?,
+        peak_count: count("peak_count", 32)?,
+        background: count("background", 36)?,
+        flags: Flags::from_bits(flags).with_context(|| format!("flags {flags}: not known"))?,
+    })
+}

@@ -1,0 +1,36 @@
+//! The native part of the Python package `dtof`.
+//!
+//! Options come as those of the command line, arrays as bytes, results go back as bytes and JSON.
+//! `python/dtof` makes arrays and keyword arguments of them.
+
+mod aer;
+mod error;
+mod events;
+mod find;
+mod load;
+mod maps;
+mod medium;
+mod options;
+mod pixel;
+mod run;
+mod work;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+fn _native(module: &Bound<PyModule>) -> PyResult<()> {
+    module.add("Error", module.py().get_type::<error::Error>())?;
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<pixel::Pixel>()?;
+    module.add_function(wrap_pyfunction!(run::replay, module)?)?;
+    module.add_function(wrap_pyfunction!(run::simulate, module)?)?;
+    module.add_function(wrap_pyfunction!(load::load, module)?)?;
+    module.add_function(wrap_pyfunction!(find::calibrate, module)?)?;
+    module.add_function(wrap_pyfunction!(find::compare, module)?)?;
+    module.add_function(wrap_pyfunction!(find::tune, module)?)?;
+    module.add_function(wrap_pyfunction!(aer::read_events, module)?)?;
+    module.add_function(wrap_pyfunction!(aer::write_events, module)?)?;
+    module.add_function(wrap_pyfunction!(maps::maps, module)?)?;
+    module.add_function(wrap_pyfunction!(maps::points, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,240 @@
+//! Photons through the engine, into memory.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use dtof::engine::Engine;
+use dtof::engine::host::host_engine;
+use dtof::engine::run::next_cycles;
+use dtof::engine::settings::Settings;
+use dtof::events::aer_file::Header;
+use dtof::events::summary::Summary;
+use dtof::input::masked::Masked;
+use dtof::input::medium::Medium;
+use dtof::input::source::PhotonSource;
+use dtof::jobs::recording::warnings;
+use dtof::jobs::replay::{Options, Replay};
+use dtof::jobs::simulate::{Options as SimulateOptions, of_scene};
+use dtof::settings::SettingsFile;
+use dtof::simulate::scene::Scene;
+use dtof_core::DepthEvent;
+use pyo3::prelude::*;
+use pyo3::types::PyByteArray;
+
+use crate::error::checked;
+use crate::events::{Array, push};
+use crate::medium::Given;
+use crate::options::parse;
+use crate::work::{Watch, work};
+
+/// What came of a run.
+#[derive(IntoPyObject)]
+pub struct Ran<'py> {
+    /// Records, of `dtof.EVENT`.
+    events: Bound<'py, PyByteArray>,
+    /// As in `summary.json`.
+    summary: String,
+    /// As in `dtof.toml`, and the same as JSON.
+    toml: String,
+    settings: String,
+    array: Array,
+    warnings: Vec<String>,
+}
+
+/// The same, before Python has it.
+struct Done {
+    /// Records of some slices each.
+    events: Vec<Vec<u8>>,
+    summary: Summary,
+    said: SettingsFile,
+    array: Array,
+    warnings: Vec<String>,
+}
+
+/// Replays a recording, a file or an array.
+#[pyfunction]
+pub fn replay<'py>(
+    py: Python<'py>,
+    input: Given,
+    arguments: Vec<OsString>,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Ran<'py>> {
+    let options = checked(|| parse::<Options>(arguments))?;
+    let input = Medium::from(input);
+    let done = work(py, progress, move |watch| {
+        let said = options.said()?;
+        replayed(&options, &input, &said, watch).map_err(|error| said.name_origin(error))
+    })?;
+    done.into_python(py)
+}
+
+fn replayed(options: &Options, input: &Medium, said: &SettingsFile, watch: &Watch) -> Result<Done> {
+    let Replay {
+        mut photons,
+        mut engine,
+        settings,
+        said,
+        known,
+    } = options.open(input, said)?;
+    let mut done = run(&mut photons, engine.as_mut(), &settings, watch, |_| ())?;
+    done.said = said.with(&settings);
+    done.warnings = warnings(&known).collect();
+    done.summary.input = Some(input.to_string());
+    done.summary.cut_off = known.cut_off;
+    done.summary.recording = known.rows;
+    done.summary.warnings = known.warnings;
+    Ok(done)
+}
+
+/// Simulates a scene: the name of a file, or the text of one.
+#[pyfunction]
+pub fn simulate<'py>(
+    py: Python<'py>,
+    scene: SceneGiven,
+    arguments: Vec<OsString>,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Ran<'py>> {
+    let options = checked(|| parse::<SimulateOptions>(arguments))?;
+    let done = work(py, progress, move |watch| {
+        let said = options.said()?;
+        let simulated = simulated(&options, &scene, said.clone(), watch);
+        simulated.map_err(|error| said.name_origin(error))
+    })?;
+    done.into_python(py)
+}
+
+fn simulated(
+    options: &SimulateOptions,
+    scene: &SceneGiven,
+    said: SettingsFile,
+    watch: &Watch,
+) -> Result<Done> {
+    let name = scene.name();
+    let scene = options.seen(scene.read()?);
+    let said = of_scene(said, &scene).with_context(|| {
+        let file = options.operation.known.settings.as_deref();
+        file.map_or("the scene".to_owned(), |file| file.display().to_string())
+    })?;
+    let settings = said.settings(scene.bins.into())?;
+    let cycles = said.run.cycles.unwrap_or(scene.cycles);
+    let photons = scene.photons(settings.seed, cycles);
+    let photons = photons.with_context(|| name.clone())?;
+    let mut photons = Masked::new(Box::new(photons), &settings.masked)?;
+    let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses())?;
+    let mut comparison = scene.comparison(&settings, cycles)?;
+    let mut done = run(&mut photons, engine.as_mut(), &settings, watch, |events| {
+        comparison.add(events);
+    })?;
+    done.said = said.with(&settings);
+    done.summary.input = Some(name);
+    done.summary.field_of_view_degrees = Some(scene.view().degrees());
+    done.summary.against_truth = Some(comparison.finish());
+    Ok(done)
+}
+
+/// A scene as Python gives it.
+#[derive(FromPyObject)]
+pub enum SceneGiven {
+    /// The name of a file.
+    File(PathBuf),
+    /// Its name for errors, and its text.
+    Text(String, String),
+}
+
+impl SceneGiven {
+    /// As errors call it.
+    pub fn name(&self) -> String {
+        match self {
+            Self::File(path) => path.display().to_string(),
+            Self::Text(name, _) => name.clone(),
+        }
+    }
+
+    /// The scene.
+    ///
+    /// # Errors
+    /// What is wrong with it, its name first.
+    pub fn read(&self) -> Result<Scene> {
+        match self {
+            Self::File(path) => Scene::read(path),
+            Self::Text(name, text) => Scene::parse(text).with_context(|| name.clone()),
+        }
+    }
+}
+
+/// Runs all of `source`.
+fn run(
+    source: &mut dyn PhotonSource,
+    engine: &mut dyn Engine,
+    settings: &Settings,
+    watch: &Watch,
+    mut see: impl FnMut(&[DepthEvent]),
+) -> Result<Done> {
+    let (scale, geometry) = (settings.range_scale()?, source.geometry());
+    let cycles = source.cycles();
+    let mut has_reported = vec![false; geometry.addresses()];
+    let mut records = Vec::new();
+    let mut done = 0;
+    watch.at(done, cycles)?;
+    while done < cycles {
+        let next = next_cycles(source, done);
+        let slice = source.next_slice(next)?;
+        let events = engine.run(&slice)?;
+        let mut of_slice = Vec::with_capacity(events.len() * crate::events::RECORD);
+        for event in &events {
+            push(&mut of_slice, event, &scale);
+            for pixel in geometry.block(event.pixel, event.level) {
+                has_reported[usize::from(pixel.0)] = true;
+            }
+        }
+        records.push(of_slice);
+        see(&events);
+        done += u64::from(next);
+        watch.at(done, cycles)?;
+    }
+    let reporting = has_reported.into_iter().filter(|&has| has).count();
+    let header = Header {
+        bins: u32::try_from(settings.bins)?,
+        geometry,
+        bin_width_ps: settings.bin_width_ps,
+        offset_mm: settings.offset_mm,
+        laser_millihertz: source.laser_hz().map_or(0, |hz| hz.saturating_mul(1000)),
+    };
+    Ok(Done {
+        events: records,
+        summary: Summary::new(engine.statistics(), source, reporting, settings),
+        said: SettingsFile::default(),
+        array: Array::of(&header),
+        warnings: Vec::new(),
+    })
+}
+
+impl Done {
+    fn into_python(self, py: Python) -> PyResult<Ran> {
+        let bytes = self.events.iter().map(Vec::len).sum();
+        let events = PyByteArray::new_with(py, bytes, |mut all| {
+            for records in &self.events {
+                let (these, rest) = all.split_at_mut(records.len());
+                these.copy_from_slice(records);
+                all = rest;
+            }
+            Ok(())
+        })?;
+        let (summary, toml, settings) = checked(|| {
+            Ok((
+                serde_json::to_string(&self.summary)?,
+                self.said.to_toml()?,
+                serde_json::to_string(&self.said)?,
+            ))
+        })?;
+        Ok(Ran {
+            events,
+            summary,
+            toml,
+            settings,
+            array: self.array,
+            warnings: self.warnings,
+        })
+    }
+}
