@@ -1,0 +1,76 @@
+"""How fast the package is, against the program: 100 million photons, listed and as histograms.
+
+    python bench/speed.py PROGRAM [PHOTONS]
+
+Fails below 0.8 of the program's speed. Both have all cores; the faster of three runs counts.
+"""
+
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy
+
+import dtof
+
+PIXELS, BINS = 64 * 64, 128
+LEAST = 0.8
+
+
+def fastest(run):
+    times = []
+    for _ in range(3):
+        begun = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - begun)
+    return min(times)
+
+
+def histograms(photons):
+    random = numpy.random.default_rng(1)
+    counts = random.poisson(0.5 * photons / PIXELS / BINS, (64, 64, BINS)).astype("u4")
+    counts[..., 60] += int(0.5 * photons / PIXELS)
+    return counts
+
+
+def photon_list(photons):
+    random = numpy.random.default_rng(1)
+    records = numpy.empty(photons, dtype=[("pixel", "<u2"), ("cycle", "<u4"), ("bin", "<u2")])
+    records["cycle"] = numpy.arange(photons) // PIXELS  # a photon a pixel and laser cycle
+    records["pixel"] = random.integers(0, PIXELS, photons, dtype="u2")
+    is_signal = random.random(photons, dtype="f4") < 0.5
+    records["bin"] = numpy.where(is_signal, 60, random.integers(0, BINS, photons, dtype="u2"))
+    return records
+
+
+def main():
+    program = sys.argv[1]
+    photons = int(float(sys.argv[2])) if len(sys.argv) > 2 else 100_000_000
+    options = {"cycles": 10_000_000, "columns": 64}
+    with tempfile.TemporaryDirectory() as folder:
+        failed = False
+        for name, make in [("histograms", histograms), ("photon list", photon_list)]:
+            array = make(photons)
+            file = Path(folder) / "input.npy"
+            numpy.save(file, array)
+            texts = [f"--{key}={value}" for key, value in options.items()]
+            command = [program, "replay", "--input", file, "--out", Path(folder) / "out",
+                       "--no-csv", "--quiet", *texts]
+            theirs = fastest(lambda: subprocess.run(command, check=True))
+            ways = {"array": lambda: dtof.replay(array, **options)}
+            if name == "photon list":
+                columns = [array[field].copy() for field in ("pixel", "cycle", "bin")]
+                ways["columns"] = lambda: dtof.photons(*columns, **options)
+            for way, run in ways.items():
+                ours = fastest(run)
+                ratio = theirs / ours
+                failed |= ratio < LEAST
+                print(f"{name} ({way}): program {theirs:.2f} s, package {ours:.2f} s, "
+                      f"{ratio:.2f} of its speed", flush=True)
+    sys.exit(failed)
+
+
+if __name__ == "__main__":
+    main()

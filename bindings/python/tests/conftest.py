@@ -1,0 +1,46 @@
+"""The program that the package is compared with, and the recordings of the public."""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+DATA = ROOT.parent / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def program():
+    """Runs the program; gives what it prints, and fails as it fails."""
+    built = subprocess.run(
+        ["cargo", "build", "--release", "--package", "dtof", "--message-format", "json"],
+        cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True,
+    )
+    messages = (json.loads(line) for line in built.stdout.splitlines())
+    names = [message.get("executable") for message in messages]
+    name = next(name for name in names if name and Path(name).stem == "dtof")
+
+    def run(*arguments, check=True):
+        arguments = [name, *map(os.fspath, arguments)]
+        done = subprocess.run(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert not check or done.returncode == 0, done.stderr
+        return done.stdout if check else done.stderr
+
+    return run
+
+
+@pytest.fixture
+def recorded(capsys):
+    """The place of a public recording; the test is skipped, and says so, where there is none."""
+
+    def place(name):
+        path = DATA / name
+        if not path.exists():
+            with capsys.disabled():
+                print(f"\nSKIPPED: recorded photons: no {path}")
+            pytest.skip("no recorded photons")
+        return path
+
+    return place

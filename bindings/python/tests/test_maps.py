@@ -1,0 +1,72 @@
+"""Maps and points, against the program's exports and against what the events themselves say."""
+
+import numpy
+import pytest
+
+import dtof
+
+
+@pytest.fixture(scope="module")
+def run():
+    random = numpy.random.default_rng(5)
+    counts = random.poisson(1.0, (6, 8, 64))
+    for row in range(6):
+        counts[row, :, 10 + 4 * row] += 20 * (numpy.arange(8) + 1)
+    counts[:, :, 55] += 40
+    return dtof.replay(counts, echoes=2, rule="window", sigma_bins=0.5, l1=8)
+
+
+def test_the_depth_map_has_the_last_range_of_each_pixel(run):
+    events = run.events
+    depth = dtof.depth_map(events, run.array, echo="all")
+    mean = dtof.depth_map(events, run.array, echo="all", mean=True)
+    assert depth.shape == (6, 8)
+    for pixel in range(48):
+        ranges = events["range_mm"][events["pixel"] == pixel]
+        last, recent = (ranges[-1], ranges[-10:].mean()) if ranges.size else (numpy.nan,) * 2
+        assert depth.flat[pixel] == pytest.approx(last, nan_ok=True)
+        assert mean.flat[pixel] == pytest.approx(recent, nan_ok=True)
+    first = run.depth_map(echo="first")
+    assert (first <= run.depth_map(echo="last")).all()
+    none = dtof.depth_map(events[:0], run.array)
+    assert none.shape == (6, 8) and numpy.isnan(none).all()
+
+
+def test_reflectivity_follows_its_formulas(run):
+    events = run.events
+    by_events = dtof.reflectivity(events, run.array, of="events", echo="all")
+    by_signal = run.reflectivity(echo="all")
+    mean = run.depth_map(echo="all", mean=True)
+    for pixel in range(48):
+        own = events[events["pixel"] == pixel]
+        expected = own.size * mean.flat[pixel] ** 2
+        assert by_events.flat[pixel] == pytest.approx(expected, rel=1e-3)
+    # The brighter a column is the more it reflects.
+    assert numpy.corrcoef(by_signal.mean(axis=0), numpy.arange(8))[0, 1] > 0.8
+
+
+def test_points_are_those_of_the_export(program, tmp_path, run):
+    dtof.write_events(tmp_path / "events.aer", run.events, run.array)
+    for options, texts in [
+        ({}, []),
+        ({"fov": (40, 30), "echo": "first", "laser_hz": 1_000_000},
+         ["--fov", "40x30", "--echo", "first", "--laser-hz", "1000000"]),
+    ]:
+        out = tmp_path / f"{len(texts)}.pcd"
+        program("export", tmp_path / "events.aer", "--format", "pcd", "--out", out, *texts)
+        data = out.read_bytes().split(b"DATA binary\n", 1)[1]
+        points = dtof.points(run.events, run.array, **options)
+        assert points.tobytes() == data and points.size > 0
+    assert (points["z"] > 0).all()
+
+
+def test_blocks_stand_for_their_pixels():
+    random = numpy.random.default_rng(6)
+    counts = random.poisson(0.4, (8, 8, 64))
+    counts[..., 30] += 3
+    run = dtof.replay(counts, binning=2, photons_per_cycle=0.01, patience=8)
+    assert (run.events["level"] > 0).any()
+    blocks = run.events[run.events["level"] > 0]
+    depth = dtof.depth_map(blocks[:1], run.array)
+    side = 2 ** int(blocks["level"][0])
+    assert (~numpy.isnan(depth)).sum() == side * side
