@@ -12,7 +12,8 @@ use dtof::events::aer_file::Header;
 use dtof::events::summary::Summary;
 use dtof::input::masked::Masked;
 use dtof::input::medium::Medium;
-use dtof::input::source::PhotonSource;
+use dtof::input::source::{PhotonSource, Slice};
+use dtof::jobs::glass::watch_glass;
 use dtof::jobs::recording::warnings;
 use dtof::jobs::replay::{Options, Replay};
 use dtof::jobs::simulate::{Options as SimulateOptions, of_scene};
@@ -23,7 +24,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
 use crate::error::checked;
-use crate::events::{Array, push};
+use crate::events::{Array, RECORD, push};
 use crate::medium::Given;
 use crate::options::parse;
 use crate::work::{Watch, work};
@@ -77,8 +78,14 @@ fn replayed(options: &Options, input: &Medium, said: &SettingsFile, watch: &Watc
         said,
         known,
     } = options.open(input, said)?;
-    let mut done = run(&mut photons, engine.as_mut(), &settings, watch, |_| ())?;
-    done.said = said.with(&settings);
+    let mut done = run(
+        &mut photons,
+        engine.as_mut(),
+        &settings,
+        &said,
+        watch,
+        |_| (),
+    )?;
     done.warnings = warnings(&known).collect();
     done.summary.input = Some(input.to_string());
     done.summary.cut_off = known.cut_off;
@@ -123,10 +130,14 @@ fn simulated(
     let mut photons = Masked::new(Box::new(photons), &settings.masked)?;
     let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses())?;
     let mut comparison = scene.comparison(&settings, cycles)?;
-    let mut done = run(&mut photons, engine.as_mut(), &settings, watch, |events| {
-        comparison.add(events);
-    })?;
-    done.said = said.with(&settings);
+    let mut done = run(
+        &mut photons,
+        engine.as_mut(),
+        &settings,
+        &said,
+        watch,
+        |events| comparison.add(events),
+    )?;
     done.summary.input = Some(name);
     done.summary.field_of_view_degrees = Some(scene.view().degrees());
     done.summary.against_truth = Some(comparison.finish());
@@ -163,25 +174,47 @@ impl SceneGiven {
     }
 }
 
-/// Runs all of `source`.
+/// The photons after `done` laser cycles, if there are any, and of how many laser cycles.
+fn next_slice(source: &mut dyn PhotonSource, done: u64) -> Result<Option<(Slice, u16)>> {
+    if done >= source.cycles() {
+        return Ok(None);
+    }
+    let length = next_cycles(source, done);
+    Ok(Some((source.next_slice(length)?, length)))
+}
+
+/// Runs all of `source`, as is `said`.
 fn run(
     source: &mut dyn PhotonSource,
-    engine: &mut dyn Engine,
+    engine: &mut (dyn Engine + Send),
     settings: &Settings,
+    said: &SettingsFile,
     watch: &Watch,
     mut see: impl FnMut(&[DepthEvent]),
 ) -> Result<Done> {
     let (scale, geometry) = (settings.range_scale()?, source.geometry());
     let cycles = source.cycles();
+    let mut bins = said
+        .sensor
+        .glass_bins
+        .as_ref()
+        .map(|_| vec![0u64; settings.bins]);
     let mut has_reported = vec![false; geometry.addresses()];
     let mut records = Vec::new();
     let mut done = 0;
     watch.at(done, cycles)?;
-    while done < cycles {
-        let next = next_cycles(source, done);
-        let slice = source.next_slice(next)?;
-        let events = engine.run(&slice)?;
-        let mut of_slice = Vec::with_capacity(events.len() * crate::events::RECORD);
+    let mut next = next_slice(source, done)?;
+    while let Some((slice, length)) = next {
+        done += u64::from(length);
+        // The photons of the next slice are made while these are decided on.
+        let (mut decided, mut after) = (None, None);
+        rayon::in_place_scope(|scope| {
+            scope.spawn(|_| decided = Some(engine.run(&slice)));
+            after = Some(next_slice(source, done));
+        });
+        let events = decided.context("no slice was decided on")??;
+        next = after.transpose()?.flatten();
+        let mut of_slice = Vec::with_capacity(events.len() * RECORD);
         for event in &events {
             push(&mut of_slice, event, &scale);
             for pixel in geometry.block(event.pixel, event.level) {
@@ -189,8 +222,15 @@ fn run(
             }
         }
         records.push(of_slice);
+        if let Some(bins) = &mut bins {
+            let photons = slice.pixels.iter().flat_map(|pixel| &pixel.photons);
+            for photon in photons {
+                if let Some(count) = bins.get_mut(usize::from(photon.code)) {
+                    *count += 1;
+                }
+            }
+        }
         see(&events);
-        done += u64::from(next);
         watch.at(done, cycles)?;
     }
     let reporting = has_reported.into_iter().filter(|&has| has).count();
@@ -201,10 +241,12 @@ fn run(
         offset_mm: settings.offset_mm,
         laser_millihertz: source.laser_hz().map_or(0, |hz| hz.saturating_mul(1000)),
     };
+    let mut summary = Summary::new(engine.statistics(), source, reporting, settings);
+    watch_glass(said, bins.as_deref(), &mut summary);
     Ok(Done {
         events: records,
-        summary: Summary::new(engine.statistics(), source, reporting, settings),
-        said: SettingsFile::default(),
+        summary,
+        said: said.with(settings),
         array: Array::of(&header),
         warnings: Vec::new(),
     })

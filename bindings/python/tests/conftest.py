@@ -11,16 +11,21 @@ ROOT = Path(__file__).resolve().parents[3]
 DATA = ROOT.parent / "shared" / "data"
 
 
-@pytest.fixture(scope="session")
-def program():
-    """Runs the program; gives what it prints, and fails as it fails."""
-    built = subprocess.run(
+def built():
+    """The program, built if it is not."""
+    done = subprocess.run(
         ["cargo", "build", "--release", "--package", "dtof", "--message-format", "json"],
         cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True,
     )
-    messages = (json.loads(line) for line in built.stdout.splitlines())
+    messages = (json.loads(line) for line in done.stdout.splitlines())
     names = [message.get("executable") for message in messages]
-    name = next(name for name in names if name and Path(name).stem == "dtof")
+    return next(name for name in names if name and Path(name).stem == "dtof")
+
+
+@pytest.fixture(scope="session")
+def program():
+    """Runs the program; gives what it prints, and fails as it fails."""
+    name = os.environ.get("DTOF_PROGRAM") or built()
 
     def run(*arguments, check=True):
         arguments = [name, *map(os.fspath, arguments)]

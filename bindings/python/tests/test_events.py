@@ -204,3 +204,18 @@ def test_what_is_surely_wrong_is_a_warning():
         dtof.replay(numpy.zeros((2, 16), dtype=int))
     with pytest.warns(UserWarning, match="bins of 0.250 ps"):
         dtof.replay(counts(), bin_width_ps=0.25)
+
+
+def test_a_cover_glass_that_has_become_brighter_is_told(program, tmp_path):
+    (tmp_path / "dtof.toml").write_text(
+        "[sensor]\ngate = [10, 127]\nglass = 0.1\nglass_bins = [0.0, 0.0, 0.05, 0.05, 0, 0, 0, 0, 0, 0]\n"
+    )
+    array = counts(bins=128)
+    array[..., 2:4] += 4000
+    numpy.save(tmp_path / "counts.npy", array)
+    options = {"recorded_cycles": 10_000, "settings": tmp_path / "dtof.toml"}
+    out = tmp_path / "out"
+    program("replay", "--input", tmp_path / "counts.npy", "--out", out, "--quiet", *said(options))
+    run = dtof.replay(array, **options)
+    is_the_programs(run, out, tmp_path / "a.aer")
+    assert run.statistics["cover_glass"][0] > 2

@@ -15,28 +15,8 @@ mod view;
 use std::io::{self, Write};
 use std::path::Path;
 
-use dtof::calibrate::{Change, RunPhotons, glass_change};
-use dtof::events::output::Output;
 use dtof::events::summary::Summary;
 use dtof::rows::{Row, aligned};
-use dtof::settings::{Sensor, SettingsFile};
-
-/// Tells whether the cover glass has become brighter than the settings say.
-fn watch_glass(said: &SettingsFile, output: &Output, summary: &mut Summary) {
-    let Sensor {
-        glass_bins, gate, ..
-    } = &said.sensor;
-    if let (Some(bins), Some(glass), Some((first, _))) = (output.bins(), glass_bins, gate) {
-        let run = RunPhotons {
-            bins,
-            cycles: summary.cycles,
-            pixels: (summary.pixels - summary.settings.masked.len()) as u64,
-        };
-        if let Change::Brighter(times, least) = glass_change(&run, glass, *first) {
-            summary.cover_glass = Some([times, least]);
-        }
-    }
-}
 
 /// Says on standard error what to know of `file`, a line each, unless `quiet`.
 fn warn(file: &Path, warnings: impl IntoIterator<Item = String>, quiet: bool) {

@@ -9,12 +9,13 @@ use dtof::engine::run::run;
 use dtof::events::echoes::Echo;
 use dtof::events::output::Output;
 use dtof::input::medium::Medium;
+use dtof::jobs::glass::watch_glass;
 use dtof::jobs::recording::warnings;
 use dtof::jobs::replay::{Options, Replay as Opened};
 use dtof::settings::SettingsFile;
 
 use super::dynamic_depth::Shown;
-use super::{print_summary, warn, watch_glass};
+use super::{print_summary, warn};
 
 #[derive(Args)]
 pub struct Replay {
@@ -76,7 +77,7 @@ impl Replay {
         let input = self.input.display().to_string();
         let lead = format!("Recorded photons of {input}.");
         summary.input = Some(input);
-        watch_glass(&said, &output, &mut summary);
+        watch_glass(&said, output.bins(), &mut summary);
         summary.cut_off = known.cut_off;
         summary.recording = known.rows;
         summary.warnings = known.warnings;

@@ -15,6 +15,7 @@ use dtof::events::output::Output;
 use dtof::geometry::FieldOfView;
 use dtof::input::masked::Masked;
 use dtof::input::source::{Geometry, PhotonSource};
+use dtof::jobs::glass::watch_glass;
 use dtof::jobs::simulate::{Options, of_scene};
 use dtof::rows::Row;
 use dtof::settings::SettingsFile;
@@ -24,8 +25,8 @@ use dtof_core::PixelAddress;
 use dtof_link::DynamicDepth;
 
 use super::dynamic_depth::Shown;
+use super::print_summary;
 use super::view::View;
-use super::{print_summary, watch_glass};
 
 #[derive(Args)]
 pub struct Simulate {
@@ -161,7 +162,7 @@ impl Simulation<'_> {
             self.quiet,
             |events| comparison.add(events),
         )?;
-        watch_glass(self.said, &output, &mut summary);
+        watch_glass(self.said, output.bins(), &mut summary);
         summary.input = self.input.map(|file| file.display().to_string());
         summary.field_of_view_degrees = Some(self.scene.view().degrees());
         summary.export_with = export_with(self.scene);

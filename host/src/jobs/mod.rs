@@ -5,6 +5,7 @@
 
 pub mod calibrate;
 pub mod compare;
+pub mod glass;
 pub mod operation;
 pub mod recording;
 pub mod replay;
