@@ -45,11 +45,12 @@ pub fn calibrate(
     work(py, None, move |_| {
         let older = older.as_deref().map(SettingsFile::read).transpose()?;
         let said = options.said(older.as_ref())?;
+        let calibrated = options.calibrate(&input, said.clone());
         let Calibrated {
             found,
             settings,
             warnings,
-        } = options.calibrate(&input, said)?;
+        } = calibrated.map_err(|error| said.name_origin(error))?;
         let changes = older.map_or(Vec::new(), |older| report::changes(&settings, &older));
         Ok(Found {
             toml: settings.to_toml()?,

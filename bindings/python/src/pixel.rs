@@ -41,13 +41,13 @@ trait Steps: Send + Sync {
     fn statistics(&self) -> Statistics;
 }
 
-struct Sized<const BINS: usize> {
+struct OfBins<const BINS: usize> {
     config: PixelConfig<BINS, AnyRule>,
     pixel: AsyncPixel<BINS>,
     statistics: Statistics,
 }
 
-impl<const BINS: usize> Sized<BINS> {
+impl<const BINS: usize> OfBins<BINS> {
     fn boxed(settings: &Settings, address: PixelAddress) -> Result<Box<dyn Steps>> {
         Ok(Box::new(Self {
             config: settings.config()?,
@@ -57,7 +57,7 @@ impl<const BINS: usize> Sized<BINS> {
     }
 }
 
-impl<const BINS: usize> Steps for Sized<BINS> {
+impl<const BINS: usize> Steps for OfBins<BINS> {
     fn count(&mut self, bins: &[u16]) {
         self.pixel.count_batch(&self.config, bins);
     }
@@ -199,14 +199,14 @@ impl Pixel {
 
 fn steps(settings: &Settings, address: PixelAddress) -> Result<Box<dyn Steps>> {
     match settings.bins {
-        8 => Sized::<8>::boxed(settings, address),
-        16 => Sized::<16>::boxed(settings, address),
-        32 => Sized::<32>::boxed(settings, address),
-        64 => Sized::<64>::boxed(settings, address),
-        128 => Sized::<128>::boxed(settings, address),
-        256 => Sized::<256>::boxed(settings, address),
-        512 => Sized::<512>::boxed(settings, address),
-        1024 => Sized::<1024>::boxed(settings, address),
+        8 => OfBins::<8>::boxed(settings, address),
+        16 => OfBins::<16>::boxed(settings, address),
+        32 => OfBins::<32>::boxed(settings, address),
+        64 => OfBins::<64>::boxed(settings, address),
+        128 => OfBins::<128>::boxed(settings, address),
+        256 => OfBins::<256>::boxed(settings, address),
+        512 => OfBins::<512>::boxed(settings, address),
+        1024 => OfBins::<1024>::boxed(settings, address),
         bins => bail!("{bins} bins: must be a power of two from 8 to 1024"),
     }
 }

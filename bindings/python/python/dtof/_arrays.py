@@ -83,8 +83,8 @@ def recording(given: Any, name: str) -> Given:
         numpy.lib.format.write_array_header_1_0(header, described)
     except ValueError as error:
         raise Error(f"{name}: {_line(error)}") from error
-    order = "F" if described["fortran_order"] else "C"
-    return name, header.getvalue(), array.tobytes(order)
+    data = array.tobytes("F") if described["fortran_order"] else array.tobytes("C")
+    return name, header.getvalue(), data
 
 
 def photon_list(pixel: Any, cycle: Any, bin: Any) -> numpy.ndarray:
@@ -138,7 +138,7 @@ def records_of(events: Any) -> bytes:
     if events.ndim != 1:
         raise Error(f"events: an array of {events.ndim} axes: must have one")
     if events.dtype == EVENT:
-        return events.tobytes()
+        return bytes(events.tobytes())
     records = numpy.zeros(events.size, dtype=EVENT)
     for name in EVENT.names or ():
         records[name] = events[name]

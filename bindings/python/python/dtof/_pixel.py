@@ -71,7 +71,8 @@ class Pixel:
     @property
     def settings(self) -> dict[str, Any]:
         """How it operates, as in a settings file."""
-        return json.loads(self._native.settings)
+        settings: dict[str, Any] = json.loads(self._native.settings)
+        return settings
 
 
 def _whole(name: str, value: Any, most: int) -> int:
