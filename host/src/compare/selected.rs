@@ -58,16 +58,12 @@ impl Selected {
 }
 
 impl PhotonSource for Selected {
+    fn inner(&self) -> Option<&dyn PhotonSource> {
+        Some(&*self.source)
+    }
+
     fn geometry(&self) -> Geometry {
         self.source.geometry()
-    }
-
-    fn sides(&self) -> [&'static str; 2] {
-        self.source.sides()
-    }
-
-    fn capture_rows(&self) -> u32 {
-        self.source.capture_rows()
     }
 
     fn addresses(&self) -> Vec<PixelAddress> {
@@ -82,10 +78,6 @@ impl PhotonSource for Selected {
         self.photons_per_cycle
     }
 
-    fn laser_hz(&self) -> Option<u64> {
-        self.source.laser_hz()
-    }
-
     fn next_slice(&mut self, cycles: u16) -> Result<Slice> {
         let mut slice = self.source.next_slice(cycles)?;
         let pixels = self
@@ -96,5 +88,23 @@ impl PhotonSource for Selected {
             first_cycle: slice.first_cycle,
             pixels: pixels.collect(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::masked::Masked;
+    use crate::simulate::demo;
+
+    #[test]
+    fn what_it_does_not_change_is_what_its_source_says() {
+        let source = demo::photons(Geometry::new(32, 16), 1, 100).unwrap();
+        let masked = Masked::new(Box::new(source), &[3]).unwrap();
+        let mut part = Selected::new(Box::new(masked.with_laser_hz(Some(20_000))), 2, 50);
+        part.next_slice(50).unwrap();
+        assert_eq!(part.laser_hz(), Some(20_000));
+        assert!(part.masked() > 0);
+        assert_eq!((part.cycles(), part.addresses().len()), (50, 256));
     }
 }

@@ -161,28 +161,16 @@ impl Stressed {
 }
 
 impl PhotonSource for Stressed {
+    fn inner(&self) -> Option<&dyn PhotonSource> {
+        Some(&*self.source)
+    }
+
     fn geometry(&self) -> Geometry {
         self.source.geometry()
     }
 
-    fn sides(&self) -> [&'static str; 2] {
-        self.source.sides()
-    }
-
-    fn capture_rows(&self) -> u32 {
-        self.source.capture_rows()
-    }
-
-    fn addresses(&self) -> Vec<PixelAddress> {
-        self.source.addresses()
-    }
-
     fn cycles(&self) -> u64 {
         self.cycles
-    }
-
-    fn photons_per_cycle(&self) -> f64 {
-        self.source.photons_per_cycle()
     }
 
     fn next_slice(&mut self, cycles: u16) -> Result<Slice> {

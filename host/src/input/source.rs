@@ -69,23 +69,38 @@ pub struct Slice {
 
 /// Produces photons as they are needed, so that memory does not grow with their
 /// number.
+///
+/// A source that changes the photons of another names it as [`inner`](Self::inner). It then
+/// says all that the other says, but for what it changes.
 pub trait PhotonSource {
+    /// The source whose photons these are, if this one changes those of another.
+    fn inner(&self) -> Option<&dyn PhotonSource> {
+        None
+    }
+
     /// The array.
     fn geometry(&self) -> Geometry;
 
     /// The names of its columns and rows.
     fn sides(&self) -> [&'static str; 2] {
-        ["column", "row"]
+        self.inner()
+            .map_or(["column", "row"], |inner| inner.sides())
     }
 
     /// Rows that were recorded together: a block of pixels has no others.
     fn capture_rows(&self) -> u32 {
-        self.geometry().rows
+        match self.inner() {
+            Some(inner) => inner.capture_rows(),
+            None => self.geometry().rows,
+        }
     }
 
     /// The pixels that are there, ascending: all of the array unless said
     /// otherwise.
     fn addresses(&self) -> Vec<PixelAddress> {
+        if let Some(inner) = self.inner() {
+            return inner.addresses();
+        }
         let all = (0..=u16::MAX).take(self.geometry().addresses());
         all.map(PixelAddress).collect()
     }
@@ -96,28 +111,28 @@ pub trait PhotonSource {
     /// Photons of all pixels in the next laser cycle, about; 0 if that is not
     /// known.
     fn photons_per_cycle(&self) -> f64 {
-        0.0
+        self.inner().map_or(0.0, |inner| inner.photons_per_cycle())
     }
 
     /// Recorded photons that no slice has held so far.
     fn not_replayed(&self) -> u64 {
-        0
+        self.inner().map_or(0, |inner| inner.not_replayed())
     }
 
     /// Photons of pixels that are left out so far.
     fn masked(&self) -> u64 {
-        0
+        self.inner().map_or(0, |inner| inner.masked())
     }
 
     /// Laser cycles that recorded histograms are taken to have lasted: those of
     /// the shortest and of the longest capture.
     fn recorded_cycles(&self) -> Option<(u64, u64)> {
-        None
+        self.inner()?.recorded_cycles()
     }
 
     /// Laser cycles a second, if that is known.
     fn laser_hz(&self) -> Option<u64> {
-        None
+        self.inner()?.laser_hz()
     }
 
     /// Of pixels that `is_wanted` does not name no photons need be made from now on, if that
