@@ -13,6 +13,7 @@ use dtof::device::monitor::map::{LiveMap, SHOW_CURSOR};
 use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::device::{self, Client};
 use dtof::events::aer_file::Header;
+use dtof::input::masked;
 use dtof::jobs::operation::Operation;
 use dtof::settings::{Sensor, SettingsFile};
 use dtof_core::fixed::types::{I24F8, U16F16};
@@ -119,9 +120,7 @@ impl Monitor {
             client.bins()
         );
         let settings = said.settings(client.bins().into())?;
-        if let Some(past) = settings.masked.iter().find(|&&masked| masked >= pixels) {
-            bail!("--mask {past}: there are {pixels} pixels");
-        }
+        masked::check(&settings.masked, pixels.into())?;
         if let Some(columns) = said
             .sensor
             .columns

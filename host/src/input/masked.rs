@@ -1,7 +1,7 @@
 //! Pixels that are left out: hot ones, which would report noise and drown their block, and dead
 //! ones.
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail};
 use dtof_core::PixelAddress;
 
 use super::source::{Geometry, PhotonSource, Slice};
@@ -15,25 +15,30 @@ pub struct Masked {
     laser_hz: Option<u64>,
 }
 
+/// Whether each of `masked` is one of so many `pixels`.
+///
+/// # Errors
+/// Names the first that is not.
+pub fn check(masked: &[u16], pixels: usize) -> Result<()> {
+    let past = masked.iter().find(|&&masked| usize::from(masked) >= pixels);
+    past.map_or(Ok(()), |past| {
+        bail!("--mask {past}: there are {pixels} pixels")
+    })
+}
+
 impl Masked {
     /// `source` without the photons of `pixels`.
     ///
     /// # Errors
     /// If one of `pixels` is not in the array.
     pub fn new(source: Box<dyn PhotonSource>, pixels: &[u16]) -> Result<Self> {
-        let (array, addresses) = (source.geometry().addresses(), source.addresses());
-        let mut places = Vec::new();
-        for &pixel in pixels {
-            ensure!(
-                usize::from(pixel) < array,
-                "--mask {pixel}: there are {array} pixels"
-            );
-            places.extend(addresses.binary_search(&PixelAddress(pixel)));
-        }
+        check(pixels, source.geometry().addresses())?;
+        let addresses = source.addresses();
+        let place = |&pixel| addresses.binary_search(&PixelAddress(pixel)).ok();
         Ok(Self {
             laser_hz: source.laser_hz(),
+            places: pixels.iter().filter_map(place).collect(),
             source,
-            places,
             photons: 0,
         })
     }
@@ -49,40 +54,20 @@ impl Masked {
 }
 
 impl PhotonSource for Masked {
+    fn inner(&self) -> Option<&dyn PhotonSource> {
+        Some(&*self.source)
+    }
+
     fn geometry(&self) -> Geometry {
         self.source.geometry()
-    }
-
-    fn sides(&self) -> [&'static str; 2] {
-        self.source.sides()
-    }
-
-    fn capture_rows(&self) -> u32 {
-        self.source.capture_rows()
-    }
-
-    fn addresses(&self) -> Vec<PixelAddress> {
-        self.source.addresses()
     }
 
     fn cycles(&self) -> u64 {
         self.source.cycles()
     }
 
-    fn photons_per_cycle(&self) -> f64 {
-        self.source.photons_per_cycle()
-    }
-
-    fn not_replayed(&self) -> u64 {
-        self.source.not_replayed()
-    }
-
     fn masked(&self) -> u64 {
         self.photons
-    }
-
-    fn recorded_cycles(&self) -> Option<(u64, u64)> {
-        self.source.recorded_cycles()
     }
 
     fn laser_hz(&self) -> Option<u64> {
