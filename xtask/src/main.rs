@@ -15,9 +15,9 @@ mod tools;
 
 use std::env;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{Command, ExitCode, Stdio};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use lexopt::prelude::{Long, Short, Value};
 use lexopt::{Parser, ValueExt};
 
@@ -147,7 +147,16 @@ fn target_folder(root: &Path) -> PathBuf {
     root.join(folder)
 }
 
+/// Runs a command that must succeed and may not ask.
+fn succeed(command: &mut Command) -> Result<()> {
+    let name = command.get_program().display().to_string();
+    let status = command.stdin(Stdio::null()).status();
+    let status = status.with_context(|| format!("{name} does not start"))?;
+    ensure!(status.success(), "{name}: {status}, see above");
+    Ok(())
+}
+
 /// The cargo that runs this program.
-fn cargo() -> std::process::Command {
-    std::process::Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+fn cargo() -> Command {
+    Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }

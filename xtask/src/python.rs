@@ -2,13 +2,14 @@
 //! elsewhere.
 
 use std::fs;
+use std::io::stderr;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 
-use crate::target_folder;
 use crate::tools::PYTHON;
+use crate::{succeed, target_folder};
 
 /// The Python of an environment below the build folder that has the packages of a file
 /// of the workspace. Needs a network only for what is not there yet.
@@ -28,24 +29,15 @@ pub fn environment(root: &Path, requirements: &str) -> Result<PathBuf> {
     eprintln!("{}: installing {requirements}", PYTHON.require()?);
     let mut venv = Command::new(PYTHON.program);
     venv.args(["-m", "venv", "--clear"]).arg(&folder);
-    succeed(&mut venv, "python3 -m venv")?;
+    // Standard output is for the path.
+    succeed(venv.stdout(stderr()))?;
     let mut pip = Command::new(&python);
     // From Python 3.12 on expelliarmus comes as its source, which needs a C compiler.
     pip.args(["-m", "pip", "install", "--quiet", "--no-input"]);
     pip.arg("--disable-pip-version-check")
         .arg("--requirement")
         .arg(&file);
-    succeed(&mut pip, "pip install")?;
+    succeed(pip.stdout(stderr()))?;
     fs::write(&installed, wanted).with_context(|| installed.display().to_string())?;
     Ok(python)
-}
-
-/// Runs a command that may not ask. What it prints goes to standard error: standard
-/// output is for the path.
-fn succeed(command: &mut Command, name: &str) -> Result<()> {
-    let command = command.stdin(Stdio::null()).stdout(std::io::stderr());
-    let status = command.status();
-    let status = status.with_context(|| format!("{name} does not start"))?;
-    ensure!(status.success(), "{name} failed, see above");
-    Ok(())
 }

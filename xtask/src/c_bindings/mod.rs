@@ -15,7 +15,7 @@ use crate::image::symbols;
 use crate::self_test;
 use crate::sizes::Sizes;
 use crate::tools::{ARM_GCC, CMAKE, CXX, QEMU, Tool};
-use crate::{cargo, qemu, target_folder, toolchain};
+use crate::{cargo, qemu, succeed, target_folder, toolchain};
 
 use self::figures::Figures;
 
@@ -151,14 +151,15 @@ fn no_panic(path: &Path) -> Result<()> {
     let bytes = fs::read(path).with_context(|| path.display().to_string())?;
     let file = object::File::parse(&*bytes)?;
     let name = path.file_name().unwrap_or_default().display();
-    let mut functions = 0;
-    for symbol in file.symbols() {
-        let symbol = symbol.name()?;
-        if let Some(why) = symbols::forbidden(symbol) {
-            bail!("{name}: {why}: {symbol}");
-        }
-        functions += u32::from(symbol.starts_with("dtof_"));
+    let found: Result<Vec<&str>, _> = file.symbols().map(|symbol| symbol.name()).collect();
+    let found = found?;
+    if let Some(problem) = symbols::problems(&found).next() {
+        bail!("{name}: {problem}");
     }
+    let functions = found
+        .iter()
+        .filter(|name| name.starts_with("dtof_"))
+        .count();
     ensure!(
         functions > 5,
         "{name}: only {functions} functions are in it"
@@ -180,12 +181,4 @@ fn printed(command: &mut Command) -> Result<String> {
     let output = command.output().context(name.clone())?;
     ensure!(output.status.success(), "{name}: {}", output.status);
     Ok(String::from_utf8(output.stdout)?)
-}
-
-fn succeed(command: &mut Command) -> Result<()> {
-    let name = command.get_program().display().to_string();
-    let status = command.stdin(Stdio::null()).status();
-    let status = status.with_context(|| format!("{name} does not start"))?;
-    ensure!(status.success(), "{name}: {status}, see above");
-    Ok(())
 }

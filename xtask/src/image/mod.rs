@@ -152,11 +152,7 @@ impl Image {
     /// The problems, one line each.
     fn problems(&self) -> Vec<String> {
         let mut problems = Vec::new();
-        for name in &self.symbols {
-            if let Some(why) = symbols::forbidden(name) {
-                problems.push(format!("{why}: {name}"));
-            }
-        }
+        problems.extend(symbols::problems(&self.symbols));
         if !self.symbols.iter().any(|name| name == "_start") {
             problems.push("the entry `_start` is missing".into());
         }

@@ -1,8 +1,14 @@
 //! Which names of symbols give away panics, floating point and allocation.
 
+/// A line for each of `names` that has no place in an image.
+pub fn problems<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = String> {
+    let names = names.iter().map(AsRef::as_ref);
+    names.filter_map(|name| Some(format!("{}: {name}", forbidden(name)?)))
+}
+
 /// Why a symbol of this name, mangled or not, has no place in the image; `None`
 /// if it may stay.
-pub fn forbidden(name: &str) -> Option<&'static str> {
+fn forbidden(name: &str) -> Option<&'static str> {
     if is_panic(name) {
         Some("panics")
     } else if is_soft_float(name) {
