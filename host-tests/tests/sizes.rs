@@ -12,8 +12,11 @@ fn a_macropixel_takes_what_the_documentation_says() {
         size_of::<AsyncPixel<128>>(),
         size_of::<DepthEvent>()
     );
-    // README: "under 400 bytes"; the pixel: 72 bytes beside its counters.
+    // The pixel: 72 bytes beside its counters.
     assert_eq!(size_of::<AsyncPixel<128>>(), 128 * 2 + 72);
+    let said = "macropixel of 128 bins takes 328 bytes";
+    assert!(include_str!("../../README.md").contains(said));
+    assert_eq!(size_of::<AsyncPixel<128>>(), 328);
     // A block: 8 bytes more.
     assert_eq!(size_of::<Block<128>>(), 128 * 2 + 72 + 8);
     // Histogram: 2 bytes a bin (4 for 24 bits) and 16 bytes more.

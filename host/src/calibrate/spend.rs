@@ -3,8 +3,8 @@
 //! The recording is replayed. More photons an event make its distance better and come later. As
 //! many are spent as the paper's rule takes with its own minimum, 5 in the highest bin: the minimum
 //! goes up, then looks become fewer. The window is the one that suits the pulse, or a wider one if
-//! that does more with as many photons. What events are off by in the median is taken off the range offset: the place of a few photons of
-//! a pulse that is not symmetric differs from that of many.
+//! that does more with as many photons. What events are off by in the median is taken off the range
+//! offset: the place of a few photons of a pulse that is not symmetric differs from that of many.
 
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
