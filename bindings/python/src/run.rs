@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use dtof::engine::Engine;
 use dtof::engine::host::host_engine;
-use dtof::engine::run::next_cycles;
+use dtof::engine::run::each_slice;
 use dtof::engine::settings::Settings;
 use dtof::events::aer_file::Header;
 use dtof::events::summary::Summary;
 use dtof::input::masked::Masked;
 use dtof::input::medium::Medium;
-use dtof::input::source::{PhotonSource, Slice};
+use dtof::input::source::PhotonSource;
 use dtof::jobs::glass::watch_glass;
 use dtof::jobs::recording::warnings;
 use dtof::jobs::replay::{Options, Replay};
@@ -174,19 +174,10 @@ impl SceneGiven {
     }
 }
 
-/// The photons after `done` laser cycles, if there are any, and of how many laser cycles.
-fn next_slice(source: &mut dyn PhotonSource, done: u64) -> Result<Option<(Slice, u16)>> {
-    if done >= source.cycles() {
-        return Ok(None);
-    }
-    let length = next_cycles(source, done);
-    Ok(Some((source.next_slice(length)?, length)))
-}
-
 /// Runs all of `source`, as is `said`.
 fn run(
     source: &mut dyn PhotonSource,
-    engine: &mut (dyn Engine + Send),
+    engine: &mut dyn Engine,
     settings: &Settings,
     said: &SettingsFile,
     watch: &Watch,
@@ -201,38 +192,31 @@ fn run(
         .map(|_| vec![0u64; settings.bins]);
     let mut has_reported = vec![false; geometry.addresses()];
     let mut records = Vec::new();
-    let mut done = 0;
-    watch.at(done, cycles)?;
-    let mut next = next_slice(source, done)?;
-    while let Some((slice, length)) = next {
-        done += u64::from(length);
-        // The photons of the next slice are made while these are decided on.
-        let (mut decided, mut after) = (None, None);
-        rayon::in_place_scope(|scope| {
-            scope.spawn(|_| decided = Some(engine.run(&slice)));
-            after = Some(next_slice(source, done));
-        });
-        let events = decided.context("no slice was decided on")??;
-        next = after.transpose()?.flatten();
-        let mut of_slice = Vec::with_capacity(events.len() * RECORD);
-        for event in &events {
-            push(&mut of_slice, event, &scale);
-            for pixel in geometry.block(event.pixel, event.level) {
-                has_reported[usize::from(pixel.0)] = true;
-            }
-        }
-        records.push(of_slice);
-        if let Some(bins) = &mut bins {
-            let photons = slice.pixels.iter().flat_map(|pixel| &pixel.photons);
-            for photon in photons {
-                if let Some(count) = bins.get_mut(usize::from(photon.code)) {
-                    *count += 1;
+    watch.at(0, cycles)?;
+    each_slice(
+        source,
+        |slice| engine.run(slice),
+        |slice, events, done| {
+            let mut of_slice = Vec::with_capacity(events.len() * RECORD);
+            for event in &events {
+                push(&mut of_slice, event, &scale);
+                for pixel in geometry.block(event.pixel, event.level) {
+                    has_reported[usize::from(pixel.0)] = true;
                 }
             }
-        }
-        see(&events);
-        watch.at(done, cycles)?;
-    }
+            records.push(of_slice);
+            if let Some(bins) = &mut bins {
+                let photons = slice.pixels.iter().flat_map(|pixel| &pixel.photons);
+                for photon in photons {
+                    if let Some(count) = bins.get_mut(usize::from(photon.code)) {
+                        *count += 1;
+                    }
+                }
+            }
+            see(&events);
+            watch.at(done, cycles)
+        },
+    )?;
     let reporting = has_reported.into_iter().filter(|&has| has).count();
     let header = Header {
         bins: u32::try_from(settings.bins)?,

@@ -198,7 +198,7 @@ fn engine(
     addresses: &[PixelAddress],
 ) -> Result<Box<dyn Engine>> {
     let Some(device) = device else {
-        return Ok(host_engine(settings, array, addresses)?);
+        return host_engine(settings, array, addresses);
     };
     ensure!(
         settings.frame.is_none(),

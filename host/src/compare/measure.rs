@@ -10,7 +10,7 @@ use super::tally::{Figures, Tally};
 use super::truth::Truth;
 use crate::engine::Engine;
 use crate::engine::host::host_engine;
-use crate::engine::run::next_cycles;
+use crate::engine::run::each_slice;
 use crate::engine::settings::Settings;
 use crate::input::source::PhotonSource;
 
@@ -39,7 +39,7 @@ pub struct Outcome {
 /// A trial under way.
 struct Running<'a> {
     trial: &'a Trial,
-    engine: Box<dyn Engine + Send>,
+    engine: Box<dyn Engine>,
     tally: Tally<'a>,
 }
 
@@ -71,24 +71,26 @@ pub fn measure(
     let mut running: Vec<Running> = running.collect::<Result<_>>()?;
     let mut watched = vec![0; geometry.addresses()];
     let mut pixel_cycles = 0;
-    let mut done = 0;
-    while done < cycles {
-        let next = next_cycles(source, done);
-        let slice = source.next_slice(next)?;
-        for (address, pixel) in addresses.iter().zip(&slice.pixels) {
-            let here = u64::from(pixel.cycles);
-            pixel_cycles += here;
-            if !masked.contains(&address.0) && truth.has_target(*address, slice.first_cycle) {
-                watched[usize::from(address.0)] += here;
+    each_slice(
+        source,
+        |slice| {
+            running.par_iter_mut().try_for_each(|running| {
+                let events = running.engine.run(slice)?;
+                running.tally.add(&events);
+                Ok(())
+            })
+        },
+        |slice, (), _| {
+            for (address, pixel) in addresses.iter().zip(&slice.pixels) {
+                let here = u64::from(pixel.cycles);
+                pixel_cycles += here;
+                if !masked.contains(&address.0) && truth.has_target(*address, slice.first_cycle) {
+                    watched[usize::from(address.0)] += here;
+                }
             }
-        }
-        running.par_iter_mut().try_for_each(|running| {
-            let events = running.engine.run(&slice)?;
-            running.tally.add(&events);
-            anyhow::Ok(())
-        })?;
-        done += u64::from(next);
-    }
+            Ok(())
+        },
+    )?;
     let outcomes = running.into_par_iter().map(|running| {
         let Running {
             trial,

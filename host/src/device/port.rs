@@ -10,7 +10,7 @@ pub(super) const PATIENCE: Duration = Duration::from_millis(2);
 pub(super) const STUCK: Duration = Duration::from_secs(5);
 
 /// Bytes to a device and from it.
-pub trait Port {
+pub trait Port: Send {
     /// Sends all of `bytes`.
     ///
     /// # Errors

@@ -29,7 +29,7 @@ pub fn host_engine(
     settings: &Settings,
     array: Geometry,
     addresses: &[PixelAddress],
-) -> Result<Box<dyn Engine + Send>> {
+) -> Result<Box<dyn Engine>> {
     Ok(match settings.bins {
         8 => HostEngine::<8>::boxed(settings, array, addresses)?,
         16 => HostEngine::<16>::boxed(settings, array, addresses)?,
@@ -48,7 +48,7 @@ impl<const BINS: usize> HostEngine<BINS> {
         settings: &Settings,
         array: Geometry,
         addresses: &[PixelAddress],
-    ) -> Result<Box<dyn Engine + Send>> {
+    ) -> Result<Box<dyn Engine>> {
         if let Some(length) = settings.frame {
             return Ok(Box::new(FrameEngine::<BINS>::new(
                 settings, length, addresses,

@@ -13,7 +13,7 @@ use crate::input::source::Slice;
 
 /// Turns photons into events. Whatever runs behind it, the same photons give
 /// the same events.
-pub trait Engine {
+pub trait Engine: Send {
     /// Runs one slice and gives the events of its laser cycles, in order of
     /// laser cycle, of level and of pixel address.
     ///

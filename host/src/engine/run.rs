@@ -1,13 +1,13 @@
 //! One run: photons through an engine into an output folder.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use dtof_core::DepthEvent;
 
 use crate::engine::Engine;
 use crate::engine::settings::Settings;
 use crate::events::output::Output;
 use crate::events::summary::Summary;
-use crate::input::source::PhotonSource;
+use crate::input::source::{PhotonSource, Slice};
 use crate::progress::Progress;
 
 /// Laser cycles produced and decided at a time, at most. Changes nothing in the events.
@@ -32,20 +32,19 @@ pub fn run(
     quiet: bool,
     mut watch: impl FnMut(&[DepthEvent]),
 ) -> Result<Summary> {
-    let cycles = source.cycles();
-    let progress = Progress::new(cycles, "laser cycles", quiet);
+    let progress = Progress::new(source.cycles(), "laser cycles", quiet);
     let pixels = source.addresses();
-    let mut done = 0;
-    while done < cycles {
-        let next = next_cycles(source, done);
-        let slice = source.next_slice(next)?;
-        output.count(&pixels, &slice);
-        let events = engine.run(&slice)?;
-        output.write(&events)?;
-        watch(&events);
-        done += u64::from(next);
-        progress.at(done);
-    }
+    each_slice(
+        source,
+        |slice| engine.run(slice),
+        |slice, events, done| {
+            output.count(&pixels, slice);
+            output.write(&events)?;
+            watch(&events);
+            progress.at(done);
+            Ok(())
+        },
+    )?;
     progress.finish();
     output.end_events();
     let reporting = output.maps().reporting();
@@ -55,6 +54,40 @@ pub fn run(
         reporting,
         settings,
     ))
+}
+
+/// Gives all of `source` to `decide`, slice by slice, and makes the photons of the next slice
+/// meanwhile. `see` is given each slice, what was decided, and how many laser cycles are done.
+///
+/// # Errors
+/// Those of the recording, of `decide` and of `see`. The first of them ends it.
+pub fn each_slice<T: Send>(
+    source: &mut dyn PhotonSource,
+    mut decide: impl FnMut(&Slice) -> Result<T> + Send,
+    mut see: impl FnMut(&Slice, T, u64) -> Result<()>,
+) -> Result<()> {
+    let mut done = 0;
+    let mut next = next_slice(source, done)?;
+    while let Some((slice, length)) = next {
+        done += u64::from(length);
+        let (mut decided, mut after) = (None, Ok(None));
+        rayon::in_place_scope(|scope| {
+            scope.spawn(|_| decided = Some(decide(&slice)));
+            after = next_slice(source, done);
+        });
+        see(&slice, decided.context("no slice was decided on")??, done)?;
+        next = after?;
+    }
+    Ok(())
+}
+
+/// The photons after `done` laser cycles, if there are any, and of how many laser cycles.
+fn next_slice(source: &mut dyn PhotonSource, done: u64) -> Result<Option<(Slice, u16)>> {
+    if done >= source.cycles() {
+        return Ok(None);
+    }
+    let length = next_cycles(source, done);
+    Ok(Some((source.next_slice(length)?, length)))
 }
 
 /// Laser cycles of the next slice, `done` of all being done.

@@ -39,7 +39,7 @@ pub struct Replay {
     /// The photons.
     pub photons: Masked,
     /// The pixels.
-    pub engine: Box<dyn Engine + Send>,
+    pub engine: Box<dyn Engine>,
     /// How they operate.
     pub settings: Settings,
     /// What was said, and what the recording says besides.

@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 use std::rc::Rc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use crate::common::aer::{HEADER, depth_event};
@@ -33,18 +34,18 @@ struct Device {
     lives: u64,
     answers: VecDeque<(u8, Vec<u8>)>,
     now_ms: u32,
-    sent: Rc<RefCell<Vec<Event>>>,
+    sent: Arc<Mutex<Vec<Event>>>,
 }
 
 impl Device {
     fn event(&mut self, pixel: u16) {
-        let cycle = self.sent.borrow().len() as u64;
+        let cycle = self.sent.lock().unwrap().len() as u64;
         let event = depth_event(pixel, 100 * cycle, 20);
         let (time, word) = self.encoder.encode(&event);
         let words = time.into_iter().chain([word]);
         let body: Vec<u8> = words.flat_map(|word| word.to_le_bytes()).collect();
         self.answers.push_back((message::EVENTS, body));
-        self.sent.borrow_mut().push(Event::Depth(event));
+        self.sent.lock().unwrap().push(Event::Depth(event));
     }
 
     fn answer(&mut self, kind: u8, body: &[u8]) {
@@ -82,7 +83,7 @@ impl Port for Device {
     fn receive(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         self.now_ms += 1;
         std::thread::sleep(Duration::from_millis(1));
-        let gone = self.sent.borrow().len() as u64 >= self.lives;
+        let gone = self.sent.lock().unwrap().len() as u64 >= self.lives;
         while let Some((kind, body)) = self.answers.front() {
             // The last thing it sends is an event.
             if gone && *kind != message::EVENTS || self.endpoint.offer(*kind, body).is_err() {
@@ -142,7 +143,7 @@ fn device(versions: [u16; 2], pixel: u16, lives: u64) -> Device {
         lives,
         answers: VecDeque::new(),
         now_ms: 0,
-        sent: Rc::default(),
+        sent: Arc::default(),
     }
 }
 
@@ -154,7 +155,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
         ..HEADER
     };
     let device = device([LINK_VERSION, AER_VERSION], pixel, lives);
-    let sent = Rc::clone(&device.sent);
+    let sent = Arc::clone(&device.sent);
     let mut client = Client::new(Box::new(device)).unwrap();
     let mut recording = Recording::new(&path, &[], &header).unwrap();
     let screen = Screen::default();
@@ -180,7 +181,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
     );
     recording.finish().unwrap();
     Monitored {
-        sent: sent.take(),
+        sent: std::mem::take(&mut sent.lock().unwrap()),
         recorded: recorded(&path),
         drawn: String::from_utf8(screen.0.take()).unwrap(),
         error: ended.err().map(|error| format!("{error:#}")),
