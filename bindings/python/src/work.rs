@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, ensure};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -35,15 +35,21 @@ impl Watch {
     pub fn at(&self, done: u64, total: u64) -> Result<()> {
         self.done.store(done, Ordering::Relaxed);
         self.total.store(total, Ordering::Relaxed);
-        if self.is_stopped.load(Ordering::Relaxed) {
-            bail!("stopped");
-        }
-        Ok(())
+        self.go_on()
     }
 
     /// What comes next.
-    pub fn step(&self, step: &str) {
+    ///
+    /// # Errors
+    /// If nobody wants it.
+    pub fn step(&self, step: &str) -> Result<()> {
         locked(&self.steps).push(step.to_owned());
+        self.go_on()
+    }
+
+    fn go_on(&self) -> Result<()> {
+        ensure!(!self.is_stopped.load(Ordering::Relaxed), "stopped");
+        Ok(())
     }
 }
 

@@ -53,7 +53,10 @@ impl Compare {
             said,
             &Told {
                 warning: &|warning| warn(name, [warning], self.quiet),
-                step: &|step| steps.at(step),
+                step: &|step| {
+                    steps.at(step);
+                    Ok(())
+                },
             },
         );
         steps.finish();

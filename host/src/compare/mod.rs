@@ -88,8 +88,8 @@ pub struct Task<'a> {
     /// How exact the answer has to be, in millimetres; as frames of L2 unless given, or as near to
     /// that as any method comes.
     pub within_mm: Option<f64>,
-    /// Told what comes next.
-    pub progress: &'a dyn Fn(&str),
+    /// Told what comes next. An error from it ends the comparison.
+    pub progress: &'a dyn Fn(&str) -> Result<()>,
 }
 
 /// What came out.
@@ -192,7 +192,7 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     } = *task;
     // What no pixel could run with is refused before anything is drawn.
     host_engine(settings, Geometry::new(1, 1), &[])?;
-    (task.progress)("surveys the photons");
+    (task.progress)("surveys the photons")?;
     let mut source = photons(task, 0, PHOTONS)?;
     let (geometry, laser_hz) = (source.geometry(), source.laser_hz());
     let most_levels = most_levels(source.as_ref());
@@ -205,11 +205,11 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     );
     let light = light(&surveyed, sigma, has_target);
 
-    (task.progress)("finds thresholds of equal false alarms");
+    (task.progress)("finds thresholds of equal false alarms")?;
     let field = Field::new(task, &light, most_levels)?;
     let bound = Bound::new(&light, settings, task.false_alarm, settings.seed)?;
 
-    (task.progress)("tries all methods");
+    (task.progress)("tries all methods")?;
     let mut source = photons(task, 0, PHOTONS)?;
     let (pixels, cycles) = (source.addresses().len(), source.cycles());
     let trials = field.trials(&light)?;
@@ -290,7 +290,7 @@ fn under_stress(
     truth: &Truth,
     stress: Stress,
 ) -> Result<(Stress, Vec<Outcome>)> {
-    (task.progress)(stress.name);
+    (task.progress)(stress.name)?;
     let source = photons(task, 1, STRESS_PHOTONS)?;
     let bins = u16::try_from(task.settings.bins)?;
     let mut source = Stressed::new(source, &stress, bins, task.sigma, task.settings.seed);

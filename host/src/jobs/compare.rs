@@ -56,8 +56,8 @@ pub enum Input {
 pub struct Told<'a> {
     /// What is wrong with the recording.
     pub warning: &'a dyn Fn(String),
-    /// What comes next.
-    pub step: &'a dyn Fn(&str),
+    /// What comes next. An error from it ends the comparison.
+    pub step: &'a dyn Fn(&str) -> Result<()>,
 }
 
 /// What came of it.
