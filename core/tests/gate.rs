@@ -45,6 +45,9 @@ fn check_gate<const BINS: usize>(gate: RangeGate<BINS>, first: u16, last: u16, i
 #[test]
 fn every_gate_is_what_it_says_or_refused() {
     every_gate::<8>();
+    every_gate::<16>();
+    every_gate::<32>();
+    every_gate::<64>();
     every_gate::<128>();
     every_gate::<1024>();
 }

@@ -10,6 +10,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use crate::document::{bit_table, pack, pack_time};
+use crate::parallel;
 
 /// Decodes any bytes as the document says, without the code.
 fn check_any_bytes(bytes: [u8; 16]) {
@@ -146,6 +147,22 @@ fn all_combinations_of_the_boundaries_of_a_dynamic_depth_event() {
             DynamicDepthEvent::new(pixel, level, LaserCycle(0), position, change, Flags::NONE);
         assert_eq!(event, None);
     }
+}
+
+/// Every position and every change there is, and the field of each at every value.
+#[test]
+#[ignore = "takes a minute: `.ci/long proofs`"]
+fn every_position_and_change_of_a_dynamic_depth_event() {
+    const LOW: u128 = 2 << 62;
+    parallel::for_each(1 << 16, |upper| {
+        for lower in 0..1 << 16 {
+            let value = u128::from(upper << 16 | lower);
+            // Beside a change of 1, and a position of 0.
+            for word in [LOW | value << 64 | 1 << 96, LOW | value << 96] {
+                check_any_bytes(word.to_le_bytes());
+            }
+        }
+    });
 }
 
 #[test]

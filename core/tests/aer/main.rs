@@ -10,3 +10,5 @@ mod any_bytes;
 mod depth_event;
 mod document;
 mod golden;
+#[path = "../common/parallel.rs"]
+mod parallel;

@@ -6,6 +6,8 @@ use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
+use crate::parallel;
+
 /// The paper's rule over all the bins given, with its example in mind: "if the
 /// peak was located in bins 64-127, the non-peak half was defined as bins 0-63".
 fn naive(bins: &[u32], peak: usize) -> u32 {
@@ -80,6 +82,34 @@ fn every_gate_of_24_bins_and_every_peak_inside() {
             }
         }
     }
+}
+
+/// Every gate of 8 to 128 bins, and every peak in it.
+#[test]
+#[ignore = "takes a minute: `.ci/long proofs`"]
+fn every_gate_of_128_bins_and_every_peak_inside() {
+    fn check<const BINS: usize>() {
+        let bins = BINS as u64;
+        parallel::for_each(bins - 7, |first| {
+            let mut rng = Pcg32::seed_from_u64(bins + first);
+            for last in first + 7..bins {
+                let gate = RangeGate::<BINS>::new(first as u16, last as u16).unwrap();
+                for most in [2, 4, 64, 1024] {
+                    let counts: [u32; BINS] = core::array::from_fn(|_| rng.next_u32() % most);
+                    let (first, last) = (first as usize, last as usize);
+                    for peak in first..=last {
+                        let expected = naive(&counts[first..=last], peak - first);
+                        assert_eq!(quadrant(&counts, &gate, peak), expected);
+                    }
+                }
+            }
+        });
+    }
+    check::<8>();
+    check::<16>();
+    check::<32>();
+    check::<64>();
+    check::<128>();
 }
 
 #[test]

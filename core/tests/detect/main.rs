@@ -10,6 +10,8 @@ mod any_rule;
 mod average;
 mod background;
 mod common;
+#[path = "../common/parallel.rs"]
+mod parallel;
 mod peak;
 mod quadrant;
 mod root;

@@ -4,6 +4,8 @@ use dtof_core::isqrt;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
+use crate::parallel;
+
 /// Whether `root` is the floor of the root of `value`, by the definition.
 fn is_floor(root: u32, value: u32) -> bool {
     let root = u64::from(root);
@@ -50,6 +52,32 @@ fn every_boundary_of_32_bits_is_exact() {
         [square - 1, square, square + 1].into_iter().for_each(check);
     }
     check(u32::MAX);
+}
+
+/// In steps of 2¹⁶, within which the roots go up one by one.
+#[test]
+#[ignore = "takes a minute: `.ci/long proofs`"]
+fn all_32_bit_values_are_exact() {
+    parallel::for_each(1 << 16, |high| {
+        let high = (high as u32) << 16;
+        let mut root = high.isqrt();
+        assert!(is_floor(root, high));
+        for value in high..=high | 0xffff {
+            let next = u64::from(root) + 1;
+            if u64::from(value) == next * next {
+                root += 1;
+            }
+            let found = [
+                isqrt::<5>(value),
+                isqrt::<6>(value),
+                isqrt::<8>(value),
+                isqrt::<12>(value),
+                isqrt::<16>(value),
+            ];
+            let expected = [31, 63, 255, 4095, 65_535].map(|largest| root.min(largest));
+            assert_eq!(found, expected, "{value}");
+        }
+    });
 }
 
 #[test]

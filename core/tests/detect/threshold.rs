@@ -6,6 +6,8 @@ use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
+use crate::parallel;
+
 /// In 1/256: 0, the smallest, 1/2, the paper's 4 and 8, odd ones, the largest.
 const ALPHAS: [u16; 12] = [
     0, 1, 128, 255, 256, 257, 640, 1024, 2048, 25_601, 65_534, 65_535,
@@ -149,6 +151,37 @@ fn the_lowest_background_is_right_for_all_10_bit_peaks() {
             assert_lowest::<Count10>(alpha, peak);
         }
     }
+}
+
+/// 2¹⁶ α, 2¹⁰ counts: the level of each, the peaks next to it, and the background that holds
+/// each peak back.
+#[test]
+#[ignore = "takes a minute: `.ci/long proofs`"]
+fn all_10_bit_counts_at_every_alpha() {
+    let roots: Vec<u64> = (0..1024).map(root).collect();
+    parallel::for_each(1 << 16, |alpha| {
+        let alpha = alpha as u16;
+        let exact = |background: u32| {
+            u64::from(background) * 256 + u64::from(alpha) * roots[background as usize]
+        };
+        for background in 0..1024 {
+            let exact = exact(background);
+            let level = level::<Count10>(alpha, background);
+            assert_eq!(u64::from(level.to_bits()), exact);
+            for peak in [0, exact / 256, exact / 256 + 1, 1023] {
+                let peak = peak.min(1023) as u32;
+                let fires = fires::<Count10>(threshold(alpha, 0), peak, background);
+                assert_eq!(fires, u64::from(peak) * 256 > exact);
+            }
+        }
+        for peak in 0..1024 {
+            let lowest = threshold(alpha, 0).lowest_background::<Count10>(Count::saturating(peak));
+            let held_back = |background: &u32| u64::from(peak) * 256 <= exact(*background);
+            // The level goes up with the background: one step on either side says all.
+            assert!(lowest == 0 || !held_back(&(lowest - 1)));
+            assert!(lowest == 1024 || held_back(&lowest));
+        }
+    });
 }
 
 #[test]
