@@ -1,0 +1,12 @@
+"""The same with dtof."""
+
+import dtof
+
+
+def events(photons, bins, least, z, **pulse):
+    """The pixel, the laser cycles until then and the position in bins of every depth event."""
+    run = dtof.photons(
+        photons.pixel, photons.cycle, photons.bin, bins=bins, cycles=photons.cycles,
+        rule="window", z=z, min_count=least, l1=4, l2=2000, x=4, **pulse,
+    )
+    return run.events["pixel"], run.events["cycle"] + 1, run.events["depth_bins"]

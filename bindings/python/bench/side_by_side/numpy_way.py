@@ -1,0 +1,119 @@
+"""What a researcher writes today: photons to ranges with numpy and scipy.
+
+Photons come in order of laser cycle. Each way gives the pixel, the laser cycles until then and the
+position in bins of every report.
+"""
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import find_peaks
+from scipy.special import gammainc
+
+
+def keys(photons, bins):
+    """A number for each pixel and bin."""
+    return photons.pixel.astype("i8") * bins + photons.bin
+
+
+def spans(cycle, cycles, length):
+    """Where the photons of every ``length`` laser cycles lie."""
+    edges = np.searchsorted(cycle, np.arange(0, cycles + 1, length))
+    return [slice(*pair) for pair in zip(edges, edges[1:])]
+
+
+def histograms(keys, pixels, bins):
+    """The photons of each pixel and bin."""
+    return np.bincount(keys, minlength=pixels * bins).reshape(pixels, bins)
+
+
+def centroid(counts, peak, background, reach):
+    """The mean position of the photons around the peak of each row, less the background."""
+    around = peak[:, None] + np.arange(-reach, reach + 1)
+    inside = (around >= 0) & (around < counts.shape[1])
+    near = np.take_along_axis(counts, around.clip(0, counts.shape[1] - 1), axis=1)
+    signal = np.where(inside, near - background[:, None], 0)
+    return ((around + 0.5) * signal).sum(axis=1) / signal.sum(axis=1)
+
+
+def joined(reports):
+    """Reports as three arrays."""
+    none = [np.empty(0, int), np.empty(0, int), np.empty(0)]
+    return [np.concatenate(column) for column in zip(none, *reports)]
+
+
+def frames_with_find_peaks(photons, pixels, bins, exposure, z, sigma, reach):
+    """Frames: smoothed with the pulse, then scipy looks for peaks of ``z`` standard deviations."""
+    key, reports = keys(photons, bins), []
+    variance = 1 / (2 * np.sqrt(np.pi) * sigma)  # of smoothed counts, over their mean
+    for frame, span in enumerate(spans(photons.cycle, photons.cycles, exposure)):
+        counts = histograms(key[span], pixels, bins)
+        smooth = gaussian_filter1d(counts.astype(float), sigma, axis=1)
+        background = np.median(smooth, axis=1)
+        threshold = background + z * np.sqrt(background * variance)
+        for pixel in np.flatnonzero(smooth.max(axis=1) >= threshold):
+            peaks, found = find_peaks(smooth[pixel], height=threshold[pixel])
+            if peaks.size:
+                peak = peaks[[found["peak_heights"].argmax()]]
+                row = slice(pixel, pixel + 1)
+                position = centroid(counts[row], peak, background[row], reach)
+                reports.append(([pixel], [(frame + 1) * exposure], position))
+    return joined(reports)
+
+
+def highest(counts):
+    """The three neighbours with the most photons in each row, and the mean of all other bins."""
+    window = counts[:, :-2] + counts[:, 1:-1] + counts[:, 2:]
+    peak = window.argmax(axis=1)
+    height = np.take_along_axis(window, peak[:, None], axis=1)[:, 0]
+    background = (counts.sum(axis=1) - height) / (counts.shape[1] - 3)
+    return peak + 1, height, background
+
+
+def gaussian(height, expected, z):
+    """Whether counts stand ``z`` standard deviations above what is expected."""
+    return height > expected + z * np.sqrt(expected)
+
+
+def poisson(height, expected, k):
+    """Whether Poisson counts are as high by chance in less than one of ``10 ** k`` cases."""
+    return gammainc(np.maximum(height, 1), expected) < 10.0**-k
+
+
+def frames(photons, pixels, bins, exposure, k, reach):
+    """Frames without a loop over pixels."""
+    key, reports = keys(photons, bins), []
+    for frame, span in enumerate(spans(photons.cycle, photons.cycles, exposure)):
+        counts = histograms(key[span], pixels, bins)
+        peak, height, background = highest(counts)
+        pixel = np.flatnonzero(poisson(height, 3 * background, k))
+        position = centroid(counts[pixel], peak[pixel], background[pixel], reach)
+        reports.append((pixel, np.full(pixel.size, (frame + 1) * exposure), position))
+    return joined(reports)
+
+
+def asynchronous(photons, pixels, bins, least, threshold, stands_clear, reach, x=4, l2=2000):
+    """Each pixel reports as soon as its peak stands clear, and starts over then."""
+    key, reports = keys(photons, bins), []
+    counts, began = np.zeros((pixels, bins), int), np.zeros(pixels, int)
+    for look, span in enumerate(spans(photons.cycle, photons.cycles, x)):
+        counts += histograms(key[span], pixels, bins)
+        now = (look + 1) * x
+        peak, height, background = highest(counts)
+        clear = stands_clear(height, 3 * background, threshold) & (height >= least)
+        pixel = np.flatnonzero(clear)
+        if pixel.size:
+            position = centroid(counts[pixel], peak[pixel], background[pixel], reach)
+            reports.append((pixel, np.full(pixel.size, now), position))
+        over = clear | (now - began >= l2)
+        counts[over], began[over] = 0, now
+    return joined(reports)
+
+
+def asynchronous_gaussian(photons, pixels, bins, least, z, reach):
+    """The paper's threshold."""
+    return asynchronous(photons, pixels, bins, least, z, gaussian, reach)
+
+
+def asynchronous_poisson(photons, pixels, bins, least, k, reach):
+    """A threshold for small counts."""
+    return asynchronous(photons, pixels, bins, least, k, poisson, reach)

@@ -1,0 +1,145 @@
+"""What dtof is compared with is right, and the page says what is kept."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench" / "side_by_side"))
+
+import measure
+import methods
+import numpy_way
+import photons
+
+SMALL = {"pixels": 48, "cycles": 2000, "empty_cycles": 4000}
+FRAMES, ASYNCHRONOUS = methods.METHODS[:2], methods.METHODS[2:]
+
+
+@pytest.fixture(scope="module")
+def bright():
+    return photons.bright(**SMALL)
+
+
+def counted(rows):
+    """Photons of histograms, all in laser cycle 0 of one."""
+    of = np.repeat(np.arange(rows.size), rows.ravel())
+    cycle = np.zeros(of.size, "u2")
+    return photons.Photons((of // rows.shape[1]).astype("u2"), cycle, of % rows.shape[1], 4)
+
+
+def test_drawn_photons_are_where_they_were_asked_for():
+    random = np.random.default_rng(1)
+    background, signal = np.array([0.0, 0.01, 0.0]), np.array([0.5, 0.0, 0.0])
+    drawn = photons.draw(random, background, 10_000, 64, signal, np.array([20.25, 0, 0]), 1.5)
+    numbers = np.bincount(drawn.pixel, minlength=3)
+    assert abs(numbers[0] - 5000) < 5 * np.sqrt(5000) and abs(numbers[1] - 6400) < 5 * np.sqrt(6400)
+    assert numbers[2] == 0
+    assert (np.diff(drawn.cycle.astype(int)) >= 0).all() and drawn.cycle.max() < 10_000
+    bins = drawn.bin[drawn.pixel == 0] + 0.5
+    assert abs(bins.mean() - 20.25) < 5 * 1.5 / np.sqrt(5000)
+    assert abs(bins.std() - np.hypot(1.5, 1 / np.sqrt(12))) < 0.1
+
+
+def test_the_centroid_of_known_counts():
+    counts = np.full((3, 32), 2)
+    counts[0, 9:12] += [10, 20, 10]  # in the middle of bin 10
+    counts[1, 9:12] += [0, 30, 10]  # a quarter of a bin later
+    counts[2, 0] += 8  # the window is cut off
+    found = numpy_way.centroid(counts, np.array([10, 10, 0]), np.full(3, 2.0), 2)
+    assert found == pytest.approx([10.5, 10.75, 0.5])
+
+
+def test_the_highest_three_bins_and_their_background():
+    counts = np.full((2, 32), 2)
+    counts[0, 9:12] += [10, 20, 10]
+    counts[1, 30] += 7
+    peak, height, background = numpy_way.highest(counts)
+    assert peak.tolist() == [10, 29] and height.tolist() == [46, 13]  # the first of equal ones
+    assert background == pytest.approx([2, 2])
+    assert numpy_way.gaussian(np.array([46, 12]), np.array([6, 6]), 2.5).tolist() == [True, False]
+
+
+def test_a_poisson_threshold_is_the_share_of_cases():
+    random = np.random.default_rng(2)
+    drawn = random.poisson(2.0, 1_000_000)
+    share = numpy_way.poisson(drawn, 2.0, 3).mean()
+    assert 0.1e-3 < share < 1e-3  # counts are whole: not exactly one in a thousand
+    assert numpy_way.poisson(np.array([1, 0]), np.array([5e-4, 1.0]), 3).tolist() == [True, False]
+
+
+@pytest.mark.parametrize("method", methods.METHODS[:4], ids=lambda method: method.name)
+def test_each_way_of_numpy_finds_a_peak_and_nothing_else(method, bright):
+    rows = np.zeros((48, 128), int)
+    rows[7, 60:63] = [100, 200, 100]
+    rows[:, ::8] += 1
+    setting = 4 if method.by_exposure else 5
+    pixel, cycle, position = method.reports(bright, counted(rows), setting, 8.0)
+    assert pixel.tolist() == [7] and cycle.tolist() == [4]
+    assert position == pytest.approx([61.5], abs=0.02)
+
+
+def test_frames_with_and_without_find_peaks_agree(bright):
+    with_scipy, with_arrays = (
+        method.reports(bright, bright.photons, 400, 5.0) for method in FRAMES
+    )
+    for mine, other in zip(with_scipy, with_arrays):
+        assert mine == pytest.approx(other, abs=0.2)
+    assert with_scipy[0].size == 48 * 5
+
+
+def test_asynchronous_numpy_reports_what_dtof_reports(bright):
+    of_numpy, of_dtof = (
+        method.reports(bright, bright.photons, 20, 5.0) for method in ASYNCHRONOUS[1:]
+    )
+    same = {*zip(of_numpy[0], of_numpy[1])} & {*zip(of_dtof[0], of_dtof[1])}
+    assert len(same) > 0.99 * of_numpy[0].size > 0.99 * 48 * 20
+    assert of_dtof[0].size == pytest.approx(of_numpy[0].size, rel=0.01)
+
+
+def test_a_pixel_starts_over_after_a_report_and_at_l2():
+    # Two bursts of ten photons in bin 5, and single ones too far apart for a report.
+    cycle = np.array([0] * 10 + [8] * 10 + [2500 + 100 * i for i in range(4)] + [4100])
+    given = photons.Photons(np.zeros(cycle.size, int), cycle, np.full(cycle.size, 5), 6000)
+    pixel, cycle, position = numpy_way.asynchronous_poisson(given, 1, 16, 5, 3.0, 2)
+    assert cycle.tolist() == [4, 12] and position == pytest.approx([5.5, 5.5])
+
+
+def test_scores_of_reports_that_are_known(bright):
+    truth = bright.truth_mm / bright.mm_per_bin
+    pixel = np.array([0, 1, 0, 2, 2])
+    cycle = np.array([10, 20, 30, 40, 50])
+    position = truth[pixel] + [0.3, -0.4, 9.0, 9.0, 0.5]  # two are wrong
+    found = measure.scored(bright, (pixel, cycle, position))
+    assert found["half"] == found["nine_of_ten"] == np.inf  # 3 of 48 pixels
+    assert found["mean"] == pytest.approx((10 + 20 + 50 + 45 * 2000) / 48)
+    assert found["error_bins"] == pytest.approx(np.sqrt((0.09 + 0.16 + 0.25) / 3))
+    assert found["error_mm"] == pytest.approx(found["error_bins"] * 250 * 0.149896229)
+    assert found["wrong"] == pytest.approx(1 / 3)
+    all_right = measure.scored(bright, (np.arange(48), np.arange(1, 49), truth))
+    assert (all_right["mean"], all_right["half"], all_right["nine_of_ten"]) == (24.5, 24, 44)
+
+
+@pytest.mark.parametrize("method", methods.METHODS, ids=lambda method: method.name)
+def test_thresholds_are_the_lowest_that_are_allowed(method, bright):
+    threshold = measure.least_threshold(method, bright, method.settings[-2])
+    below = method.thresholds[max(method.thresholds.index(threshold) - 1, 0)]
+    of = lambda threshold: measure.alarms(method, bright, bright.empty, method.settings[-2], threshold)
+    assert of(threshold) <= 1 < of(below) or threshold == method.thresholds[0]
+
+
+def test_lines_are_counted_without_comments_and_docstrings():
+    def function(a,
+                 b):
+        """Of two
+        lines."""
+        # Not this.
+
+        text = """one
+        two"""
+        return a, b, text  # but this
+
+    assert methods.lines_of(function) == 5
+    names = {function.__name__ for function in methods.needed(numpy_way.frames)}
+    assert {"frames", "highest", "poisson", "joined"} <= names and "gaussian" not in names
