@@ -62,8 +62,7 @@ def of_dtof(scene):
 METHODS = (
     Method("frames, find_peaks", numpy_way.frames_with_find_peaks, of_find_peaks, DEVIATIONS, True),
     Method("frames, arrays", numpy_way.frames, of_numpy, POWERS, True),
-    Method("asynchronous, normal", numpy_way.asynchronous_gaussian, of_numpy, DEVIATIONS, False),
-    Method("asynchronous, Poisson", numpy_way.asynchronous_poisson, of_numpy, POWERS, False),
+    Method("asynchronous, arrays", numpy_way.asynchronous, of_numpy, POWERS, False),
     Method("dtof", dtof_way.events, of_dtof, DEVIATIONS, False),
 )
 

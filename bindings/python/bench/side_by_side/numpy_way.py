@@ -69,12 +69,7 @@ def highest(counts):
     return peak + 1, height, background
 
 
-def gaussian(height, expected, z):
-    """Whether counts stand ``z`` standard deviations above what is expected."""
-    return height > expected + z * np.sqrt(expected)
-
-
-def poisson(height, expected, k):
+def stands_clear(height, expected, k):
     """Whether Poisson counts are as high by chance in less than one of ``10 ** k`` cases."""
     return gammainc(np.maximum(height, 1), expected) < 10.0**-k
 
@@ -85,13 +80,13 @@ def frames(photons, pixels, bins, exposure, k, reach):
     for frame, span in enumerate(spans(photons.cycle, photons.cycles, exposure)):
         counts = histograms(key[span], pixels, bins)
         peak, height, background = highest(counts)
-        pixel = np.flatnonzero(poisson(height, 3 * background, k))
+        pixel = np.flatnonzero(stands_clear(height, 3 * background, k))
         position = centroid(counts[pixel], peak[pixel], background[pixel], reach)
         reports.append((pixel, np.full(pixel.size, (frame + 1) * exposure), position))
     return joined(reports)
 
 
-def asynchronous(photons, pixels, bins, least, threshold, stands_clear, reach, x=4, l2=2000):
+def asynchronous(photons, pixels, bins, least, k, reach, x=4, l2=2000):
     """Each pixel reports as soon as its peak stands clear, and starts over then."""
     key, reports = keys(photons, bins), []
     counts, began = np.zeros((pixels, bins), int), np.zeros(pixels, int)
@@ -99,7 +94,7 @@ def asynchronous(photons, pixels, bins, least, threshold, stands_clear, reach, x
         counts += histograms(key[span], pixels, bins)
         now = (look + 1) * x
         peak, height, background = highest(counts)
-        clear = stands_clear(height, 3 * background, threshold) & (height >= least)
+        clear = stands_clear(height, 3 * background, k) & (height >= least)
         pixel = np.flatnonzero(clear)
         if pixel.size:
             position = centroid(counts[pixel], peak[pixel], background[pixel], reach)
@@ -107,13 +102,3 @@ def asynchronous(photons, pixels, bins, least, threshold, stands_clear, reach, x
         over = clear | (now - began >= l2)
         counts[over], began[over] = 0, now
     return joined(reports)
-
-
-def asynchronous_gaussian(photons, pixels, bins, least, z, reach):
-    """The paper's threshold."""
-    return asynchronous(photons, pixels, bins, least, z, gaussian, reach)
-
-
-def asynchronous_poisson(photons, pixels, bins, least, k, reach):
-    """A threshold for small counts."""
-    return asynchronous(photons, pixels, bins, least, k, poisson, reach)

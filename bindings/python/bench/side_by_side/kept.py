@@ -1,0 +1,76 @@
+"""The tables that are kept: what was measured, and how fast."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+from measure import Row
+
+ROOT = Path(__file__).resolve().parents[4]
+ROWS = ROOT / "docs/results/data/python.csv"
+SPEEDS = ROOT / "docs/results/data/python_speed.csv"
+PAGE = ROOT / "docs/results/python.md"
+CHART = ROOT / "docs/figures/python.svg"
+PALETTE = ROOT / "draw/src/palette.css"
+
+
+@dataclass
+class Speed:
+    """Photons a second, in millions, with the setting of the larger error."""
+
+    scene: str
+    method: str
+    one_core: float  # of processor time
+    all_cores: float  # from start to end
+    photons: int
+    machine: str
+
+
+def text(row) -> dict:
+    """Figures of five digits, so that a last bit does not matter."""
+    shown = asdict(row)
+    for name, value in shown.items():
+        if value is None:
+            shown[name] = ""
+        elif isinstance(value, float):
+            shown[name] = f"{value:.5g}"
+        else:
+            shown[name] = str(value)
+    return shown
+
+
+def write(path, rows) -> None:
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        names = [field.name for field in fields(rows[0])]
+        table = csv.DictWriter(file, names, lineterminator="\n")
+        table.writeheader()
+        table.writerows(map(text, rows))
+
+
+def read(path, kind) -> list:
+    """The rows of a table, ``Row`` or ``Speed``."""
+    rows = []
+    with open(path, newline="", encoding="utf-8") as file:
+        for line in csv.DictReader(file):
+            for field in fields(kind):
+                value = line[field.name]
+                if field.type == "int":
+                    line[field.name] = int(value)
+                elif field.type != "str":
+                    line[field.name] = float(value) if value else None
+            rows.append(kind(**line))
+    return rows
+
+
+def differences(measured, scenes) -> list[str]:
+    """What differs from the kept rows of these scenes."""
+    old = [text(row) for row in read(ROWS, Row) if row.scene in scenes]
+    new = [text(row) for row in measured]
+    if len(old) != len(new):
+        return [f"{len(new)} rows, {len(old)} are kept"]
+    return [
+        f"{was['scene']}, {was['method']}, {was['setting']}: {name} {now[name]}, kept {was[name]}"
+        for was, now in zip(old, new) for name in was if was[name] != now[name]
+    ]
