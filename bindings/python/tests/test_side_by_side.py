@@ -15,6 +15,8 @@ import numpy_way
 import page
 import photons
 
+import dtof
+
 SMALL = {"pixels": 48, "cycles": 2000, "empty_cycles": 2000}
 FRAMES, ASYNCHRONOUS = methods.METHODS[:2], methods.METHODS[2:]
 
@@ -42,6 +44,26 @@ def test_drawn_photons_are_where_they_were_asked_for():
     bins = drawn.bin[drawn.pixel == 0] + 0.5
     assert abs(bins.mean() - 20.25) < 5 * 1.5 / np.sqrt(5000)
     assert abs(bins.std() - np.hypot(1.5, 1 / np.sqrt(12))) < 0.1
+
+
+def test_recorded_photons_are_those_of_the_recording(recorded):
+    file = recorded("tmf8820_plane_gt/distance_data.json")
+    scene = photons.recorded(file, parts=3, cycles=500, empty_cycles=10, added=0.0)
+    counts = dtof.load(file)
+    zones, truth = counts.counts[:, 0].astype(float), counts.truth_mm[:, 0, 4]
+    zones, truth = zones[truth > 29.9], truth[truth > 29.9]
+    assert scene.pixels == 149 * 3 and len(scene.empty) == 0
+    assert scene.truth_mm[::3] == pytest.approx(truth + 179.5)
+    # Half a photon a laser cycle in the brightest zone: so many in each part, in these bins.
+    expected = zones[:, 4] / zones.sum(2).max(1, keepdims=True) * 0.5 * 500
+    seen = np.bincount(scene.photons.pixel.astype(int) * 128 + scene.photons.bin, minlength=149 * 384)
+    seen = seen.reshape(149, 3, 128)
+    for part in range(3):
+        of_bins, all_bins = seen[:, part].sum(0), expected.sum(0)
+        assert (abs(of_bins - all_bins) < 6 * np.sqrt(all_bins + 1)).all()
+    assert (seen[:, 0] != seen[:, 1]).any()
+    assert abs(np.bincount(scene.photons.cycle, minlength=500) - seen.sum() / 500).max() < 6 * np.sqrt(
+        seen.sum() / 500)
 
 
 def test_the_centroid_of_known_counts():
