@@ -28,7 +28,7 @@ class Row:
     scene: str
     method: str
     setting: int
-    threshold: float
+    threshold: Optional[float]
     mean: float
     half: float
     nine_of_ten: float
@@ -102,6 +102,14 @@ def curve(method, scene) -> list[Row]:
     for row in filter(None, (chosen(rows, within) for within in WITHIN)):
         row.false_alarms = alarms(method, scene, scene.empty_again, row.setting, row.threshold)
     return rows
+
+
+def own_threshold(name, method, scene) -> Row:
+    """The first setting without a threshold that is found."""
+    setting = method.settings[0]
+    reports = method.reports(scene, scene.photons, setting, None)
+    many = alarms(method, scene, scene.empty_again, setting, None)
+    return Row(scene.name, name, setting, None, **scored(scene, reports), false_alarms=many)
 
 
 def chosen(rows, within) -> Optional[Row]:

@@ -65,6 +65,8 @@ METHODS = (
     Method("asynchronous, arrays", numpy_way.asynchronous, of_numpy, POWERS, False),
     Method("dtof", dtof_way.events, of_dtof, DEVIATIONS, False),
 )
+# What dtof does without a threshold that is found.
+OWN_THRESHOLD = "dtof, its own threshold"
 
 
 def needed(function):
