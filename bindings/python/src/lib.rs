@@ -11,6 +11,7 @@ mod load;
 mod maps;
 mod medium;
 mod options;
+mod part;
 mod pixel;
 mod run;
 mod work;
@@ -28,6 +29,9 @@ fn _native(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(find::calibrate, module)?)?;
     module.add_function(wrap_pyfunction!(find::compare, module)?)?;
     module.add_function(wrap_pyfunction!(find::tune, module)?)?;
+    module.add_function(wrap_pyfunction!(part::check_options, module)?)?;
+    module.add_function(wrap_pyfunction!(part::cover_glass, module)?)?;
+    module.add_function(wrap_pyfunction!(part::use_threads, module)?)?;
     module.add_function(wrap_pyfunction!(aer::read_events, module)?)?;
     module.add_function(wrap_pyfunction!(aer::write_events, module)?)?;
     module.add_function(wrap_pyfunction!(maps::maps, module)?)?;

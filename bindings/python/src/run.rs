@@ -12,6 +12,7 @@ use dtof::events::aer_file::Header;
 use dtof::events::summary::Summary;
 use dtof::input::masked::Masked;
 use dtof::input::medium::Medium;
+use dtof::input::recorded::Whole;
 use dtof::input::source::PhotonSource;
 use dtof::jobs::glass::watch_glass;
 use dtof::jobs::recording::warnings;
@@ -27,6 +28,7 @@ use crate::error::checked;
 use crate::events::{Array, RECORD, push};
 use crate::medium::Given;
 use crate::options::parse;
+use crate::part::WholeGiven;
 use crate::work::{Watch, work};
 
 /// What came of a run.
@@ -41,6 +43,8 @@ pub struct Ran<'py> {
     settings: String,
     array: Array,
     warnings: Vec<String>,
+    /// Photons bin by bin, where the cover glass is watched.
+    bins: Option<Vec<u64>>,
 }
 
 /// The same, before Python has it.
@@ -51,33 +55,42 @@ struct Done {
     said: SettingsFile,
     array: Array,
     warnings: Vec<String>,
+    bins: Option<Vec<u64>>,
 }
 
-/// Replays a recording, a file or an array.
+/// Replays a recording, a file or an array; one that is a part as it is replayed in the whole.
 #[pyfunction]
 pub fn replay<'py>(
     py: Python<'py>,
     input: Given,
     arguments: Vec<OsString>,
     progress: Option<Bound<'py, PyAny>>,
+    whole: Option<WholeGiven>,
 ) -> PyResult<Ran<'py>> {
     let options = checked(|| parse::<Options>(arguments))?;
     let input = Medium::from(input);
     let done = work(py, progress, move |watch| {
         let said = options.said()?;
-        replayed(&options, &input, &said, watch).map_err(|error| said.name_origin(error))
+        let whole = whole.map(WholeGiven::read).transpose()?;
+        replayed(&options, &input, &said, whole, watch).map_err(|error| said.name_origin(error))
     })?;
     done.into_python(py)
 }
 
-fn replayed(options: &Options, input: &Medium, said: &SettingsFile, watch: &Watch) -> Result<Done> {
+fn replayed(
+    options: &Options,
+    input: &Medium,
+    said: &SettingsFile,
+    whole: Option<Whole>,
+    watch: &Watch,
+) -> Result<Done> {
     let Replay {
         mut photons,
         mut engine,
         settings,
         said,
         known,
-    } = options.open(input, said)?;
+    } = options.open_part(input, said, whole)?;
     let mut done = run(
         &mut photons,
         engine.as_mut(),
@@ -233,6 +246,7 @@ fn run(
         said: said.with(settings),
         array: Array::of(&header),
         warnings: Vec::new(),
+        bins,
     })
 }
 
@@ -261,6 +275,7 @@ impl Done {
             settings,
             array: self.array,
             warnings: self.warnings,
+            bins: self.bins,
         })
     }
 }

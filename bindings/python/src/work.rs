@@ -3,7 +3,7 @@
 
 use std::mem;
 use std::process;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -124,22 +124,44 @@ pub fn work<T: Send + 'static>(
     }
 }
 
+/// How many threads a process has, if that was said.
+static THREADS: AtomicUsize = AtomicUsize::new(0);
+
+/// The threads of a process.
+struct Pool {
+    process: u32,
+    asked: usize,
+    threads: Arc<ThreadPool>,
+}
+
+/// From now on this process has so many threads, 0 for one a core. Work that has begun keeps its own.
+pub fn use_threads(threads: usize) {
+    THREADS.store(threads, Ordering::Relaxed);
+}
+
 /// The threads of this process. A process that was forked has none of its parent's.
 fn pool() -> Result<Arc<ThreadPool>> {
-    static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+    static POOL: Mutex<Option<Pool>> = Mutex::new(None);
     let mut known = locked(&POOL);
-    let process = process::id();
-    if let Some((of, pool)) = &*known
-        && *of == process
+    let (process, asked) = (process::id(), THREADS.load(Ordering::Relaxed));
+    if let Some(pool) = &*known
+        && (pool.process, pool.asked) == (process, asked)
     {
-        return Ok(Arc::clone(pool));
+        return Ok(Arc::clone(&pool.threads));
     }
-    let pool = Arc::new(ThreadPoolBuilder::new().build()?);
-    if let Some(of_parent) = known.replace((process, Arc::clone(&pool))) {
-        // Its threads are not here: to wait for their end would take for ever.
-        mem::forget(of_parent);
+    let threads = Arc::new(ThreadPoolBuilder::new().num_threads(asked).build()?);
+    let pool = Pool {
+        process,
+        asked,
+        threads: Arc::clone(&threads),
+    };
+    if let Some(before) = known.replace(pool)
+        && before.process != process
+    {
+        // The threads of the parent are not here: to wait for their end would take for ever.
+        mem::forget(before);
     }
-    Ok(pool)
+    Ok(threads)
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {

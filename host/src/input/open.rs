@@ -14,7 +14,7 @@ use crate::input::npy::records::{self, Records};
 use crate::input::npy::{archive, histograms};
 use crate::input::photon_csv::CsvRows;
 use crate::input::photon_list::{Listed, PhotonList, Rows, Shape};
-use crate::input::recorded::{Capture, RecordedHistograms, RecordingLength};
+use crate::input::recorded::{Capture, RecordedHistograms, RecordingLength, Whole};
 use crate::input::source::{Geometry, PhotonSource};
 use crate::input::{tmf8820, tmf8829, warnings};
 use crate::rows::Row;
@@ -46,6 +46,8 @@ pub struct Opening {
     pub cycles: u64,
     /// Seed of the laser cycles that recorded photons are given.
     pub seed: u64,
+    /// Arrays of histograms: the recording that these are a part of.
+    pub whole: Option<Whole>,
 }
 
 impl Default for Opening {
@@ -60,6 +62,7 @@ impl Default for Opening {
             length: None,
             cycles: u64::MAX,
             seed: 1,
+            whole: None,
         }
     }
 }
@@ -100,8 +103,11 @@ impl Counts {
         let length = opening.length;
         let length = length.unwrap_or(RecordingLength::PhotonsPerCycle(1.0));
         let (most, seed) = (opening.cycles, opening.seed);
-        let photons = RecordedHistograms::new(self.geometry, &self.captures, length, most, seed)?;
-        Ok(photons.with_sides(self.sides))
+        let photons = match &opening.whole {
+            None => RecordedHistograms::new(self.geometry, &self.captures, length, most, seed),
+            Some(whole) => RecordedHistograms::part(whole, &self.captures, length, most, seed),
+        };
+        Ok(photons?.with_sides(self.sides))
     }
 }
 
@@ -274,9 +280,10 @@ fn array(medium: &Medium, opening: &Opening, read: Histograms) -> Result<Content
         first,
         pixels,
     } = read;
-    let axes = match opening.axes {
-        None => warnings::of_axes(first, &pixels),
-        Some(_) => None,
+    // A part is too little to tell.
+    let axes = match (&opening.axes, &opening.whole) {
+        (None, None) => warnings::of_axes(first, &pixels),
+        _ => None,
     };
     let bins = layout.bins();
     let captures = pixels.chunks(layout.capture).map(<[_]>::to_vec).collect();
@@ -334,9 +341,23 @@ fn fitted(
     let captures: Vec<Capture> = captures
         .map(|capture| capture.into_iter().map(&mut fit_one).collect())
         .collect();
+    // A part says what is known of the whole.
+    let empty = match &opening.whole {
+        None => {
+            let histograms = captures.iter().flatten();
+            warnings::of_photons(histograms.map(|bins| bins.iter().all(|&count| count == 0)))
+        }
+        Some(whole) => {
+            warnings::of_photons(whole.captures.iter().flatten().map(|&total| total == 0))
+        }
+    };
+    known.cut_off = opening
+        .whole
+        .as_ref()
+        .map_or(known.cut_off, |whole| whole.cut_off);
     known.gate = fit.gate();
     known.rows = fit.rows(known.cut_off);
-    known.warnings.extend(warnings::of_photons(&captures));
+    known.warnings.extend(empty);
     Ok(Counts {
         geometry: Geometry::new(1, 1),
         sides: ["column", "row"],

@@ -2,8 +2,6 @@
 
 use dtof_core::fixed::types::U16F16;
 
-use crate::input::recorded::Capture;
-
 /// No SPAD resolves a picosecond: a narrower bin was said in another unit.
 #[must_use]
 pub fn of_bin_width(width_ps: U16F16) -> Option<String> {
@@ -15,14 +13,15 @@ pub fn of_bin_width(width_ps: U16F16) -> Option<String> {
     })
 }
 
-/// Histograms without a photon.
+/// Histograms without a photon, if each `is_empty`.
 #[must_use]
-pub fn of_photons(captures: &[Capture]) -> Option<String> {
-    let mut counts = captures.iter().flatten().flatten();
-    let all: usize = captures.iter().map(Vec::len).sum();
-    counts
-        .all(|&count| count == 0)
-        .then(|| format!("no photons: all {all} histograms are empty"))
+pub fn of_photons(is_empty: impl Iterator<Item = bool>) -> Option<String> {
+    let (mut all, mut empty) = (0u32, 0);
+    for is_empty in is_empty {
+        all += 1;
+        empty += u32::from(is_empty);
+    }
+    (empty == all).then(|| format!("no photons: all {all} histograms are empty"))
 }
 
 /// How much more often two photons of a line meet in one place than if they were spread

@@ -7,17 +7,25 @@ use crate::settings::{Sensor, SettingsFile};
 /// Notes it in the summary of a run that was set by `said`, if `bins` has all its photons bin by
 /// bin.
 pub fn watch_glass(said: &SettingsFile, bins: Option<&[u64]>, summary: &mut Summary) {
-    let Sensor {
-        glass_bins, gate, ..
-    } = &said.sensor;
-    if let (Some(bins), Some(glass), Some((first, _))) = (bins, glass_bins, gate) {
+    if let Some(bins) = bins {
         let run = RunPhotons {
             bins,
             cycles: summary.cycles,
-            pixels: (summary.pixels - summary.settings.masked.len()) as u64,
+            pixels: summary.pixels.saturating_sub(summary.settings.masked.len()) as u64,
         };
-        if let Change::Brighter(times, least) = glass_change(&run, glass, *first) {
-            summary.cover_glass = Some([times, least]);
-        }
+        summary.cover_glass = brighter(said, &run);
+    }
+}
+
+/// How many times as bright it is, and at least, if that is surely more than `said`.
+#[must_use]
+pub fn brighter(said: &SettingsFile, run: &RunPhotons) -> Option<[f64; 2]> {
+    let Sensor {
+        glass_bins, gate, ..
+    } = &said.sensor;
+    let (glass, (first, _)) = (glass_bins.as_ref()?, (*gate)?);
+    match glass_change(run, glass, first) {
+        Change::Brighter(times, least) => Some([times, least]),
+        _ => None,
     }
 }

@@ -161,6 +161,7 @@ pub fn opening(said: &SettingsFile) -> Opening {
         length: recorded.or(rate),
         cycles: cycles.unwrap_or(10_000),
         seed: seed.unwrap_or(1),
+        whole: None,
     }
 }
 

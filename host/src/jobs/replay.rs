@@ -1,6 +1,6 @@
 //! Recorded photons or histograms, ready for the engine.
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
 
 use super::operation::{Frames, Operation};
@@ -11,7 +11,8 @@ use crate::engine::host::host_engine;
 use crate::engine::settings::Settings;
 use crate::input::masked::Masked;
 use crate::input::medium::Medium;
-use crate::input::open::{Known, open};
+use crate::input::open::{Known, Opening, open};
+use crate::input::recorded::Whole;
 use crate::input::source::{PhotonSource, has_only_neighbours};
 use crate::settings::{Run, SettingsFile};
 
@@ -69,9 +70,30 @@ impl Options {
     /// # Errors
     /// What is wrong with it, its name first, or with what is said.
     pub fn open(&self, input: &Medium, said: &SettingsFile) -> Result<Replay> {
-        let recording = open(input, &opening(said))?;
+        self.open_part(input, said, None)
+    }
+
+    /// The same of an array that is a part of `whole`, if that is given.
+    ///
+    /// # Errors
+    /// The same, and if it is no part of it or cuts blocks of pixels.
+    pub fn open_part(
+        &self,
+        input: &Medium,
+        said: &SettingsFile,
+        whole: Option<Whole>,
+    ) -> Result<Replay> {
+        let opening = Opening {
+            whole,
+            ..opening(said)
+        };
+        let recording = open(input, &opening)?;
         let (photons, known) = (recording.photons, recording.known);
         self.recording.suits(input, &known)?;
+        ensure!(
+            opening.whole.is_none() || !known.is_list,
+            "{input} holds photons: only histograms are replayed in parts"
+        );
         let said = said.clone().or(of_file(&known, photons.geometry()));
         let settings = said.settings(known.bins)?;
         ensure!(
@@ -86,6 +108,11 @@ impl Options {
                  captures; a {column} and a {row} are no neighbours there",
                 binning.levels.raw()
             );
+            if let Some(whole) = &opening.whole {
+                let pixels = photons.addresses().len();
+                let is_whole = whole.has_whole_blocks(pixels, side);
+                is_whole.with_context(|| input.to_string())?;
+            }
         }
         let photons = Masked::new(photons, &settings.masked)?;
         let photons = photons.with_laser_hz(said.sensor.laser_hz);

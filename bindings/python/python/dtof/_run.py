@@ -74,7 +74,7 @@ def replay(
     if axis != -1:
         recorded = _bins_last(recorded, axis, options)
     given = recording(recorded, "the array")
-    return ran(_native.replay(given, arguments(options), progress))
+    return ran(_native.replay(given, arguments(options), progress, None))
 
 
 def photons(
@@ -88,7 +88,7 @@ def photons(
     twice; for more than fits, save them with ``numpy.save`` and replay the file.
     """
     given = recording(photon_list(pixel, cycle, bin), "photons")
-    return ran(_native.replay(given, arguments(options), progress))
+    return ran(_native.replay(given, arguments(options), progress, None))
 
 
 def simulate(scene: Any, *, progress: Progress = None, **options: Any) -> Replay:
@@ -113,11 +113,15 @@ def scene_of(scene: Any) -> Any:
 def ran(done: dict[str, Any]) -> Replay:
     """What the native part gives."""
     warn(done["warnings"])
-    statistics = json.loads(done["summary"])
+    return quietly(done)
+
+
+def quietly(done: dict[str, Any]) -> Replay:
+    """The same without its warnings."""
     return Replay(
         events=events_of(done["events"]),
         array=Array(**done["array"]),
-        statistics=statistics,
+        statistics=json.loads(done["summary"]),
         settings=json.loads(done["settings"]),
         toml=done["toml"],
     )

@@ -11,6 +11,7 @@
 mod remaining;
 #[cfg(test)]
 mod tests;
+mod whole;
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::PixelAddress;
@@ -20,6 +21,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 use self::remaining::Remaining;
+pub use self::whole::Whole;
 use crate::input::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_theory::random::pixel_rng;
 
@@ -61,6 +63,8 @@ pub struct RecordedHistograms {
     next_cycle: u64,
     /// Laser cycles of a chunk.
     chunk: u16,
+    /// The address of the first of `pixels`.
+    first: u16,
     pixels: Vec<RecordedPixel>,
 }
 
@@ -77,47 +81,80 @@ impl RecordedHistograms {
         cycles: u64,
         seed: u64,
     ) -> Result<Self> {
-        let mut pixels = Vec::new();
-        let mut photons_per_cycle = 0.0;
-        let (mut shortest, mut longest) = (u64::MAX, 0);
+        let whole = Whole {
+            geometry,
+            captures: captures.iter().map(totals).collect::<Result<_>>()?,
+            first: 0,
+            cut_off: 0,
+        };
+        Self::placed(&whole, captures, length, cycles, seed)
+    }
+
+    /// Replays `captures`, which are a part of `whole`, as they are replayed there.
+    ///
+    /// # Errors
+    /// If they are no part of it, and those of [`Self::new`].
+    pub fn part(
+        whole: &Whole,
+        captures: &[Capture],
+        length: RecordingLength,
+        cycles: u64,
+        seed: u64,
+    ) -> Result<Self> {
+        let mut own = Vec::new();
         for capture in captures {
-            let add = |sum: u64, &count| sum.checked_add(count);
-            let totals = capture.iter().map(|counts| counts.iter().try_fold(0, add));
-            let totals = totals
-                .collect::<Option<Vec<u64>>>()
-                .filter(|totals| totals.iter().all(|&total| total <= MOST))
-                .context("a histogram holds more than 2^40 photons")?;
+            own.extend(totals(capture)?);
+        }
+        whole.check(&own)?;
+        Self::placed(whole, captures, length, cycles, seed)
+    }
+
+    fn placed(
+        whole: &Whole,
+        captures: &[Capture],
+        length: RecordingLength,
+        cycles: u64,
+        seed: u64,
+    ) -> Result<Self> {
+        let (mut recorded, mut of_all) = (Vec::new(), 0.0);
+        let (mut shortest, mut longest) = (u64::MAX, 0);
+        for totals in &whole.captures {
             let brightest = totals.iter().copied().max().unwrap_or(0);
-            let recorded = recorded_cycles(length, brightest, cycles)?;
-            shortest = shortest.min(recorded);
-            longest = longest.max(recorded);
-            let mean = |total: &u64| *total as f64 / recorded.max(1) as f64;
-            photons_per_cycle += totals.iter().map(mean).sum::<f64>();
-            for counts in capture {
-                let address = u16::try_from(pixels.len()).context("more than 65,536 pixels")?;
-                pixels.push(RecordedPixel {
-                    left: Remaining::new(counts),
-                    cycles_left: recorded,
-                    rng: pixel_rng(seed, PixelAddress(address)),
-                    chunk: PixelPhotons::default(),
-                    given: 0,
-                    given_photons: 0,
-                });
-            }
+            let lasted = recorded_cycles(length, brightest, cycles)?;
+            shortest = shortest.min(lasted);
+            longest = longest.max(lasted);
+            of_all += totals.iter().map(|&total| mean(total, lasted)).sum::<f64>();
+            recorded.extend(totals.iter().map(|_| lasted));
+        }
+        let (mut pixels, mut photons_per_cycle) = (Vec::new(), 0.0);
+        let recorded = recorded.into_iter().enumerate().skip(whole.first);
+        for (counts, (address, recorded)) in captures.iter().flatten().zip(recorded) {
+            let address = u16::try_from(address).context("more than 65,536 pixels")?;
+            let left = Remaining::new(counts);
+            photons_per_cycle += mean(left.photons(), recorded);
+            pixels.push(RecordedPixel {
+                left,
+                cycles_left: recorded,
+                rng: pixel_rng(seed, PixelAddress(address)),
+                chunk: PixelPhotons::default(),
+                given: 0,
+                given_photons: 0,
+            });
         }
         ensure!(
             photons_per_cycle <= MOST_A_CYCLE,
             "{photons_per_cycle:.0} photons a laser cycle are more than {MOST_A_CYCLE:.0}"
         );
         Ok(Self {
-            geometry,
+            geometry: whole.geometry,
             sides: ["column", "row"],
-            capture_rows: geometry.rows / u32::try_from(captures.len().max(1))?,
+            capture_rows: whole.capture_rows()?,
             photons_per_cycle,
             cycles: cycles.min(longest),
             recorded: (shortest, longest),
             next_cycle: 0,
-            chunk: chunk(photons_per_cycle),
+            chunk: chunk(of_all),
+            first: u16::try_from(whole.first).context("more than 65,536 pixels")?,
             pixels,
         })
     }
@@ -127,6 +164,21 @@ impl RecordedHistograms {
     pub fn with_sides(self, sides: [&'static str; 2]) -> Self {
         Self { sides, ..self }
     }
+}
+
+/// Photons of each pixel of a capture.
+fn totals(capture: &Capture) -> Result<Vec<u64>> {
+    let add = |sum: u64, &count: &u64| sum.checked_add(count);
+    let totals = capture.iter().map(|counts| counts.iter().try_fold(0, add));
+    totals
+        .collect::<Option<Vec<u64>>>()
+        .filter(|totals| totals.iter().all(|&total| total <= MOST))
+        .context("a histogram holds more than 2^40 photons")
+}
+
+/// Photons a laser cycle.
+fn mean(photons: u64, cycles: u64) -> f64 {
+    photons as f64 / cycles.max(1) as f64
 }
 
 /// Laser cycles of a chunk, if all pixels have so many photons a laser cycle.
@@ -176,6 +228,11 @@ impl PhotonSource for RecordedHistograms {
         self.capture_rows
     }
 
+    fn addresses(&self) -> Vec<PixelAddress> {
+        let there = (self.first..=u16::MAX).take(self.pixels.len());
+        there.map(PixelAddress).collect()
+    }
+
     fn cycles(&self) -> u64 {
         self.cycles
     }
@@ -193,7 +250,7 @@ impl PhotonSource for RecordedHistograms {
     }
 
     fn spare(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
-        for (address, pixel) in (0..=u16::MAX).map(PixelAddress).zip(&mut self.pixels) {
+        for (address, pixel) in self.addresses().into_iter().zip(&mut self.pixels) {
             if !is_wanted(address) {
                 pixel.cycles_left = 0;
             }

@@ -94,3 +94,95 @@ fn photons_fall_evenly_over_the_laser_cycles_whatever_their_bin() {
         assert!((cell - 5_000).abs() < 335, "{cells:?}");
     }
 }
+
+/// Captures of three rows of four pixels, of different brightness.
+fn bright(captures: u64) -> Vec<Capture> {
+    let counts = |pixel: u64| {
+        (0..8)
+            .map(move |bin| (pixel * 37 + bin * 11) % 90)
+            .collect()
+    };
+    let captures = (0..captures).map(|capture| (capture * 12..(capture + 1) * 12).map(counts));
+    captures.map(Iterator::collect).collect()
+}
+
+/// Whatever the parts are, and however many photons a chunk holds.
+#[test]
+fn parts_hold_the_photons_that_they_hold_in_the_whole() {
+    let geometry = Geometry::new(4, 6);
+    for length in [
+        RecordingLength::PhotonsPerCycle(0.4),
+        RecordingLength::Cycles(3000),
+    ] {
+        let captures = bright(2);
+        let all: Vec<Vec<u64>> = captures.iter().flatten().cloned().collect();
+        let totals: Vec<u64> = all.iter().map(|counts| counts.iter().sum()).collect();
+        let mut whole = RecordedHistograms::new(geometry, &captures, length, 900, 5).unwrap();
+        let cycles = whole.cycles();
+        let expected = whole.next_slice(900).unwrap().pixels;
+        for (first, end) in [(0, 8), (8, 12), (12, 24), (4, 20), (0, 24)] {
+            let known = Whole::new(geometry, 2, &totals, first).unwrap();
+            let histograms = [all[first..end].to_vec()];
+            let mut part = RecordedHistograms::part(&known, &histograms, length, 900, 5).unwrap();
+            let addresses = part.addresses();
+            assert_eq!(usize::from(addresses[0].0), first);
+            assert_eq!(part.geometry(), geometry);
+            assert_eq!((part.cycles(), part.capture_rows()), (cycles, 3));
+            assert_eq!(part.recorded_cycles(), whole.recorded_cycles());
+            let photons = part.next_slice(900).unwrap().pixels;
+            assert_eq!(photons, expected[first..end]);
+        }
+    }
+}
+
+/// A dim part of a bright array is drawn in the chunks of the array.
+#[test]
+fn a_part_has_the_chunks_of_the_whole() {
+    let geometry = Geometry::new(1, 2);
+    let captures = [vec![vec![4_000_000; 8], vec![900; 8]]];
+    let length = RecordingLength::Cycles(4000);
+    let mut whole = RecordedHistograms::new(geometry, &captures, length, 600, 5).unwrap();
+    assert!(whole.chunk < 600);
+    let known = Whole::new(geometry, 1, &[32_000_000, 7200], 1).unwrap();
+    let dim = [vec![vec![900; 8]]];
+    let mut part = RecordedHistograms::part(&known, &dim, length, 600, 5).unwrap();
+    assert_eq!(part.chunk, whole.chunk);
+    assert_eq!(
+        part.next_slice(600).unwrap().pixels[0],
+        whole.next_slice(600).unwrap().pixels[1]
+    );
+}
+
+#[test]
+fn what_is_no_part_is_refused() {
+    let geometry = Geometry::new(1, 2);
+    let known = |first| Whole::new(geometry, 1, &[80, 16], first).unwrap();
+    let refused = |whole: &Whole, counts: &[u64]| {
+        let part = [counts.iter().map(|&count| vec![count; 8]).collect()];
+        let length = RecordingLength::Cycles(10);
+        let refused = RecordedHistograms::part(whole, &part, length, 10, 1);
+        refused.unwrap_err().to_string()
+    };
+    assert!(refused(&known(1), &[10]).contains("pixel 1 has 80 photons, but 16"));
+    assert!(refused(&known(1), &[2, 2]).contains("there is no pixel 2"));
+    assert!(Whole::new(geometry, 1, &[1], 0).is_err());
+    assert!(Whole::new(geometry, 0, &[1, 1], 0).is_err());
+    assert!(Whole::new(geometry, 3, &[1, 1], 0).is_err());
+}
+
+#[test]
+fn a_part_that_cuts_a_block_is_refused() {
+    let geometry = Geometry::new(4, 10);
+    let cuts = |row: usize, end: usize, side: usize| {
+        let whole = Whole::new(geometry, 1, &[0; 40], row * 4).unwrap();
+        whole.has_whole_blocks((end - row) * 4, side).is_err()
+    };
+    for row in 0..10 {
+        for end in row + 1..=10 {
+            for side in [2, 4, 8] {
+                let is_cut = row % side != 0 || (end < 10 && end % side != 0);
+                assert_eq!(cuts(row, end, side), is_cut, "{row}..{end} {side}");
+            }
+        }
+    }
+}
