@@ -1,0 +1,69 @@
+"""How fast two workers are against one: photons a second of many recordings, and of one in parts.
+
+    python bench/cluster.py [PHOTONS]
+
+PHOTONS is how many there are in all (100 million). A worker has one thread. The faster of three runs
+counts. Fails below 1.6 times the speed of one.
+"""
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy
+from distributed import Client, LocalCluster
+
+from dtof import cluster
+
+FILES, PIXELS, BINS = 16, (32, 32), 128
+LEAST = 1.6
+
+
+def recordings(folder, photons):
+    random = numpy.random.default_rng(1)
+    each = photons / FILES / PIXELS[0] / PIXELS[1]
+    files = []
+    for number in range(FILES):
+        counts = random.poisson(0.5 * each / BINS, (*PIXELS, BINS)).astype("u4")
+        counts[..., 60] += int(0.5 * each)
+        files.append(Path(folder) / f"{number}.npy")
+        numpy.save(files[-1], counts)
+    one = Path(folder) / "one.npy"
+    numpy.save(one, numpy.concatenate([numpy.load(file) for file in files]))
+    return files, one
+
+
+def speeds(workers, files, one):
+    """Photons a second."""
+    options = {"cycles": 10_000_000, "photons_per_cycle": 1}
+    found = []
+    with LocalCluster(
+        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as local, Client(local) as client:
+        for replay in (
+            lambda: cluster.recordings(client, files, **options).totals,
+            lambda: cluster.replay(client, one, rows=32, **options).statistics,
+        ):
+            seconds = []
+            for _ in range(3):
+                begun = time.perf_counter()
+                photons = replay()["photons"]
+                seconds.append(time.perf_counter() - begun)
+            found.append(photons / min(seconds))
+    return found
+
+
+def main():
+    photons = int(float(sys.argv[1])) if len(sys.argv) > 1 else 100_000_000
+    with tempfile.TemporaryDirectory() as folder:
+        given = recordings(folder, photons)
+        one, two = (speeds(workers, *given) for workers in (1, 2))
+    for name, alone, both in zip(("many recordings", "one in parts"), one, two):
+        print(f"{name}: one worker {alone / 1e6:.1f}, two {both / 1e6:.1f} million photons a second, "
+              f"ratio {both / alone:.2f}")
+    sys.exit(any(both / alone < LEAST for alone, both in zip(one, two)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,93 @@
+"""What a client does: it looks at the workers, and waits for results."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from importlib import metadata
+from typing import Any, Callable, Optional
+
+from distributed import Client, Future, as_completed
+
+from .._native import Error, __version__
+
+Progress = Optional[Callable[[int, int], Any]]
+
+#: Counters of ``statistics`` that parts add up.
+COUNTERS = (
+    "photons", "events", "events_of_blocks", "pixels", "pixels_reporting", "held", "rejected",
+    "saturated", "saturated_in_blocks", "gated_out", "masked", "deferred", "expired",
+    "expired_deferred", "not_replayed", "cut_off",
+)
+
+
+def totals(statistics: Iterable[dict[str, Any]]) -> dict[str, int]:
+    """The sums of all counters."""
+    sums = dict.fromkeys(COUNTERS, 0)
+    for one in statistics:
+        for name in COUNTERS:
+            sums[name] += one[name]
+    return sums
+
+
+def look_at(client: Any, folder: Optional[str] = None) -> None:
+    """Checks that workers have this version of dtof, and ``folder``.
+
+    Tasks of workers that come later check it themselves.
+    """
+    if not isinstance(client, Client):
+        raise Error(f"client: {type(client).__name__}: must be a distributed.Client")
+    if client.asynchronous:
+        raise Error("client: is asynchronous: must be one that waits")
+    # Functions of Python itself: a worker without dtof has them, too.
+    for worker, version in client.run(metadata.version, "dtof", on_error="return").items():
+        if isinstance(version, Exception):
+            raise Error(f"worker {worker} has no dtof: install it there, too")
+        check_version(f"worker {worker}", version)
+    if folder is None:
+        return
+    for worker, is_there in client.run(os.path.isdir, folder).items():
+        if not is_there:
+            raise Error(f"{folder}: worker {worker} has no such folder: make one that all share")
+
+
+def check_version(who: str, version: str, expected: str = __version__) -> None:
+    """Checks that ``version`` is ours."""
+    if version != expected:
+        raise Error(f"{who} has dtof {version}, not {expected}: install the same everywhere")
+
+
+def wait_for(
+    futures: list[Future[Any]], progress: Progress, keep_errors: bool = False
+) -> list[Any]:
+    """The results of ``futures``, in their order.
+
+    The first error cancels the others and is raised, unless errors are kept as results.
+    """
+    places = {future.key: place for place, future in enumerate(futures)}
+    results: list[Any] = [None] * len(futures)
+    done = 0
+    try:
+        for future in as_completed(futures):
+            try:
+                results[places[future.key]] = future.result()
+            except Exception as error:
+                if not keep_errors:
+                    raise
+                results[places[future.key]] = error
+            # Workers need not keep it.
+            future.release()
+            done += 1
+            if progress is not None:
+                progress(done, len(futures))
+    except BaseException:
+        for future in futures:
+            future.cancel()
+        raise
+    return results
+
+
+def line(error: BaseException) -> str:
+    """An error in one line."""
+    text = " ".join(str(error).split())
+    return text if isinstance(error, Error) else f"{type(error).__name__}: {text}"

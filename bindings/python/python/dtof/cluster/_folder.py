@@ -1,0 +1,153 @@
+"""The folder of one recording: what an earlier run has left, and what comes new."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from typing import Any, Callable, Optional
+from uuid import uuid4
+
+import numpy
+
+from .. import _native
+from .._arrays import EVENT
+from .._files import write_events
+from .._run import Replay
+
+#: Kinds of files of events.
+FORMATS = ("aer", "npy")
+
+
+class Folder:
+    """Where the results of one recording are to be.
+
+    ``summary.json`` is written last and removed first, so that a folder that has it is complete.
+    """
+
+    def __init__(self, folder: str, events: str, file: str, said: list[str]) -> None:
+        self._folder = folder
+        self._events = f"events.{events}"
+        self._request = _request(file, said)
+        self._inputs = [file, *_settings(said)]
+
+    def kept(self) -> Optional[dict[str, Any]]:
+        """The statistics of an earlier run with the same request, if its files are there."""
+        summary = self._earlier()
+        asked = {**self._request, "events": self._events}
+        request = dict(summary.pop("request", None) or {}) if summary else {}
+        size = request.pop("events_bytes", None)
+        events = self._place(self._events)
+        is_whole = os.path.isfile(events) and os.path.getsize(events) == size
+        return summary if request == asked and is_whole else None
+
+    def write(self, run: Replay) -> None:
+        """Writes the files, each whole or not at all. Only results of dtof are replaced."""
+        self._earlier()
+        for name, is_ours in _OURS.items():
+            place = self._place(name)
+            if not os.path.lexists(place):
+                continue
+            if not (os.path.isfile(place) and is_ours(place)):
+                raise _native.Error(f"{place}: was not written by dtof: move it away")
+            if any(os.path.samefile(place, name) for name in self._inputs):
+                raise _native.Error(f"{place}: is a file that is read")
+        os.makedirs(self._folder, exist_ok=True)
+        for name in ("summary.json", *(f"events.{other}" for other in FORMATS)):
+            if name != self._events and os.path.exists(self._place(name)):
+                os.remove(self._place(name))
+        events = self._place(self._events)
+        if self._events == "events.aer":
+            write_events(events, run.events, run.array)
+        else:
+            self._put(self._events, lambda file: numpy.save(file, run.events))
+        self._put("dtof.toml", lambda file: file.write(run.toml.encode()))
+        request = {**self._request, "events": self._events}
+        request["events_bytes"] = os.path.getsize(events)
+        summary = json.dumps({**run.statistics, "request": request}, indent=2) + "\n"
+        self._put("summary.json", lambda file: file.write(summary.encode()))
+
+    def _place(self, name: str) -> str:
+        return os.path.join(self._folder, name)
+
+    def _earlier(self) -> Optional[dict[str, Any]]:
+        """The summary of an earlier run, if there is one."""
+        place = self._place("summary.json")
+        try:
+            with open(place, encoding="utf-8") as file:
+                summary = json.load(file)
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except ValueError:
+            summary = None
+        if not isinstance(summary, dict) or not str(summary.get("program")).startswith("dtof "):
+            raise _native.Error(f"{place}: was not written by dtof: move it away")
+        return summary
+
+    def _put(self, name: str, write: Callable[[Any], Any]) -> None:
+        """Writes a file beside its place, and moves it there."""
+        aside = self._place(f".dtof-{uuid4().hex}.partial")
+        try:
+            with open(aside, "xb") as file:
+                write(file)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(aside, self._place(name))
+        except BaseException:
+            if os.path.exists(aside):
+                os.unlink(aside)
+            raise
+
+
+def _settings(said: list[str]) -> list[str]:
+    prefix = "--settings="
+    return [text[len(prefix) :] for text in said if text.startswith(prefix)]
+
+
+def _request(file: str, said: list[str]) -> dict[str, Any]:
+    """All that the results depend on."""
+    try:
+        known = os.stat(file)
+    except OSError as error:
+        raise _native.Error(f"{file}: {error.strerror}") from error
+    settings = _settings(said)
+    return {
+        "version": _native.__version__,
+        "file": file,
+        "bytes": known.st_size,
+        "modified_ns": known.st_mtime_ns,
+        "options": sorted(set(said) - {f"--settings={name}" for name in settings}),
+        "settings_sha256": [_hash(name) for name in settings],
+    }
+
+
+def _hash(name: str) -> str:
+    try:
+        with open(name, "rb") as file:
+            return hashlib.sha256(file.read()).hexdigest()
+    except OSError as error:
+        raise _native.Error(f"{name}: {error.strerror}") from error
+
+
+def _begins(mark: bytes) -> Callable[[str], bool]:
+    """Whether ``mark`` is near the start of a file."""
+
+    def is_ours(place: str) -> bool:
+        with open(place, "rb") as file:
+            return mark in file.read(1024)
+
+    return is_ours
+
+
+def _holds_events(place: str) -> bool:
+    try:
+        return bool(numpy.load(place, mmap_mode="r").dtype == EVENT)
+    except (ValueError, OSError, EOFError):
+        return False
+
+
+_OURS: dict[str, Callable[[str], bool]] = {
+    "events.aer": _begins(b"DTOF-AER"),
+    "events.npy": _holds_events,
+    "dtof.toml": _begins(b"# dtof settings"),
+}
