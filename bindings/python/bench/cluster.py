@@ -2,8 +2,10 @@
 
     python bench/cluster.py [PHOTONS]
 
-PHOTONS is how many there are in all (100 million). A worker has one thread. The faster of three runs
-counts. Fails below 1.6 times the speed of one.
+PHOTONS is how many there are in all (100 million). A worker has one thread. Many recordings leave
+their events in a folder; those of one in parts, 48 bytes for 40 photons here, come back to the client,
+through the scheduler. The fastest of three runs counts. Fails if two workers have less than 1.6 times
+the speed of one with many recordings, or 1.3 times with one. Needs two cores that nobody else uses.
 """
 
 import sys
@@ -17,7 +19,7 @@ from distributed import Client, LocalCluster
 from dtof import cluster
 
 FILES, PIXELS, BINS = 16, (32, 32), 128
-LEAST = 1.6
+LEAST = {"many recordings": 1.6, "one in parts": 1.3}
 
 
 def recordings(folder, photons):
@@ -34,17 +36,20 @@ def recordings(folder, photons):
     return files, one
 
 
-def speeds(workers, files, one):
+def speeds(workers, files, one, folder):
     """Photons a second."""
     options = {"cycles": 10_000_000, "photons_per_cycle": 1}
     found = []
+
+    def many():
+        # Nothing of an earlier run is kept.
+        with tempfile.TemporaryDirectory(dir=folder) as out:
+            return cluster.recordings(client, files, out=out, **options).totals
+
     with LocalCluster(
         n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None
     ) as local, Client(local) as client:
-        for replay in (
-            lambda: cluster.recordings(client, files, **options).totals,
-            lambda: cluster.replay(client, one, rows=32, **options).statistics,
-        ):
+        for replay in (many, lambda: cluster.replay(client, one, rows=32, **options).statistics):
             seconds = []
             for _ in range(3):
                 begun = time.perf_counter()
@@ -58,11 +63,13 @@ def main():
     photons = int(float(sys.argv[1])) if len(sys.argv) > 1 else 100_000_000
     with tempfile.TemporaryDirectory() as folder:
         given = recordings(folder, photons)
-        one, two = (speeds(workers, *given) for workers in (1, 2))
-    for name, alone, both in zip(("many recordings", "one in parts"), one, two):
+        one, two = (speeds(workers, *given, folder) for workers in (1, 2))
+    failed = False
+    for (name, least), alone, both in zip(LEAST.items(), one, two):
+        failed |= both / alone < least
         print(f"{name}: one worker {alone / 1e6:.1f}, two {both / 1e6:.1f} million photons a second, "
               f"ratio {both / alone:.2f}")
-    sys.exit(any(both / alone < LEAST for alone, both in zip(one, two)))
+    sys.exit(failed)
 
 
 if __name__ == "__main__":

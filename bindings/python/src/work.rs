@@ -149,7 +149,9 @@ fn pool() -> Result<Arc<ThreadPool>> {
     {
         return Ok(Arc::clone(&pool.threads));
     }
-    let threads = Arc::new(ThreadPoolBuilder::new().num_threads(asked).build()?);
+    let builder = ThreadPoolBuilder::new().num_threads(asked);
+    let builder = builder.thread_name(|number| format!("dtof-{number}"));
+    let threads = Arc::new(builder.build()?);
     let pool = Pool {
         process,
         asked,

@@ -11,12 +11,14 @@ from pathlib import Path
 import dask
 from distributed import Client
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "clusters.md"
+ROOT = Path(__file__).resolve().parents[3]
+PAGE = ROOT / "docs" / "clusters.md"
+README = ROOT / "bindings" / "python" / "README.md"
 
 
-def blocks(language):
-    """The blocks of the page, as they stand."""
-    return re.findall(rf"^```{language}\n(.*?)^```$", PAGE.read_text(), re.M | re.S)
+def blocks(language, page=PAGE):
+    """The blocks of a page, as they stand."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", page.read_text(), re.M | re.S)
 
 
 class Cluster:

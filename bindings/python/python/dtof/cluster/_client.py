@@ -41,13 +41,15 @@ def look_at(client: Any, folder: Optional[str] = None) -> None:
         raise Error("client: is asynchronous: must be one that waits")
     # Functions of Python itself: a worker without dtof has them, too.
     for worker, version in client.run(metadata.version, "dtof", on_error="return").items():
-        if isinstance(version, Exception):
+        if isinstance(version, metadata.PackageNotFoundError):
             raise Error(f"worker {worker} has no dtof: install it there, too")
-        check_version(f"worker {worker}", version)
+        # A worker that is lost meanwhile says nothing.
+        if isinstance(version, str):
+            check_version(f"worker {worker}", version)
     if folder is None:
         return
-    for worker, is_there in client.run(os.path.isdir, folder).items():
-        if not is_there:
+    for worker, is_there in client.run(os.path.isdir, folder, on_error="return").items():
+        if is_there is False:
             raise Error(f"{folder}: worker {worker} has no such folder: make one that all share")
 
 
