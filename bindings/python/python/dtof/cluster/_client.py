@@ -60,7 +60,7 @@ def check_version(who: str, version: str, expected: str = __version__) -> None:
 
 
 def wait_for(
-    futures: list[Future[Any]], progress: Progress, keep_errors: bool = False
+    client: Client, futures: list[Future[Any]], progress: Progress, keep_errors: bool = False
 ) -> list[Any]:
     """The results of ``futures``, in their order.
 
@@ -70,23 +70,36 @@ def wait_for(
     results: list[Any] = [None] * len(futures)
     done = 0
     try:
-        for future in as_completed(futures):
-            try:
-                results[places[future.key]] = future.result()
-            except Exception as error:
-                if not keep_errors:
-                    raise
-                results[places[future.key]] = error
-            # Workers need not keep it.
-            future.release()
-            done += 1
-            if progress is not None:
-                progress(done, len(futures))
+        for batch in as_completed(futures).batches():
+            for future, result in zip(batch, _results(client, batch)):
+                if isinstance(result, Exception) and not keep_errors:
+                    raise result
+                results[places[future.key]] = result
+                # Workers need not keep it.
+                future.release()
+                done += 1
+                if progress is not None:
+                    progress(done, len(futures))
     except BaseException:
         for future in futures:
             future.cancel()
         raise
     return results
+
+
+def _results(client: Client, futures: list[Future[Any]]) -> list[Any]:
+    """Results, or the errors in their places."""
+    try:
+        return list(client.gather(futures))
+    except Exception:
+        return [_result(future) for future in futures]
+
+
+def _result(future: Future[Any]) -> Any:
+    try:
+        return future.result()
+    except Exception as error:
+        return error
 
 
 def line(error: BaseException) -> str:

@@ -107,7 +107,7 @@ def recordings(
     tasks = [Task(version, file, place, events, said) for file, place in zip(given, folders)]
     futures = client.map(do, tasks, pure=False)
     results = []
-    for task, done in zip(tasks, wait_for(futures, progress, keep_errors=True)):
+    for task, done in zip(tasks, wait_for(client, futures, progress, keep_errors=True)):
         if isinstance(done, Exception):
             results.append(Recorded(task.file, error=f"{task.file}: {line(done)}"))
             continue

@@ -97,7 +97,7 @@ def _on_all(
     told = None
     if progress is not None:
         told = lambda done, parts: progress(before + done, 2 * parts)  # noqa: E731
-    return wait_for(futures, told)
+    return wait_for(client, futures, told)
 
 
 def _count(version: str, name: str, block: Any, said: list[str]) -> tuple[numpy.ndarray, int]:

@@ -109,7 +109,7 @@ def seeds(
     futures = client.map(
         _simulate, *zip(*((version, text, part, said) for part in parts)), pure=False
     )
-    statistics = [run for part in wait_for(futures, progress) for run in part]
+    statistics = [run for part in wait_for(client, futures, progress) for run in part]
     return Seeds(ordered, statistics)
 
 
