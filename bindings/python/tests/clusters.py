@@ -1,4 +1,5 @@
-"""A scheduler and two worker processes, started by the commands of docs/clusters.md."""
+"""A scheduler and two worker processes, started by the commands of docs/clusters.md, and what tests
+of them need."""
 
 import os
 import re
@@ -9,7 +10,11 @@ import time
 from pathlib import Path
 
 import dask
+import numpy
+import pytest
 from distributed import Client
+
+import dtof
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = ROOT / "docs" / "clusters.md"
@@ -71,3 +76,41 @@ class Cluster:
             # With what it has started.
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
+
+
+def counts(seed=3, rows=4, columns=6, bins=100, bright=90.0):
+    random = numpy.random.default_rng(seed)
+    counts = random.poisson(3.0, size=(rows, columns, bins))
+    counts[..., 40:43] += random.poisson(bright, size=(rows, columns, 3))
+    return counts
+
+
+def saved(folder, name, array):
+    path = folder / name
+    path.parent.mkdir(exist_ok=True)
+    numpy.save(path, array)
+    return path
+
+
+def refused(call, *words):
+    with pytest.raises(dtof.Error) as caught:
+        call()
+    text = str(caught.value)
+    assert "\n" not in text and all(word in text for word in words), text
+
+
+def are_equal(run, expected, by_another_name=False):
+    assert run.events.tobytes() == expected.events.tobytes()
+    name = {"input": expected.statistics["input"]} if by_another_name else {}
+    assert {**run.statistics, **name} == expected.statistics
+    assert (run.toml, run.settings, run.array) == (expected.toml, expected.settings, expected.array)
+
+
+def contents(folder):
+    """All files, less those that a killed process left."""
+    files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in files
+        if not path.name.endswith(".partial")
+    }

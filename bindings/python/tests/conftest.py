@@ -49,3 +49,20 @@ def recorded(capsys):
         return path
 
     return place
+
+
+@pytest.fixture(scope="session")
+def running(tmp_path_factory):
+    """A Dask cluster."""
+    from clusters import Cluster
+
+    running = Cluster(tmp_path_factory.mktemp("cluster"))
+    yield running
+    running.close()
+
+
+@pytest.fixture
+def client(running):
+    """A client of it, with all workers there."""
+    running.all_there()
+    return running.client

@@ -14,7 +14,7 @@ from .._arrays import EVENT, Array, recording
 from .._options import arguments
 from .._run import Replay, quietly, warn
 from ._client import Progress, look_at, totals, wait_for
-from ._split import Part, Split, blocks_of_file, split
+from ._split import Split, blocks_of_file, split
 from ._worker import begin
 
 
