@@ -8,7 +8,6 @@
 mod chip;
 #[path = "chip/pin.rs"]
 mod pin;
-#[path = "../../core/examples/platform/mod.rs"]
 #[macro_use]
 mod platform;
 

@@ -117,15 +117,6 @@ fn a_calibration_gives_directions_and_takes_the_bias_off() {
 }
 
 #[test]
-fn the_calibration_of_the_documentation_is_one() {
-    let docs = include_str!("../../../docs/export.md");
-    let (_, rest) = docs.split_once("```toml\n").unwrap();
-    let (text, _) = rest.split_once("```").unwrap();
-    let rays = calibration::parse(text, array(2, 1)).unwrap();
-    assert_eq!(rays[1].bias_mm, -12.5);
-}
-
-#[test]
 fn the_largest_calibration_is_read_in_linear_time() {
     let pixels: String = (0..65_536)
         .map(|pixel| format!("[0, 0, 1, {pixel}],\n"))

@@ -10,12 +10,12 @@ use super::scene::{self, Scene};
 use crate::engine::settings::Settings;
 use crate::input::source::Geometry;
 
-/// `scenes/demo.toml`.
+/// `demo.toml` beside this file.
 ///
 /// # Errors
 /// Never: it is a part of the program.
 pub fn scene() -> Result<Scene> {
-    Scene::parse(include_str!("../../../scenes/demo.toml"))
+    Scene::parse(include_str!("demo.toml"))
 }
 
 /// Blocks of 4×4 pixels and two echoes, with the window rule and one false alarm in a hundred

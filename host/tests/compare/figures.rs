@@ -26,7 +26,7 @@ fn drawn(input: &str, name: &str) {
 
 #[test]
 fn the_demo() {
-    let scene = of_package("../scenes/demo.toml");
+    let scene = of_package("src/simulate/demo.toml");
     drawn(&format!("--scene {}", scene.display()), "demo");
 }
 

@@ -4,6 +4,9 @@ use crate::common::aer::{HEADER, depth, dynamic, events, exported, file};
 use crate::common::{Scratch, says, table};
 use dtof::events::aer_file::EventKind;
 use dtof::export::{Format, Options};
+use dtof::geometry::Rays;
+use dtof::input::source::Geometry;
+use dtof_core::{BlockLevel, PixelAddress};
 
 /// A record: x, y, z, value, pixel; flags, level, echo; time.
 fn record(bytes: &[u8]) -> ([f32; 4], u32, [u8; 3], f64) {
@@ -180,6 +183,19 @@ fn a_link_stays_and_what_it_leads_to_is_replaced() {
     let lost = scratch.run("export events.aer --format csv --out lost.csv");
     scratch.refused(&lost, &["lost.csv: is a link to what is not there"]);
     assert!(scratch.path("lost.csv").is_symlink());
+}
+
+#[test]
+fn the_calibration_of_the_documentation_is_one() {
+    let docs = include_str!("../../../docs/export.md");
+    let (_, rest) = docs.split_once("```toml\n").unwrap();
+    let (text, _) = rest.split_once("```").unwrap();
+    let scratch = Scratch::new();
+    let rays = Rays::read(&scratch.file("rays.toml", text), Geometry::new(2, 1)).unwrap();
+    // Its second pixel measures 12.5 mm too little.
+    let point = rays.point(PixelAddress(1), BlockLevel::PIXEL, 987.5);
+    let length = point.unwrap().iter().map(|side| side * side).sum::<f64>();
+    assert!((length - 1.0).abs() < 1e-12, "{length}");
 }
 
 #[test]

@@ -55,7 +55,7 @@ const SCENES: [File; 5] = [
     },
     File {
         name: "demo",
-        text: include_str!("../../../../scenes/demo.toml"),
+        text: include_str!("../../../../host/src/simulate/demo.toml"),
         light: 1.0,
         cycles: 4000,
     },

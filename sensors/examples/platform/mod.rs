@@ -1,0 +1,1 @@
+../../../core/examples/platform/mod.rs
