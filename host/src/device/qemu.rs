@@ -22,6 +22,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Runs its arguments until they end or its standard input does: however this program
 /// ends, the other end of the pipe then does.
+#[cfg(unix)]
 const UNTIL_END_OF_INPUT: &str = "exec 3<&0
 \"$@\" </dev/null 3<&- &
 command=$!
@@ -47,7 +48,8 @@ impl Emulator {
         let image = image.map_or_else(built, |image| Ok(image.to_owned()))?;
         ensure!(
             image.is_file(),
-            "no image at {}: `cargo xtask image mps2-an386` builds one, --image names another",
+            "no image at {}: run `cargo xtask image mps2-an386` in a clone of dtof; --image takes the path \
+             that it prints",
             image.display()
         );
         let mut start = [0; 4];
@@ -62,7 +64,7 @@ impl Emulator {
         let asked = ask.stdout(Stdio::null()).stderr(Stdio::null()).status();
         ensure!(
             asked.is_ok_and(|status| status.success()),
-            "{QEMU} is missing: `cargo xtask setup` installs it"
+            "{QEMU} is missing: install QEMU for Arm; in a clone of dtof `cargo xtask setup` does"
         );
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
         listener.set_nonblocking(true)?;
