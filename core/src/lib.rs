@@ -1,13 +1,5 @@
-//! Asynchronous peak detection for single-photon direct time-of-flight
-//! histograms: integer-only, `no_std`, without heap, `unsafe` or a way to
-//! panic.
-//!
-//! Each macropixel counts photons into a histogram and reports a depth event
-//! the moment its peak stands clear of the background; then it starts over.
-//! The method is that of Y. Liu et al., *An on-chip Pixel Processing Approach
-//! with 2.4 µs latency for Asynchronous Read-out of SPAD-based dToF Flash
-//! LiDARs*. Sections, equations and algorithms cited in this crate are that
-//! paper's.
+#![doc = include_str!("../README.md")]
+//! ## From photon to word
 //!
 //! ```text
 //! photon (TDC code)
@@ -21,38 +13,7 @@
 //! of the events of a pixel: RunningMean, Reflectivity, DynamicDepthEvent
 //! ```
 //!
-//! # Example
-//!
-//! A macropixel with one signal photon a laser cycle in bin 60 and now and then
-//! a background photon:
-//!
-//! ```
-//! use dtof_core::fixed::types::{I24F8, U16F16};
-//! use dtof_core::*;
-//!
-//! // Checked when compiled. The bins are 250 ps wide.
-//! const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().x(4).l1(40).l2(2000).build());
-//! const SCALE: RangeScale = checked!(RangeScale::new(U16F16::lit("250"), I24F8::ZERO));
-//!
-//! let mut pixel = AsyncPixel::<128>::new(PixelAddress(0));
-//! let mut statistics = Statistics::default(); // of all pixels
-//! let mut event = None;
-//! for cycle in 0..100 {
-//!     pixel.count(&CONFIG, 60);
-//!     if cycle % 7 == 0 {
-//!         pixel.count(&CONFIG, cycle as u16);
-//!     }
-//!     pixel.end_laser_cycle(&CONFIG, &mut statistics, LaserCycle(cycle));
-//!     event = event.or(pixel.acknowledge());
-//! }
-//! let event = event.expect("a peak as clear as this is reported");
-//! assert_eq!(event.exposure, 44); // the first look with N > 40
-//! assert_eq!(SCALE.range(event.position()).round(), 2267); // 60.5 bins, in mm
-//! ```
-//!
-//! More examples are in `core/examples`: `minimal`, `whole_histogram`, `aer_stream`.
-//!
-//! # Modules
+//! ## Modules
 //!
 //! Each module imports only from those above it.
 //!
@@ -68,13 +29,13 @@
 //! | `events` | what comes of events: means, changes of depth, reflectivity |
 //! | `aer` | events as words |
 //!
-//! # Rules of the crate
+//! ## Rules of the crate
 //!
 //! Data flows one way through the pipeline. Configuration and state are separate
 //! types: one configuration, many pixels. Time is an argument. What is lost
 //! (saturated, rejected, gated out) is counted. Nothing is logged.
 //!
-//! # Glossary
+//! ## Glossary
 //!
 //! - **Macropixel**: SPADs that share a TDC and a histogram.
 //! - **Laser cycle**: one laser pulse and the listening time after it.

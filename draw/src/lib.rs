@@ -1,5 +1,5 @@
-//! Charts and maps as SVG documents. They need nothing beside themselves, read well at
-//! 400 pixels of width, in light and dark, and the same calls give the same bytes.
+#![doc = include_str!("../README.md")]
+//! ## Modules
 //!
 //! | module | what it has |
 //! |---|---|

@@ -16,6 +16,7 @@ fn a_macropixel_takes_what_the_documentation_says() {
     assert_eq!(size_of::<AsyncPixel<128>>(), 128 * 2 + 72);
     let said = "macropixel of 128 bins takes 328 bytes";
     assert!(include_str!("../../README.md").contains(said));
+    assert!(include_str!("../../core/README.md").contains(said));
     assert_eq!(size_of::<AsyncPixel<128>>(), 328);
     // A block: 8 bytes more.
     assert_eq!(size_of::<Block<128>>(), 128 * 2 + 72 + 8);

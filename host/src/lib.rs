@@ -1,5 +1,5 @@
-//! Photons in, depth events out, on the host: simulated and recorded photons,
-//! the engine that turns them into events, and the files they are written to.
+#![doc = include_str!("../README.md")]
+//! ## From photons to files
 //!
 //! ```text
 //! simulation, recorded histograms, photon list   PhotonSource

@@ -1,19 +1,9 @@
-//! The link between a dToF sidecar and its host: messages arrive whole, once and
-//! in order, or not yet. Its format is `docs/link-format.md`.
-//!
-//! ```text
-//! endpoint       numbers, acknowledges and repeats messages; closes its window when full
-//!   ↕
-//! frame          COBS and CRC-32: a damaged frame is dropped and counted
-//!   ↕
-//! bytes          of a serial port or a TCP stream, whatever carries them
-//! ```
+#![doc = include_str!("../README.md")]
+//! ## Modules
 //!
 //! [`message`] has the kinds of messages; [`Configuration`], [`Token`], [`Refusal`],
-//! [`Report`], [`SensorRecord`] and [`HistogramPart`] are their bodies. Neither a board
-//! nor a host is known here.
-//!
-//! The example `two_ends` is a host and a device in one process.
+//! [`Report`], [`SensorRecord`] and [`HistogramPart`] are their bodies. [`endpoint`] is
+//! one end, [`frame`] what lies between them.
 
 #![no_std]
 #![forbid(unsafe_code)]

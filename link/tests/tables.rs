@@ -1,10 +1,11 @@
 //! The tables of `docs/link-format.md`: every byte of the records, every refusal and every
-//! fault of a sensor.
+//! fault of a sensor. And the figures of the README.
 
 use std::fmt::Display;
 
 use dtof_core::Statistics;
-use dtof_link::endpoint::LinkCounters;
+use dtof_link::endpoint::{BODY_BYTES, LinkCounters, WINDOW};
+use dtof_link::frame::WIRE_BYTES;
 use dtof_link::{Configuration, FaultRecord, NoHistogram, Refusal, Report, SensorRecord};
 
 /// The table of the document under this heading describes each of so many bytes once, in
@@ -30,6 +31,16 @@ fn the_tables_describe_every_byte_of_the_records() {
     describes_all_bytes("Configuration", Configuration::BYTES);
     describes_all_bytes("Sensor", SensorRecord::BYTES);
     describes_all_bytes("Report", Report::BYTES);
+}
+
+#[test]
+fn the_readme_says_what_a_message_takes() {
+    let more = WIRE_BYTES - BODY_BYTES;
+    let said = format!("A message has up to {BODY_BYTES} bytes, a frame on the wire {more} more.");
+    let readme = include_str!("../README.md");
+    assert!(readme.contains(&said), "{said}");
+    assert_eq!(WINDOW, 4);
+    assert!(readme.contains("at most eight messages: four that"));
 }
 
 #[test]

@@ -1,21 +1,10 @@
-//! Drivers of the sensors that photons come from.
+#![doc = include_str!("../README.md")]
+//! ## After an error
 //!
-//! | module | sensor | what it gives |
-//! |---|---|---|
-//! | [`tdc7200`] | TI TDC7200 time-to-digital converter, SPI | one photon time for each of up to five stops |
-//! | [`tmf882x`] | ams OSRAM TMF8820/21/28, I²C | whole histograms of nine zones |
-//! | [`simulated`] | none | photons drawn on the device |
-//!
-//! A driver never waits. Each [`Sensor::poll`] does what can be done at once,
-//! at most one register block on the bus, and keeps in its state what it waits
-//! for; the time is an argument. So a sensor that is unplugged or hangs costs
-//! its own error every few milliseconds and nobody else's time. Every error
-//! leaves the driver usable: the next polls bring the sensor up again.
-//!
-//! The examples `tdc7200` and `tmf882x` go from bus and pins to millimetres.
-//!
-//! A driver owns an `SpiDevice` or an `I2c` of embedded-hal 1.0, so that several
-//! sensors share a bus by way of embedded-hal-bus.
+//! Each [`Sensor::poll`] keeps in the driver's state what it waits for; the time is an
+//! argument. So a sensor that is unplugged or hangs costs its own error every few
+//! milliseconds and nobody else's time. Every error leaves the driver usable: the next
+//! polls bring the sensor up again.
 
 #![no_std]
 #![forbid(unsafe_code)]

@@ -1,4 +1,5 @@
-//! The paper's performance analysis (section II-C) and what it leaves out.
+#![doc = include_str!("../README.md")]
+//! ## Modules
 //!
 //! | module | what | source |
 //! |---|---|---|
@@ -15,10 +16,6 @@
 //! | [`counts`] | Poisson, normal and binomial laws | exact |
 //! | [`tune`] | settings for a wanted false-alarm rate | all of these |
 //! | [`random`] | random numbers of a pixel or a trial | |
-//!
-//! Times are in bins from the start of bin 0, counts are mean photons, all in
-//! `f64`. Inputs are not checked: rates are finite and not negative,
-//! probabilities lie strictly between 0 and 1 where an inverse is taken of them.
 
 #![forbid(unsafe_code)]
 

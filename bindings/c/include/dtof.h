@@ -570,7 +570,7 @@ typedef struct dtof_report_t {
 extern "C" {
 #endif // __cplusplus
 
-// The version of the library, such as "0.1.0".
+// The version of the library: major, minor and patch, with a dot between them.
 //
 // Threads: any.
 const char *dtof_version(void);

@@ -29,7 +29,7 @@ const _: () = assert!(
     "DTOF_BINS must be a power of two from 8 to 256"
 );
 
-/// The version of the library, such as "0.1.0".
+/// The version of the library: major, minor and patch, with a dot between them.
 ///
 /// Threads: any.
 #[unsafe(no_mangle)]

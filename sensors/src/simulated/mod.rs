@@ -11,44 +11,7 @@
 //! the same whenever and however often the driver is asked. The time only says
 //! how many laser cycles are due.
 //!
-//! ```
-//! use core::num::NonZeroU16;
-//! use dtof_core::PixelAddress;
-//! use dtof_core::fixed::types::{U0F32, U8F24};
-//! use dtof_sensors::simulated::{Pulse, Settings, Simulated, SimulatedPixel};
-//! use dtof_sensors::{PhotonSink, Polled, Sensor};
-//!
-//! struct Counter { photons: u32, cycles: u32 }
-//! impl PhotonSink for Counter {
-//!     fn photon(&mut self, _: PixelAddress, code: u16) {
-//!         assert!(code < 128);
-//!         self.photons += 1;
-//!     }
-//!     fn end_laser_cycles(&mut self, cycles: u16) {
-//!         self.cycles += u32::from(cycles);
-//!     }
-//!     fn histogram(&mut self, _: PixelAddress, _: &[u32; 128]) {}
-//! }
-//!
-//! // A quarter, a half and the rest in bins 60, 61 and 62.
-//! const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
-//! let pixels = [
-//!     SimulatedPixel::new(PixelAddress(0), 60, U8F24::lit("0.2"), U8F24::lit("0.3"))?,
-//! ];
-//! let settings = Settings {
-//!     seed: 1,
-//!     bins: 128,
-//!     cycles_per_second: 10_000,
-//!     cycles_per_poll: NonZeroU16::new(1000).unwrap(),
-//! };
-//! let mut sensor = Simulated::new(&pixels, PULSE, settings);
-//! let mut sink = Counter { photons: 0, cycles: 0 };
-//! assert_eq!(sensor.poll(0, &mut sink), Ok(Polled::Idle));
-//! assert_eq!(sensor.poll(100, &mut sink), Ok(Polled::Data));
-//! assert_eq!(sink.cycles, 1000);
-//! assert!((400..600).contains(&sink.photons));
-//! # Ok::<(), dtof_sensors::simulated::RateError>(())
-//! ```
+//! The example of the [crate](crate) runs one.
 
 mod poisson;
 mod scene;
