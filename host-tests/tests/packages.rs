@@ -1,0 +1,234 @@
+//! What is published is what a user can want, and complete without the workspace: README,
+//! licences, an example, and every file that is compiled in.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+
+/// In the order in which they are published.
+const PUBLISHED: [&str; 6] = [
+    "dtof-core",
+    "dtof-draw",
+    "dtof-link",
+    "dtof-sensors",
+    "dtof-theory",
+    "dtof",
+];
+
+/// The most that a package may hold, in bytes before it is compressed.
+const MOST_BYTES: u64 = 1_100_000;
+
+fn root() -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    root.canonicalize().unwrap()
+}
+
+fn cargo(arguments: &[&str]) -> Vec<u8> {
+    let mut command = Command::new(env!("CARGO"));
+    let output = command
+        .current_dir(root())
+        .args(arguments)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{arguments:?}: {output:?}");
+    output.stdout
+}
+
+fn packages() -> Vec<Value> {
+    let arguments = ["metadata", "--no-deps", "--format-version", "1", "--locked"];
+    let metadata: Value = serde_json::from_slice(&cargo(&arguments)).unwrap();
+    metadata["packages"].as_array().unwrap().clone()
+}
+
+fn text<'a>(package: &'a Value, key: &str) -> &'a str {
+    package[key].as_str().unwrap_or_default()
+}
+
+fn folder(package: &Value) -> PathBuf {
+    let manifest = Path::new(text(package, "manifest_path"));
+    manifest.parent().unwrap().to_owned()
+}
+
+/// `publish = false` is an empty list of registries.
+fn is_published(package: &Value) -> bool {
+    package["publish"].is_null()
+}
+
+/// What a package lacks that its page and its users need.
+fn lacking(package: &Value) -> Vec<&'static str> {
+    let count = |key: &str| package[key].as_array().map_or(0, Vec::len);
+    let builds = |kind: &str| {
+        let mut targets = package["targets"].as_array().unwrap().iter();
+        targets.any(|target| target["kind"][0] == kind)
+    };
+    let docs = &package["metadata"]["docs"]["rs"];
+    let readme = fs::read_to_string(folder(package).join(text(package, "readme")));
+    let readme = readme.unwrap_or_default();
+    let library = folder(package).join("src/lib.rs");
+    let library = fs::read_to_string(library).unwrap_or_default();
+    let wanted = [
+        ("description", !text(package, "description").is_empty()),
+        ("licence", text(package, "license") == "MIT OR Apache-2.0"),
+        ("oldest Rust", !text(package, "rust_version").is_empty()),
+        ("categories", (1..=5).contains(&count("categories"))),
+        ("keywords", (1..=5).contains(&count("keywords"))),
+        ("library", builds("lib")),
+        ("example", builds("example")),
+        (
+            "README of 150 to 350 words",
+            (150..=350).contains(&readme.split_whitespace().count()),
+        ),
+        ("compiled example in it", readme.contains("\n```rust\n")),
+        ("README without ways out of it", !readme.contains("](")),
+        (
+            "README as its documentation",
+            library.contains("#![doc = include_str!(\"../README.md\")]"),
+        ),
+        ("all features on docs.rs", docs["all-features"] == true),
+        ("targets on docs.rs", docs["targets"].is_array()),
+    ];
+    let lacking = wanted.iter().filter(|(_, is_there)| !is_there);
+    lacking.map(|(what, _)| *what).collect()
+}
+
+/// The files of a package as it is packed.
+fn packed(package: &Value) -> BTreeSet<PathBuf> {
+    let list = [
+        "package",
+        "--list",
+        "--allow-dirty",
+        "--locked",
+        "--offline",
+    ];
+    let list = [&list[..], &["--package", text(package, "name")]].concat();
+    let list = String::from_utf8(cargo(&list)).unwrap();
+    list.lines().map(PathBuf::from).collect()
+}
+
+/// What sources among `files` compile in, less what is among them, too.
+fn compiled_from_elsewhere(folder: &Path, files: &BTreeSet<PathBuf>) -> Vec<String> {
+    let is_source = |file: &&PathBuf| file.extension() == Some("rs".as_ref());
+    let mut elsewhere = Vec::new();
+    for file in files.iter().filter(is_source) {
+        let source = fs::read_to_string(folder.join(file)).unwrap();
+        let names = ["include_str!(\"", "include_bytes!(\"", "#[path = \""]
+            .into_iter()
+            .flat_map(|start| source.split(start).skip(1))
+            .filter_map(|rest| rest.split_once('"'));
+        for (name, _) in names {
+            let mut path = file.parent().unwrap().to_owned();
+            let inside = Path::new(name).iter().all(|part| {
+                if part == ".." {
+                    return path.pop();
+                }
+                path.push(part);
+                true
+            });
+            if !inside || !files.contains(&path) {
+                elsewhere.push(format!("{}: {name}", file.display()));
+            }
+        }
+    }
+    elsewhere
+}
+
+#[test]
+fn published_is_what_a_user_can_want_and_nothing_that_others_use_comes_later() {
+    let packages = packages();
+    let name = |package: &Value| text(package, "name").to_owned();
+    let published: BTreeSet<String> = packages
+        .iter()
+        .filter(|package| is_published(package))
+        .map(name)
+        .collect();
+    assert_eq!(published, PUBLISHED.map(str::to_owned).into());
+
+    for package in packages.iter().filter(|package| is_published(package)) {
+        let place = |name: &str| PUBLISHED.iter().position(|other| *other == name);
+        let own = place(text(package, "name"));
+        for used in package["dependencies"].as_array().unwrap() {
+            // Without a version, which only dependencies of tests may lack, it is not packed.
+            if !used["path"].is_null() && used["req"] != "*" {
+                let place = place(text(used, "name"));
+                assert!(place.is_some() && place < own, "{used}");
+            }
+        }
+    }
+    let order = PUBLISHED.join(" ");
+    for page in ["CONTRIBUTING.md", ".ci/long"] {
+        let page_text = fs::read_to_string(root().join(page)).unwrap();
+        assert!(page_text.contains(&order), "{page} has another order");
+    }
+}
+
+#[test]
+fn the_version_is_the_newest_of_the_changelog() {
+    let changelog = fs::read_to_string(root().join("CHANGELOG.md")).unwrap();
+    let headings = changelog
+        .lines()
+        .filter_map(|line| line.strip_prefix("## ["));
+    let newest = headings.filter_map(|line| line.split_once(']'));
+    let newest = newest
+        .map(|(version, _)| version)
+        .find(|name| *name != "Unreleased");
+    for package in &packages() {
+        assert_eq!(
+            Some(text(package, "version")),
+            newest,
+            "{}",
+            package["name"]
+        );
+    }
+}
+
+#[test]
+fn a_published_package_has_all_that_its_page_and_its_users_need() {
+    let packages = packages();
+    for package in packages.iter().filter(|package| is_published(package)) {
+        assert_eq!(lacking(package), [""; 0], "{}", package["name"]);
+    }
+    // What is not published lacks most of it, and that is found.
+    let other = packages
+        .iter()
+        .find(|package| package["name"] == "dtof-lab");
+    assert!(lacking(other.unwrap()).len() > 5);
+}
+
+#[test]
+fn a_package_is_small_and_compiles_in_what_is_packed_only() {
+    for package in packages().iter().filter(|package| is_published(package)) {
+        let (folder, files) = (folder(package), packed(package));
+        for file in ["LICENSE-APACHE", "LICENSE-MIT", "README.md", "src/lib.rs"] {
+            assert!(
+                files.contains(Path::new(file)),
+                "{file} of {}",
+                package["name"]
+            );
+        }
+        let has_example = files.iter().any(|file| file.starts_with("examples"));
+        assert!(has_example, "{}", package["name"]);
+        // Cargo makes some files itself.
+        let there = files
+            .iter()
+            .filter_map(|file| fs::metadata(folder.join(file)).ok());
+        let bytes: u64 = there.map(|file| file.len()).sum();
+        println!("{}: {} files, {bytes} bytes", package["name"], files.len());
+        assert!(bytes < MOST_BYTES, "{}: {bytes} bytes", package["name"]);
+
+        let sources: BTreeSet<PathBuf> = files
+            .into_iter()
+            .filter(|file| folder.join(file).exists())
+            .collect();
+        assert_eq!(compiled_from_elsewhere(&folder, &sources), [""; 0]);
+        // It would be found.
+        let without: BTreeSet<PathBuf> = sources
+            .into_iter()
+            .filter(|file| file != Path::new("README.md"))
+            .collect();
+        let found = compiled_from_elsewhere(&folder, &without);
+        assert_eq!(found, ["src/lib.rs: ../README.md"]);
+    }
+}
