@@ -11,7 +11,7 @@
 //! the same whenever and however often the driver is asked. The time only says
 //! how many laser cycles are due.
 //!
-//! The example of the [crate](crate) runs one.
+//! The example of the [crate] runs one.
 
 mod poisson;
 mod scene;
