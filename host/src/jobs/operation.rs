@@ -33,14 +33,11 @@ impl Known {
     /// # Errors
     /// What is wrong with the file.
     pub fn said(&self, more: SettingsFile) -> Result<SettingsFile> {
-        let options = SettingsFile {
-            sensor: Sensor {
-                gate: self.gate,
-                masked: self.mask.clone(),
-                sigma_bins: self.sigma_bins,
-                ..Sensor::default()
-            },
-            ..SettingsFile::default()
+        let own = Sensor {
+            gate: self.gate,
+            masked: self.mask.clone(),
+            sigma_bins: self.sigma_bins,
+            ..Sensor::default()
         };
         let file = self.settings.as_deref().map(SettingsFile::read);
         let mut file = file.transpose()?.unwrap_or_default();
@@ -53,7 +50,12 @@ impl Known {
             // Frames have none of these options.
             file.run.frame = None;
         }
-        Ok(options.or(more).or(file))
+        // One command: half widths beside a pulse are its own, those of the file may be another's.
+        let options = SettingsFile {
+            sensor: own.or(more.sensor.clone()),
+            ..more
+        };
+        Ok(options.or(file))
     }
 }
 

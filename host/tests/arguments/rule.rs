@@ -51,6 +51,8 @@ fn half_widths_move_the_depth() {
     assert_eq!(settings["half_widths"], serde_json::json!([1.0, 4.0]));
     assert_eq!(skew.lines().count(), even.lines().count());
     assert_ne!(skew, even);
+    // Beside a pulse they hold as well.
+    assert_eq!(replayed("--half-widths 1,4 --sigma-bins 1").1, skew);
 
     let scratch = Scratch::new();
     let file = scratch.file(
