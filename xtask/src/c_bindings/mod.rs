@@ -21,6 +21,7 @@ use self::figures::Figures;
 
 const FOLDER: &str = "bindings/c";
 const HEADER: &str = "bindings/c/include/dtof.h";
+const README: &str = "bindings/c/README.md";
 const TARGET: &str = "thumbv7em-none-eabihf";
 /// An instruction takes 256 ns of the emulator's clock.
 const COUNT_INSTRUCTIONS: [&str; 2] = ["-icount", "shift=8"];
@@ -65,8 +66,13 @@ pub fn check(root: &Path, bless: bool) -> Result<()> {
     figures::check(root, &c?, &rust?, bless)
 }
 
-/// The header is C99 and C++17 without a warning.
+/// The header, with what the README makes of it, is C99 and C++17 without a warning.
 fn header(root: &Path) -> Result<()> {
+    let page = fs::read_to_string(root.join(README))?;
+    let block = page
+        .split_once("```c\n")
+        .and_then(|(_, rest)| rest.split_once("```"));
+    let (block, _) = block.with_context(|| format!("{README}: no C"))?;
     let strict = "-Wall -Wextra -Wpedantic -Werror -fsyntax-only -I";
     for (compiler, language) in [
         ("gcc", "-std=c99 -x c"),
@@ -79,7 +85,7 @@ fn header(root: &Path) -> Result<()> {
         // Not the header itself: of the main file some compilers warn less, some more.
         let mut compiler = command.arg("-").stdin(Stdio::piped()).spawn()?;
         let stdin = compiler.stdin.take().context("no standard input")?;
-        std::io::Write::write_all(&mut { stdin }, b"#include <dtof.h>\nint main(void);\n")?;
+        std::io::Write::write_all(&mut { stdin }, block.as_bytes())?;
         let status = compiler.wait()?;
         ensure!(status.success(), "{HEADER}: {language}: see above");
     }
