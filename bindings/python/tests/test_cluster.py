@@ -69,7 +69,22 @@ def test_what_are_no_seeds(client):
     refused(lambda: seeds(client, "columns = x\n", [1]), "the scene")
     one, two = (seeds(client, SCENE, [1], **{**SMALL, "alpha": alpha}) for alpha in (8, 9))
     refused(lambda: one + one, "seed 1 is in both")
-    refused(lambda: one + cluster.Seeds([2], two.statistics), "alpha differs")
+    refused(lambda: one + cluster.Seeds([2], two.statistics, one.scene_sha256), "alpha differs")
+
+
+def test_runs_of_different_scenes_do_not_add_up(client):
+    """Nor of different options that no summary tells apart."""
+    scene = "columns = 4\nrows = 2\nbackground = 0.02\n"
+    scene += "[[surface]]\nname = 'wall'\nrange_mm = 1500\nreflectivity = 0.5\n"
+    one = cluster.seeds(client, scene, [1], cycles=300)
+    others = [
+        cluster.seeds(client, scene.replace("1500", "900"), [2], cycles=300),
+        cluster.seeds(client, scene, [2], cycles=300, array=(2, 4)),
+        cluster.seeds(client, scene, [2], cycles=300, laser_off=True),
+    ]
+    for other in others:
+        refused(lambda: one + other, "different scenes or options", "scene_sha256 differs")
+    assert (one + cluster.seeds(client, scene, [2], cycles=300)).seeds == [1, 2]
 
 
 # Workers.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 import os
 from collections.abc import Iterable
@@ -26,12 +28,14 @@ class Seeds:
     """Runs of one scene with different seeds.
 
     ``statistics`` are those of each run, as in ``summary.json``, in the order of ``seeds``, which
-    ascend. Two of these add up, if they have no seed in common. What is told of all runs depends on
-    the runs alone, and not on what was added up in which order.
+    ascend. ``scene_sha256`` is that of the text of the scene and the options. Two of these add up, if
+    they are of one scene and the same options, and have no seed in common. What is told of all runs
+    depends on the runs alone, and not on what was added up in which order.
     """
 
     seeds: list[int]
     statistics: list[dict[str, Any]]
+    scene_sha256: str
 
     @cached_property
     def totals(self) -> dict[str, int]:
@@ -62,11 +66,14 @@ class Seeds:
         different = next((key for key in one if one[key] != two.get(key)), None)
         if different is not None:
             raise _native.Error(f"runs of different scenes or options: {different} differs")
+        if self.scene_sha256 != other.scene_sha256:
+            raise _native.Error("runs of different scenes or options: scene_sha256 differs")
         runs = sorted(
             zip(self.seeds + other.seeds, self.statistics + other.statistics),
             key=lambda run: run[0],
         )
-        return Seeds([seed for seed, _ in runs], [statistics for _, statistics in runs])
+        ordered = [seed for seed, _ in runs]
+        return Seeds(ordered, [statistics for _, statistics in runs], self.scene_sha256)
 
     def __repr__(self) -> str:
         return f"<dtof.cluster.Seeds: {self.totals['events']} events of {len(self.seeds)} runs>"
@@ -110,7 +117,7 @@ def seeds(
         _simulate, *zip(*((version, text, part, said) for part in parts)), pure=False
     )
     statistics = [run for part in wait_for(client, futures, progress) for run in part]
-    return Seeds(ordered, statistics)
+    return Seeds(ordered, statistics, _hash(text[1], said))
 
 
 def _simulate(
@@ -132,6 +139,12 @@ def _text(scene: Any) -> tuple[str, str]:
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise _native.Error(f"{name}: {reason}") from error
+
+
+def _hash(scene: str, said: list[str]) -> str:
+    """What tells runs apart. Those of a settings file are in their statistics."""
+    options = sorted(text for text in said if not text.startswith("--settings="))
+    return hashlib.sha256(json.dumps([scene, options]).encode()).hexdigest()
 
 
 def _fixed(statistics: dict[str, Any]) -> dict[str, Any]:
