@@ -100,6 +100,14 @@ def test_what_is_finished_is_not_done_again(client, tmp_path):
     assert kept() == [False, False, True] and contents(out) == before
     (out / "1" / "events.aer").unlink()
     assert kept() == [True, False, True] and contents(out) == before
+    (out / "1" / "dtof.toml").unlink()
+    assert kept() == [True, False, True] and contents(out) == before
+    # A damaged file, of the same size.
+    for name in ("events.aer", "dtof.toml"):
+        damaged = bytearray(before[f"2/{name}"])
+        damaged[-3] ^= 1
+        (out / "2" / name).write_bytes(damaged)
+        assert kept() == [True, True, False] and contents(out) == before
     # Another request.
     assert kept(l1=20) == [False] * 3 and contents(out) != before
     settings.write_text("[detection]\nalpha = 6.0\n")
@@ -118,6 +126,30 @@ def test_events_may_be_arrays(client, tmp_path):
     assert not (tmp_path / "a" / "events.aer").exists()
     assert cluster.recordings(client, [file], out=tmp_path, events="npy").results[0].is_kept
     assert not cluster.recordings(client, [file], out=tmp_path).results[0].is_kept
+
+
+def test_what_is_kept_is_checked_whatever_its_kind(client, tmp_path):
+    file = saved(tmp_path, "in/a.npy", counts())
+    first = cluster.recordings(client, [file], out=tmp_path, events="npy").results[0]
+    place = tmp_path / "a" / "events.npy"
+    events = place.read_bytes()
+    place.write_bytes(events[:-1] + bytes([events[-1] ^ 1]))
+    again = cluster.recordings(client, [file], out=tmp_path, events="npy").results[0]
+    assert not first.is_kept and not again.is_kept and place.read_bytes() == events
+
+
+def test_what_is_kept_warns_again(client, tmp_path):
+    empty = saved(tmp_path, "in/empty.npy", counts() * 0)
+    files = [saved(tmp_path, "in/cut.npy", counts()), empty]
+    told = []
+    for _ in range(2):
+        with pytest.warns(UserWarning) as warned:
+            many = cluster.recordings(client, files, out=tmp_path, bins=64)
+        told.append([str(warning.message) for warning in warned])
+    assert all(one.is_kept for one in many.results) and told[0] == told[1]
+    cut_off = f"{many.results[0].statistics['cut_off']:,}"
+    assert "," in cut_off and f"{cut_off} photons in bins" in told[0][0]
+    assert "histograms are empty" in told[0][1]
 
 
 def test_no_file_of_others_is_replaced(client, tmp_path):

@@ -32,14 +32,12 @@ class Folder:
         self._inputs = [file, *_settings(said)]
 
     def kept(self) -> Optional[dict[str, Any]]:
-        """The statistics of an earlier run with the same request, if its files are there."""
+        """The statistics of an earlier run with the same request, if its files are as it left them."""
         summary = self._earlier()
         asked = {**self._request, "events": self._events}
         request = dict(summary.pop("request", None) or {}) if summary else {}
-        size = request.pop("events_bytes", None)
-        events = self._place(self._events)
-        is_whole = os.path.isfile(events) and os.path.getsize(events) == size
-        return summary if request == asked and is_whole else None
+        hashes = request.pop("sha256", None)
+        return summary if request == asked and self._hashes() == hashes else None
 
     def write(self, run: Replay) -> None:
         """Writes the files, each whole or not at all. Only results of dtof are replaced."""
@@ -62,10 +60,16 @@ class Folder:
         else:
             self._put(self._events, lambda file: numpy.save(file, run.events))
         self._put("dtof.toml", lambda file: file.write(run.toml.encode()))
-        request = {**self._request, "events": self._events}
-        request["events_bytes"] = os.path.getsize(events)
+        request = {**self._request, "events": self._events, "sha256": self._hashes()}
         summary = json.dumps({**run.statistics, "request": request}, indent=2) + "\n"
         self._put("summary.json", lambda file: file.write(summary.encode()))
+
+    def _hashes(self) -> dict[str, Optional[str]]:
+        """The SHA-256 of each file but the summary, None where there is none."""
+        places = {name: self._place(name) for name in (self._events, "dtof.toml")}
+        return {
+            name: _hash(place) if os.path.isfile(place) else None for name, place in places.items()
+        }
 
     def _place(self, name: str) -> str:
         return os.path.join(self._folder, name)
@@ -123,8 +127,11 @@ def _request(file: str, said: list[str]) -> dict[str, Any]:
 
 def _hash(name: str) -> str:
     try:
+        of_file = hashlib.sha256()
         with open(name, "rb") as file:
-            return hashlib.sha256(file.read()).hexdigest()
+            while some := file.read(1 << 20):
+                of_file.update(some)
+        return of_file.hexdigest()
     except OSError as error:
         raise _native.Error(f"{name}: {error.strerror}") from error
 

@@ -47,10 +47,17 @@ def _kept_or_new(task: Task) -> Done:
         folder = Folder(task.folder, task.events, task.file, task.said)
         kept = folder.kept()
         if kept is not None:
-            return Done({"statistics": kept, "is_kept": True}, [])
+            return Done({"statistics": kept, "is_kept": True}, _warnings(kept))
     done = _native.replay(task.file, task.said, None, None)
     run = quietly(done)
     if folder is None:
         return Done({"statistics": run.statistics, "run": run}, done["warnings"])
     folder.write(run)
     return Done({"statistics": run.statistics}, done["warnings"])
+
+
+def _warnings(statistics: dict[str, Any]) -> list[str]:
+    """The lines that the run itself gave."""
+    cut_off = statistics["cut_off"]
+    lines = [f"{cut_off:,} photons in bins that were cut off"] if cut_off else []
+    return [*statistics["warnings"], *lines]
