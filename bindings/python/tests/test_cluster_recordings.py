@@ -14,6 +14,7 @@ pytest.importorskip("distributed")
 from clusters import are_equal, contents, counts, refused, saved  # noqa: E402
 
 from dtof import cluster  # noqa: E402
+from dtof.cluster._folder import Folder  # noqa: E402
 
 
 def test_recordings_come_in_order_and_their_totals_are_sums(client, tmp_path):
@@ -214,6 +215,24 @@ def test_an_interrupted_run_is_continued(client, tmp_path):
     for file, one in zip(files, many.results):
         events, _ = dtof.read_events(Path(one.folder) / "events.aer")
         assert events.tobytes() == dtof.replay(file).events.tobytes()
+
+
+def test_a_task_that_runs_twice_at_a_time_is_no_error(tmp_path, monkeypatch):
+    file = str(saved(tmp_path, "in/a.npy", counts()))
+    run = dtof.replay(file)
+    ours = Folder(str(tmp_path / "a"), "aer", file, [])
+    Folder(str(tmp_path / "a"), "npy", file, []).write(run)
+    remove, removed = os.remove, []
+
+    def after_the_other(place):
+        if os.path.exists(place):
+            removed.append(os.path.basename(place))
+            remove(place)
+        remove(place)
+
+    monkeypatch.setattr(os, "remove", after_the_other)
+    ours.write(run)
+    assert removed == ["summary.json", "events.npy"] and ours.kept() == run.statistics
 
 
 def test_what_is_no_list_of_recordings(client, tmp_path):

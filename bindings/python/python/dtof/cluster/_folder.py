@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from contextlib import suppress
 from typing import Any, Callable, Optional
 from uuid import uuid4
 
@@ -52,8 +53,10 @@ class Folder:
                 raise _native.Error(f"{place}: is a file that is read")
         os.makedirs(self._folder, exist_ok=True)
         for name in ("summary.json", *(f"events.{other}" for other in FORMATS)):
-            if name != self._events and os.path.exists(self._place(name)):
-                os.remove(self._place(name))
+            if name != self._events:
+                # Dask may repeat a task that still runs, and that one removes it first.
+                with suppress(FileNotFoundError):
+                    os.remove(self._place(name))
         events = self._place(self._events)
         if self._events == "events.aer":
             write_events(events, run.events, run.array)
