@@ -70,11 +70,21 @@ def test_folders_hold_what_the_program_writes(program, client, tmp_path):
     assert summary.pop("request")["options"] == ["--alpha=5"]
     del expected["export_with"], summary["export_with"]
     assert summary == expected
-    # Results of the program are replaced as it would.
+    # Its tables and pictures do not stay beside other events, whichever of them is there.
+    more = {path.name for path in theirs.iterdir()} - {path.name for path in ours.iterdir()}
+    assert {"events.csv", "report.html", "depth-mean.svg"} < more
+    before = contents(theirs)
+    (tmp_path / "one").mkdir()
+    for name in sorted(more):
+        (tmp_path / "one" / name).write_bytes(before[name])
+        again = cluster.recordings(client, [file], out=tmp_path, names=["one"], alpha=6)
+        error = again.results[0].error
+        assert f"{tmp_path / 'one'}: has {name} of another run" in error and "\n" not in error
+        assert contents(tmp_path / "one") == {name: before[name]}
+        (tmp_path / "one" / name).unlink()
     again = cluster.recordings(client, [file], out=tmp_path, names=["theirs"], alpha=6)
-    assert not again.failed and not again.results[0].is_kept
-    events, _ = dtof.read_events(theirs / "events.aer")
-    assert events.tobytes() == dtof.replay(file, alpha=6).events.tobytes()
+    assert "of another run" in again.results[0].error
+    assert contents(theirs) == before
 
 
 def test_what_is_finished_is_not_done_again(client, tmp_path):

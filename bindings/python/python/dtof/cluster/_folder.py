@@ -18,6 +18,11 @@ from .._run import Replay
 
 #: Kinds of files of events.
 FORMATS = ("aer", "npy")
+#: What the program writes besides.
+_OF_THE_PROGRAM = (
+    "events.csv", "report.html", "depth-last.svg", "depth-mean.svg", "event-counts.svg",
+    "reflectivity-events.svg", "reflectivity-signal.svg", "photon-counts.svg",
+)
 
 
 class Folder:
@@ -41,8 +46,12 @@ class Folder:
         return summary if request == asked and self._hashes() == hashes else None
 
     def write(self, run: Replay) -> None:
-        """Writes the files, each whole or not at all. Only results of dtof are replaced."""
+        """Writes the files, each whole or not at all. Only results of this module are replaced."""
         self._earlier()
+        # They would stay, beside events that they do not show.
+        other = next((name for name in _OF_THE_PROGRAM if os.path.lexists(self._place(name))), None)
+        if other is not None:
+            raise _native.Error(f"{self._folder}: has {other} of another run: move the folder away")
         for name, is_ours in _OURS.items():
             place = self._place(name)
             if not os.path.lexists(place):

@@ -85,7 +85,8 @@ def recordings(
     the files without their ending if not given. ``summary.json`` is written last. A recording whose
     folder has one, of this version and with equal options, settings, size and time of the file, is
     not replayed again, if its files are as they were written; its warnings are given again. Other
-    results of dtof are replaced, other files never.
+    results of this function are replaced, other files never. A folder that ``dtof replay`` wrote is
+    an error of its recording.
 
     A recording that cannot be replayed is a result with an ``error``; the others go on.
     ``progress(done, all)`` is called with each that is done.
