@@ -43,6 +43,21 @@ def test_parts_are_the_whole(client, tmp_path, name):
     are_equal(cluster.replay(client, file, **options), dtof.replay(file, **options))
 
 
+def test_the_one_warning_that_parts_cannot_make(client):
+    """That of the axes. All else is the same, and so are other warnings."""
+    array = numpy.moveaxis(counts(rows=16, columns=12), -1, 0)
+    with pytest.warns(UserWarning) as warned:
+        expected = dtof.replay(array, bin_width_ps=0.25)
+    axes = [str(line.message) for line in warned if "first axis looks like" in str(line.message)]
+    with pytest.warns(UserWarning) as warned:
+        run = cluster.replay(client, dask.array.from_array(array, chunks=(20, -1, -1)), bin_width_ps=0.25)
+    assert [str(line.message) for line in warned] == run.statistics["warnings"]
+    assert len(axes) == 1 and len(run.statistics["warnings"]) == 1
+    left = [line for line in expected.statistics["warnings"] if line not in axes]
+    assert run.events.tobytes() == expected.events.tobytes() and run.events.size > 0
+    assert run.statistics == {**expected.statistics, "warnings": left}
+
+
 def test_parts_of_captures_and_other_orders_of_axes(client, tmp_path):
     array = counts(rows=12).reshape(3, 4, 6, 100) * numpy.array([1, 30, 5])[:, None, None, None]
     axes = "captures,rows,columns,bins"

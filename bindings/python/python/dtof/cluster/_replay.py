@@ -36,8 +36,9 @@ def replay(
 ) -> Replay:
     """Replays one recording of histograms, its rows spread over the workers of ``client``.
 
-    The result is that of :func:`dtof.replay` on the whole, byte for byte. No worker holds more than
-    a few parts of it at a time; the events come back and have to fit into memory.
+    The result is that of :func:`dtof.replay` on the whole, its events byte for byte. One warning is
+    not made: that the first axis looks like the bins, which no part can tell. No worker holds more
+    than a few parts at a time; the events come back and have to fit into memory.
 
     ``recorded`` is a dask array, or the name of an ``.npy`` file that every worker can read. Its
     axes are those of :func:`dtof.replay`: ``axes`` names them, without it the last is the bins, the
