@@ -96,25 +96,57 @@ pub struct Calibration {
     pub looked_at: (usize, usize),
 }
 
+/// The histograms of a recording, and what their pixels are like.
+struct Seen {
+    traces: Vec<Trace>,
+    levels: Vec<Level>,
+    pixels: Pixels,
+    /// The last bin that was measured.
+    last: usize,
+    tdc: Option<Tdc>,
+}
+
+impl Seen {
+    fn new(observed: &Observed, hot: &[usize]) -> Result<Self> {
+        let mut traces = observed.traces(hot)?;
+        let last = leave_out_unmeasured(&mut traces);
+        let tdc = observed.length.is_known().then(|| pile_up::tdc(&traces));
+        if let Some(Tdc::OneHit(_)) = tdc {
+            for trace in &mut traces {
+                trace.counts = pile_up::coates(&trace.counts, trace.cycles).0;
+            }
+        }
+        let levels: Vec<Level> = traces
+            .iter()
+            .map(|trace| Level::of(&trace.counts))
+            .collect();
+        Ok(Self {
+            pixels: Pixels::new(observed.geometry.addresses(), &traces, &levels),
+            traces,
+            levels,
+            last,
+            tdc,
+        })
+    }
+}
+
 /// Calibrates by a recording.
 ///
 /// # Errors
 /// What is wrong with the recording, or with what was asked.
 pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
-    let mut traces = observed.traces()?;
-    let pixel_count = observed.geometry.addresses();
-    let last = leave_out_unmeasured(&mut traces);
-    let tdc = observed.length.is_known().then(|| pile_up::tdc(&traces));
-    if let Some(Tdc::OneHit(_)) = tdc {
-        for trace in &mut traces {
-            trace.counts = pile_up::coates(&trace.counts, trace.cycles).0;
-        }
+    let mut seen = Seen::new(observed, &[])?;
+    if !seen.pixels.hot.is_empty() && !observed.length.is_known() {
+        // A hot pixel is the brightest, and no measure of how long the recording lasted.
+        seen = Seen::new(observed, &seen.pixels.hot)?;
     }
-    let levels: Vec<Level> = traces
-        .iter()
-        .map(|trace| Level::of(&trace.counts))
-        .collect();
-    let pixels = Pixels::new(pixel_count, &traces, &levels);
+    let Seen {
+        traces,
+        levels,
+        pixels,
+        last,
+        tdc,
+    } = seen;
     let truth = observed.truth_mm.unwrap_or_default();
     let good = traces.into_iter().zip(levels).enumerate();
     let good = good.filter(|(_, (trace, _))| pixels.is_good(trace.pixel));
@@ -154,7 +186,7 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
         .unwrap_or(observed.bin_width_ps);
     if let (Some(of), Some(offset)) = (&detection, &mut offset) {
         let scale = (gate, bin_width_ps, offset.mm);
-        if let Some(replay) = Replay::new(observed, of, scale, asked.seed)? {
+        if let Some(replay) = Replay::new(observed, of, &pixels.hot, scale, asked.seed)? {
             spent = replay.best()?;
         }
         if let Some(spent) = spent {
@@ -175,7 +207,7 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
         detection,
         spent,
         mean: counts.iter().map(|count| count / cycles).collect(),
-        looked_at: (observed.captures.len(), pixel_count),
+        looked_at: (observed.captures.len(), observed.geometry.addresses()),
         pixels,
     })
 }

@@ -14,7 +14,7 @@ use super::find::limits::median;
 use super::{Detection, Length, Observed};
 use crate::engine::host::host_engine;
 use crate::engine::settings::Settings;
-use crate::input::recorded::{RecordedHistograms, RecordingLength};
+use crate::input::recorded::{RecordedHistograms, RecordingLength, Whole};
 use crate::input::source::{Geometry, PhotonSource, Slice};
 use crate::settings::SettingsFile;
 
@@ -70,6 +70,7 @@ impl<'a> Replay<'a> {
     pub fn new(
         observed: &Observed,
         detection: &'a Detection,
+        hot: &[usize],
         (gate, bin_width_ps, offset_mm): ((u16, u16), f64, f64),
         seed: u64,
     ) -> Result<Option<Self>> {
@@ -85,7 +86,11 @@ impl<'a> Replay<'a> {
         let array = observed.geometry;
         let whole = Geometry::new(array.columns, array.rows * captures);
         let all = u64::from(CYCLES);
-        let mut photons = RecordedHistograms::new(whole, observed.captures, length, all, seed)?;
+        let pixels = array.addresses();
+        let hot = (0..whole.addresses()).filter(|pixel| hot.contains(&(pixel % pixels)));
+        let hot = hot.map(u16::try_from).collect::<Result<_, _>>();
+        let known = Whole::of(whole, observed.captures)?.with_masked(hot?);
+        let mut photons = RecordedHistograms::part(&known, observed.captures, length, all, seed)?;
         let most = (PHOTONS / photons.photons_per_cycle().max(1e-9)).clamp(1.0, CYCLES.into());
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let slice = photons.next_slice(most as u16)?;

@@ -48,6 +48,8 @@ pub struct Opening {
     pub seed: u64,
     /// Arrays of histograms: the recording that these are a part of.
     pub whole: Option<Whole>,
+    /// Pixels that say nothing of how long histograms lasted.
+    pub masked: Vec<u16>,
 }
 
 impl Default for Opening {
@@ -63,6 +65,7 @@ impl Default for Opening {
             cycles: u64::MAX,
             seed: 1,
             whole: None,
+            masked: Vec::new(),
         }
     }
 }
@@ -103,10 +106,12 @@ impl Counts {
         let length = opening.length;
         let length = length.unwrap_or(RecordingLength::PhotonsPerCycle(1.0));
         let (most, seed) = (opening.cycles, opening.seed);
-        let photons = match &opening.whole {
-            None => RecordedHistograms::new(self.geometry, &self.captures, length, most, seed),
-            Some(whole) => RecordedHistograms::part(whole, &self.captures, length, most, seed),
+        let whole = match &opening.whole {
+            None => Whole::of(self.geometry, &self.captures)?,
+            Some(whole) => whole.clone(),
         };
+        let whole = whole.with_masked(opening.masked.clone());
+        let photons = RecordedHistograms::part(&whole, &self.captures, length, most, seed);
         Ok(photons?.with_sides(self.sides))
     }
 }

@@ -41,7 +41,8 @@ pub struct Recording {
     /// sensor]
     #[arg(long, value_name = "MM", value_parser = fixed::<I24F8>, allow_hyphen_values = true)]
     offset_mm: Option<I24F8>,
-    /// Histograms: photons a laser cycle in the brightest pixel of each capture [default: 1]
+    /// Histograms: photons a laser cycle in the brightest pixel of each capture that is not
+    /// masked [default: 1]
     #[arg(long, value_name = "R", value_parser = positive, conflicts_with = "recorded_cycles")]
     photons_per_cycle: Option<f64>,
     /// Histograms: laser cycles that each capture lasted
@@ -162,6 +163,7 @@ pub fn opening(said: &SettingsFile) -> Opening {
         cycles: cycles.unwrap_or(10_000),
         seed: seed.unwrap_or(1),
         whole: None,
+        masked: said.sensor.masked.clone().unwrap_or_default(),
     }
 }
 

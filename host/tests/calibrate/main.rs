@@ -21,6 +21,11 @@ fn scene(background: f64, glass: f64) -> String {
 
 /// The histograms of a scene as NumPy writes them.
 fn recording(text: &str) -> Vec<u8> {
+    with_hot(text, None)
+}
+
+/// The same, so many photons more in each bin of a pixel.
+fn with_hot(text: &str, hot: Option<(usize, u32)>) -> Vec<u8> {
     let scene = Scene::parse(text).unwrap();
     let mut photons = scene.photons(5, scene.cycles).unwrap();
     let mut counts = vec![0u32; 128 * 128];
@@ -31,6 +36,10 @@ fn recording(text: &str) -> Vec<u8> {
                 counts[128 * pixel + usize::from(photon.code)] += 1;
             }
         }
+    }
+    if let Some((pixel, photons)) = hot {
+        let bins = &mut counts[128 * pixel..128 * (pixel + 1)];
+        bins.iter_mut().for_each(|count| *count += photons);
     }
     let bytes: Vec<u8> = counts.into_iter().flat_map(u32::to_le_bytes).collect();
     npy("<u4", "(8, 16, 128)", &bytes)
@@ -77,4 +86,32 @@ fn a_cover_glass_is_gated_and_its_dirt_is_flagged() {
     assert!(summary["cover_glass"][0].as_f64().unwrap() > 1.2);
     let summary = scratch.replayed(&scratch.path("glass.npy"), line);
     assert!(summary["cover_glass"].is_null());
+}
+
+/// Nobody says how long it lasted: the brightest pixel does, and that is the hot one.
+#[test]
+fn a_hot_pixel_changes_nothing_for_the_others() {
+    let scratch = Scratch::new();
+    let text = scene(0.02, 0.0);
+    let [clean, hot] = [None, Some((5, 200_000))].map(|hot| {
+        let name = format!("{}.npy", hot.is_some());
+        scratch.file(&name, with_hot(&text, hot));
+        scratch.printed(&format!(
+            "calibrate --input {name} --glass no --out {name}.toml"
+        ));
+        scratch.printed(&format!(
+            "replay --input {name} --settings {name}.toml --out out"
+        ));
+        scratch.summary()
+    });
+    assert_eq!(hot["settings"]["masked"], serde_json::json!([5]));
+    assert!(hot["masked"].as_u64() > Some(1_000_000));
+    for same in ["l1", "l2", "min_count"] {
+        assert_eq!(hot["settings"][same], clean["settings"][same], "{same}");
+    }
+    let [clean, hot] = [clean, hot].map(|summary| summary["events"].as_f64().unwrap());
+    assert!(
+        clean > 1000.0 && (hot / clean - 1.0).abs() < 0.05,
+        "{hot} {clean}"
+    );
 }

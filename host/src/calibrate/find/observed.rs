@@ -24,7 +24,7 @@ impl Length {
         matches!(self, Self::Cycles(_))
     }
 
-    /// Laser cycles of a capture whose brightest pixel holds `brightest` photons.
+    /// Laser cycles of a capture whose brightest pixel, of those that are not hot, holds `brightest` photons.
     fn cycles(self, brightest: u64) -> f64 {
         let brightest = brightest.max(1) as f64;
         match self {
@@ -68,11 +68,11 @@ pub struct Trace {
 }
 
 impl Observed<'_> {
-    /// Every histogram, checked.
+    /// Every histogram, checked. The `hot` pixels say nothing of how long a capture lasted.
     ///
     /// # Errors
     /// If captures or histograms differ in size, or there is none.
-    pub fn traces(&self) -> Result<Vec<Trace>> {
+    pub fn traces(&self, hot: &[usize]) -> Result<Vec<Trace>> {
         let pixels = self.geometry.addresses();
         let bins = self.bins();
         ensure!(!self.captures.is_empty(), "no captures");
@@ -84,7 +84,9 @@ impl Observed<'_> {
                 found == pixels,
                 "capture {index} has {found} pixels, not {pixels}"
             );
-            let totals = capture.iter().map(|counts| counts.iter().sum::<u64>());
+            let looked_at = capture.iter().enumerate();
+            let looked_at = looked_at.filter(|(pixel, _)| !hot.contains(pixel));
+            let totals = looked_at.map(|(_, counts)| counts.iter().sum::<u64>());
             let cycles = self.length.cycles(totals.max().unwrap_or(0));
             for (pixel, counts) in capture.iter().enumerate() {
                 let own = self.cycles.map(|cycles| cycles.get(traces.len()).copied());

@@ -40,8 +40,8 @@ const AT_ONCE: usize = 4;
 /// How many laser cycles a recording is taken to have lasted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RecordingLength {
-    /// So many that the brightest pixel of each capture averages this many
-    /// photons a laser cycle.
+    /// So many that the brightest pixel of each capture, of those that are not masked, averages
+    /// this many photons a laser cycle.
     PhotonsPerCycle(f64),
     /// This many.
     Cycles(u64),
@@ -81,13 +81,13 @@ impl RecordedHistograms {
         cycles: u64,
         seed: u64,
     ) -> Result<Self> {
-        let whole = Whole {
-            geometry,
-            captures: captures.iter().map(totals).collect::<Result<_>>()?,
-            first: 0,
-            cut_off: 0,
-        };
-        Self::placed(&whole, captures, length, cycles, seed)
+        Self::placed(
+            &Whole::of(geometry, captures)?,
+            captures,
+            length,
+            cycles,
+            seed,
+        )
     }
 
     /// Replays `captures`, which are a part of `whole`, as they are replayed there.
@@ -118,8 +118,14 @@ impl RecordedHistograms {
     ) -> Result<Self> {
         let (mut recorded, mut of_all) = (Vec::new(), 0.0);
         let (mut shortest, mut longest) = (u64::MAX, 0);
+        let mut first = 0;
         for totals in &whole.captures {
-            let brightest = totals.iter().copied().max().unwrap_or(0);
+            let is_masked = |&(pixel, _): &(usize, &u64)| {
+                u16::try_from(first + pixel).is_ok_and(|pixel| whole.masked.contains(&pixel))
+            };
+            let looked_at = totals.iter().enumerate().filter(|pixel| !is_masked(pixel));
+            let brightest = looked_at.map(|(_, &total)| total).max().unwrap_or(0);
+            first += totals.len();
             let lasted = recorded_cycles(length, brightest, cycles)?;
             shortest = shortest.min(lasted);
             longest = longest.max(lasted);

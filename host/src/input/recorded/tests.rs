@@ -186,3 +186,21 @@ fn a_part_that_cuts_a_block_is_refused() {
         }
     }
 }
+
+/// A hot pixel that is masked says nothing of how long the recording lasted; of two captures each
+/// has its own.
+#[test]
+fn masked_pixels_do_not_set_the_length() {
+    let geometry = Geometry::new(3, 2);
+    let row = |totals: [u64; 3]| totals.map(|total| vec![total; 8]).to_vec();
+    let captures = [row([10, 5000, 20]), row([40, 3, 7])];
+    let lasted = |masked: Vec<u16>| {
+        let whole = Whole::of(geometry, &captures).unwrap().with_masked(masked);
+        let length = RecordingLength::PhotonsPerCycle(0.5);
+        let source = RecordedHistograms::part(&whole, &captures, length, u64::MAX, 1);
+        source.unwrap().recorded_cycles()
+    };
+    assert_eq!(lasted(vec![]), Some((640, 80_000)));
+    assert_eq!(lasted(vec![1]), Some((320, 640)));
+    assert_eq!(lasted(vec![1, 3]), Some((112, 320)));
+}

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result, ensure};
 
+use super::{Capture, totals};
 use crate::input::source::Geometry;
 
 /// The recording that a part is of.
@@ -19,6 +20,8 @@ pub struct Whole {
     pub first: usize,
     /// Photons in bins that were cut off before.
     pub cut_off: u64,
+    /// Addresses of pixels that say nothing of how long it lasted, such as hot ones.
+    pub masked: Vec<u16>,
 }
 
 impl Whole {
@@ -45,6 +48,27 @@ impl Whole {
                 .collect(),
             first,
             cut_off: 0,
+            masked: Vec::new(),
+        })
+    }
+
+    /// The same, its length said by the pixels that are not `masked`.
+    #[must_use]
+    pub fn with_masked(self, masked: Vec<u16>) -> Self {
+        Self { masked, ..self }
+    }
+
+    /// All of `captures`.
+    ///
+    /// # Errors
+    /// If a histogram holds more photons than can be counted.
+    pub fn of(geometry: Geometry, captures: &[Capture]) -> Result<Self> {
+        Ok(Self {
+            geometry,
+            captures: captures.iter().map(totals).collect::<Result<_>>()?,
+            first: 0,
+            cut_off: 0,
+            masked: Vec::new(),
         })
     }
 
