@@ -1,9 +1,11 @@
 //! Depth events as records of an array, and back.
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Error, Result, ensure};
+use dtof::cli::arguments::bins_of;
 use dtof::events::aer_file::{Event, Header};
 use dtof::events::events_csv::range_mm;
 use dtof::input::source::Geometry;
+use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
     BinIndex, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress,
@@ -71,25 +73,29 @@ impl Array {
             self.columns,
             self.rows
         );
-        let width = self.bin_width_ps;
-        let offset = self.offset_mm;
-        Ok(Header {
+        let (width, offset) = (self.bin_width_ps, self.offset_mm);
+        let bins = u16::try_from(self.bins).unwrap_or(u16::MAX);
+        let known = bins_of(bins).map_err(Error::msg);
+        known.with_context(|| format!("bins {}", self.bins))?;
+        let header = Header {
             bins: self.bins,
             geometry: Geometry::new(self.columns, self.rows),
-            bin_width_ps: fixed(width, U16F16::checked_from_num)
-                .with_context(|| format!("bin_width_ps {width}: cannot be"))?,
-            offset_mm: fixed(offset, I24F8::checked_from_num)
-                .with_context(|| format!("offset_mm {offset}: cannot be"))?,
+            bin_width_ps: exact::<U16F16>(width)
+                .with_context(|| format!("bin_width_ps {width}: must be a multiple of 1/65536"))?,
+            offset_mm: exact::<I24F8>(offset)
+                .with_context(|| format!("offset_mm {offset}: must be a multiple of 1/256"))?,
             laser_millihertz: self.laser_millihertz,
-        })
+        };
+        RangeScale::new(header.bin_width_ps, header.offset_mm)
+            .with_context(|| format!("bin_width_ps {width}, offset_mm {offset}"))?;
+        Ok(header)
     }
 }
 
-/// A fixed-point number of a finite one.
-fn fixed<T>(number: f64, of: impl FnOnce(f64) -> Option<T>) -> Option<T> {
-    Some(number)
-        .filter(|number| number.is_finite())
-        .and_then(of)
+/// `number` as fixed point, if that is the same number.
+fn exact<T: Fixed>(number: f64) -> Option<T> {
+    let finite = Some(number).filter(|number| number.is_finite())?;
+    T::checked_from_num(finite).filter(|fixed| *fixed == finite)
 }
 
 /// The events of records, each of which an array with this header can have sent.

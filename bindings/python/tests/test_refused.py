@@ -180,7 +180,13 @@ def test_events_that_cannot_be(tmp_path):
             refused(lambda: dtof.points(events, run.array), "event 1", words)
     for array in [run.array._replace(rows=0), run.array._replace(rows=70_000),
                   run.array._replace(bin_width_ps=-1.0), run.array._replace(bin_width_ps=numpy.nan),
-                  run.array._replace(offset_mm=1e30)]:
+                  run.array._replace(offset_mm=1e30), run.array._replace(bin_width_ps=0.0),
+                  run.array._replace(bin_width_ps=1e-9), run.array._replace(bin_width_ps=92.1),
+                  run.array._replace(bin_width_ps=65535.9), run.array._replace(offset_mm=0.1),
+                  # Multiples, with which no range is found.
+                  run.array._replace(bin_width_ps=2.0**-16), run.array._replace(bin_width_ps=65535.0),
+                  run.array._replace(bins=0), run.array._replace(bins=24),
+                  run.array._replace(bins=2048), run.array._replace(bins=4_000_000_000)]:
         refused(lambda: dtof.write_events(path, run.events, array))
         refused(lambda: dtof.depth_map(run.events, array))
     refused(lambda: dtof.write_events(tmp_path / "no" / "a.aer", run.events, run.array), "no")
