@@ -2,6 +2,7 @@
 
 import os
 import re
+from importlib import metadata
 from pathlib import Path
 
 import h5py
@@ -69,6 +70,15 @@ def test_the_first_lines_of_the_page(tmp_path, counts):
     numpy.save(tmp_path / "counts.npy", counts)
     run = run_in(tmp_path, lines_with("numpy.load"))
     assert run.events.size > 100
+
+
+def test_the_package_has_its_licences():
+    package = metadata.distribution("dtof")
+    names = package.metadata.get_all("License-File")
+    assert sorted(names) == ["LICENSE-APACHE", "LICENSE-MIT"]
+    for name in names:
+        text = (PAGE.parents[2] / name).read_text()
+        assert package.read_text(f"licenses/{name}") == text and len(text) > 1000
 
 
 def test_csv_and_archives(tmp_path, counts):
