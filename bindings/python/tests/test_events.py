@@ -68,7 +68,7 @@ def test_histograms(program, tmp_path, name):
     assert run.events.size >= 24
 
 
-@pytest.mark.parametrize("dtype", ["u1", "<u2", ">u2", "<i4", ">i8", "<f4", ">f8", "u8"])
+@pytest.mark.parametrize("dtype", ["u1", "f2", "<u2", ">u2", "<i4", ">i8", "<f4", ">f8", "u8"])
 @pytest.mark.parametrize("order", ["C", "F"])
 def test_every_type_and_order_is_the_same_array(dtype, order):
     array = numpy.minimum(counts(), 255)
@@ -76,6 +76,19 @@ def test_every_type_and_order_is_the_same_array(dtype, order):
     given = numpy.array(array, dtype=dtype, order=order)
     assert dtof.replay(given).events.tobytes() == expected.tobytes()
     assert dtof.replay(given.tolist()).events.tobytes() == expected.tobytes()
+
+
+def test_bits_are_counts():
+    array = counts() > 4
+    assert dtof.replay(array).events.tobytes() == dtof.replay(array.astype(int)).events.tobytes()
+    assert (dtof.load(array).counts[0, ..., :100] == array).all()
+
+
+@pytest.mark.parametrize("mask", [[], (), numpy.flatnonzero([0, 0])])
+def test_a_mask_may_be_empty(mask):
+    run = dtof.replay(counts(), mask=mask)
+    assert run.statistics["masked"] == 0
+    assert run.events.tobytes() == dtof.replay(counts()).events.tobytes()
 
 
 def test_the_bins_may_be_any_axis():

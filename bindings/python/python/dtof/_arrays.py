@@ -77,6 +77,9 @@ def recording(given: Any, name: str) -> Given:
         raise Error(f"{name}: no array: {_line(error)}") from error
     if array.dtype.hasobject:
         raise Error(f"{name}: an array of {array.dtype}: must be numbers")
+    small = {"bool": "u1", "float16": "f4"}.get(array.dtype.name)
+    if small is not None:
+        array = array.astype(small)
     header = io.BytesIO()
     described = numpy.lib.format.header_data_from_array_1_0(array)
     try:

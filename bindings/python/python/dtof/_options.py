@@ -10,17 +10,22 @@ import numpy
 
 
 def arguments(options: dict[str, Any], flags: Iterable[str] = ()) -> list[str]:
-    """Each option that is not None as ``--name=value``; one of ``flags`` as ``--name``."""
+    """Each option that is given as ``--name=value``; one of ``flags`` as ``--name``."""
     said = []
     for key, value in options.items():
         name = "--" + key.replace("_", "-")
-        if value is None:
+        if value is None or _is_no_pixel(key, value):
             continue
         if key not in flags:
             said.append(f"{name}={_text(key, value)}")
         elif value:
             said.append(name)
     return said
+
+
+def _is_no_pixel(key: str, value: Any) -> bool:
+    """Whether it is an empty mask, as of ``numpy.flatnonzero``."""
+    return key == "mask" and not isinstance(value, (str, os.PathLike)) and not _text(key, value)
 
 
 def _text(key: str, value: Any) -> str:

@@ -63,8 +63,10 @@ def replay(
 
     ``photons_per_cycle`` (1.0, in the brightest pixel) or ``recorded_cycles`` say how long
     histograms were recorded. ``cycles`` (10,000) are replayed with the random numbers of ``seed``
-    (1). Every other option of ``dtof replay`` is a keyword, ``-`` being ``_``: ``rule="window",
-    sigma_bins=0.8, gate=(12, 119), mask=[3, 70]``. ``settings`` names a settings file.
+    (1). Other options of ``dtof replay`` are keywords, ``-`` being ``_``: ``rule="window",
+    sigma_bins=0.8, gate=(12, 119), mask=[3, 70]``. An empty ``mask`` is the same as none.
+    ``settings`` names a settings file. The options of its report and its files are no keywords:
+    ``echo``, ``dynamic_depth``, ``threshold_mm``, ``reference`` and ``no_csv``.
 
     ``progress(done, total)`` is called about 20 times a second with laser cycles. What it raises
     ends the work, as Ctrl-C does.
