@@ -219,6 +219,16 @@ def test_what_is_surely_wrong_is_a_warning():
         dtof.replay(counts(), bin_width_ps=0.25)
 
 
+@pytest.mark.filterwarnings("default")
+@pytest.mark.parametrize("name,options", [
+    ("replay", {}), ("load", {}), ("calibrate", {}), ("compare", {"within": 1000, "cycles": 6000}),
+])
+def test_a_warning_names_the_line_that_called(name, options):
+    with pytest.warns(UserWarning, match="photons in bins that were cut off") as warned:
+        getattr(dtof, name)(counts(2, 2), bins=64, **options)
+    assert {warning.filename for warning in warned} == {__file__}
+
+
 def test_a_cover_glass_that_has_become_brighter_is_told(program, tmp_path):
     (tmp_path / "dtof.toml").write_text(
         "[sensor]\ngate = [10, 127]\nglass = 0.1\nglass_bins = [0.0, 0.0, 0.05, 0.05, 0, 0, 0, 0, 0, 0]\n"

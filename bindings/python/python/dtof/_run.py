@@ -114,7 +114,7 @@ def scene_of(scene: Any) -> Any:
 
 def ran(done: dict[str, Any]) -> Replay:
     """What the native part gives."""
-    warn(done["warnings"])
+    warn(done["warnings"], callers=3)
     return quietly(done)
 
 
@@ -129,10 +129,13 @@ def quietly(done: dict[str, Any]) -> Replay:
     )
 
 
-def warn(lines: list[str]) -> None:
-    """Says what is surely wrong with a recording."""
+def warn(lines: list[str], callers: int = 2) -> None:
+    """Says what is surely wrong with a recording.
+
+    The line that is named is so many callers up: 2 if the user called what calls this.
+    """
     for line in lines:
-        warnings.warn(line, UserWarning, stacklevel=4)
+        warnings.warn(line, UserWarning, stacklevel=callers + 1)
 
 
 def _bins_last(recorded: Any, axis: int, options: dict[str, Any]) -> numpy.ndarray:
