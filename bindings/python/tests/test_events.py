@@ -204,6 +204,14 @@ def test_events_are_read_as_they_were_written(tmp_path):
     assert dtof.read_events(tmp_path / "none.aer")[0].size == 0
 
 
+def test_events_have_one_layout_on_every_machine():
+    fields = [dtof.EVENT.fields[name] for name in dtof.EVENT.names]
+    assert [at for _, at in fields] == [0, 8, 10, 12, 16, 24, 32, 36, 40, 41, 42]
+    assert dtof.EVENT.itemsize == 48
+    # Said, and not left to what a compiler aligns to.
+    assert not dtof.EVENT.isalignedstruct
+
+
 def test_what_was_lost_is_counted():
     array = counts()
     statistics = dtof.replay(array, bins=64, gate=(10, 60), mask=[1], cycles=50).statistics

@@ -10,21 +10,17 @@ import numpy
 
 from ._native import Error
 
+# The layout of C, written down: what compilers align to differs between machines.
 EVENT = numpy.dtype(
-    [
-        ("cycle", "<u8"),
-        ("pixel", "<u2"),
-        ("exposure", "<u2"),
-        ("peak_bin", "<u2"),
-        ("depth_bins", "<f4"),
-        ("range_mm", "<f8"),
-        ("peak_count", "<u4"),
-        ("background", "<u4"),
-        ("flags", "u1"),
-        ("level", "u1"),
-        ("echo", "u1"),
-    ],
-    align=True,
+    {
+        "names": [
+            "cycle", "pixel", "exposure", "peak_bin", "depth_bins", "range_mm", "peak_count",
+            "background", "flags", "level", "echo",
+        ],
+        "formats": ["<u8", "<u2", "<u2", "<u2", "<f4", "<f8", "<u4", "<u4", "u1", "u1", "u1"],
+        "offsets": [0, 8, 10, 12, 16, 24, 32, 36, 40, 41, 42],
+        "itemsize": 48,
+    }
 )
 
 POINT = numpy.dtype(
