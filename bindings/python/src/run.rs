@@ -15,7 +15,7 @@ use dtof::input::medium::Medium;
 use dtof::input::recorded::Whole;
 use dtof::input::source::PhotonSource;
 use dtof::jobs::glass::watch_glass;
-use dtof::jobs::recording::warnings;
+use dtof::jobs::recording::{opening, warnings};
 use dtof::jobs::replay::{Options, Replay};
 use dtof::jobs::simulate::{Options as SimulateOptions, of_scene};
 use dtof::settings::SettingsFile;
@@ -59,18 +59,24 @@ struct Done {
 }
 
 /// Replays a recording, a file or an array; one that is a part as it is replayed in the whole.
+/// `cycles` are those of a recording that is replayed to its end unless said otherwise.
 #[pyfunction]
+#[pyo3(signature = (input, arguments, progress, whole, cycles=None))]
 pub fn replay<'py>(
     py: Python<'py>,
     input: Given,
     arguments: Vec<OsString>,
     progress: Option<Bound<'py, PyAny>>,
     whole: Option<WholeGiven>,
+    cycles: Option<u64>,
 ) -> PyResult<Ran<'py>> {
     let options = checked(|| parse::<Options>(arguments))?;
     let input = Medium::from(input);
     let done = work(py, progress, move |watch| {
-        let said = options.said()?;
+        let mut said = options.said()?;
+        // Fewer than are replayed anyhow need not be said.
+        let cycles = cycles.filter(|&cycles| cycles > opening(&said).cycles);
+        said.run.cycles = said.run.cycles.or(cycles);
         let whole = whole.map(WholeGiven::read).transpose()?;
         replayed(&options, &input, &said, whole, watch).map_err(|error| said.name_origin(error))
     })?;

@@ -140,6 +140,23 @@ def test_photons_may_be_far_apart():
     assert run.statistics["photons"] == 4 and run.statistics["not_replayed"] == 1
 
 
+def test_photons_are_replayed_to_the_last(tmp_path):
+    given = [1, 1, 1], [1, 20_000, 30_000], [3, 3, 3]
+    run = dtof.photons(*given)
+    assert run.statistics["photons"] == 3 and run.statistics["not_replayed"] == 0
+    # Its settings repeat it, and may say less.
+    toml = tmp_path / "dtof.toml"
+    toml.write_text(run.toml)
+    numpy.save(tmp_path / "photons.npy", numpy.array(
+        list(zip(*given)), dtype=[("pixel", "u2"), ("cycle", "u4"), ("bin", "u2")]))
+    again = dtof.replay(tmp_path / "photons.npy", settings=toml)
+    assert again.statistics["photons"] == 3 and again.toml == run.toml
+    toml.write_text("[run]\ncycles = 20_001\n")
+    for options in [{"settings": toml}, {"cycles": 20_001}]:
+        statistics = dtof.photons(*given, **options).statistics
+        assert statistics["photons"] == 2 and statistics["not_replayed"] == 1
+
+
 def test_the_tmf8820_log(program, tmp_path, recorded):
     log = recorded("tmf8820_plane_gt/distance_data.json")
     options = {"photons_per_cycle": 0.5, "rule": "window", "sigma_bins": 0.75, "l1": 4}

@@ -86,11 +86,17 @@ def photons(
 
     ``pixel``, ``cycle`` and ``bin`` are integers from 0, one a photon, or one number for all;
     laser cycles do not decrease. ``columns`` says how wide the array is (one row), ``bins`` how
-    many there are (128). Further options are those of :func:`replay`. The photons are copied
-    twice; for more than fits, save them with ``numpy.save`` and replay the file.
+    many there are (128). All laser cycles up to the last photon are replayed, or as many as
+    ``cycles`` or a settings file says. Further options are those of :func:`replay`. The photons are
+    copied twice; for more than fits, save them with ``numpy.save`` and replay the file, with
+    ``cycles``.
     """
-    given = recording(photon_list(pixel, cycle, bin), "photons")
-    return ran(_native.replay(given, arguments(options), progress, None))
+    listed = photon_list(pixel, cycle, bin)
+    # Laser cycles do not decrease. What cannot be is refused later.
+    last = int(listed["cycle"][-1]) if listed.size else 0
+    cycles = min(max(last, 0) + 1, 2**63 - 1)
+    given = recording(listed, "photons")
+    return ran(_native.replay(given, arguments(options), progress, None, cycles))
 
 
 def simulate(scene: Any, *, progress: Progress = None, **options: Any) -> Replay:
