@@ -40,7 +40,9 @@ cargo xtask <command>
                 run the sidecar in QEMU, its serial port on a TCP port (5386).
                 The last word ends it in that way
   sizes         print flash, RAM and stack of each image
-  check-image   link dtof-core for every target: no panic, float or allocation
+  check-image [--all]
+                link dtof-core for every target: no panic, float or allocation.
+                --all: both for speed and for size, not for Cortex-M4F alone
   self-test [--bless]
                 run the self-test in QEMU and compare its lines with
                 firmware/self-test.out; --bless writes the file
@@ -66,6 +68,7 @@ fn main() -> ExitCode {
 /// The options of all commands.
 #[derive(Default)]
 struct Options {
+    all: bool,
     bless: bool,
     check: bool,
     chip: Option<String>,
@@ -87,6 +90,7 @@ fn run() -> Result<()> {
         match (&*command, argument) {
             ("self-test" | "c-bindings", Long("bless")) => options.bless = true,
             ("bench", Long("check")) => options.check = true,
+            ("check-image", Long("all")) => options.all = true,
             ("flash", Long("chip")) => options.chip = Some(parser.value()?.string()?),
             ("image", Long("emulator")) => options.emulator = true,
             ("emulate", Long("port")) => {
@@ -117,7 +121,7 @@ fn run() -> Result<()> {
             emulate::emulate(root, options.port, end.first().copied())?;
         }
         ("sizes", []) => sizes::print(root)?,
-        ("check-image", []) => image::check(root)?,
+        ("check-image", []) => image::check(root, options.all)?,
         ("self-test", []) if options.bless => self_test::bless(root)?,
         ("self-test", []) => self_test::check(root)?,
         ("bench", []) if options.check => bench::check(root)?,

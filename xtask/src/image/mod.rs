@@ -20,7 +20,11 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
 use crate::toolchain::{self, Toolchain};
 use crate::{cargo, target_folder};
 
+/// For speed, and for size.
 const PROFILES: [&str; 2] = ["firmware", "firmware-small"];
+/// The target that images are for. It is looked at in both profiles, the others in the small one
+/// unless all are asked for.
+const BOARDS: &str = "thumbv7em-none-eabihf";
 
 /// The function that the panic handler of the image calls and nobody defines.
 const UNDEFINED: &str = "dtof_core_has_a_reachable_panic";
@@ -33,8 +37,9 @@ const PARTS: &str =
 /// smallest image there was when this was written.
 const MIN_TEXT: u64 = 16 * 1024;
 
-/// Builds and looks at all images, and fails if anything is wrong with any.
-pub fn check(root: &Path) -> Result<()> {
+/// Builds and looks at images of every target, in `all` profiles or those that matter most, and
+/// fails if anything is wrong with any.
+pub fn check(root: &Path, all: bool) -> Result<()> {
     let targets = Toolchain::read(root)?.targets;
     let mut bad = 0;
     println!(
@@ -43,7 +48,8 @@ pub fn check(root: &Path) -> Result<()> {
     );
     for target in &targets {
         toolchain::ensure_target(target)?;
-        for profile in PROFILES {
+        let both = all || target == BOARDS;
+        for &profile in &PROFILES[usize::from(!both)..] {
             let (image, mut problems) = match build(root, target, profile, &[])? {
                 Build::Done(path) => (Image::read(&path)?, vec![]),
                 // Link it all the same, to say what can panic.
