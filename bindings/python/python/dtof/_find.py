@@ -11,7 +11,7 @@ from typing import Any, Callable, Optional
 
 from . import _native
 from ._arrays import recording
-from ._options import arguments
+from ._options import arguments, settings_file
 from ._run import scene_of, warn
 
 
@@ -72,7 +72,7 @@ def calibrate(recorded: Any, *, settings: Any = None, **options: Any) -> Calibra
     millimetres, ``glass`` says whether the nearest surface is a cover glass, ``settings`` names
     older settings. Further options are those of ``dtof calibrate``.
     """
-    older = None if settings is None else os.fspath(settings)
+    older = None if settings is None else settings_file(settings)
     found = _native.calibrate(recording(recorded, "the array"), older, arguments(options))
     warn(found["warnings"])
     return Calibration(

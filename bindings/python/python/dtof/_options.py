@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy
 
+from ._native import Error
+
 
 def arguments(options: dict[str, Any], flags: Iterable[str] = ()) -> list[str]:
     """Each option that is given as ``--name=value``; one of ``flags`` as ``--name``."""
@@ -28,7 +30,18 @@ def _is_no_pixel(key: str, value: Any) -> bool:
     return key == "mask" and not isinstance(value, (str, os.PathLike)) and not _text(key, value)
 
 
+def settings_file(value: Any) -> str:
+    """The name of a settings file."""
+    if not isinstance(value, (str, os.PathLike)) or "\n" in str(value):
+        raise Error('settings: must be the name of a file; save it first, as with .save("dtof.toml")')
+    return os.fspath(value)
+
+
 def _text(key: str, value: Any) -> str:
+    if key == "settings":
+        return settings_file(value)
+    if key == "mask" and getattr(value, "dtype", None) == bool:
+        raise Error("mask: must be addresses of pixels, as numpy.flatnonzero gives them")
     if key == "glass" and isinstance(value, (bool, numpy.bool_)):
         return "yes" if value else "no"
     if isinstance(value, (bool, numpy.bool_)):
