@@ -173,6 +173,16 @@ def test_the_page_says_what_is_kept():
     assert kept.PAGE.read_text(encoding="utf-8") == page.text(rows, speeds)
 
 
+def test_measured_scenes_replace_those_that_are_kept(tmp_path):
+    rows = kept.read(kept.ROWS, measure.Row)
+    names = list(page.SCENES)
+    new = [row for row in rows if row.scene == "outdoor"][:2]
+    new[0].mean = 17.0
+    kept.write(tmp_path / "rows.csv", kept.with_others(kept.ROWS, new, names))
+    found = kept.read(tmp_path / "rows.csv", measure.Row)
+    assert found == [row for row in rows if row.scene != "outdoor" or row in new]
+
+
 def test_a_changed_figure_is_found(tmp_path, monkeypatch):
     rows = kept.read(kept.ROWS, measure.Row)
     assert kept.differences(rows, {row.scene for row in rows}) == []

@@ -11,12 +11,9 @@ from __future__ import annotations
 import argparse
 import os
 import platform
-import subprocess
 import sys
-from types import SimpleNamespace
 
-if "--wall" not in sys.argv:
-    os.environ["RAYON_NUM_THREADS"] = "1"  # before dtof is loaded
+os.environ["RAYON_NUM_THREADS"] = "1"  # before dtof is loaded
 
 import numpy
 import scipy
@@ -32,22 +29,19 @@ def arguments():
     place = kept.ROOT.parent / "shared/data/tmf8820_plane_gt/distance_data.json"
     parser.add_argument("recording", nargs="?", default=place, help="the log of a TMF8820")
     parser.add_argument("--check", action="store_true", help="compare with what is kept")
-    parser.add_argument("--scenes", default="bright,outdoor,recording", help="those to check")
+    parser.add_argument("--scenes", default="bright,outdoor,recording", help="those to measure or check; the rest stays as kept")
     parser.add_argument("--page", action="store_true", help="write page and chart of what is kept")
-    parser.add_argument("--wall", help=argparse.SUPPRESS)
     return parser.parse_args()
 
 
 def main():
     given = arguments()
     made = scenes(given.recording)
-    if given.wall:
-        return print(wall(made, *given.wall.split(",")))
     if given.page:
         return write_page()
-    names = given.scenes.split(",") if given.check else list(made)
+    names = given.scenes.split(",")
     if "recording" in names and not os.path.exists(given.recording):
-        sys.exit(f"{given.recording}: not found; name the log, or leave it out: --check --scenes bright,outdoor")
+        sys.exit(f"{given.recording}: not found; name the log, or leave it out: --scenes bright,outdoor")
     rows, speeds = [], []
     for name in names:
         scene = made[name]()
@@ -57,21 +51,14 @@ def main():
             print(f"{name}: {method.name}, {len(found)} settings", flush=True)
             if not given.check:
                 speeds.append(speed(method, scene, found))
-        if not given.check and cores() > 1:
-            speeds[-1].all_cores = all_cores(given.recording, fast(found))
         rows.append(measure.own_threshold(OWN_THRESHOLD, METHODS[-1], scene))
     if given.check:
         wrong = kept.differences(rows, names)
         print(*wrong or [f"{len(rows)} rows are as kept"], sep="\n")
         sys.exit(f"{len(wrong)} figures differ from {kept.ROWS}" if wrong else 0)
-    kept.write(kept.ROWS, rows)
-    kept.write(kept.SPEEDS, speeds)
+    kept.write(kept.ROWS, kept.with_others(kept.ROWS, rows, list(made)))
+    kept.write(kept.SPEEDS, kept.with_others(kept.SPEEDS, speeds, list(made)))
     write_page()
-
-
-def cores():
-    """Those that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
 def fast(rows):
@@ -80,28 +67,12 @@ def fast(rows):
 
 
 def speed(method, scene, rows):
-    found = measure.photons_a_second(method, scene, fast(rows), measure.CPU) / 1e6
+    found = measure.photons_a_second(method, scene, fast(rows)) / 1e6
     print(f"    {found:.3g} million photons a second of processor time", flush=True)
     machine = (f"{platform.machine()} with {os.cpu_count()} cores, "
                f"Python {platform.python_version()}, numpy {numpy.__version__}, "
                f"scipy {scipy.__version__}")
-    return kept.Speed(scene.name, method.name, found, 0.0, len(scene.photons), machine)
-
-
-def wall(made, name, setting, threshold):
-    """Millions of photons a second from start to end, of the last way and with all cores."""
-    way = METHODS[-1]
-    row = SimpleNamespace(setting=int(setting), threshold=float(threshold))
-    return measure.photons_a_second(way, made[name](), row, measure.WALL) / 1e6
-
-
-def all_cores(recording, row):
-    """The same in a process of its own, as dtof takes its threads once."""
-    environment = {name: value for name, value in os.environ.items() if name != "RAYON_NUM_THREADS"}
-    said = f"{row.scene},{row.setting},{row.threshold}"
-    command = [sys.executable, os.path.dirname(os.path.abspath(__file__)), str(recording), "--wall", said]
-    done = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True)
-    return float(done.stdout)
+    return kept.Speed(scene.name, method.name, found, len(scene.photons), machine)
 
 
 def write_page():

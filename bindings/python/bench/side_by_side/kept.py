@@ -23,7 +23,6 @@ class Speed:
     scene: str
     method: str
     one_core: float  # of processor time
-    all_cores: float  # from start to end
     photons: int
     machine: str
 
@@ -62,6 +61,13 @@ def read(path, kind) -> list:
                     line[field.name] = float(value) if value else None
             rows.append(kind(**line))
     return rows
+
+
+def with_others(path, new, scenes) -> list:
+    """The new rows, and the kept ones of other scenes, in the order of the scenes."""
+    measured = {row.scene for row in new}
+    rows = new + [row for row in read(path, type(new[0])) if row.scene not in measured]
+    return sorted(rows, key=lambda row: scenes.index(row.scene))
 
 
 def differences(measured, scenes) -> list[str]:

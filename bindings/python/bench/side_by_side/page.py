@@ -25,7 +25,7 @@ def text(rows, speeds) -> str:
     parts = [HEAD, in_short(rows, speeds), COMPARED, ways(), MEASURED]
     for scene, title in SCENES.items():
         parts += [f"## {title}", SCENE[scene], figures(rows, scene)]
-    parts += [SPEED, speed(speeds), all_cores(speeds), FAIR]
+    parts += [SPEED, speed(speeds), machine(speeds), FAIR]
     return "\n\n".join(part.strip() for part in parts) + "\n"
 
 
@@ -61,13 +61,10 @@ def speed(speeds) -> str:
     return table(("way", *(title.lower() for title in SCENES.values())), lines)
 
 
-def all_cores(speeds) -> str:
-    ours = by_name(speeds, "dtof")
-    wall = ", ".join(rounded(row.all_cores) for row in ours if row.all_cores)
-    photons = ", ".join(f"{row.photons / 1e6:.1f}" for row in ours)
-    said = (f"The scenes have {photons} million photons. The machine: {speeds[0].machine}.\n"
+def machine(speeds) -> str:
+    photons = ", ".join(f"{row.photons / 1e6:.1f}" for row in by_name(speeds, "dtof"))
+    return (f"The scenes have {photons} million photons. The machine: {speeds[0].machine}.\n"
             "Other work ran beside.")
-    return f"From start to end, with all cores, `dtof` took {wall} million a second.\n{said}" if wall else said
 
 
 def in_short(rows, speeds) -> str:
