@@ -1,6 +1,8 @@
 """What dtof is compared with is right, and the page says what is kept."""
 
+import inspect
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -103,6 +105,35 @@ def test_each_way_of_numpy_finds_a_peak_and_nothing_else(method, bright):
     assert position == pytest.approx([61.5], abs=0.02)
 
 
+@pytest.mark.parametrize("method", FRAMES, ids=lambda method: method.name)
+def test_frames_of_every_length_have_a_threshold_and_are_right(method, bright):
+    rows = measure.curve(method, bright)
+    assert [row.setting for row in rows] == list(methods.EXPOSURES)
+    assert all(row.wrong == 0 and row.error_bins < 0.6 for row in rows)
+    # Half of the pixels are right after a frame of 14 laser cycles, or two of ten.
+    assert min(row.half for row in rows) <= 20
+
+
+@pytest.mark.parametrize("method", methods.METHODS[:3], ids=lambda method: method.name)
+def test_a_peak_needs_its_least_photons(method, bright):
+    given = {**method.arguments(bright), "least": 6, "exposure": 4, "k": 0.0, "z": 0.0}
+    names = inspect.signature(method.way).parameters
+    given = {name: value for name, value in given.items() if name in names}
+    rows = np.zeros((48, 128), int)
+    rows[7, 59:62], rows[9, 59:62], rows[11, 58:63] = [1, 4, 1], [1, 3, 1], [3, 1, 3, 1, 1]
+    rows[:, 0] = 1  # some background
+    assert method.way(counted(rows), **given)[0].tolist() == [7, 11]
+
+
+@pytest.mark.parametrize("method", FRAMES, ids=lambda method: method.name)
+def test_the_shortest_frames_have_no_threshold_without_least_photons(method, bright):
+    without = replace(bright, least_of_frames=(0, 0))
+    for setting in methods.EXPOSURES[:2]:
+        with np.errstate(invalid="ignore"):  # a centroid of nothing
+            assert measure.least_threshold(method, without, setting) is None
+        assert measure.least_threshold(method, bright, setting) is not None
+
+
 def test_frames_with_and_without_find_peaks_agree(bright):
     with_scipy, with_arrays = (
         method.reports(bright, bright.photons, 400, 5.0) for method in FRAMES
@@ -171,6 +202,22 @@ def test_lines_are_counted_without_comments_and_docstrings():
 def test_the_page_says_what_is_kept():
     rows, speeds = kept.read(kept.ROWS, measure.Row), kept.read(kept.SPEEDS, kept.Speed)
     assert kept.PAGE.read_text(encoding="utf-8") == page.text(rows, speeds)
+
+
+def test_what_the_picture_says_is_so():
+    rows = kept.read(kept.ROWS, measure.Row)
+
+    def times(scene, within):
+        """The mean times of frames and of events, those of numpy first."""
+        found = [measure.times_at(page.of(rows, scene, method.name), within)[0] for method in methods.METHODS]
+        return found[:2], found[2:]
+
+    for within in (0.4, 0.3, 0.2):
+        frames, (of_numpy, of_dtof) = times("outdoor", within)
+        assert max(of_numpy, of_dtof) < 0.8 * min(frames) and of_numpy < 1.2 * of_dtof
+    for within in (0.3, 0.2, 0.1):
+        frames, events = times("bright", within)
+        assert max(frames + events) < 1.2 * min(frames + events)
 
 
 def test_measured_scenes_replace_those_that_are_kept(tmp_path):

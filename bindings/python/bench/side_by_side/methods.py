@@ -12,7 +12,7 @@ import dtof_way
 import numpy_way
 
 # Settings grow by the root of two.
-EXPOSURES = (28, 40, 56, 80, 112, 160, 224, 320, 450, 640, 900, 1280)
+EXPOSURES = (10, 14, 20, 28, 40, 56, 80, 112, 160, 224, 320, 450, 640, 900, 1280)
 LEAST = (5, 7, 10, 14, 20, 28, 40, 56, 80, 112, 160)
 DEVIATIONS = tuple(2 + step / 16 for step in range(161))
 POWERS = tuple(3 + step / 16 for step in range(97))
@@ -49,7 +49,11 @@ def of_numpy(scene):
 
 
 def of_find_peaks(scene):
-    return {**of_numpy(scene), "sigma": scene.sigma_bins}
+    return {**of_numpy(scene), "least": scene.least_of_frames[0], "sigma": scene.sigma_bins}
+
+
+def of_frames(scene):
+    return {**of_numpy(scene), "least": scene.least_of_frames[1]}
 
 
 def of_dtof(scene):
@@ -61,7 +65,7 @@ def of_dtof(scene):
 
 METHODS = (
     Method("frames, find_peaks", numpy_way.frames_with_find_peaks, of_find_peaks, DEVIATIONS, True),
-    Method("frames, arrays", numpy_way.frames, of_numpy, POWERS, True),
+    Method("frames, arrays", numpy_way.frames, of_frames, POWERS, True),
     Method("asynchronous, arrays", numpy_way.asynchronous, of_numpy, POWERS, False),
     Method("dtof", dtof_way.events, of_dtof, DEVIATIONS, False),
 )

@@ -41,25 +41,6 @@ def joined(reports):
     return [np.concatenate(column) for column in zip(none, *reports)]
 
 
-def frames_with_find_peaks(photons, pixels, bins, exposure, z, sigma, reach):
-    """Frames: smoothed with the pulse, then scipy looks for peaks of ``z`` standard deviations."""
-    key, reports = keys(photons, bins), []
-    variance = 1 / (2 * np.sqrt(np.pi) * sigma)  # of smoothed counts, over their mean
-    for frame, span in enumerate(spans(photons.cycle, photons.cycles, exposure)):
-        counts = histograms(key[span], pixels, bins)
-        smooth = gaussian_filter1d(counts.astype(float), sigma, axis=1)
-        background = np.median(smooth, axis=1)
-        threshold = background + z * np.sqrt(background * variance)
-        for pixel in np.flatnonzero(smooth.max(axis=1) >= threshold):
-            peaks, found = find_peaks(smooth[pixel], height=threshold[pixel])
-            if peaks.size:
-                peak = peaks[[found["peak_heights"].argmax()]]
-                row = slice(pixel, pixel + 1)
-                position = centroid(counts[row], peak, background[row], reach)
-                reports.append(([pixel], [(frame + 1) * exposure], position))
-    return joined(reports)
-
-
 def highest(counts):
     """The three neighbours with the most photons in each row, and the mean of all other bins."""
     window = counts[:, :-2] + counts[:, 1:-1] + counts[:, 2:]
@@ -69,18 +50,38 @@ def highest(counts):
     return peak + 1, height, background
 
 
+def frames_with_find_peaks(photons, pixels, bins, exposure, least, z, sigma, reach):
+    """Frames: smoothed with the pulse, then scipy looks for peaks of ``z`` standard deviations."""
+    key, reports = keys(photons, bins), []
+    variance = 1 / (2 * np.sqrt(np.pi) * sigma)  # of smoothed counts, over their mean
+    for frame, span in enumerate(spans(photons.cycle, photons.cycles, exposure)):
+        counts = histograms(key[span], pixels, bins)
+        _, height, background = highest(counts)
+        pixel = np.flatnonzero(height >= least)
+        counts, background = counts[pixel], background[pixel]
+        smooth = gaussian_filter1d(counts.astype(float), sigma, axis=1)
+        threshold = background + z * np.sqrt(background * variance)
+        for row in np.flatnonzero(smooth.max(axis=1) >= threshold):
+            peaks, found = find_peaks(smooth[row], height=threshold[row])
+            if peaks.size:
+                peak = peaks[[found["peak_heights"].argmax()]]
+                position = centroid(counts[[row]], peak, background[[row]], reach)
+                reports.append((pixel[[row]], [(frame + 1) * exposure], position))
+    return joined(reports)
+
+
 def stands_clear(height, expected, k):
     """Whether Poisson counts are as high by chance in less than one of ``10 ** k`` cases."""
     return gammainc(np.maximum(height, 1), expected) < 10.0**-k
 
 
-def frames(photons, pixels, bins, exposure, k, reach):
+def frames(photons, pixels, bins, exposure, least, k, reach):
     """Frames without a loop over pixels."""
     key, reports = keys(photons, bins), []
     for frame, span in enumerate(spans(photons.cycle, photons.cycles, exposure)):
         counts = histograms(key[span], pixels, bins)
         peak, height, background = highest(counts)
-        pixel = np.flatnonzero(stands_clear(height, 3 * background, k))
+        pixel = np.flatnonzero(stands_clear(height, 3 * background, k) & (height >= least))
         position = centroid(counts[pixel], peak[pixel], background[pixel], reach)
         reports.append((pixel, np.full(pixel.size, (frame + 1) * exposure), position))
     return joined(reports)

@@ -13,6 +13,9 @@ import numpy as np
 import dtof
 
 MM_PER_PS = 0.149896229  # half the speed of light
+# Photons in the three best bins of a frame: the best of 5, 6, 7 and 10, and that on the recording.
+FRAMES_NEED, FIND_PEAKS_NEEDS = 6, 10
+HALF_WIDTHS = 1.75, 4.0  # dtof's window for the recording, in bins
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,7 @@ class Scene:
     empty: Photons  # thresholds are found with these
     empty_again: Photons  # and false alarms counted in these
     reach: int  # bins each side of the peak in numpy's centroid: the better of 2 and 3
+    least_of_frames: tuple[int, int] = (FRAMES_NEED, FRAMES_NEED)  # with find_peaks, with arrays
     half_widths: Optional[tuple[float, float]] = None  # dtof's window for a pulse that falls slowly
     fit_offset: bool = False  # the zero of the sensor is not known
 
@@ -173,6 +177,7 @@ def recorded(file, parts=8, cycles=4000, empty_cycles=8000, added=0.01) -> Scene
         empty=draw(random, background, empty_cycles, bins),
         empty_again=draw(random, background, empty_cycles, bins),
         reach=2,
-        half_widths=(1.75, 4.0),
+        least_of_frames=(FIND_PEAKS_NEEDS, FRAMES_NEED),
+        half_widths=HALF_WIDTHS,
         fit_offset=True,
     )
