@@ -31,7 +31,7 @@ PANELS = {
     "outdoor": (
         "outdoors: bright and dim pixels", (100, 200, 500, 1000), (0.15, 0.2, 0.3, 0.4, 0.5),
         {
-            "frames, find_peaks": (0, 9, -9), "frames, arrays": (0, 9, -4),
+            "frames, find_peaks": (-1, 9, -12), "frames, arrays": (-1, 9, 2),
             "asynchronous, arrays": (0, 10, -2), "dtof": (6, -34, -12),
         },
     ),
