@@ -29,7 +29,8 @@ def arguments():
     place = kept.ROOT.parent / "shared/data/tmf8820_plane_gt/distance_data.json"
     parser.add_argument("recording", nargs="?", default=place, help="the log of a TMF8820")
     parser.add_argument("--check", action="store_true", help="compare with what is kept")
-    parser.add_argument("--scenes", default="bright,outdoor,recording", help="those to measure or check; the rest stays as kept")
+    parser.add_argument("--scenes", default="bright,outdoor,recording",
+                        help="those to measure or check; the rest stays as kept")
     parser.add_argument("--page", action="store_true", help="write page and chart of what is kept")
     return parser.parse_args()
 
