@@ -85,6 +85,7 @@ def in_short(rows, speeds) -> str:
     errors = [one.error_bins / other.error_bins for one, other in pairs]
     coarse, fine = WITHIN
     waits = [times(name, coarse)[0] for name in (ours, events, slow, frames)]
+    alike = [times(name, fine)[0] for name in (ours, events, slow, frames)]
     bright = [times(name, coarse, "bright")[0] for name in (ours, events, slow, frames)]
     of_frames = " or ".join(dict.fromkeys(f"{time:.0f}" for time in bright[2:]))
     exact = [times(name, fine, "bright")[0] for name in lines]
@@ -94,8 +95,9 @@ def in_short(rows, speeds) -> str:
 - **Photons a second.** Frames in numpy arrays take {ratios(frames, ours)} times as many as `dtof`. Asynchronous
   numpy takes {ratios(events, ours)} times as many, frames with `find_peaks` {ratios(slow, ours)}.
 - **Time.** Outdoors, at an error of {coarse} bins, a pixel is first right after {waits[0]:.0f} laser cycles with `dtof`,
-  {waits[1]:.0f} with asynchronous numpy, and {waits[2]:.0f} or {waits[3]:.0f} with frames of the best length. In a bright room it
-  is {bright[0]:.0f}, {bright[1]:.0f} and {of_frames}; at {fine} bins all take {span(exact)}.
+  {waits[1]:.0f} with asynchronous numpy, and {waits[2]:.0f} or {waits[3]:.0f} with frames of the best length, which are more exact.
+  At {fine} bins, which all can be, it is {alike[0]:.0f}, {alike[1]:.0f}, and {alike[2]:.0f} or {alike[3]:.0f}.
+- **A bright room.** At {coarse} bins a pixel waits {bright[0]:.0f}, {bright[1]:.0f} and {of_frames} laser cycles; at {fine} bins all take {span(exact)}.
 - **The dimmest pixels.** Outdoors, at {fine} bins, nine in ten pixels are right after {late[1]:.0f} laser cycles of frames, and
   after {late[0]:.0f} with `dtof`. Every event has the same least photons, which dim pixels take long to see.
 - **Error.** With the same least photons, the error of `dtof` is {span(errors)} times that of asynchronous numpy.
