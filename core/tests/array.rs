@@ -11,6 +11,7 @@ fn levels() -> impl Iterator<Item = BlockLevel> {
 fn check(columns: u32, rows: u32) {
     let array = Array::new(columns, rows).unwrap();
     assert_eq!(array.pixels(), columns * rows);
+    assert_eq!((array.columns(), array.rows()), (columns, rows));
     for level in levels() {
         let side = 1 << level.raw();
         let across = columns.div_ceil(side);
@@ -35,6 +36,16 @@ fn check(columns: u32, rows: u32) {
             seen.iter().all(|&seen| seen == 1),
             "{columns}x{rows} {level}"
         );
+        // Nowhere else, and not past the array, begins a block.
+        for pixel in 0..u16::try_from(columns * (rows + 1)).unwrap_or(u16::MAX) {
+            let (row, column) = (u32::from(pixel) / columns, u32::from(pixel) % columns);
+            let begins = row < rows && row.is_multiple_of(side) && column.is_multiple_of(side);
+            let first = PixelAddress(pixel);
+            assert_eq!(
+                array.pixels_of(first, level).next(),
+                begins.then_some(first)
+            );
+        }
     }
 }
 
