@@ -176,6 +176,12 @@ fn watch(
         "the blocks of a device count masked pixels, too; leave out --mask or --binning"
     );
     client.configure(&configuration(Source::Sensor)?)?;
+    // From now on there may be events, which are written also if nothing else comes.
+    let columns = match task.dynamic_depth {
+        None => events_csv::HEADER,
+        Some(_) => events_csv::DYNAMIC_DEPTH_HEADER,
+    };
+    readers.events = still_open(header(outputs.events, columns))?;
     let started = Instant::now();
     let mut figures = Figures {
         since: started,
@@ -183,11 +189,6 @@ fn watch(
         first: client.report()?,
         last: [0; 2],
     };
-    let columns = match task.dynamic_depth {
-        None => events_csv::HEADER,
-        Some(_) => events_csv::DYNAMIC_DEPTH_HEADER,
-    };
-    readers.events = still_open(header(outputs.events, columns))?;
     let recorded = outputs.recording.is_some();
     let goes_on = |readers: &Readers| recorded || (readers.events && readers.statistics);
     let mut asked = false;

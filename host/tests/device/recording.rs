@@ -16,6 +16,7 @@ use dtof::device::monitor::map::LiveMap;
 use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
 use dtof::device::{Client, Port};
 use dtof::events::aer_file::{Event, Header, Reader};
+use dtof::events::events_csv;
 use dtof_core::{AER_VERSION, AerEncoder};
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
@@ -188,7 +189,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
     }
 }
 
-fn recorded(path: &Path) -> Vec<Event> {
+pub fn recorded(path: &Path) -> Vec<Event> {
     let file = std::fs::File::open(path).unwrap();
     let mut reader = Reader::new(io::BufReader::new(file)).unwrap();
     std::iter::from_fn(|| reader.next_event().unwrap()).collect()
@@ -216,6 +217,34 @@ fn what_was_sent_before_the_device_is_gone_is_recorded() {
         assert_eq!(run.sent.len() as u64, lives);
         assert_eq!(run.recorded, run.sent);
     }
+}
+
+#[test]
+fn events_before_the_first_report_have_their_header() {
+    let device = device([LINK_VERSION, AER_VERSION], 3, 1);
+    let mut client = Client::new(Box::new(device)).unwrap();
+    let mut printed = Vec::new();
+    let ended = monitor(
+        &mut client,
+        &Task {
+            settings: &settings(),
+            pixels: PIXELS,
+            columns: 2,
+            dynamic_depth: None,
+        },
+        |_| false,
+        &mut Outputs {
+            events: &mut printed,
+            statistics: &mut io::sink(),
+            map: None,
+            recording: None,
+            masked: 0,
+        },
+    );
+    assert!(ended.is_err());
+    let rows = String::from_utf8(printed).unwrap();
+    let rows: Vec<&str> = rows.lines().collect();
+    assert!(rows.len() == 2 && rows[0] == events_csv::HEADER, "{rows:?}");
 }
 
 #[test]
