@@ -224,3 +224,23 @@ fn too_many_photons_are_refused() {
     assert_eq!(new(U8F24::MAX, U8F24::MAX), Err(RateError));
     assert_eq!(Poisson::new(more + two), None);
 }
+
+#[test]
+fn laser_cycles_that_are_asked_for_are_those_of_the_clock() {
+    let pixels = [pixel(3, 60, 0.5, 0.0), pixel(4, 9, 0.2, 1.28)];
+    let mut sensor = Simulated::new(&pixels, PULSE, settings(5));
+    let by_clock = photons(&run(&mut sensor, 1_000));
+    let mut sensor = Simulated::new(&pixels, PULSE, settings(5)).without_clock();
+    let mut sink = Notes::default();
+    assert_eq!(sensor.laser_cycles(0, &mut sink), Polled::Idle);
+    for cycles in [1, 99, 900] {
+        assert_eq!(sensor.laser_cycles(cycles, &mut sink), Polled::Data);
+        for now_ms in [0, 1_000, 2_000] {
+            assert_eq!(sensor.poll(now_ms, &mut sink), Ok(Polled::Idle));
+        }
+    }
+    let given = sink.take();
+    assert_eq!(ended(&given), 1_000);
+    assert_eq!(photons(&given), by_clock);
+    assert_eq!(sensor.skipped(), 0);
+}

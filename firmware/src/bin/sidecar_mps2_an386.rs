@@ -9,7 +9,7 @@ compile_error!("an image for a board: cargo xtask image mps2-an386");
 use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, entry, exception};
-use dtof_firmware::board::{mps2_an386::Mps2An386, turn};
+use dtof_firmware::board::{Board, mps2_an386::Mps2An386, turn};
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_sensors::Sensor;
 use dtof_sensors::simulated;
@@ -25,13 +25,22 @@ static BLOCKS: ConstStaticCell<Vec<Block, 42>> = ConstStaticCell::new(Vec::new()
 fn main() -> ! {
     let (mut board, mut serial) = Mps2An386::start();
     defmt::info!("mps2-an386 started");
-    board.obey_command_line();
+    let unpaced = board.obey_command_line();
     let mut sensor = simulated::scene();
+    if unpaced.is_some() {
+        sensor = sensor.without_clock();
+    }
+    let mut left = unpaced.unwrap_or_default();
     let mut sidecar = Sidecar::new(PIXELS.take(), BLOCKS.take(), Some(sensor.about()));
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
             let lost = serial.lost();
             let Ok(()) = sidecar.poll_with(&mut sensor, serial, lost, now_ms);
+            sidecar.simulate(&mut sensor, &mut left);
+            if left > 0 {
+                // There is more to do: its interrupt ends the sleep before it begins.
+                Mps2An386::start_sending();
+            }
         });
     }
 }

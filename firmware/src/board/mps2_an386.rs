@@ -69,23 +69,28 @@ impl Mps2An386 {
     }
 
     /// Does what the words behind the image's name on the emulator's command line
-    /// (`-semihosting-config arg=…`) ask for, to show that each end is seen:
-    /// `exit`, `panic` or `fault`.
+    /// (`-semihosting-config arg=…`) ask for. `exit`, `panic` and `fault` show that each
+    /// end is seen. Gives N of `unpaced=N`: laser cycles that the simulated sensor makes
+    /// as fast as they are worked on, and none after them.
     ///
     /// # Panics
     /// On request.
-    pub fn obey_command_line(&self) {
-        let Ok(words) = env::args::<128>() else {
-            return;
-        };
-        for word in words.skip(1).flatten() {
-            match word {
-                "exit" => Self::exit(ExitCode::SUCCESS),
-                "panic" => panic!("as asked for on the command line"),
-                "fault" => cortex_m::asm::udf(),
+    // Part of a large function, its branches would become a jump that hides where it goes.
+    #[inline(never)]
+    #[must_use]
+    pub fn obey_command_line(&self) -> Option<u64> {
+        let mut unpaced = None;
+        for word in env::args::<128>().ok()?.skip(1).flatten() {
+            let cycles = word.strip_prefix("unpaced=");
+            match (word, cycles.and_then(|cycles| cycles.parse().ok())) {
+                ("exit", _) => Self::exit(ExitCode::SUCCESS),
+                ("panic", _) => panic!("as asked for on the command line"),
+                ("fault", _) => cortex_m::asm::udf(),
+                (_, cycles @ Some(_)) => unpaced = cycles,
                 _ => defmt::warn!("what is `{=str}`?", word),
             }
         }
+        unpaced
     }
 
     /// Ends the emulator.

@@ -4,9 +4,10 @@ use dtof_core::{AnyRule, Count24, DepthEvent, Histogram, LaserCycle, PixelAddres
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
 use super::events::has_room_for_events;
-use super::{BINS, Sidecar};
+use super::{BINS, LOOKS, Sidecar};
 use dtof_link::Source;
 use dtof_link::message;
+use dtof_sensors::simulated::Simulated;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault};
 
 /// Polls of the sensor one after the other. A sensor that always has more must
@@ -62,6 +63,20 @@ impl Sidecar<'_> {
                     return;
                 }
             }
+        }
+    }
+
+    /// Asks a simulated sensor for laser cycles, not by the clock but as fast as they are
+    /// worked on. It is asked while its photons count, every event has left its slot, and
+    /// `left` laser cycles are left, which it counts down. So no decision is put off.
+    /// [`Self::poll`] goes between the calls.
+    pub fn simulate(&mut self, sensor: &mut Simulated<'_>, left: &mut u64) {
+        for _ in 0..LOOKS {
+            if *left == 0 || !self.takes_sensor() || self.waiting() {
+                return;
+            }
+            *left -= 1;
+            sensor.laser_cycles(1, self);
         }
     }
 

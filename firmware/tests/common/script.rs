@@ -66,9 +66,9 @@ pub fn config(wanted: &Configuration) -> PixelConfig<128, AnyRule> {
     config.estimator(wanted.estimator).build().unwrap()
 }
 
-/// What pixels with a link that takes every event at once report.
+/// What pixels, 16 at most, with a link that takes every event at once report.
 pub fn reference(script: &[Vec<Call>], config: &PixelConfig<128, AnyRule>) -> Vec<DepthEvent> {
-    let mut pixels: Vec<_> = (0..8)
+    let mut pixels: Vec<_> = (0..16)
         .map(|address| AsyncPixel::<128>::new(PixelAddress(address)))
         .collect();
     let mut events = Vec::new();

@@ -9,7 +9,7 @@
 //!
 //! The photons depend on the seed and the pixels alone: the n-th laser cycle is
 //! the same whenever and however often the driver is asked. The time only says
-//! how many laser cycles are due.
+//! how many laser cycles are due, or nothing at all: [`Simulated::without_clock`].
 //!
 //! The example of the [crate] runs one.
 
@@ -159,10 +159,43 @@ impl<'a> Simulated<'a> {
         }
     }
 
+    /// The same photons, but none by the clock: only [`Self::laser_cycles`] simulates.
+    #[must_use]
+    pub const fn without_clock(mut self) -> Self {
+        self.settings.cycles_per_second = 0;
+        self
+    }
+
     /// Laser cycles that were due but never simulated.
     #[must_use]
     pub const fn skipped(&self) -> u64 {
         self.skipped
+    }
+
+    /// Simulates the next laser cycles now, whatever the time. The answer is [`Polled::Idle`]
+    /// if there are none.
+    pub fn laser_cycles(&mut self, cycles: u16, sink: &mut impl PhotonSink) -> Polled {
+        let pixels = self.pixels;
+        // Laser cycles that are over but not yet said to be.
+        let mut over = 0;
+        for _ in 0..cycles {
+            for pixel in pixels {
+                for _ in 0..pixel.photons.draw(&mut self.random) {
+                    if over > 0 {
+                        sink.end_laser_cycles(over);
+                        over = 0;
+                    }
+                    let code = self.code(pixel);
+                    sink.photon(pixel.address, code);
+                }
+            }
+            over += 1;
+        }
+        if over > 0 {
+            sink.end_laser_cycles(over);
+            return Polled::Data;
+        }
+        Polled::Idle
     }
 
     /// Takes the whole laser cycles that are due.
@@ -207,26 +240,6 @@ impl Sensor for Simulated<'_> {
 
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Infallible> {
         let cycles = self.cycles(now_ms);
-        let pixels = self.pixels;
-        // Laser cycles that are over but not yet said to be.
-        let mut over = 0;
-        for _ in 0..cycles {
-            for pixel in pixels {
-                for _ in 0..pixel.photons.draw(&mut self.random) {
-                    if over > 0 {
-                        sink.end_laser_cycles(over);
-                        over = 0;
-                    }
-                    let code = self.code(pixel);
-                    sink.photon(pixel.address, code);
-                }
-            }
-            over += 1;
-        }
-        if over > 0 {
-            sink.end_laser_cycles(over);
-            return Ok(Polled::Data);
-        }
-        Ok(Polled::Idle)
+        Ok(self.laser_cycles(cycles, sink))
     }
 }
