@@ -9,4 +9,6 @@ pub mod host;
 pub mod mocks;
 pub mod scene;
 pub mod script;
+pub mod session;
 pub mod sharing;
+pub mod wire;
