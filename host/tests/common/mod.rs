@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "not every test needs all of it")]
 
 pub mod aer;
+pub mod sensed;
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output};

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod bad_wire;
 mod calibrate;
 mod calibrate_refused;
 mod desk;
@@ -11,6 +12,8 @@ mod map;
 mod masked;
 mod monitor;
 mod recording;
+#[path = "../../../firmware/tests/common/wire.rs"]
+mod wire;
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};

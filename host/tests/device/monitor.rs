@@ -8,6 +8,7 @@ use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use crate::common::sensed::Photons;
 use crate::common::{Scratch, names, says};
 use crate::{Closing, client, listen, serve, settings};
 use anyhow::Result;
@@ -16,7 +17,7 @@ use dtof::device::monitor::{Outputs, Task, monitor};
 use dtof::engine::host::host_engine;
 use dtof::engine::settings::Settings;
 use dtof::events::events_csv;
-use dtof::input::source::{Geometry, Photon, PixelPhotons, Slice};
+use dtof::input::source::Geometry;
 use dtof_core::fixed::types::{U0F32, U8F24, U16F16, U24F8};
 use dtof_core::{DepthEvent, DynamicDepthPixel, PixelAddress, Reference};
 use dtof_firmware::sidecar::Sidecar;
@@ -109,39 +110,13 @@ fn device_of(
     (name, rests)
 }
 
-/// The photons of each pixel, from laser cycle 0.
-struct Photons(Vec<PixelPhotons>);
-
-impl PhotonSink for Photons {
-    fn photon(&mut self, pixel: PixelAddress, code: u16) {
-        let pixel = &mut self.0[usize::from(pixel.0)];
-        let cycle = pixel.cycles;
-        pixel.photons.push(Photon { cycle, code });
-    }
-    fn end_laser_cycles(&mut self, cycles: u16) {
-        self.0.iter_mut().for_each(|pixel| pixel.cycles += cycles);
-    }
-    fn histogram(&mut self, _: PixelAddress, _: &[u32; 128]) {
-        panic!("a histogram");
-    }
-}
-
 /// The events of the first 5,000 laser cycles.
 fn reference_events() -> Vec<DepthEvent> {
     let addresses: Vec<_> = (0..PIXELS).map(PixelAddress).collect();
-    let mut photons = Photons(vec![PixelPhotons::default(); addresses.len()]);
-    let mut sensor = sensor();
-    let mut now_ms = 0;
-    while photons.0[0].cycles < 5_000 {
-        let Ok(_) = sensor.poll(now_ms, &mut photons);
-        now_ms += 10;
-    }
+    let mut photons = Photons::new(PIXELS);
+    sensor().laser_cycles(5_000, &mut photons);
     let mut engine = host_engine(&settings(), Geometry::new(4, 1), &addresses).unwrap();
-    let slice = Slice {
-        first_cycle: 0,
-        pixels: photons.0,
-    };
-    engine.run(&slice).unwrap()
+    engine.run(&photons.slice(0)).unwrap()
 }
 
 /// The same as CSV.
