@@ -213,7 +213,7 @@ fn log(image: &Path, bytes: Vec<u8>) -> Result<String> {
 }
 
 /// What decides the events: a setting at which there are many.
-fn settings() -> Settings {
+pub fn settings() -> Settings {
     Settings {
         rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
         l1: 20,
@@ -234,7 +234,7 @@ fn with_windows() -> Settings {
 }
 
 /// Blocks of three levels, tracking and two echoes as well.
-fn with_all() -> Settings {
+pub fn with_all() -> Settings {
     Settings {
         binning: Some(AdaptiveBinning {
             levels: BlockLevel::MAX,

@@ -15,6 +15,9 @@ mod emulator;
 mod histograms;
 mod readers;
 mod report;
+#[path = "../../../host/tests/common/sensed.rs"]
+mod sensed;
+mod soak;
 mod stack;
 
 use std::env;

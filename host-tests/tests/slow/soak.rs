@@ -1,0 +1,268 @@
+//! Photons that an emulated device makes as fast as it goes, and decides on: the events and
+//! counts are those of this computer, which makes the same photons.
+//!
+//! ```sh
+//! DTOF_SLOW=1 cargo test --release --package dtof-host-tests --test slow soak -- --ignored --nocapture
+//! ```
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail, ensure};
+use dtof::device::{Client, configuration};
+use dtof::engine::host::host_engine;
+use dtof::engine::settings::Settings;
+use dtof::events::aer_file::Event;
+use dtof::input::source::Geometry;
+use dtof_core::PixelAddress;
+use dtof_link::endpoint::LinkCounters;
+use dtof_link::{Report, Source};
+use dtof_sensors::{PhotonSink, Polled, simulated};
+
+use crate::boards::{settings, with_all};
+use crate::emulator::{Board, Emulator, QEMU};
+use crate::sensed::Photons;
+use crate::{stack, wanted};
+
+const BOARD: Board = Board::Mps2An386;
+/// The pixels of the simulated scene.
+const ARRAY: Geometry = Geometry::new(4, 4);
+const PIXELS: u16 = 16;
+/// Laser cycles that this computer works on at a time.
+const SLICE: u16 = 10_000;
+/// How often the device is asked how far it is.
+const EVERY: Duration = Duration::from_millis(200);
+/// A device that makes no photon for so long has stopped.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// The name of `with_all`.
+const ALL: &str = "windows, blocks, tracking, two echoes";
+
+/// What came of a device.
+struct Sensed {
+    events: Vec<Event>,
+    report: Report,
+    here: LinkCounters,
+    length: Duration,
+    stack: u64,
+}
+
+/// The device makes the photons of so many laser cycles and decides on them.
+fn on_device(image: &Path, settings: &Settings, cycles: u64) -> Result<Sensed> {
+    let mut emulator = Emulator::start(BOARD, image, &[&format!("unpaced={cycles}")])?;
+    let mut client = Client::new(emulator.connect()?)?;
+    let start = Instant::now();
+    let wanted = configuration(settings, PIXELS, ARRAY.columns, Source::Sensor, None)?;
+    client.configure(&wanted)?;
+    let (mut events, mut last) = (Vec::new(), client.report()?);
+    let (mut length, mut moved) = (None, Instant::now());
+    loop {
+        let since = Instant::now();
+        while since.elapsed() < EVERY {
+            ensure!(client.poll_report()?.is_none(), "a report nobody asked for");
+            events.append(&mut client.take_events());
+        }
+        let report = client.report()?;
+        events.append(&mut client.take_events());
+        if report.cycles == cycles {
+            length.get_or_insert_with(|| start.elapsed());
+            // Events may have waited in their slots for the report before.
+            if (report.statistics, report.blocks) == (last.statistics, last.blocks) {
+                break;
+            }
+        }
+        if report.cycles > last.cycles {
+            moved = Instant::now();
+        }
+        ensure!(
+            moved.elapsed() < PATIENCE,
+            "the device stops after {} of {cycles} laser cycles",
+            report.cycles
+        );
+        last = report;
+    }
+    // After the answer there are no more events.
+    let none = Source::Link;
+    client.configure(&configuration(settings, PIXELS, ARRAY.columns, none, None)?)?;
+    ensure!(client.take_events().is_empty(), "events past the last");
+    Ok(Sensed {
+        events,
+        report: last,
+        here: *client.counters(),
+        length: length.unwrap_or_default(),
+        stack: emulator.stop()?,
+    })
+}
+
+/// Whether what came of the device is what this computer makes of the photons of `sensor`.
+fn compare(
+    sensed: &Sensed,
+    settings: &Settings,
+    mut sensor: impl FnMut(u16, &mut Photons) -> Polled,
+) -> Result<()> {
+    let addresses: Vec<_> = (0..PIXELS).map(PixelAddress).collect();
+    let mut engine = host_engine(settings, ARRAY, &addresses)?;
+    let mut sent = sensed.events.iter();
+    let (mut cycle, cycles) = (0, sensed.report.cycles);
+    while cycle < cycles {
+        let length = u16::try_from(cycles - cycle).unwrap_or(SLICE).min(SLICE);
+        let mut photons = Photons::new(PIXELS);
+        sensor(length, &mut photons);
+        for event in engine.run(&photons.slice(cycle))? {
+            let expected = Event::Depth(event);
+            let sent = sent.next().with_context(|| {
+                let number = sensed.events.len();
+                format!("the device sends {number} events, the next should be {expected:?}")
+            })?;
+            ensure!(
+                *sent == expected,
+                "the device sends {sent:?}, not {expected:?}"
+            );
+        }
+        cycle += u64::from(length);
+    }
+    if let Some(event) = sent.next() {
+        bail!("the device sends one event more: {event:?}");
+    }
+    let counted = [sensed.report.statistics, sensed.report.blocks];
+    let expected = engine.statistics();
+    ensure!(counted == expected, "{counted:?}, not {expected:?}");
+    let [pixels, blocks] = expected;
+    let events = pixels.events + blocks.events;
+    ensure!(
+        events == sensed.events.len() as u64,
+        "{events} events counted"
+    );
+    Ok(())
+}
+
+/// The photons of the device.
+fn scene() -> impl FnMut(u16, &mut Photons) -> Polled {
+    let mut scene = simulated::scene();
+    move |cycles, photons| scene.laser_cycles(cycles, photons)
+}
+
+/// Whether nothing was lost on the way. A pause of this computer may repeat a message.
+fn loses_nothing(sensed: &Sensed) -> Result<()> {
+    let report = &sensed.report;
+    for link in [&report.link, &sensed.here] {
+        ensure!(
+            link.corrupt + link.oversized + link.foreign == 0,
+            "{link:?}"
+        );
+    }
+    let put_off = report.statistics.deferred + report.blocks.deferred;
+    let unheard = u64::from(report.overrun + report.unknown + report.sensor_errors);
+    ensure!(put_off + unheard + report.unaddressed == 0, "{report:?}");
+    Ok(())
+}
+
+/// Runs so many laser cycles, and holds them against this computer's.
+fn runs_alike(name: &str, image: &Path, settings: &Settings, cycles: u64) -> Result<Sensed> {
+    let sensed = on_device(image, settings, cycles)?;
+    compare(&sensed, settings, scene())?;
+    loses_nothing(&sensed)?;
+    stack::check(image, &[sensed.stack])?;
+    let Sensed { report, here, .. } = &sensed;
+    let (photons, seconds) = (report.statistics.photons(), sensed.length.as_secs_f64());
+    println!(
+        "soak: device: {name}: {photons} photons, {} events, {} of them of blocks, identical; \
+         {} messages repeated; {seconds:.0} s, {:.2} million photons/s; {} bytes of stack",
+        sensed.events.len(),
+        report.blocks.events,
+        report.link.retransmitted + here.retransmitted,
+        photons as f64 / seconds / 1e6,
+        sensed.stack
+    );
+    Ok(sensed)
+}
+
+/// Gives photons on, one of them in another bin.
+struct Altered<'a> {
+    photons: &'a mut Photons,
+    until: &'a mut u32,
+}
+
+impl PhotonSink for Altered<'_> {
+    fn photon(&mut self, pixel: PixelAddress, code: u16) {
+        // In the middle of the pulse of pixel 0.
+        let is_signal = pixel.0 == 0 && code == 21;
+        *self.until = self.until.wrapping_sub(u32::from(is_signal));
+        let is_altered = is_signal && *self.until == 0;
+        let code = if is_altered { code + 1 } else { code };
+        self.photons.photon(pixel, code);
+    }
+    fn end_laser_cycles(&mut self, cycles: u16) {
+        self.photons.end_laser_cycles(cycles);
+    }
+    fn histogram(&mut self, _: PixelAddress, _: &[u32; 128]) {}
+}
+
+#[test]
+fn a_device_as_fast_as_it_goes_decides_alike_and_one_other_photon_would_show() -> Result<()> {
+    let Some(_alone) = wanted("photons made on mps2-an386", &[QEMU]) else {
+        return Ok(());
+    };
+    let image = BOARD.image(&[])?;
+    let settings = settings();
+    let sensed = runs_alike("the paper's rule", &image, &settings, 20_000)?;
+    runs_alike(ALL, &image, &with_all(), 20_000)?;
+    any_difference_shows(sensed, &settings)
+}
+
+/// Photons, events and counts that are not those of this computer.
+fn any_difference_shows(mut sensed: Sensed, settings: &Settings) -> Result<()> {
+    let differs = |sensed: &Sensed| compare(sensed, settings, scene()).is_err();
+    // One photon, in the next bin.
+    let (mut all, mut until) = (simulated::scene(), 1_000);
+    let altered = compare(&sensed, settings, |cycles, photons| {
+        let until = &mut until;
+        all.laser_cycles(cycles, &mut Altered { photons, until })
+    });
+    let said = altered.unwrap_err().to_string();
+    ensure!(said.starts_with("the device sends Depth("), "{said}");
+    // Other random numbers.
+    let mut late = scene();
+    late(1, &mut Photons::new(PIXELS));
+    ensure!(compare(&sensed, settings, late).is_err());
+    // An event that is lost, one that comes twice, two in the wrong order.
+    let whole = sensed.events.clone();
+    let middle = whole.len() / 2;
+    sensed.events.remove(middle);
+    ensure!(differs(&sensed));
+    sensed.events.clone_from(&whole);
+    sensed.events.insert(middle, whole[middle]);
+    ensure!(differs(&sensed));
+    sensed.events.clone_from(&whole);
+    sensed.events.swap(middle, middle + 1);
+    ensure!(differs(&sensed));
+    // The first and the last one.
+    for (first, length) in [(1, whole.len()), (0, whole.len() - 1)] {
+        sensed.events = whole[first..length].to_vec();
+        ensure!(differs(&sensed));
+    }
+    // A wrong count.
+    sensed.events = whole;
+    ensure!(!differs(&sensed));
+    sensed.report.statistics.expired += 1;
+    ensure!(differs(&sensed));
+    Ok(())
+}
+
+#[test]
+#[ignore = "takes minutes: `.ci/long soak` runs it"]
+fn a_hundred_million_photons_of_a_device_are_decided_on_alike() -> Result<()> {
+    let Some(_alone) = wanted("10^8 photons on mps2-an386", &[QEMU]) else {
+        return Ok(());
+    };
+    let image = BOARD.image(&[])?;
+    let seldom = |settings| Settings {
+        l1: 100,
+        ..settings
+    };
+    let sensed = runs_alike("the paper's rule", &image, &seldom(settings()), 8_800_000)?;
+    let photons = sensed.report.statistics.photons();
+    ensure!(photons >= 100_000_000, "{photons} photons");
+    runs_alike(ALL, &image, &seldom(with_all()), 880_000)?;
+    Ok(())
+}
