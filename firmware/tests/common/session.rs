@@ -73,7 +73,6 @@ impl Line {
         self.earlier.push(*self.device.endpoint().counters());
         self.device = device::<8>(None);
         self.frames = Deframer::new();
-        self.tap = Tap::default();
     }
 }
 
@@ -180,6 +179,7 @@ pub fn session(line: &mut Line, number: u16, script: &Script, plan: Plan) -> Out
             line.tap.hear(&wire[..length]);
             line.up.carry(&wire[..length], now, &mut line.rng);
         }
+        line.tap.look(line.device.endpoint());
         host.hear(&line.up.arrived(now), now);
         if now.is_multiple_of(plan.reads_one_in) {
             host.read(usize::MAX);

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use dtof_core::{AerDecoder, AerRecord, AerWord, DepthEvent};
+use dtof_link::endpoint::{Endpoint, WINDOW};
 use dtof_link::frame::Deframer;
 use dtof_link::message;
 use rand_core::Rng;
@@ -75,12 +76,25 @@ pub struct Tap {
     /// The last session.
     pub session: Option<u16>,
     next: u8,
+    /// Events so far at the end of each of its messages.
+    messages: Vec<usize>,
     decoder: AerDecoder,
     /// Its events, each once, however often it was sent.
     pub events: Vec<DepthEvent>,
+    /// The first of them that the device knows to be delivered, as far as can be told.
+    pub delivered: usize,
 }
 
 impl Tap {
+    /// Looks at the device's end when everything that is due has been heard.
+    pub fn look(&mut self, device: &Endpoint) {
+        if device.is_open() {
+            let waiting = WINDOW - device.room();
+            let delivered = self.messages.iter().rev().nth(waiting);
+            self.delivered = delivered.copied().unwrap_or_default();
+        }
+    }
+
     pub fn hear(&mut self, bytes: &[u8]) {
         let mut frames = std::mem::take(&mut self.frames);
         for &byte in bytes {
@@ -118,5 +132,6 @@ impl Tap {
                 other => panic!("{other:?}"),
             }
         }
+        self.messages.push(self.events.len());
     }
 }

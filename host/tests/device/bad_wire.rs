@@ -43,6 +43,8 @@ struct Plan {
 /// What the device has done in a connection.
 struct Sent {
     events: Vec<DepthEvent>,
+    /// The first of them that it knows to be delivered.
+    delivered: usize,
     faults: u32,
     repeated: u32,
 }
@@ -98,6 +100,7 @@ impl Device {
         let after = self.sidecar.endpoint().counters().retransmitted;
         Sent {
             events: tap.events,
+            delivered: tap.delivered,
             faults: down.faults + up.faults,
             repeated: after.saturating_sub(before),
         }
@@ -148,6 +151,7 @@ impl Device {
                 }
                 up.carry(&wire[..length], now, &mut self.rng);
             }
+            tap.look(self.sidecar.endpoint());
             stream.write_all(&up.arrived(now))?;
         }
     }
@@ -250,6 +254,7 @@ impl Totals {
                 recorded.len(),
                 all.len()
             );
+            assert!(recorded.len() >= sent.delivered);
             assert_eq!(status.code(), Some(1));
             let [error] = errors[..] else {
                 panic!("{said}");
