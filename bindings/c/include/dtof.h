@@ -6,7 +6,8 @@
 // `static dtof_pixel_t pixels[64];`. Do not read or write what is `opaque`.
 //
 // Pointers: null, misalignment and objects that were never initialised are answered by an error.
-// What else a pointer leads to is up to you: memory of its type, as long as said.
+// What else a pointer leads to is up to you: memory of its type, as long as said. Two pointers of
+// one call lead to different objects unless both are `const`.
 //
 // Errors: nearly every function returns a dtof_status_t. All but DTOF_OK mean that nothing was
 // done. dtof_status_text says what they mean.

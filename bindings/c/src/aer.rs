@@ -1,5 +1,7 @@
 //! Events as words of 16 bytes.
 
+use core::mem::MaybeUninit;
+
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use dtof_core::{AER_VERSION, AerDecoder, AerEncoder, AerRecord, AerWord};
 
@@ -30,19 +32,19 @@ pub const DTOF_AER_ALIGN: usize = 8;
 /// Packs the events of one stream. One thread or interrupt at a time may use it.
 #[repr(C)]
 pub struct dtof_aer_encoder_t {
-    opaque: [u64; DTOF_AER_WORDS],
+    opaque: [MaybeUninit<u64>; DTOF_AER_WORDS],
 }
 
-holds!(dtof_aer_encoder_t, Tagged<AerEncoder>,
+holds!(dtof_aer_encoder_t, Tagged<AerEncoder, 0xd4>,
     size DTOF_AER_SIZE, align DTOF_AER_ALIGN, waste 8);
 
 /// Reads the words of one stream. One thread or interrupt at a time may use it.
 #[repr(C)]
 pub struct dtof_aer_decoder_t {
-    opaque: [u64; DTOF_AER_WORDS],
+    opaque: [MaybeUninit<u64>; DTOF_AER_WORDS],
 }
 
-holds!(dtof_aer_decoder_t, Tagged<AerDecoder>,
+holds!(dtof_aer_decoder_t, Tagged<AerDecoder, 0xd5>,
     size DTOF_AER_SIZE, align DTOF_AER_ALIGN, waste 8);
 
 /// A depth event.

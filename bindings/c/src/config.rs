@@ -1,5 +1,7 @@
 //! Settings, and the configuration that is made of them.
 
+use core::mem::MaybeUninit;
+
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
     AnyRule, AverageRule, CentredWindow, Count, DepthEstimator, EchoNumber, PaperRule, PixelConfig,
@@ -84,13 +86,13 @@ pub const DTOF_CHECKED_CONFIG_ALIGN: usize = 8;
 /// so that any number of threads may use it at once. It may be copied.
 #[repr(C)]
 pub struct dtof_checked_config_t {
-    opaque: [u64; DTOF_CHECKED_CONFIG_WORDS],
+    opaque: [MaybeUninit<u64>; DTOF_CHECKED_CONFIG_WORDS],
 }
 
 /// The configuration of this library's pixels.
 pub(crate) type Config = PixelConfig<DTOF_BINS, AnyRule>;
 
-holds!(dtof_checked_config_t, Tagged<Config>,
+holds!(dtof_checked_config_t, Tagged<Config, 0xd6>,
     size DTOF_CHECKED_CONFIG_SIZE, align DTOF_CHECKED_CONFIG_ALIGN, waste 8);
 
 /// Fills in the paper's settings: its rule with an alpha of 4 and at least 5 photons, its depth,

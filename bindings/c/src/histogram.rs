@@ -1,5 +1,7 @@
 //! Histograms that a sensor has counted by itself.
 
+use core::mem::MaybeUninit;
+
 use dtof_core::{Count24, DepthEvent, Histogram, LaserCycle, PixelAddress};
 
 use crate::config::dtof_checked_config_t;
@@ -26,7 +28,7 @@ pub const DTOF_ECHOES: usize = 4;
 /// and again. One thread or interrupt at a time may use it.
 #[repr(C)]
 pub struct dtof_histogram_t {
-    opaque: [u32; DTOF_HISTOGRAM_WORDS],
+    opaque: [MaybeUninit<u32>; DTOF_HISTOGRAM_WORDS],
 }
 
 type Whole = Histogram<DTOF_BINS, Count24>;

@@ -1,5 +1,7 @@
 //! The device's end of the link: messages arrive whole, once and in order.
 
+use core::mem::MaybeUninit;
+
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message;
@@ -78,7 +80,7 @@ pub const DTOF_LINK_ALIGN: usize = 8;
 /// not be copied while it is in use. One thread or interrupt at a time may use it.
 #[repr(C)]
 pub struct dtof_link_t {
-    opaque: [u64; DTOF_LINK_WORDS],
+    opaque: [MaybeUninit<u64>; DTOF_LINK_WORDS],
 }
 
 /// What a dtof_link_t holds.
@@ -88,7 +90,7 @@ pub(crate) struct Link {
 }
 
 // Of 32 bits it is smaller.
-holds!(dtof_link_t, Tagged<Link>, size DTOF_LINK_SIZE, align DTOF_LINK_ALIGN, waste 160);
+holds!(dtof_link_t, Tagged<Link, 0xd7>, size DTOF_LINK_SIZE, align DTOF_LINK_ALIGN, waste 160);
 
 /// A message of the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

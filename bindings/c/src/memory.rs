@@ -1,7 +1,10 @@
 //! Pointers of C's, checked.
 //!
 //! A type of the header whose fields are nobody's business holds one of Rust's. [`holds`] says
-//! which, and does not compile if that does not fit.
+//! which, and does not compile if that does not fit. Its words are [`MaybeUninit`]: some bytes are
+//! padding of what it holds, and were never written.
+//!
+//! [`MaybeUninit`]: core::mem::MaybeUninit
 
 use core::{hint, slice};
 
@@ -35,18 +38,26 @@ macro_rules! holds {
 pub(crate) use holds;
 
 /// A value that is only valid if it was written as a whole: its memory may hold anything before.
+/// Each type of the header has a `KIND` of its own, so that none is taken for another.
 #[repr(C)]
-pub(crate) struct Tagged<T> {
+pub(crate) struct Tagged<T, const KIND: u8> {
     tag: u32,
     value: T,
 }
 
-/// Stands in memory that was initialised. Zeroed or erased memory does not have it.
-const TAG: u32 = 0xd7d7_d7d7;
+impl<T, const KIND: u8> Tagged<T, KIND> {
+    /// Stands in memory that was initialised. Zeroed or erased memory does not have it. Four equal
+    /// bytes are one instruction.
+    const TAG: u32 = {
+        assert!(KIND != 0 && KIND != u8::MAX);
+        u32::from_ne_bytes([KIND; 4])
+    };
 
-impl<T> Tagged<T> {
     pub(crate) const fn new(value: T) -> Self {
-        Self { tag: TAG, value }
+        Self {
+            tag: Self::TAG,
+            value,
+        }
     }
 }
 
@@ -130,13 +141,13 @@ fn check_number<T>(number: usize) -> Result<(), dtof_status_t> {
 /// # Safety
 /// As [`shared`]'s.
 #[inline(always)]
-pub(crate) unsafe fn tagged<'a, T: 'a, C: Holds<Inside = Tagged<T>>>(
+pub(crate) unsafe fn tagged<'a, T: 'a, const KIND: u8, C: Holds<Inside = Tagged<T, KIND>>>(
     pointer: *const C,
 ) -> Result<&'a T, dtof_status_t> {
-    let inside = pointer.cast::<Tagged<T>>();
+    let inside = pointer.cast::<Tagged<T, KIND>>();
     check(inside)?;
     // SAFETY: as in `shared`; only the tag is read, which any bytes are a value of.
-    if unsafe { (&raw const (*inside).tag).read() } != TAG {
+    if unsafe { (&raw const (*inside).tag).read() } != Tagged::<T, KIND>::TAG {
         return Err(refused(DTOF_ERROR_NOT_INITIALISED));
     }
     // SAFETY: with its tag the whole value was written.
@@ -148,13 +159,13 @@ pub(crate) unsafe fn tagged<'a, T: 'a, C: Holds<Inside = Tagged<T>>>(
 /// # Safety
 /// As [`exclusive`]'s.
 #[inline(always)]
-pub(crate) unsafe fn tagged_mut<'a, T: 'a, C: Holds<Inside = Tagged<T>>>(
+pub(crate) unsafe fn tagged_mut<'a, T: 'a, const KIND: u8, C: Holds<Inside = Tagged<T, KIND>>>(
     pointer: *mut C,
 ) -> Result<&'a mut T, dtof_status_t> {
     // SAFETY: the same promise.
     unsafe { tagged(pointer)? };
     // SAFETY: checked in the line before; nobody else has it, by the promise.
-    Ok(unsafe { &mut (*pointer.cast::<Tagged<T>>()).value })
+    Ok(unsafe { &mut (*pointer.cast::<Tagged<T, KIND>>()).value })
 }
 
 /// Puts a value into memory that may hold anything.

@@ -1,5 +1,7 @@
 //! Pixels: they count photons, look at the end of laser cycles, and report events.
 
+use core::mem::MaybeUninit;
+
 use dtof_core::{AsyncPixel, LaserCycle, Look, PixelAddress};
 
 use crate::config::dtof_checked_config_t;
@@ -25,7 +27,7 @@ pub const DTOF_PIXEL_ALIGN: usize = 8;
 /// One thread or interrupt at a time may use a pixel. Different pixels are independent.
 #[repr(C)]
 pub struct dtof_pixel_t {
-    opaque: [u64; DTOF_PIXEL_WORDS],
+    opaque: [MaybeUninit<u64>; DTOF_PIXEL_WORDS],
 }
 
 type Pixel = AsyncPixel<DTOF_BINS>;

@@ -1,5 +1,7 @@
 //! From bins to millimetres.
 
+use core::mem::MaybeUninit;
+
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{BinPosition, RangeScale};
 
@@ -18,7 +20,7 @@ pub const DTOF_SCALE_ALIGN: usize = 4;
 /// be copied.
 #[repr(C)]
 pub struct dtof_scale_t {
-    opaque: [u32; DTOF_SCALE_WORDS],
+    opaque: [MaybeUninit<u32>; DTOF_SCALE_WORDS],
 }
 
 holds!(dtof_scale_t, RangeScale, size DTOF_SCALE_SIZE, align DTOF_SCALE_ALIGN, waste 1);

@@ -1,5 +1,7 @@
 //! What pixels have done, and what was lost.
 
+use core::mem::MaybeUninit;
+
 use dtof_core::Statistics;
 
 use crate::memory::{holds, put, shared, status};
@@ -16,7 +18,7 @@ pub const DTOF_STATISTICS_ALIGN: usize = 8;
 /// One serves any number of pixels; pixels of two threads need one each.
 #[repr(C)]
 pub struct dtof_statistics_t {
-    opaque: [u64; DTOF_STATISTICS_WORDS],
+    opaque: [MaybeUninit<u64>; DTOF_STATISTICS_WORDS],
 }
 
 holds!(dtof_statistics_t, Statistics,

@@ -4,6 +4,7 @@
 #![allow(unsafe_code, reason = "they are called as C calls them")]
 
 mod link;
+mod memory;
 mod pixels;
 mod refusals;
 mod words;

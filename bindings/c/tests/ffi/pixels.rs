@@ -93,10 +93,13 @@ fn numbers(of: &Statistics) -> [u64; 9] {
     [&photons[..], &events].concat().try_into().unwrap()
 }
 
+/// Laser cycles of a pixel; under Miri each costs 0.1 s.
+const CYCLES: usize = if cfg!(miri) { 60 } else { 300 };
+
 /// The TDC codes of laser cycles: a pulse, background, and codes past the last bin.
 fn photons() -> impl Strategy<Value = Vec<Vec<u16>>> {
     let code = prop_oneof![4 => 70u16..73, 1 => 100u16..102, 3 => 0u16..140];
-    prop::collection::vec(prop::collection::vec(code, 0..3), 300)
+    prop::collection::vec(prop::collection::vec(code, 0..3), CYCLES)
 }
 
 proptest! {
@@ -104,7 +107,7 @@ proptest! {
     fn a_pixel_reports_what_the_core_reports(
         settings in settings(),
         photons in photons(),
-        taken in prop::collection::vec(any::<bool>(), 300),
+        taken in prop::collection::vec(any::<bool>(), CYCLES),
         batches in any::<bool>(),
     ) {
         let Some(config) = config_of(&settings) else {
