@@ -7,6 +7,7 @@ mod aer_file;
 mod link;
 #[cfg(feature = "host")]
 mod recordings;
+mod sensors;
 #[cfg(feature = "host")]
 mod settings;
 mod sidecar;
@@ -17,6 +18,7 @@ pub use aer_file::aer_file;
 pub use link::link;
 #[cfg(feature = "host")]
 pub use recordings::recordings;
+pub use sensors::sensors;
 #[cfg(feature = "host")]
 pub use settings::settings;
 pub use sidecar::sidecar;

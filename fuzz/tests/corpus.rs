@@ -33,6 +33,11 @@ fn link() {
 }
 
 #[test]
+fn sensors() {
+    all("sensors", dtof_fuzz::sensors);
+}
+
+#[test]
 fn sidecar() {
     all("sidecar", dtof_fuzz::sidecar);
 }

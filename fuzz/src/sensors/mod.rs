@@ -1,0 +1,128 @@
+//! Drivers of sensors, and a bus that answers anything. Each has a model written from the data sheet
+//! that sees the same answers, and says what the sink must be given.
+
+mod bus;
+mod tdc7200;
+mod tmf882x;
+
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::U16F16;
+use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault};
+
+use self::bus::{Bus, Chip};
+use crate::Input;
+
+/// One call of the sink.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Given {
+    Photon(u16, u16),
+    End(u16),
+    Histogram(u16, Vec<u32>),
+}
+
+/// What a poll has given.
+#[derive(Default)]
+struct Notes(Vec<Given>);
+
+impl PhotonSink for Notes {
+    fn photon(&mut self, pixel: PixelAddress, code: u16) {
+        self.0.push(Given::Photon(pixel.0, code));
+    }
+
+    fn end_laser_cycles(&mut self, cycles: u16) {
+        self.0.push(Given::End(cycles));
+    }
+
+    fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]) {
+        self.0.push(Given::Histogram(pixel.0, counts.to_vec()));
+    }
+}
+
+/// The most transfers of a poll: a TDC7200 is configured by 19.
+const TRANSFERS: usize = 20;
+/// A sensor that answers well again has something after so many milliseconds: the longest time
+/// limit of a driver is a second.
+const AGAIN_MS: u32 = 3000;
+
+/// What the answers of a poll must bring, beside the driver.
+trait Model<C> {
+    /// The driver is told to begin anew.
+    fn restart(&mut self);
+
+    /// Sees the answers of a poll, and what came of them.
+    fn check(&mut self, answers: &[bus::Answer], failed: bool, given: &[Given]);
+}
+
+/// The input says which sensor, how it is set, and what the bus and the pins do. Calls of a poll are
+/// bounded, what is given is what was answered, once, and good answers bring data again.
+pub fn sensors(data: &[u8]) {
+    let mut input = Input::new(data);
+    let (kind, settings) = (input.byte(), input.byte());
+    match kind % 4 {
+        0 => tdc7200::run::<13>(settings, input),
+        1 => tdc7200::run::<2>(settings, input),
+        2 => tmf882x::run::<135>(settings, input),
+        _ => tmf882x::run::<32>(settings, input),
+    }
+}
+
+/// Polls while there is input, and then until the sensor has something.
+fn drive<C: Chip, S: Sensor>(sensor: &mut S, bus: &Bus<'_, C>, model: &mut impl Model<C>)
+where
+    S::Error: std::error::Error,
+{
+    let mut now_ms = 0u32.wrapping_sub(50);
+    while let Some(what) = bus.next() {
+        now_ms = now_ms.wrapping_add([0, 1, 1, 3, 11, 60, 150, 1001][usize::from(what & 7)]);
+        match what >> 3 {
+            // A line that is torn off, or lies on another.
+            0 => bus.set_line(bus::Line::Broken),
+            1 => bus.set_line(bus::Line::High),
+            2 => bus.set_line(bus::Line::Low),
+            3 => {
+                model.restart();
+                sensor.start(U16F16::lit("250"));
+            }
+            4 => {
+                model.restart();
+                sensor.stop();
+                bus.take_answers();
+            }
+            _ => bus.set_line(bus::Line::Chip),
+        }
+        let _ = poll(sensor, bus, now_ms, model);
+    }
+    bus.set_line(bus::Line::Chip);
+    let began = now_ms;
+    while poll(sensor, bus, now_ms, model) != Ok(Polled::Data) {
+        now_ms = now_ms.wrapping_add(1);
+        assert!(
+            now_ms.wrapping_sub(began) <= AGAIN_MS,
+            "a good sensor gives nothing"
+        );
+    }
+}
+
+fn poll<C: Chip, S: Sensor>(
+    sensor: &mut S,
+    bus: &Bus<'_, C>,
+    now_ms: u32,
+    model: &mut impl Model<C>,
+) -> Result<Polled, SensorFault>
+where
+    S::Error: std::error::Error,
+{
+    let mut notes = Notes::default();
+    let polled = sensor.poll(now_ms, &mut notes);
+    let answers = bus.take_answers();
+    assert!(answers.len() <= TRANSFERS, "{} transfers", answers.len());
+    model.check(&answers, polled.is_err(), &notes.0);
+    if let Ok(polled) = &polled {
+        assert_eq!(*polled == Polled::Data, !notes.0.is_empty());
+    }
+    polled.map_err(|error| {
+        let line = error.to_string();
+        assert!(!line.is_empty() && !line.contains('\n'), "{line:?}");
+        error.into()
+    })
+}
