@@ -14,6 +14,7 @@ mod report;
 #[cfg(all(target_os = "none", feature = "stm32f405"))]
 pub mod stm32f405;
 pub mod systick;
+mod transmit;
 
 // Each board defines the interrupt handlers of the image.
 #[cfg(all(feature = "mps2-an386", feature = "stm32f405"))]
@@ -21,6 +22,8 @@ compile_error!("an image is for one board: choose one of mps2-an386 and stm32f40
 
 #[cfg(all(feature = "sensor-tdc7200", feature = "sensor-tmf882x"))]
 compile_error!("an image is for one sensor: choose one of sensor-tdc7200 and sensor-tmf882x");
+
+pub use self::transmit::{Transmitter, transmit};
 
 use crate::serial::Serial;
 

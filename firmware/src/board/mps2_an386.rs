@@ -22,7 +22,7 @@ use semihosting::experimental::env;
 use semihosting::process::ExitCode;
 use static_cell::ConstStaticCell;
 
-use super::{Board, report};
+use super::{Board, Transmitter, report, transmit};
 use crate::serial::{BoardBuffers, Buffers, Serial, SerialInterrupt};
 
 /// The clock of processor and UART.
@@ -241,11 +241,25 @@ mod uart {
     }
 
     pub fn on_transmit(port: &mut SerialInterrupt<'_>) {
+        // First, so that room that comes from now on interrupts again.
         write(Register::IntClear, TX_INTERRUPT);
-        while port.has_to_send() && read(Register::State) & TX_FULL == 0 {
-            if let Some(byte) = port.next_to_send() {
-                write(Register::Data, byte.into());
-            }
+        transmit(port, &mut Uart);
+    }
+
+    struct Uart;
+
+    impl Transmitter for Uart {
+        fn has_room(&mut self) -> bool {
+            read(Register::State) & TX_FULL == 0
         }
+
+        fn send(&mut self, byte: u8) {
+            write(Register::Data, byte.into());
+        }
+
+        // It interrupts whenever a byte leaves it.
+        fn wake(&mut self) {}
+
+        fn rest(&mut self) {}
     }
 }

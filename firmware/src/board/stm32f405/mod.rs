@@ -38,7 +38,7 @@ use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 pub use self::sensor_port::SensorPort;
 
-use super::{Board, report, systick};
+use super::{Board, Transmitter, report, systick, transmit};
 use crate::serial::{BoardBuffers, Buffers, Serial, SerialInterrupt};
 
 const BAUD: u32 = 1_000_000;
@@ -214,14 +214,25 @@ impl Port {
                 Err(nb::Error::WouldBlock) => break,
             }
         }
-        while self.tx.is_tx_empty() {
-            let Some(byte) = self.interrupt.next_to_send() else {
-                self.tx.unlisten();
-                return;
-            };
-            // There is room, as was just seen.
-            let _ = self.tx.write(byte);
-        }
-        self.tx.listen();
+        transmit(&mut self.interrupt, &mut self.tx);
+    }
+}
+
+impl Transmitter for Tx<USART2> {
+    fn has_room(&mut self) -> bool {
+        self.is_tx_empty()
+    }
+
+    fn send(&mut self, byte: u8) {
+        // There is room, as was just seen.
+        let _ = self.write(byte);
+    }
+
+    fn wake(&mut self) {
+        self.listen();
+    }
+
+    fn rest(&mut self) {
+        self.unlisten();
     }
 }
