@@ -69,6 +69,7 @@ fn check_any_bytes(bytes: [u8; 16]) {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "millions of words: hours under Miri")]
 fn random_bytes_decode_as_documented_or_not_at_all() {
     let mut rng = Pcg32::seed_from_u64(2);
     for number in 0..2_000_000 {
@@ -96,6 +97,7 @@ fn random_bytes_decode_as_documented_or_not_at_all() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "millions of words: hours under Miri")]
 fn all_combinations_of_the_boundaries_of_a_dynamic_depth_event() {
     let tables = ["### Dynamic depth event", "### Time word"].map(bit_table);
     let two = |number: i32| u128::from(number.cast_unsigned());

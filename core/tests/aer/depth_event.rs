@@ -30,6 +30,7 @@ fn check_event(tables: &[Vec<Field>; 2], event: &DepthEvent) {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "millions of words: hours under Miri")]
 fn all_combinations_of_field_boundaries_round_trip() {
     // Four boundaries a field; eight of the laser cycle, five of the offset.
     let bits = |bits: u32| {
@@ -129,6 +130,7 @@ fn random_event(rng: &mut Pcg32) -> DepthEvent {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "millions of words: hours under Miri")]
 fn a_million_random_events_round_trip() {
     let mut rng = Pcg32::seed_from_u64(1);
     let tables = tables();
