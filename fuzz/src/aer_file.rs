@@ -1,32 +1,45 @@
-//! AER files: one that is read whole is written as it was.
+//! AER files: one that is read whole is written as it was, and exported.
 
+use std::fs;
 use std::io::Cursor;
 
 use dtof::events::aer_file::{Reader, Writer};
+use dtof::export::{Format, Options, export};
+
+use crate::{folder, is_one_line};
+
+const FORMATS: [Format; 5] = [
+    Format::Csv,
+    Format::Pcd,
+    Format::Ply,
+    Format::Mcap,
+    Format::Evt2,
+];
 
 /// Any bytes are a file, or an error.
 pub fn aer_file(data: &[u8]) {
-    let Ok(mut reader) = Reader::new(Cursor::new(data)) else {
-        return;
+    let mut reader = match Reader::new(Cursor::new(data)) {
+        Ok(reader) => reader,
+        Err(error) => return is_one_line(&error.into()),
     };
     let header = reader.header().clone();
     let mut writer = Writer::new(Vec::new(), &header).expect("memory");
     let mut events = 0;
-    loop {
+    let damage = loop {
         match reader.next_event() {
             Ok(Some(event)) => {
                 events += 1;
                 assert!(events <= data.len() / 16, "more events than words");
                 writer.write(&event).expect("memory");
             }
-            Ok(None) => break,
+            Ok(None) => break false,
             Err(error) => {
-                let line = format!("{error:#}");
-                assert!(!line.is_empty() && !line.contains('\n'), "{line:?}");
-                return;
+                is_one_line(&error.into());
+                break true;
             }
         }
-    }
+    };
+    exported(data, events, damage);
     // Time words that nothing needs may be there; nothing else may.
     let written = writer.finish().expect("memory");
     let mut again = Reader::new(Cursor::new(&written)).expect("what was written");
@@ -36,4 +49,26 @@ pub fn aer_file(data: &[u8]) {
         assert_eq!(event.expect("as before"), same.expect("what was written"));
     }
     assert!(again.next_event().expect("what was written").is_none());
+}
+
+/// What came before the damage is there, and the damage is said.
+fn exported(data: &[u8], events: usize, damage: bool) {
+    let folder = folder();
+    let [input, out] = ["a.aer", "b"].map(|name| folder.path().join(name));
+    fs::write(&input, data).expect("a file");
+    let format = FORMATS[data.len() / 16 % FORMATS.len()];
+    match export(&input, &out, format, &Options::default(), true) {
+        Ok(exported) => {
+            assert_eq!(exported.damage.is_some(), damage);
+            // An event camera sends a change as several.
+            let most = if format == Format::Evt2 { 1 << 16 } else { 1 };
+            assert!(exported.written + exported.late <= most * events as u64);
+            assert!(out.exists());
+        }
+        Err(error) => {
+            is_one_line(&error);
+            assert!(!out.exists());
+        }
+    }
+    assert_eq!(fs::read(&input).expect("the input"), data);
 }

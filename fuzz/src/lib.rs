@@ -23,6 +23,19 @@ pub use sensors::sensors;
 pub use settings::settings;
 pub use sidecar::sidecar;
 
+/// In memory where there is such a file system.
+#[cfg(feature = "host")]
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir());
+    folder.expect("a folder")
+}
+
+#[cfg(feature = "host")]
+fn is_one_line(error: &anyhow::Error) {
+    let line = format!("{error:#}");
+    assert!(!line.is_empty() && !line.contains('\n'), "{line:?}");
+}
+
 /// Numbers out of an input; 0 behind its end.
 struct Input<'a> {
     left: &'a [u8],

@@ -5,58 +5,83 @@ use std::fs;
 use dtof::input::medium::Medium;
 use dtof::input::open::{Opening, counts, open};
 
-use crate::Input;
+use crate::{Input, folder, is_one_line};
 
 /// What a file of this name begins with, so that the search need not find it.
-const FORMATS: [(&str, &[u8]); 6] = [
+const FORMATS: [(&str, &[u8]); 8] = [
     ("a.npy", b""),
     ("a.npy", b"\x93NUMPY\x01\x00"),
     ("a.npz", b"PK\x03\x04"),
     ("a.csv", b"pixel,cycle,bin\n"),
     ("a.json", b"[{"),
     ("a.json", b"{\"Result_Set\":["),
+    ("a.json.gz", b"\x1f\x8b\x08"),
+    ("a.npz", b""),
 ];
 
-/// Photons that are read are in the array and in order, and are as many as are counted.
+/// Laser cycles that are read.
+const CYCLES: u16 = 300;
+
+/// What a user says of a recording: nothing, mostly.
+fn opening(choice: u8) -> Opening {
+    let is = |bit: u8| choice >> bit & 1 == 1;
+    Opening {
+        cycles: CYCLES.into(),
+        rebin: if is(0) { 2 } else { 1 },
+        columns: is(1).then_some(2),
+        bins: is(2).then_some(8),
+        axes: is(3).then(|| "bins,captures,columns".parse().expect("axes")),
+        masked: if is(4) { vec![0] } else { Vec::new() },
+        ..Opening::default()
+    }
+}
+
+/// Photons that are read are in the array and in order. Together with those that are left they are
+/// all that were counted.
 pub fn recordings(data: &[u8]) {
     let mut input = Input::new(data);
-    let (name, head) = FORMATS[usize::from(input.byte()) % FORMATS.len()];
-    let folder = tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir());
-    let folder = folder.expect("a folder");
+    let choice = input.byte();
+    let (name, head) = FORMATS[usize::from(choice & 7)];
+    let folder = folder();
     let path = folder.path().join(name);
     fs::write(&path, [head, input.left].concat()).expect("a file");
     let medium = Medium::File(path);
-    let opening = Opening {
-        cycles: 300,
-        ..Opening::default()
-    };
+    let opening = opening(choice >> 3);
     let mut recording = match open(&medium, &opening) {
         Ok(recording) => recording,
-        Err(error) => {
-            let line = format!("{error:#}");
-            assert!(!line.is_empty() && !line.contains('\n'), "{line:?}");
-            return;
-        }
+        Err(error) => return is_one_line(&error),
     };
     let source = recording.photons.as_mut();
-    let pixels = source.addresses().len();
-    let mut done = 0;
-    while done < source.cycles().min(300) {
-        let Ok(slice) = source.next_slice(100) else {
-            return;
+    let (pixels, cycles) = (source.addresses().len(), source.cycles());
+    assert!(cycles <= u64::from(CYCLES));
+    let (mut done, mut photons) = (0, 0);
+    while done < cycles {
+        let slice = match source.next_slice(100) {
+            Ok(slice) => slice,
+            Err(error) => return is_one_line(&error),
         };
         assert_eq!(slice.pixels.len(), pixels);
         assert_eq!(slice.first_cycle, done);
         for pixel in &slice.pixels {
+            let mut of_pixel = pixel.photons.iter();
             assert!(pixel.photons.is_sorted_by_key(|photon| photon.cycle));
-            assert!(
-                pixel
-                    .photons
-                    .iter()
-                    .all(|photon| photon.cycle < pixel.cycles.max(1))
-            );
+            assert!(of_pixel.all(|photon| {
+                photon.cycle < pixel.cycles && usize::from(photon.code) < recording.known.bins
+            }));
+            photons += pixel.photons.len() as u64;
         }
         done += 100;
     }
-    let _ = counts(&medium, &opening);
+    let all = match counts(&medium, &opening) {
+        Ok(all) => all,
+        Err(error) => return is_one_line(&error),
+    };
+    let counted: u64 = all.captures.iter().flatten().flatten().sum();
+    // Of a list the laser cycles that are read are counted, of histograms all.
+    let left = if recording.known.is_list {
+        0
+    } else {
+        source.not_replayed()
+    };
+    assert_eq!(photons + left, counted);
 }

@@ -1,7 +1,13 @@
-//! Settings files and scenes: any text is one, or one clear line.
+//! Settings files, scenes and calibrations of pixels: any text is one, or one clear line.
 
+use std::fs;
+
+use dtof::geometry::Rays;
+use dtof::input::source::Geometry;
 use dtof::settings::SettingsFile;
 use dtof::simulate::scene::Scene;
+
+use crate::{folder, is_one_line};
 
 /// What is read is written, and read again as the same.
 pub fn settings(data: &[u8]) {
@@ -22,6 +28,15 @@ pub fn settings(data: &[u8]) {
         // Few enough pixels not to take seconds.
         if scene.geometry.addresses() <= 64 && scene.surfaces.len() < 10 {
             let _ = scene.photons(1, 4);
+        }
+    }
+    // A calibration has nothing but these.
+    if text.contains("pixels") {
+        let folder = folder();
+        let path = folder.path().join("a.toml");
+        fs::write(&path, text).expect("a file");
+        if let Err(error) = Rays::read(&path, Geometry::new(2, 1)) {
+            is_one_line(&error);
         }
     }
 }

@@ -1,11 +1,14 @@
 //! The engine beside the sensor, and a host that sends it anything.
 
+use std::collections::VecDeque;
+
 use dtof_core::{AerDecoder, AerRecord, AerWord};
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
-use dtof_link::Report;
+
 use dtof_link::endpoint::{BODY_BYTES, Endpoint};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
+use dtof_link::{Report, Token};
 
 use crate::Input;
 
@@ -38,6 +41,7 @@ pub fn sidecar(data: &[u8]) {
                 return;
             }
             if host.endpoint.is_open() && host.endpoint.offer(kind, body).is_ok() {
+                host.note(kind, body);
                 break;
             }
         }
@@ -59,6 +63,11 @@ struct Host {
     down: Deframer,
     decoder: AerDecoder,
     events: u64,
+    /// What was sent and is not answered yet: configurations, requests of statistics, and of
+    /// messages of photons how many they hold.
+    asked: VecDeque<(u8, u64)>,
+    /// Photons since the configuration, if there is one.
+    photons: Option<u64>,
 }
 
 impl Host {
@@ -69,7 +78,41 @@ impl Host {
             down: Deframer::new(),
             decoder: AerDecoder::new(),
             events: 0,
+            asked: VecDeque::new(),
+            photons: None,
         }
+    }
+
+    fn note(&mut self, kind: u8, mut body: &[u8]) {
+        let mut photons = 0;
+        if kind == message::PHOTONS {
+            while let Some((token, rest)) = Token::split_first(body) {
+                photons += u64::from(matches!(token, Token::Photon { .. }));
+                body = rest;
+            }
+        }
+        let kinds = [
+            message::CONFIGURE,
+            message::PHOTONS,
+            message::STATISTICS_REQUEST,
+        ];
+        if kinds.contains(&kind) {
+            self.asked.push_back((kind, photons));
+        }
+    }
+
+    /// What was asked before this answer is done.
+    fn answered(&mut self, question: u8) {
+        while let Some((kind, photons)) = self.asked.pop_front() {
+            if let Some(all) = &mut self.photons {
+                *all += photons;
+            }
+            if kind == question {
+                return;
+            }
+            assert_eq!(kind, message::PHOTONS, "an answer is missing");
+        }
+        panic!("an answer to nothing");
     }
 
     fn exchange(&mut self, device: &mut Sidecar, now: u32) {
@@ -113,12 +156,21 @@ impl Host {
                 }
             }
             // The counts begin anew.
-            message::CONFIGURED => self.events = 0,
+            message::CONFIGURED => {
+                self.answered(message::CONFIGURE);
+                (self.events, self.photons) = (0, Some(0));
+            }
+            message::REFUSED => self.answered(message::CONFIGURE),
             message::STATISTICS => {
+                self.answered(message::STATISTICS_REQUEST);
                 let report = Report::from_le_bytes(body).expect("a report");
                 assert_eq!(report.link.corrupt, 0, "a good wire");
                 let events = report.statistics.events + report.blocks.events;
                 assert!(self.events <= events, "events that none has decided");
+                let of = &report.statistics;
+                let kept = of.counted + of.held;
+                let lost = of.saturated + of.rejected + of.gated_out + report.unaddressed;
+                assert_eq!(self.photons.unwrap_or(0), kept + lost, "photons");
             }
             _ => {}
         }

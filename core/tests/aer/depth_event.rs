@@ -71,6 +71,7 @@ fn all_combinations_of_field_boundaries_round_trip() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "takes minutes under Miri")]
 fn each_field_alone_at_each_of_its_bits() {
     let tables = tables();
     let widths = [16, 2, 2, 64, 16, 10, 10, 24, 24, 6];

@@ -29,7 +29,9 @@ fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histogr
         arrays.extend(array_name_from_file_name(&name).map(str::to_owned));
     }
     arrays.sort();
-    let list = arrays.join(", ");
+    // A name may be any text, an error is one line.
+    let list: Vec<String> = arrays.iter().map(|name| one_line(name)).collect();
+    let list = list.join(", ");
     let chosen = match (name, &arrays[..]) {
         (Some(name), arrays) => arrays.iter().find(|array| *array == name),
         (None, [single]) => Some(single),
@@ -45,9 +47,13 @@ fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histogr
         format!("no array {name:?}; there is {list}")
     })?;
     let entry = zip.by_name(&format!("{chosen}.npy"));
-    let entry = entry.with_context(|| format!("array {chosen}"))?;
+    let entry = entry.with_context(|| format!("array {}", one_line(chosen)))?;
     let length = entry.size();
     let array = Array::read(BufReader::new(entry), length);
     let histograms = array.and_then(|array| of_array(array, axes));
-    histograms.with_context(|| format!("array {chosen}"))
+    histograms.with_context(|| format!("array {}", one_line(chosen)))
+}
+
+fn one_line(name: &str) -> String {
+    name.escape_debug().to_string()
 }
