@@ -19,6 +19,8 @@ pub enum Answers {
     Error,
     /// All ones, as a bus with a pull-up.
     Ones,
+    /// As the sensor does, whose interrupt line is stuck at this level, for no reason.
+    Stuck(bool),
 }
 
 /// A bus with one sensor; clones are the same bus.
@@ -72,9 +74,17 @@ impl SpiDevice for Bus<Tdc> {
             (Answers::Error, _) => return Err(spi::ErrorKind::Other),
             (Answers::Ones, [_, spi::Operation::Read(bytes)]) => bytes.fill(0xff),
             (Answers::Ones, _) => {}
-            (Answers::Sensor, _) => {
+            (answers, _) => {
                 let is_low = self.chip.borrow_mut().answer(operations);
                 self.interrupt.set(!is_low);
+                if let Answers::Stuck(level) = answers {
+                    self.interrupt.set(level);
+                    if let [spi::Operation::Write([0x02]), spi::Operation::Read(status)] =
+                        operations
+                    {
+                        status.fill(0);
+                    }
+                }
             }
         }
         Ok(())
@@ -91,12 +101,19 @@ impl I2c for Bus<Tmf> {
         _: u8,
         operations: &mut [i2c::Operation<'_>],
     ) -> Result<(), i2c::ErrorKind> {
-        if self.begin() != Answers::Sensor {
+        let answers = self.begin();
+        if matches!(answers, Answers::Error | Answers::Ones) {
             let source = NoAcknowledgeSource::Address;
             return Err(i2c::ErrorKind::NoAcknowledge(source));
         }
         let is_low = self.chip.borrow_mut().answer(operations);
         self.interrupt.set(!is_low);
+        if let Answers::Stuck(level) = answers {
+            self.interrupt.set(level);
+            if let [i2c::Operation::Write([0xE1]), i2c::Operation::Read(status)] = operations {
+                status.fill(0);
+            }
+        }
         Ok(())
     }
 }

@@ -1,0 +1,352 @@
+//! Interrupts that are stuck: those of the serial port never come again or without end, the line
+//! of a sensor stays at one level. The main loop goes round all the same, no event is wrong, and
+//! what can be known of it is said.
+
+mod common;
+
+use std::cell::RefCell;
+use std::convert::Infallible;
+
+use common::host::{CONFIGURATION, Host, configured, device};
+use common::mocks::Line;
+use common::mocks::plug::{Answers, Bus, Tdc, Tmf};
+use common::script;
+use dtof_core::fixed::types::U16F16;
+use dtof_core::{DepthEvent, PixelAddress};
+use dtof_firmware::serial::{Buffers, Serial, SerialInterrupt};
+use dtof_firmware::sidecar::Sidecar;
+use dtof_link::frame::WIRE_BYTES;
+use dtof_link::{Configuration, FaultRecord, Source, message};
+use dtof_sensors::simulated;
+use dtof_sensors::tmf882x::Tmf882x;
+use dtof_sensors::{About, Sensor, tdc7200, tmf882x};
+use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+/// A host gives a device up that is silent for longer.
+const SILENCE_MS: u32 = 5_000;
+
+/// The port of the main loop, which counts what is asked of it. With `flood` the interrupt
+/// handler runs before each question, and the queue is full again.
+struct Port<'a, 'b> {
+    serial: &'a mut Serial<'b>,
+    interrupt: &'a RefCell<SerialInterrupt<'b>>,
+    flood: Option<&'a mut Pcg32>,
+    asked: u32,
+}
+
+impl Port<'_, '_> {
+    fn ask(&mut self) {
+        self.asked += 1;
+        if let Some(rng) = &mut self.flood {
+            let mut interrupt = self.interrupt.borrow_mut();
+            let lost = self.serial.lost();
+            while self.serial.lost() == lost {
+                interrupt.on_receive(rng.next_u32().to_le_bytes()[0]);
+            }
+        }
+    }
+}
+
+impl ErrorType for Port<'_, '_> {
+    type Error = Infallible;
+}
+
+impl ReadReady for Port<'_, '_> {
+    fn read_ready(&mut self) -> Result<bool, Infallible> {
+        self.ask();
+        self.serial.read_ready()
+    }
+}
+
+impl Read for Port<'_, '_> {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Infallible> {
+        self.ask();
+        self.serial.read(bytes)
+    }
+}
+
+impl WriteReady for Port<'_, '_> {
+    fn write_ready(&mut self) -> Result<bool, Infallible> {
+        self.ask();
+        self.serial.write_ready()
+    }
+}
+
+impl Write for Port<'_, '_> {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        self.ask();
+        self.serial.write(bytes)
+    }
+    fn flush(&mut self) -> Result<(), Infallible> {
+        panic!("it would wait");
+    }
+}
+
+/// What still works of the serial port's interrupts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Interrupts {
+    All,
+    NoReceive,
+    NoTransmit,
+    None,
+    /// The one of receiving comes without end.
+    Flood,
+}
+
+/// A host and a device with a serial port between them, a millisecond at a time.
+struct Bench<'a> {
+    host: Host,
+    device: Sidecar<'static>,
+    serial: Serial<'a>,
+    interrupt: RefCell<SerialInterrupt<'a>>,
+    rng: Pcg32,
+    now_ms: u32,
+    /// The most that was asked of the port in one turn of the main loop.
+    most: u32,
+}
+
+impl<'a> Bench<'a> {
+    fn new(buffers: &'a mut Buffers<2048, 1024>, device: Sidecar<'static>) -> Self {
+        let (interrupt, serial) = buffers.split(|| ());
+        Self {
+            host: Host::new(1, 0),
+            device,
+            serial,
+            interrupt: RefCell::new(interrupt),
+            rng: Pcg32::seed_from_u64(4),
+            now_ms: 0,
+            most: 0,
+        }
+    }
+
+    /// A millisecond, with a sensor that may have nothing.
+    fn turn(&mut self, interrupts: Interrupts, sensor: &mut impl Sensor) {
+        use Interrupts::{All, Flood, NoReceive, NoTransmit};
+        let mut wire = [0; WIRE_BYTES];
+        while let length @ 1.. = self.host.endpoint.transmit(self.now_ms, &mut wire) {
+            if matches!(interrupts, All | NoTransmit | Flood) {
+                let mut interrupt = self.interrupt.borrow_mut();
+                wire[..length]
+                    .iter()
+                    .for_each(|&byte| interrupt.on_receive(byte));
+            }
+        }
+        let lost = self.serial.lost();
+        let mut port = Port {
+            serial: &mut self.serial,
+            interrupt: &self.interrupt,
+            flood: (interrupts == Flood).then_some(&mut self.rng),
+            asked: 0,
+        };
+        // Never an error, and never a wait: this would not end.
+        let Ok(()) = self.device.poll_with(sensor, &mut port, lost, self.now_ms);
+        self.most = self.most.max(port.asked);
+        if matches!(interrupts, All | NoReceive | Flood) {
+            let mut interrupt = self.interrupt.borrow_mut();
+            let sent = std::iter::from_fn(|| interrupt.next_to_send());
+            let sent: Vec<u8> = sent.take(100).collect();
+            self.host.hear(&sent, self.now_ms);
+        }
+        self.host.read(usize::MAX);
+        self.now_ms += 1;
+    }
+
+    fn configure(&mut self, wanted: &Configuration, sensor: &mut impl Sensor) {
+        while !self.host.endpoint.is_open() {
+            self.turn(Interrupts::All, sensor);
+        }
+        self.host.ask(message::CONFIGURE, &wanted.to_le_bytes());
+        while self.host.answers.is_empty() {
+            self.turn(Interrupts::All, sensor);
+        }
+        assert_eq!(self.host.answers[0].0, message::CONFIGURED);
+    }
+}
+
+/// Photons from the link: events are those of pixels that nobody disturbs.
+#[test]
+fn serial_interrupts_that_never_come_again_lose_nothing_until_they_do() {
+    let calls = script::script(3_000, &mut Pcg32::seed_from_u64(3));
+    let events = script::reference(&calls, &script::config(&CONFIGURATION));
+    let wanted = Configuration {
+        source: Source::Link,
+        ..CONFIGURATION
+    };
+    for (stuck, is_silent) in [
+        (Interrupts::NoReceive, false),
+        (Interrupts::NoTransmit, true),
+        (Interrupts::None, true),
+        (Interrupts::Flood, false),
+    ] {
+        let mut buffers = Buffers::new();
+        let mut bench = Bench::new(&mut buffers, device::<8>(None));
+        let mut sensor = simulated::scene();
+        bench.configure(&wanted, &mut sensor);
+        let mut photons = script::messages(&calls).into_iter();
+        let (mut silent_ms, mut before) = (0, 0);
+        while bench.host.events.len() < events.len() {
+            assert!(bench.now_ms < 100_000, "{stuck:?}: out of step");
+            while bench.host.endpoint.has_room() {
+                let Some(body) = photons.next() else {
+                    break;
+                };
+                bench.host.ask(message::PHOTONS, &body);
+            }
+            let is_stuck = (200..10_200).contains(&bench.now_ms);
+            bench.turn(if is_stuck { stuck } else { Interrupts::All }, &mut sensor);
+            assert!(events.starts_with(&bench.host.events), "{stuck:?}");
+            if is_stuck {
+                silent_ms = silent_ms.max(bench.host.endpoint.silent_ms(bench.now_ms));
+            } else if bench.now_ms < 200 {
+                before = bench.host.events.len();
+            }
+        }
+        assert!(
+            before > 0 && bench.now_ms > 10_200,
+            "{stuck:?}: over before"
+        );
+        assert_eq!(
+            silent_ms > SILENCE_MS,
+            is_silent,
+            "{stuck:?}: {silent_ms} ms"
+        );
+        assert_eq!(bench.serial.lost() > 0, stuck == Interrupts::Flood);
+        // A piece is read and a few frames written, twice.
+        assert!(
+            bench.most <= 60,
+            "{stuck:?}: {} questions a turn",
+            bench.most
+        );
+        println!(
+            "faults: serial interrupts stuck for 10 s ({stuck:?}): {} events right, silent for {silent_ms} ms, \
+             at most {} accesses to the port a turn, {} bytes lost and counted",
+            events.len(),
+            bench.most,
+            bench.serial.lost()
+        );
+    }
+}
+
+/// Photons from the sensor, which do not wait: fewer events, and each where its surface is.
+#[test]
+fn a_flood_of_interrupts_keeps_neither_the_sensor_nor_the_host_waiting() {
+    let mut buffers = Buffers::new();
+    let mut bench = Bench::new(&mut buffers, device::<16>(Some(About::new(256))));
+    let mut sensor = simulated::scene();
+    let wanted = Configuration {
+        pixels: 16,
+        l1: 100,
+        l2: 2_000,
+        ..CONFIGURATION
+    };
+    bench.configure(&wanted, &mut sensor);
+    let mut events = [0; 3];
+    for interrupts in [Interrupts::All, Interrupts::Flood, Interrupts::All] {
+        for _ in 0..2_000 {
+            bench.turn(interrupts, &mut sensor);
+            // The device speaks, whatever it is told.
+            assert!(bench.host.endpoint.silent_ms(bench.now_ms) < 200);
+        }
+        events.rotate_left(1);
+        events[2] = bench.host.events.len();
+    }
+    assert!(events[0] > 500 && events[2] > events[1] + 500, "{events:?}");
+    let is_right = |event: &&DepthEvent| {
+        let bin = 20 + 6 * event.pixel.0;
+        (bin - 1..=bin + 3).contains(&event.peak_bin.raw())
+    };
+    let right = bench.host.events.iter().filter(is_right).count();
+    // Noise makes as many wrong ones as without a flood: none with this threshold.
+    assert_eq!(right, bench.host.events.len());
+    bench.host.ask(message::STATISTICS_REQUEST, &[]);
+    while bench.host.answers.len() < 2 {
+        bench.turn(Interrupts::All, &mut sensor);
+    }
+    let report = dtof_link::Report::from_le_bytes(&bench.host.answers[1].1).unwrap();
+    assert!(report.overrun > 0 && report.cycles > 20_000, "{report:?}");
+    println!(
+        "faults: receive interrupt without end for 2 s: {} bytes lost and counted, {} events before, {} while, \
+         {} after, 0 wrong",
+        report.overrun,
+        events[0],
+        events[1] - events[0],
+        events[2] - events[1]
+    );
+}
+
+/// The sensor gives data, its line is stuck for ten seconds, and it gives data again.
+fn stuck<Chip: Default>(
+    mut sensor: impl Sensor,
+    bus: &Bus<Chip>,
+    level: bool,
+    said: FaultRecord,
+    bin: u16,
+) {
+    let wanted = Configuration {
+        pixels: 9,
+        ..CONFIGURATION
+    };
+    let (mut device, mut host) = configured::<9>(&wanted);
+    let mut now_ms = 0;
+    let mut seconds = |count: u32| {
+        for _ in 0..count {
+            for _ in 0..1000 {
+                now_ms += 1;
+                let before = bus.transfers();
+                device.poll_sensor(&mut sensor, now_ms);
+                assert!(bus.transfers() - before <= 4 * 19);
+                host.exchange(&mut device, now_ms);
+                host.read(8);
+            }
+        }
+        // The device answers at once, whatever its sensor does.
+        let report = host.report(&mut device, now_ms);
+        assert!(host.events.iter().all(|event| event.peak_bin.raw() == bin));
+        (report, host.events.len())
+    };
+    let (report, before) = seconds(1);
+    assert!(before > 5 && report.sensor_errors == 0, "{report:?}");
+    bus.plug(Answers::Stuck(level));
+    bus.interrupt.set(level);
+    let (_, at) = seconds(1);
+    let (report, while_stuck) = seconds(9);
+    assert_eq!(while_stuck, at, "events out of nothing");
+    assert!(report.sensor_errors >= 8, "{report:?}");
+    assert_eq!(report.last_sensor_error, said as u8);
+    bus.plug(Answers::Sensor);
+    let errors = report.sensor_errors;
+    seconds(2);
+    let (report, after) = seconds(1);
+    assert!(after > while_stuck + 5, "{report:?}");
+    println!(
+        "faults: the line of a sensor stuck at {} for 10 s: {errors} errors ({said}), 0 events, then {} again",
+        u8::from(level),
+        after - while_stuck
+    );
+}
+
+#[test]
+fn a_line_that_is_stuck_is_named_and_the_device_answers() {
+    for (level, said) in [
+        (false, FaultRecord::StuckInterrupt),
+        (true, FaultRecord::Timeout),
+    ] {
+        let bus = Bus::<Tdc>::new();
+        let settings = tdc7200::Settings {
+            first_bin_ps: 240_000,
+            ..tdc7200::Settings::new(PixelAddress(0), 8_000, U16F16::lit("250"))
+        };
+        let config = tdc7200::Config::new(settings).unwrap();
+        let (interrupt, enable) = (bus.interrupt.clone(), Line::new(false));
+        let sensor = tdc7200::Tdc7200::<_, _, _>::new(bus.clone(), interrupt, enable, config);
+        stuck(sensor, &bus, level, said, 28);
+
+        let bus = Bus::<Tmf>::new();
+        let config = tmf882x::Config::new(tmf882x::Settings::new(PixelAddress(0))).unwrap();
+        let (interrupt, enable) = (bus.interrupt.clone(), Line::new(false));
+        let sensor = Tmf882x::<_, _, _>::new(bus.clone(), interrupt, enable, &[1, 2, 3], config);
+        stuck(sensor, &bus, level, said, 40);
+    }
+}
