@@ -39,6 +39,7 @@ struct Port<'a, 'b> {
 impl Port<'_, '_> {
     fn ask(&mut self) {
         self.asked += 1;
+        assert!(self.asked < 1_000, "a turn without end");
         if let Some(rng) = &mut self.flood {
             let mut interrupt = self.interrupt.borrow_mut();
             let lost = self.serial.lost();

@@ -30,7 +30,13 @@ pub fn significant(value: f64, digits: u8) -> String {
     format!("{value:.decimals$}")
 }
 
-/// Rows as lines of text, names to the left, values aligned.
+/// The text without what a terminal obeys: a name in a file does not move the cursor.
+#[must_use]
+pub fn printable(text: &str) -> String {
+    text.replace(char::is_control, "\u{fffd}")
+}
+
+/// Rows as lines of text, names to the left, values aligned, all [`printable`].
 #[must_use]
 pub fn aligned(rows: &[Row]) -> String {
     let width = rows
@@ -39,6 +45,7 @@ pub fn aligned(rows: &[Row]) -> String {
         .max()
         .unwrap_or(0);
     rows.iter()
+        .map(|row| (printable(&row.0), printable(&row.1)))
         .map(|(name, value)| format!("  {name:width$}  {value}\n"))
         .collect()
 }

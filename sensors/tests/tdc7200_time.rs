@@ -28,6 +28,34 @@ fn what_cannot_be_a_calibration_is_none() {
     assert!(new(16_000, 0, (1 << 23) - 1).is_some());
 }
 
+/// The clock is all there is to measure with: nothing else knows that it is off, and all ranges are
+/// off by as much.
+#[test]
+fn a_clock_2_percent_off_shows_as_ranges_2_percent_off() {
+    const LSB_PS: f64 = 55.0;
+    for (actual_khz, factor) in [(8_000.0, 1.0), (8_160.0, 1.02), (7_840.0, 0.98)] {
+        let clock_ps = 1e9 / actual_khz;
+        // What the chip counts in so many picoseconds.
+        let counts = |ps: f64| (ps / LSB_PS).round() as u32;
+        let [first, second] = [1.0, 10.0].map(|periods| counts(periods * clock_ps));
+        let calibration = Calibration::new(8_000, CalibrationPeriods::Ten, first, second).unwrap();
+        for stop_ps in [20_000.0, 100_000.0, 450_000.0] {
+            // Two counts of one part in twenty thousand, and one of the time.
+            let exact = stop_ps * factor;
+            let bound = LSB_PS + exact / f64::from(second - first);
+            let mode_1 = calibration.mode_1(counts(stop_ps)) as f64;
+            assert!((mode_1 - exact).abs() <= bound, "{mode_1} for {exact} ps");
+
+            // Mode 2: from START and from the stop to the next edge of the clock.
+            let (start, stop) = (0.3 * clock_ps, (0.3 * clock_ps + stop_ps) / clock_ps);
+            let (time1, next) = (clock_ps - start, (stop.ceil() - stop) * clock_ps);
+            let clocks = stop.ceil() as u32 - 1;
+            let mode_2 = calibration.mode_2(counts(time1), counts(next), clocks) as f64;
+            assert!((mode_2 - exact).abs() <= 2.0 * bound, "{mode_2} for {exact} ps");
+        }
+    }
+}
+
 proptest! {
     /// Rounded to the nearest, half up: with the formula as the fraction `n / d`,
     /// the time `t` has `-d < 2·(d·t - n) <= d`.

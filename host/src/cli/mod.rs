@@ -10,6 +10,8 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::Parser;
 
+use crate::rows::printable;
+
 /// Parses the command line and runs it.
 #[must_use]
 pub fn run<C: Parser>(run: impl FnOnce(C) -> Result<()>) -> ExitCode {
@@ -59,5 +61,5 @@ fn is_broken_pipe(error: &anyhow::Error) -> bool {
 /// One line on standard error; if that cannot be written, nobody reads it.
 fn complain(message: &str) {
     let line: Vec<&str> = message.lines().collect();
-    let _ = writeln!(io::stderr(), "{}", line.join(" "));
+    let _ = writeln!(io::stderr(), "{}", printable(&line.join(" ")));
 }

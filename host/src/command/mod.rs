@@ -16,12 +16,13 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use dtof::events::summary::Summary;
-use dtof::rows::{Row, aligned};
+use dtof::rows::{Row, aligned, printable};
 
 /// Says on standard error what to know of `file`, a line each, unless `quiet`.
 fn warn(file: &Path, warnings: impl IntoIterator<Item = String>, quiet: bool) {
     for warning in warnings.into_iter().filter(|_| !quiet) {
-        eprintln!("warning: {}: {warning}", file.display());
+        let warning = format!("warning: {}: {warning}", file.display());
+        eprintln!("{}", printable(&warning));
     }
 }
 

@@ -189,6 +189,10 @@ impl Monitor {
             Recording::finish_after_failure
         };
         let recorded = recording.map_or(Ok(()), finish);
-        monitored.and(recorded)
+        match (monitored, recorded) {
+            // Why it ended, and where the events are.
+            (Err(ended), Err(kept)) => bail!("{ended:#}; {kept:#}"),
+            (monitored, recorded) => monitored.and(recorded),
+        }
     }
 }

@@ -34,6 +34,8 @@ pub struct Client {
     pixels: u16,
     /// Pixels of the configuration in force.
     configured: u16,
+    /// Since when [`Self::poll_report`] waits: the question, or the last event after it.
+    asked: Option<Instant>,
 }
 
 impl Client {
@@ -61,6 +63,7 @@ impl Client {
             bins: 0,
             pixels: 0,
             configured: 0,
+            asked: None,
         };
         while !client.endpoint.is_open() {
             client.exchange().context("no device answered")?;
@@ -144,7 +147,9 @@ impl Client {
     /// If the device is gone.
     pub fn report(&mut self) -> Result<Report> {
         self.request_report()?;
-        report(&self.answer()?)
+        let answer = self.answer()?;
+        self.asked = None;
+        report(&answer)
     }
 
     /// Asks what the device has done so far; [`Self::poll_report`] gives the
@@ -153,6 +158,7 @@ impl Client {
     /// # Errors
     /// If the device is gone.
     pub fn request_report(&mut self) -> Result<()> {
+        self.asked = Some(Instant::now());
         self.send(message::STATISTICS_REQUEST, &[])
     }
 
@@ -160,14 +166,25 @@ impl Client {
     /// [`Self::take_events`] gives, and the report if it was asked for.
     ///
     /// # Errors
-    /// If the device is gone.
+    /// If the device is gone, or neither answers nor sends an event for long.
     pub fn poll_report(&mut self) -> Result<Option<Report>> {
         if let Err(gone) = self.exchange() {
             // Events that have arrived before are taken all the same.
             while let Ok(Some(_)) = self.next() {}
             return Err(gone);
         }
-        self.next()?.map(|answer| report(&answer)).transpose()
+        let events = self.events.len();
+        if let Some(answer) = self.next()? {
+            self.asked = None;
+            return report(&answer).map(Some);
+        }
+        if let Some(since) = &mut self.asked {
+            if self.events.len() > events {
+                *since = Instant::now();
+            }
+            answers_within(*since)?;
+        }
+        Ok(None)
     }
 
     /// Asks for the histogram of a pixel. [`Self::poll_histogram`] gives the answer, also when
@@ -237,11 +254,7 @@ impl Client {
             if self.events.len() > events {
                 (since, events) = (Instant::now(), self.events.len());
             }
-            ensure!(
-                since.elapsed() < ANSWER,
-                "the device does not answer for {} seconds",
-                ANSWER.as_secs()
-            );
+            answers_within(since)?;
             self.exchange()?;
         }
     }
@@ -330,6 +343,16 @@ impl Client {
     fn now_ms(&self) -> u32 {
         self.started.elapsed().as_millis() as u32
     }
+}
+
+/// Fails once a device has kept the host waiting for too long.
+fn answers_within(since: Instant) -> Result<()> {
+    ensure!(
+        since.elapsed() < ANSWER,
+        "the device does not answer for {} seconds",
+        ANSWER.as_secs()
+    );
+    Ok(())
 }
 
 /// A message that must be a report.

@@ -75,17 +75,21 @@ fn patient(result: io::Result<usize>) -> io::Result<usize> {
 fn gone(error: io::Error) -> io::Error {
     match error.kind() {
         ErrorKind::BrokenPipe => io::Error::new(ErrorKind::NotConnected, "the port is gone"),
+        // As a write says that has waited for room.
+        ErrorKind::WouldBlock => ErrorKind::TimedOut.into(),
         _ => error,
     }
 }
 
-/// The same connection, which sends at once and does not wait long for a byte.
+/// The same connection, which sends at once, does not wait long for a byte, and not for ever for
+/// room.
 ///
 /// # Errors
 /// If it is gone.
 pub fn prompt(stream: TcpStream) -> io::Result<TcpStream> {
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(STUCK))?;
     Ok(stream)
 }
 

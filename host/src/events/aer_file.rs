@@ -244,6 +244,14 @@ impl<W: Write> Writer<W> {
         self.put(&word.to_le_bytes())
     }
 
+    /// What was written goes as far as it can.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+
     /// Ends the file and gives the writer back.
     ///
     /// # Errors

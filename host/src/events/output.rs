@@ -10,7 +10,7 @@ use std::fs;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Error, Result, ensure};
 use dtof_core::{DepthEvent, EchoNumber, PixelAddress, RangeScale};
 use tempfile::NamedTempFile;
 
@@ -89,8 +89,9 @@ impl Output {
         may_hold_results(folder, &inputs)?;
         remove_leftovers(folder, &inputs);
         let geometry = source.geometry();
+        let name = || folder.display().to_string();
         let mut csv = BufWriter::new(aside(folder, OF_A_RUN)?);
-        writeln!(csv, "{}", events_csv::HEADER)?;
+        writeln!(csv, "{}", events_csv::HEADER).with_context(name)?;
         let header = aer_file::Header {
             bins: u32::try_from(settings.bins)?,
             geometry,
@@ -98,7 +99,8 @@ impl Output {
             offset_mm: settings.offset_mm,
             laser_millihertz: source.laser_hz().map_or(0, |hz| hz.saturating_mul(1000)),
         };
-        let aer = aer_file::Writer::new(BufWriter::new(aside(folder, OF_A_RUN)?), &header)?;
+        let aer = BufWriter::new(aside(folder, OF_A_RUN)?);
+        let aer = aer_file::Writer::new(aer, &header).with_context(name)?;
         Ok(Self {
             folder: folder.to_owned(),
             inputs,
@@ -285,30 +287,30 @@ impl Output {
         };
         let report = report::html(title, lead, &all, &figures, &cloud);
 
-        let aside = |text: &str| -> Result<NamedTempFile> {
-            let mut file = aside(&self.folder, OF_A_RUN)?;
-            file.write_all(text.as_bytes())
-                .with_context(|| self.folder.display().to_string())?;
-            Ok(file)
+        let name = |file: &str| self.folder.join(file).display().to_string();
+        let written = |text: &str, file: &'static str| -> Result<_> {
+            let mut aside = BufWriter::new(aside(&self.folder, OF_A_RUN)?);
+            let text = aside.write_all(text.as_bytes()).map_err(Error::from);
+            let whole = text.and_then(|()| flushed(aside));
+            Ok((whole.with_context(|| name(file))?, file))
         };
         // Everything is written before anything is moved to its place.
-        let mut files = vec![(flushed(self.aer.finish()?)?, AER)];
+        let aer = self.aer.finish().map_err(Error::from).and_then(flushed);
+        let mut files = vec![(aer.with_context(|| name(AER))?, AER)];
         // Without a summary the folder does not look complete; a table that is not written
         // is not that of another run.
         let mut gone = vec![SUMMARY];
         match self.csv {
-            Some(csv) => files.push((flushed(csv)?, CSV)),
+            Some(csv) => files.push((flushed(csv).with_context(|| name(CSV))?, CSV)),
             None => gone.push(CSV),
         }
         for picture in &pictures {
-            files.push((aside(&picture.svg)?, picture.name));
+            files.push(written(&picture.svg, picture.name)?);
         }
-        files.push((aside(&report)?, REPORT));
-        files.push((aside(&self.settings.to_toml()?)?, SETTINGS));
-        files.push((
-            aside(&(serde_json::to_string_pretty(summary)? + "\n"))?,
-            SUMMARY,
-        ));
+        files.push(written(&report, REPORT)?);
+        files.push(written(&self.settings.to_toml()?, SETTINGS)?);
+        let summary = serde_json::to_string_pretty(summary)? + "\n";
+        files.push(written(&summary, SUMMARY)?);
 
         // Something may have come there since.
         may_hold_results(&self.folder, &self.inputs)?;

@@ -4,6 +4,8 @@
 mod common;
 
 mod bad_wire;
+#[cfg(target_os = "linux")]
+mod cable;
 mod calibrate;
 mod calibrate_refused;
 mod desk;
@@ -14,6 +16,8 @@ mod monitor;
 mod recording;
 #[path = "../../../firmware/tests/common/wire.rs"]
 mod wire;
+#[cfg(target_os = "linux")]
+mod saved;
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};

@@ -16,6 +16,13 @@
 //! a result of 0 is a stop that did not come: description of CONFIG1. SPI: mode
 //! 0, at most 20 MHz.
 //!
+//! # Its clock
+//!
+//! All times are fractions of the reference clock. Nothing else knows how fast that is: a clock
+//! that is 2 % faster than [`Settings::clock_khz`] makes every time, and every range, 2 % too
+//! long, and a slower one too short. The calibration takes out the chip's own oscillator, not the
+//! clock. A crystal oscillator of 50 ppm is 0.05 mm a metre; an RC oscillator is not good enough.
+//!
 //! # Wiring
 //!
 //! CSB belongs to the `SpiDevice`. ENABLE is an output and must be low before

@@ -10,7 +10,8 @@
 //! ```
 //!
 //! Here each is one fraction, rounded once: the result is the formula's value
-//! to the nearest picosecond, half a picosecond up.
+//! to the nearest picosecond, half a picosecond up. A clock that is off by some percent is not
+//! seen: times are off by as much.
 //!
 //! The data sheet's example of mode 1:
 //!

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use tempfile::NamedTempFile;
 
 use crate::events::aer_file::{Event, Header, Writer};
@@ -12,11 +12,15 @@ use crate::files::{aside, flushed, place_of};
 
 /// A file on its way: written aside, and at its place once [`Recording::finish`] has
 /// returned. What cannot be moved there stays aside: events do not come twice.
+///
+/// Events that were written are in the file aside, whatever becomes of this program.
 pub struct Recording {
     aer: Writer<BufWriter<NamedTempFile>>,
     path: PathBuf,
     aside: PathBuf,
     is_empty: bool,
+    /// The disk did not take an event: the file aside is not whole, and never will be.
+    is_broken: bool,
 }
 
 impl Recording {
@@ -29,11 +33,21 @@ impl Recording {
         let name = || path.display().to_string();
         let mut file = aside(&place.folder, ".dtof-recording-").with_context(name)?;
         file.disable_cleanup(true);
+        let aside = file.path().to_owned();
+        let begun = Writer::new(BufWriter::new(file), header).and_then(|mut aer| {
+            aer.flush()?;
+            Ok(aer)
+        });
+        if begun.is_err() {
+            // Nothing is in it. That it cannot be removed is the lesser failure.
+            let _ = fs::remove_file(&aside);
+        }
         Ok(Self {
-            aside: file.path().to_owned(),
-            aer: Writer::new(BufWriter::new(file), header).with_context(name)?,
+            aer: begun.with_context(name)?,
             path: place.file,
+            aside,
             is_empty: true,
+            is_broken: false,
         })
     }
 
@@ -42,12 +56,15 @@ impl Recording {
     /// # Errors
     /// If the disk does not take them.
     pub fn write(&mut self, events: &[Event]) -> Result<()> {
-        for event in events {
-            let written = self.aer.write(event);
-            written.with_context(|| self.path.display().to_string())?;
-            self.is_empty = false;
+        if events.is_empty() {
+            return Ok(());
         }
-        Ok(())
+        self.is_empty = false;
+        let mut all = events.iter();
+        let written = all.try_for_each(|event| self.aer.write(event));
+        let written = written.and_then(|()| self.aer.flush());
+        self.is_broken |= written.is_err();
+        written.with_context(|| self.path.display().to_string())
     }
 
     /// Ends the file after a failure: what came before is kept, and if nothing came, so is
@@ -66,12 +83,17 @@ impl Recording {
     /// Ends the file and moves it to its place.
     ///
     /// # Errors
-    /// If the disk does not take it; says where the events are then.
+    /// If the disk does not take it, or has not taken an event; says where the events are then.
     pub fn finish(self) -> Result<()> {
         let Self {
-            aer, path, aside, ..
+            aer,
+            path,
+            aside,
+            is_broken,
+            ..
         } = self;
         let moved = || -> Result<()> {
+            ensure!(!is_broken, "an event is missing");
             let file = flushed(aer.finish()?)?;
             file.persist(&path).map_err(|error| error.error)?;
             Ok(())
