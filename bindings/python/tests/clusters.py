@@ -40,9 +40,9 @@ class Cluster:
         scheduler, *workers = [line.removesuffix("&").split() for line in commands.splitlines()]
         self._worker = workers[0]
         assert len(workers) == 2
-        self._processes = [self._start([*scheduler, "--port", "0", "--no-dashboard"])]
+        self.processes = [self._start([*scheduler, "--port", "0", "--no-dashboard"])]
         for worker in workers:
-            self._processes.append(self._start([*worker, "--no-dashboard"]))
+            self.processes.append(self._start([*worker, "--no-dashboard"]))
         while not (folder / "scheduler.json").exists():
             time.sleep(0.05)
         dask.config.set({"distributed.comm.timeouts.connect": "2s"})
@@ -72,7 +72,7 @@ class Cluster:
 
     def close(self):
         self.client.close()
-        for process in self._processes:
+        for process in self.processes:
             # With what it has started.
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()

@@ -138,6 +138,21 @@ def test_workers_without_dtof_or_of_another_version(client, tmp_path):
     refused(client.submit(begin, "0.0.9", pure=False).result, "has dtof", "not 0.0.9")
 
 
+def test_a_cluster_listens_on_this_computer_alone(running, client):
+    import psutil
+
+    addresses = []
+    for started in running.processes:
+        process = psutil.Process(started.pid)
+        for one in [process, *process.children(recursive=True)]:
+            sockets = one.net_connections(kind="inet")
+            addresses += [known.laddr.ip for known in sockets if known.status == psutil.CONN_LISTEN]
+    # A scheduler, and two workers with a nanny each.
+    assert len(addresses) >= 5
+    assert set(addresses) == {"127.0.0.1"}
+    print(f"doors: {len(addresses)} sockets of a Dask cluster listen, all on 127.0.0.1")
+
+
 # The pages.
 
 

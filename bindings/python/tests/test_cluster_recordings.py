@@ -257,7 +257,7 @@ def test_what_is_no_list_of_recordings(client, tmp_path):
     refused(lambda: recordings(client, [file, tmp_path / "in" / "link.npy"]), "is given twice")
     refused(lambda: recordings(client, [file, other], out=tmp_path), str(other), str(file), "give names")
     refused(lambda: recordings(client, [file, other], out=tmp_path, names=["a"]), "1 for 2")
-    for name in ("..", "", "/a", "a/../b", "a//b", "a\0"):
+    for name in ("..", "", "/a", "a/../b", "a//b", "a\0", "..\\b", "a\\..\\..\\b"):
         refused(lambda: recordings(client, [file], out=tmp_path, names=[name]), "names")
     refused(lambda: recordings(client, [file], names=["a"]), "say out")
     refused(lambda: recordings(client, [file], out=tmp_path / "none"), "none", "no such folder")

@@ -4,6 +4,8 @@
 //! to the deepest module on it. A module and what lies in its own folder are one room:
 //! what a child takes from its parent is no import. Tests are left out.
 
+mod doors;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;

@@ -3,6 +3,8 @@
 
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -31,12 +33,13 @@ fn connect(name: &str) -> TcpStream {
     stream
 }
 
-/// Copies what comes until one end is gone.
-fn copy(mut from: TcpStream, mut to: TcpStream) -> io::Result<()> {
+/// Copies what comes until one end is gone. What comes while the cable `is_cut` is lost.
+fn copy(mut from: TcpStream, mut to: TcpStream, is_cut: &AtomicBool) -> io::Result<()> {
     let mut bytes = [0; 1024];
     loop {
         match from.read(&mut bytes)? {
             0 => return Ok(()),
+            _ if is_cut.load(Ordering::Relaxed) => {}
             length => to.write_all(&bytes[..length])?,
         }
     }
@@ -48,9 +51,11 @@ fn cable(fault: Fault, cut: usize) -> String {
     listen(move |host| {
         host.set_nodelay(true).unwrap();
         let mut device = connect(&first);
+        let is_cut = Arc::new(AtomicBool::new(false));
         let down = thread::spawn({
             let (host, device) = (host.try_clone().unwrap(), device.try_clone().unwrap());
-            move || copy(host, device)
+            let is_cut = Arc::clone(&is_cut);
+            move || copy(host, device, &is_cut)
         });
         let mut left = cut;
         let mut byte = [0];
@@ -79,13 +84,14 @@ fn cable(fault: Fault, cut: usize) -> String {
             Fault::Restarts => {
                 let second = connect(&crate::monitor::device(true, LONG));
                 let _ = device.shutdown(Shutdown::Both);
-                let host_down = (host.try_clone().unwrap(), second.try_clone().unwrap());
-                thread::spawn(move || copy(host_down.0, host_down.1));
-                let _ = copy(second, host.try_clone().unwrap());
+                let _ = down.join();
+                let below = (host.try_clone().unwrap(), second.try_clone().unwrap());
+                thread::spawn(move || copy(below.0, below.1, &AtomicBool::new(false)));
+                let _ = copy(second, host.try_clone().unwrap(), &is_cut);
             }
             Fault::IsDeaf => {
-                // The host's bytes go to nobody, the device's to the host.
-                let _ = copy(device, host.try_clone().unwrap());
+                is_cut.store(true, Ordering::Relaxed);
+                let _ = copy(device, host.try_clone().unwrap(), &AtomicBool::new(false));
             }
         }
         false

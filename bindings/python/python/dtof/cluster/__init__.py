@@ -6,7 +6,7 @@ them are lost on the way.
 
 >>> from distributed import Client
 >>> from dtof import cluster
->>> with Client(n_workers=2, threads_per_worker=1) as client:  # doctest: +SKIP
+>>> with Client(n_workers=2, dashboard_address=None) as client:  # doctest: +SKIP
 ...     many = cluster.recordings(client, files, out="results", bin_width_ps=250)
 ...     print(many.totals["events"], many.failed)
 

@@ -143,7 +143,8 @@ def _names(files: list[str], names: Optional[Iterable[str]]) -> list[str]:
         raise _native.Error(f"names: {len(given)} for {len(files)} files")
     seen: dict[str, str] = {}
     for file, name in zip(files, given):
-        parts = name.split("/")
+        # What separates names on one system does so for all.
+        parts = name.replace("\\", "/").split("/")
         if os.path.isabs(name) or not all(parts) or {".", ".."} & set(parts) or "\0" in name:
             raise _native.Error(f"names: {name!r} is no name of a folder in out")
         # Some file systems do not tell them apart.
