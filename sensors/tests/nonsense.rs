@@ -293,12 +293,12 @@ fn all(name: &str, survives: impl Fn(u64, u32, bool) -> u32) {
         &(any::<u64>(), 1u32..=200, any::<bool>()),
         |(seed, one_in, parity)| {
             let more = survives(seed, one_in, parity);
-            prop_assert!(more > 0);
             errors.set(errors.get() + u64::from(more));
             Ok(())
         },
     );
     tried.unwrap();
+    assert!(errors.get() > u64::from(cases), "hardly any nonsense");
     println!(
         "faults: {name} with nonsense, {cases} times 3 s: {} errors counted, 0 panics, nothing given that \
          is marked as wrong, right again each time",

@@ -51,7 +51,10 @@ fn a_clock_2_percent_off_shows_as_ranges_2_percent_off() {
             let (time1, next) = (clock_ps - start, (stop.ceil() - stop) * clock_ps);
             let clocks = stop.ceil() as u32 - 1;
             let mode_2 = calibration.mode_2(counts(time1), counts(next), clocks) as f64;
-            assert!((mode_2 - exact).abs() <= 2.0 * bound, "{mode_2} for {exact} ps");
+            assert!(
+                (mode_2 - exact).abs() <= 2.0 * bound,
+                "{mode_2} for {exact} ps"
+            );
         }
     }
 }

@@ -14,10 +14,10 @@ mod map;
 mod masked;
 mod monitor;
 mod recording;
-#[path = "../../../firmware/tests/common/wire.rs"]
-mod wire;
 #[cfg(target_os = "linux")]
 mod saved;
+#[path = "../../../firmware/tests/common/wire.rs"]
+mod wire;
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
