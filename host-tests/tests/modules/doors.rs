@@ -99,7 +99,8 @@ fn files(folder: &Path, ends: &[&str], found: &mut Vec<(String, String)>) {
         }
         // Scripts of `.ci` have no ending.
         let is_script = path.parent().is_some_and(|folder| folder.ends_with(".ci"));
-        if is_script || ends.iter().any(|end| name.ends_with(end)) {
+        let end = path.extension().and_then(|end| end.to_str());
+        if is_script || end.is_some_and(|end| ends.contains(&end)) {
             let short = path.strip_prefix(root()).unwrap().to_str().unwrap();
             let text = fs::read_to_string(&path).unwrap_or_default();
             found.push((short.to_owned(), text));
@@ -147,7 +148,7 @@ fn what_listens_does_so_for_this_computer_alone() {
     let mut all = Vec::new();
     files(
         &root(),
-        &[".rs", ".py", ".c", ".cpp", ".sh", ".md", ".ipynb"],
+        &["rs", "py", "c", "cpp", "sh", "md", "ipynb"],
         &mut all,
     );
     all.retain(|(name, _)| !is_this(name));
@@ -183,7 +184,7 @@ fn a_door_that_is_open_is_found() {
 fn results_are_written_in_a_few_places_only() {
     let mut all = Vec::new();
     for folder in ["host/src", "bindings/python/src", "bindings/python/python"] {
-        files(&root().join(folder), &[".rs", ".py"], &mut all);
+        files(&root().join(folder), &["rs", "py"], &mut all);
     }
     let writes = |text: &str| WRITES.iter().any(|writes| text.contains(writes));
     let code = |text: &str| {
