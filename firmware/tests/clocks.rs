@@ -60,7 +60,7 @@ fn session(percent: u32, one_in: u32, seed: u64) -> u32 {
         }
         let arrived: Vec<u8> = down.drain(..down.len().min(100)).collect();
         deliver(&mut frames, &arrived, |frame| {
-            device.receive(frame, device_ms)
+            device.receive(frame, device_ms);
         });
         device.work(0);
         while let length @ 1.. = device.transmit(device_ms, &mut wire) {
@@ -111,6 +111,11 @@ fn a_link_between_clocks_2_percent_apart_changes_no_event() {
 /// `bit` of its own ones long, from `phase` of a sample on. As that of STM32: the start bit is
 /// found in its samples, each bit is what two of the samples 8, 9 and 10 are. `None` for a stop
 /// bit that is none.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "no line is that long"
+)]
 fn received(bytes: &[u8], bit: f64, phase: f64) -> Vec<Option<u8>> {
     let line: Vec<bool> = bytes
         .iter()

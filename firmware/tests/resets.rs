@@ -18,21 +18,21 @@ const PIXELS: usize = 8;
 const SOON_MS: u32 = 100;
 
 /// A host that sends photons.
-struct Session {
+struct Session<'a> {
     host: Host,
     down: Deframer,
-    photons: std::vec::IntoIter<Vec<u8>>,
+    photons: std::slice::Iter<'a, Vec<u8>>,
     now_ms: u32,
     /// Bytes that the host has heard.
     heard: usize,
 }
 
-impl Session {
+impl Session<'_> {
     fn new(number: u16) -> Self {
         Self {
             host: Host::new(number, 0),
             down: Deframer::new(),
-            photons: Vec::new().into_iter(),
+            photons: [].iter(),
             now_ms: 0,
             heard: 0,
         }
@@ -46,7 +46,7 @@ impl Session {
             let Some(body) = self.photons.next() else {
                 break;
             };
-            self.host.ask(message::PHOTONS, &body);
+            self.host.ask(message::PHOTONS, body);
         }
         while let length @ 1.. = self.host.endpoint.transmit(self.now_ms, &mut wire) {
             deliver(&mut self.down, &wire[..length], |frame| {
@@ -73,7 +73,7 @@ fn script() -> (Vec<Vec<u8>>, Vec<DepthEvent>) {
 }
 
 /// Opens a session and configures the device.
-fn begin(number: u16, device: &mut Sidecar, photons: &[Vec<u8>]) -> Session {
+fn begin<'a>(number: u16, device: &mut Sidecar, photons: &'a [Vec<u8>]) -> Session<'a> {
     let mut session = Session::new(number);
     let wanted = Configuration {
         source: Source::Link,
@@ -86,7 +86,7 @@ fn begin(number: u16, device: &mut Sidecar, photons: &[Vec<u8>]) -> Session {
     while session.host.answers.is_empty() {
         session.turn(device, usize::MAX);
     }
-    session.photons = photons.to_vec().into_iter();
+    session.photons = photons.iter();
     session.heard = 0;
     session
 }

@@ -30,6 +30,11 @@ fn what_cannot_be_a_calibration_is_none() {
 
 /// The clock is all there is to measure with: nothing else knows that it is off, and all ranges are
 /// off by as much.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "counts of the chip"
+)]
 #[test]
 fn a_clock_2_percent_off_shows_as_ranges_2_percent_off() {
     const LSB_PS: f64 = 55.0;

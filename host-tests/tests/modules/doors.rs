@@ -98,7 +98,7 @@ fn files(folder: &Path, ends: &[&str], found: &mut Vec<(String, String)>) {
             continue;
         }
         // Scripts of `.ci` have no ending.
-        let is_script = path.parent().is_some_and(|folder| folder.ends_with(".ci"));
+        let is_script = folder.file_name().is_some_and(|folder| folder == ".ci");
         let end = path.extension().and_then(|end| end.to_str());
         if is_script || end.is_some_and(|end| ends.contains(&end)) {
             let short = path.strip_prefix(root()).unwrap().to_str().unwrap();
