@@ -66,9 +66,14 @@ impl<Chip: Default> Bus<Chip> {
                 (1, Some(bytes)) => bytes.fill(0),
                 (2, Some(bytes)) => bytes.fill(0xff),
                 (3, Some(bytes)) => rng.fill_bytes(bytes),
-                (_, Some(bytes)) => {
+                (4, Some(bytes)) => {
                     let at = rng.next_u32() as usize % bytes.len();
                     bytes[at] = rng.next_u32().to_le_bytes()[0];
+                }
+                // Another header that may be one.
+                (_, Some(bytes)) => {
+                    let at = rng.next_u32() as usize % bytes.len().min(7);
+                    bytes[at] = rng.next_u32().to_le_bytes()[0] % 32;
                 }
                 _ => {}
             }

@@ -1,5 +1,7 @@
 //! The program killed at any moment.
 
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
 use std::process::{Child, Stdio};
 use std::thread;
 use std::time::Instant;
@@ -83,9 +85,12 @@ fn a_run_killed_while_files_move_to_their_places_has_no_summary() {
     let (mut between, all) = (0, times(5, 30));
     for _ in 0..all {
         work.earlier(out);
-        let summary = work.scratch.path("simulated/summary.json");
+        // The first that is moved, and so the first that is another file.
+        let events = work.scratch.path("simulated/events.aer");
+        let ino = |events: &Path| std::fs::metadata(events).map_or(0, |file| file.ino());
+        let earlier_ino = ino(&events);
         let mut child = begin(&work, out);
-        while summary.exists() && child.try_wait().unwrap().is_none() {
+        while ino(&events) == earlier_ino && child.try_wait().unwrap().is_none() {
             std::hint::spin_loop();
         }
         child.kill().unwrap();
