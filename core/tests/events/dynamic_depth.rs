@@ -4,7 +4,7 @@
 
 use dtof_core::fixed::types::{I24F8, U16F16, U24F8};
 use dtof_core::{
-    BinIndex, BlockLevel, Count, DepthEvent, DynamicDepthConfig, DynamicDepthEvent,
+    BinIndex, BinPosition, BlockLevel, Count, DepthEvent, DynamicDepthConfig, DynamicDepthEvent,
     DynamicDepthPixel, EchoNumber, Flags, LaserCycle, PixelAddress, Polarity, RangeScale,
     Reference, SubBinOffset, ZeroThresholdError,
 };
@@ -142,6 +142,32 @@ fn the_threshold_is_strict_and_rounded_to_the_nearest_step() {
     let never = config(16_777_215.0, Reference::Reported);
     let changes = observe::<1>(&never, &[-512, 262_399]);
     assert!(changes.iter().all(Option::is_none));
+}
+
+#[test]
+fn a_change_is_not_zero_and_no_more_than_two_positions_can_be_apart() {
+    let position = BinPosition::MIN;
+    let new = |change| {
+        let (pixel, level) = (PixelAddress(1), BlockLevel::PIXEL);
+        DynamicDepthEvent::new(pixel, level, LaserCycle(2), position, change, Flags::NONE)
+    };
+    let most = 1023 * 256 + 511 + 512;
+    for change in [1, 2, most - 1, most] {
+        let (nearer, farther) = (new(-change).unwrap(), new(change).unwrap());
+        assert_eq!((nearer.change(), farther.change()), (-change, change));
+        let polarities = (nearer.polarity(), farther.polarity());
+        assert_eq!(polarities, (Polarity::Nearer, Polarity::Farther));
+    }
+    for change in [0, most + 1, -most - 1, i32::MAX, i32::MIN] {
+        assert_eq!(new(change), None);
+    }
+}
+
+#[test]
+fn a_threshold_of_nothing_says_so() {
+    let error = DynamicDepthConfig::new(U24F8::ZERO, &scale(), Reference::Previous).unwrap_err();
+    let text = "the threshold of dynamic depth is less than 1/512 bin";
+    assert_eq!((error.text(), error.to_string()), (text, text.to_owned()));
 }
 
 #[test]

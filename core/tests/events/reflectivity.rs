@@ -117,4 +117,7 @@ fn at_the_limit_the_ratio_stays() {
         pixel.add(&event(0xff_ffff, 0, 1));
     }
     assert_eq!(pixel.signal(), 0xff_ffff);
+    // 2^48 - 1 photons: not one more.
+    pixel.add(&event(1, 0, 1));
+    assert_eq!(pixel.signal(), 0xff_ffff);
 }

@@ -2,8 +2,8 @@
 
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::{
-    ConfigError, Count, CounterWidth, DepthEstimator, DetectionRule, Histogram, Look, PaperRule,
-    Peak, PixelConfig, RangeGate, checked,
+    ConfigError, Count, CounterWidth, DepthEstimator, DetectionRule, EchoNumber, Histogram, Look,
+    PaperRule, Peak, PixelConfig, RangeGate, checked,
 };
 
 use crate::model::Lone;
@@ -71,8 +71,11 @@ fn every_setting_arrives() {
     let gate = RangeGate::new(3, 60).unwrap();
     let estimator = DepthEstimator::for_pulse(U8F8::ONE);
     let config = PixelConfig::<64>::paper().x(7).l1(9).l2(99).gate(gate);
-    let config = config.estimator(estimator).one_hit_tdc(true).build();
-    let config = config.unwrap();
+    let last = EchoNumber::new(3).unwrap();
+    let config = config.estimator(estimator).one_hit_tdc(true);
+    let config = config.echoes(last, 5).echo_wait(6).build().unwrap();
+    assert_eq!((config.echoes(), config.peel_reach()), (last, 5));
+    assert_eq!(config.echo_wait(), 6);
     assert_eq!((config.x(), config.l1(), config.l2()), (7, 9, 99));
     assert_eq!((config.gate(), config.estimator()), (&gate, &estimator));
     assert!(config.is_one_hit());

@@ -1,0 +1,85 @@
+//! Quantities, flags and statistics: their limits, their text, and how they add up.
+
+use dtof_core::{
+    BinIndex, BinPosition, BlockLevel, EchoNumber, Flags, LaserCycle, Look, PixelAddress,
+    PixelConfig, Statistics, SubBinOffset, checked,
+};
+
+#[test]
+fn flags_have_six_bits_and_read_as_their_number() {
+    for bits in 0..=u8::MAX {
+        let flags = Flags::from_bits(bits);
+        assert_eq!(flags.map(Flags::bits), (bits < 64).then_some(bits));
+        if let Some(flags) = flags {
+            assert_eq!(flags.to_string(), bits.to_string());
+        }
+    }
+}
+
+#[test]
+fn echoes_and_levels_have_four_values_each() {
+    for raw in 0..=u8::MAX {
+        let echo = EchoNumber::new(raw);
+        assert_eq!(
+            echo.map(EchoNumber::raw),
+            (1..=4).contains(&raw).then_some(raw)
+        );
+        if let Some(echo) = echo {
+            assert_eq!(echo.to_string(), raw.to_string());
+        }
+        let pixels = BlockLevel::new(raw).map(BlockLevel::pixels);
+        assert_eq!(pixels, [1, 4, 16, 64].get(usize::from(raw)).copied());
+    }
+}
+
+#[test]
+fn every_position_is_its_bin_and_its_offset() {
+    for bin in 0..1024 {
+        let bin = BinIndex::new(bin).unwrap();
+        for offset in (-512..=511).filter_map(SubBinOffset::new) {
+            let position = BinPosition::of(bin, offset);
+            let expected = 256 * i32::from(bin.raw()) + i32::from(offset.raw());
+            assert_eq!(position.raw(), expected);
+        }
+    }
+}
+
+#[test]
+fn statistics_add_up_field_by_field() {
+    let of = |first: u64, step: u64| {
+        let number = |field: u64| first + step * field;
+        Statistics {
+            counted: number(0),
+            held: number(1),
+            saturated: number(2),
+            rejected: number(3),
+            gated_out: number(4),
+            events: number(5),
+            deferred: number(6),
+            expired: number(7),
+            expired_deferred: number(8),
+        }
+    };
+    let mut sum = of(3, 10);
+    sum += of(7, 1000);
+    assert_eq!(sum, of(10, 1010));
+    assert_eq!(sum.photons(), 5 * 10 + (1 + 2 + 3 + 4) * 1010);
+}
+
+#[test]
+fn a_pixel_has_reported_while_its_event_waits_or_its_exposure_goes_on() {
+    const ONE: PixelConfig<64> = checked!(PixelConfig::paper().build());
+    let two = PixelConfig::<64>::paper().echoes(EchoNumber::LAST, 4);
+    for (config, goes_on) in [(ONE, false), (two.build().unwrap(), true)] {
+        let mut pixel = dtof_core::AsyncPixel::<64>::new(PixelAddress(0));
+        let mut statistics = Statistics::default();
+        assert!(!pixel.has_reported());
+        (0..50).for_each(|_| pixel.count(&config, 20));
+        assert!(!pixel.has_reported());
+        let look = pixel.end_laser_cycles(&config, &mut statistics, LaserCycle(43), 44);
+        assert_eq!(look, Look::Event);
+        assert!(pixel.has_reported(), "its event waits");
+        assert!(pixel.acknowledge().is_some());
+        assert_eq!(pixel.has_reported(), goes_on);
+    }
+}
