@@ -9,6 +9,11 @@
 //!   → Output         events.csv, events.aer, summary.json, pictures, report
 //! ```
 
+#![deny(
+    clippy::print_stderr,
+    reason = "a closed standard error is no reason to stop"
+)]
+
 pub mod calibrate;
 pub mod cli;
 pub mod compare;

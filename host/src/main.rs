@@ -1,5 +1,10 @@
 //! The command line.
 
+#![deny(
+    clippy::print_stderr,
+    reason = "a closed standard error is no reason to stop"
+)]
+
 mod command;
 
 use std::process::ExitCode;

@@ -11,8 +11,9 @@
 //! # Safety
 //!
 //! A function that takes pointers is safe to call if each points to memory of its type, as long
-//! as said, that nobody else writes meanwhile. No two of them overlap unless both are `const`. Null, misalignment and memory that was never
-//! initialised are answered by an error where they can be seen.
+//! as said, that nobody else writes meanwhile. No two of them overlap unless both are `const`.
+//! Null, misalignment and memory that was never initialised are answered by an error where they
+//! can be seen.
 //!
 //! | module | what it has |
 //! |---|---|

@@ -9,7 +9,7 @@ compile_error!("an image for a board: cargo xtask image mps2-an386");
 use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, entry, exception};
-use dtof_firmware::board::{Board, mps2_an386::Mps2An386, turn};
+use dtof_firmware::board::{mps2_an386::Mps2An386, turn};
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_sensors::Sensor;
 use dtof_sensors::simulated;
@@ -37,10 +37,6 @@ fn main() -> ! {
             let lost = serial.lost();
             let Ok(()) = sidecar.poll_with(&mut sensor, serial, lost, now_ms);
             sidecar.simulate(&mut sensor, &mut left);
-            if left > 0 {
-                // There is more to do: its interrupt ends the sleep before it begins.
-                Mps2An386::start_sending();
-            }
         });
     }
 }

@@ -4,7 +4,7 @@ use dtof_core::{AnyRule, Count24, DepthEvent, Histogram, LaserCycle, PixelAddres
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
 use super::events::has_room_for_events;
-use super::{BINS, LOOKS, Sidecar};
+use super::{BINS, Sidecar};
 use dtof_link::Source;
 use dtof_link::message;
 use dtof_sensors::simulated::Simulated;
@@ -13,6 +13,10 @@ use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault};
 /// Polls of the sensor one after the other. A sensor that always has more must
 /// not keep the link waiting.
 const POLLS: usize = 4;
+
+/// Laser cycles between two polls of the link, which come a millisecond apart at the latest, of a
+/// simulated sensor that goes by no clock.
+const UNPACED: u16 = 4096;
 
 impl Sidecar<'_> {
     /// [`Self::poll`], and `sensor` while a configuration takes photons from it.
@@ -71,7 +75,7 @@ impl Sidecar<'_> {
     /// `left` laser cycles are left, which it counts down. So no decision is put off.
     /// [`Self::poll`] goes between the calls.
     pub fn simulate(&mut self, sensor: &mut Simulated<'_>, left: &mut u64) {
-        for _ in 0..LOOKS {
+        for _ in 0..UNPACED {
             if *left == 0 || !self.takes_sensor() || self.waiting() {
                 return;
             }

@@ -24,16 +24,13 @@ const LISTENS: [&str; 15] = [
 ];
 
 /// The same words, and nothing that listens.
-const HARMLESS: [&str; 8] = [
+const HARMLESS: [&str; 5] = [
     // The function of the tests that does.
     "listen(move |",
     "listen(|",
     "use crate::{",
     "interrupt::listen(",
     "pub fn listen(at_once",
-    "rx.listen()",
-    "tx.listen()",
-    "tx.unlisten()",
 ];
 
 /// What says that it is for this computer alone.
@@ -152,7 +149,8 @@ fn what_listens_does_so_for_this_computer_alone() {
         &["rs", "py", "c", "cpp", "sh", "md", "ipynb"],
         &mut all,
     );
-    all.retain(|(name, _)| !is_this(name));
+    // Firmware has no network; its ports listen for interrupts.
+    all.retain(|(name, _)| !is_this(name) && !name.starts_with("firmware/src/"));
     let (mut doors, mut open) = (0, Vec::new());
     for (name, text) in &all {
         let (more, lines) = open_doors(text);

@@ -22,8 +22,13 @@ use dtof::rows::{Row, aligned, printable};
 fn warn(file: &Path, warnings: impl IntoIterator<Item = String>, quiet: bool) {
     for warning in warnings.into_iter().filter(|_| !quiet) {
         let warning = format!("warning: {}: {warning}", file.display());
-        eprintln!("{}", printable(&warning));
+        complain(&printable(&warning));
     }
+}
+
+/// A line on standard error. If that cannot be written, nobody reads it.
+fn complain(line: &str) {
+    let _ = writeln!(io::stderr(), "{line}");
 }
 
 /// Prints the summary of a run.

@@ -92,7 +92,7 @@ impl Monitor {
             Client::new(device::open(&self.device, self.image.as_deref())?).with_context(name)?;
         interrupt::listen(|| {
             if io::stderr().is_terminal() {
-                eprint!("{SHOW_CURSOR}");
+                let _ = write!(io::stderr(), "{SHOW_CURSOR}");
             }
         })?;
         // A device without a sensor says so when it is configured.

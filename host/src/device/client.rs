@@ -17,6 +17,18 @@ use crate::events::aer_file::Event;
 const SILENCE: Duration = Duration::from_secs(5);
 /// So is one that speaks, and does not answer for so long, nor sends an event.
 const ANSWER: Duration = Duration::from_secs(30);
+/// So is one that sends events, and does not answer for so long. A message of photons may make
+/// events for a minute on a slow line.
+const EVENTS_ALONE: Duration = Duration::from_secs(600);
+
+/// Waiting for an answer.
+#[derive(Clone, Copy)]
+struct Wait {
+    began: Instant,
+    /// The beginning, or the last event.
+    heard: Instant,
+    arrived: u64,
+}
 
 /// A session with a device.
 pub struct Client {
@@ -26,6 +38,8 @@ pub struct Client {
     decoder: AerDecoder,
     started: Instant,
     events: Vec<Event>,
+    /// Events so far.
+    arrived: u64,
     histograms: Assembly,
     /// Messages are taken no more often than this: a slow reader, for tests.
     pub reads_every: Duration,
@@ -34,8 +48,8 @@ pub struct Client {
     pixels: u16,
     /// Pixels of the configuration in force.
     configured: u16,
-    /// Since when [`Self::poll_report`] waits: the question, or the last event after it.
-    asked: Option<Instant>,
+    /// What [`Self::poll_report`] waits for.
+    asked: Option<Wait>,
 }
 
 impl Client {
@@ -57,6 +71,7 @@ impl Client {
             decoder: AerDecoder::new(),
             started: now,
             events: Vec::new(),
+            arrived: 0,
             histograms: Assembly::default(),
             reads_every: Duration::ZERO,
             read: now,
@@ -66,7 +81,10 @@ impl Client {
             asked: None,
         };
         while !client.endpoint.is_open() {
-            client.exchange().context("no device answered")?;
+            let answered = client.exchange();
+            answered
+                .and_then(|()| within(now, ANSWER))
+                .context("no device answered")?;
         }
         let [a, b, c, d, e, f, g, h] = *client.endpoint.peer_greeting();
         let versions = (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]));
@@ -158,7 +176,7 @@ impl Client {
     /// # Errors
     /// If the device is gone.
     pub fn request_report(&mut self) -> Result<()> {
-        self.asked = Some(Instant::now());
+        self.asked = Some(self.wait());
         self.send(message::STATISTICS_REQUEST, &[])
     }
 
@@ -173,16 +191,13 @@ impl Client {
             while let Ok(Some(_)) = self.next() {}
             return Err(gone);
         }
-        let events = self.events.len();
         if let Some(answer) = self.next()? {
             self.asked = None;
             return report(&answer).map(Some);
         }
-        if let Some(since) = &mut self.asked {
-            if self.events.len() > events {
-                *since = Instant::now();
-            }
-            answers_within(*since)?;
+        if let Some(mut wait) = self.asked {
+            self.goes_on(&mut wait)?;
+            self.asked = Some(wait);
         }
         Ok(None)
     }
@@ -223,11 +238,13 @@ impl Client {
     /// # Errors
     /// If the device is gone.
     pub fn send(&mut self, kind: u8, body: &[u8]) -> Result<()> {
+        let mut wait = self.wait();
         while self.endpoint.offer(kind, body).is_err() {
             self.exchange()?;
             if let Some(message) = self.next()? {
                 bail!("the device sends message {:#04x} unasked", message.kind);
             }
+            self.goes_on(&mut wait)?;
         }
         Ok(())
     }
@@ -246,17 +263,32 @@ impl Client {
 
     /// Waits for the next message that is not events.
     fn answer(&mut self) -> Result<Message> {
-        let (mut since, mut events) = (Instant::now(), self.events.len());
+        let mut wait = self.wait();
         loop {
             if let Some(message) = self.next()? {
                 return Ok(message);
             }
-            if self.events.len() > events {
-                (since, events) = (Instant::now(), self.events.len());
-            }
-            answers_within(since)?;
+            self.goes_on(&mut wait)?;
             self.exchange()?;
         }
+    }
+
+    fn wait(&self) -> Wait {
+        let now = Instant::now();
+        Wait {
+            began: now,
+            heard: now,
+            arrived: self.arrived,
+        }
+    }
+
+    /// Fails once a device has kept the host waiting for too long.
+    fn goes_on(&self, wait: &mut Wait) -> Result<()> {
+        if self.arrived > wait.arrived {
+            (wait.heard, wait.arrived) = (Instant::now(), self.arrived);
+        }
+        within(wait.heard, ANSWER)?;
+        within(wait.began, EVENTS_ALONE)
     }
 
     /// Takes messages until one is not events and no histogram.
@@ -294,6 +326,7 @@ impl Client {
                     );
                 }
                 self.events.push(event);
+                self.arrived += 1;
             }
         }
         Ok(None)
@@ -345,12 +378,11 @@ impl Client {
     }
 }
 
-/// Fails once a device has kept the host waiting for too long.
-fn answers_within(since: Instant) -> Result<()> {
+fn within(since: Instant, most: Duration) -> Result<()> {
     ensure!(
-        since.elapsed() < ANSWER,
+        since.elapsed() < most,
         "the device does not answer for {} seconds",
-        ANSWER.as_secs()
+        most.as_secs()
     );
     Ok(())
 }

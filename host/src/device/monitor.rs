@@ -211,7 +211,9 @@ fn watch(
             client.request_report()?;
         }
         let report = loop {
-            if let Some(report) = client.poll_report()? {
+            let report = client.poll_report()?;
+            outputs.write(client.take_events(), task.settings, readers)?;
+            if let Some(report) = report {
                 break report;
             }
         };

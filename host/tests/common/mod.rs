@@ -5,6 +5,7 @@
 pub mod aer;
 pub mod sensed;
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output};
 use std::time::Duration;
@@ -165,6 +166,12 @@ pub fn names(folder: &Path) -> Vec<String> {
         .collect();
     names.sort();
     names
+}
+
+/// Says that `test` has not run for want of `what`, past the harness, which hides what passing tests
+/// print.
+pub fn skipped(test: &str, what: &str) {
+    let _ = writeln!(std::io::stderr(), "SKIPPED: {test}: no {what}");
 }
 
 /// `text` must have `part` in it.

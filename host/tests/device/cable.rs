@@ -175,4 +175,12 @@ fn what_came_before_the_cable_was_pulled_is_recorded_whole() {
 fn a_device_that_hears_nothing_is_given_up() {
     let faults = [(Fault::IsDeaf, "the device does not answer for 30 seconds")];
     pulled_at(&faults, &[1202]);
+    // Photons that nobody takes, too.
+    let scratch = Scratch::new();
+    let scene = "columns = 2\nrows = 2\ncycles = 200_000\nbackground = 0.5\n\
+                 [[surface]]\nrange_mm = 2000\nreflectivity = 0.8\n";
+    let scene = scratch.file("scene.toml", scene);
+    let name = cable(Fault::IsDeaf, 400);
+    let output = scratch.simulate(&scene, &format!("--device {name}"));
+    scratch.refused(&output, &["the device does not answer for 30 seconds"]);
 }

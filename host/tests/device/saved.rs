@@ -10,7 +10,7 @@ use std::time::Duration;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::common::{Scratch, names, says};
+use crate::common::{Scratch, names, says, skipped};
 use crate::monitor::{LONG, device, reference};
 
 const OLDER: &str = "older";
@@ -49,6 +49,11 @@ fn whole(printed: &str) -> &str {
     &printed[..printed.rfind('\n').map_or(0, |end| end + 1)]
 }
 
+/// Rows below the names of the columns.
+fn events(rows: &str) -> usize {
+    whole(rows).lines().count().saturating_sub(1)
+}
+
 /// Kills a recording at a moment that the seed gives; rows that were printed and that are left.
 fn killed(seed: u64) -> [usize; 2] {
     let scratch = Scratch::new();
@@ -71,10 +76,10 @@ fn killed(seed: u64) -> [usize; 2] {
     child.wait().unwrap();
     let rows = left(&scratch);
     assert!(
-        rows.starts_with(whole(&printed)) || rows.is_empty(),
+        rows.starts_with(whole(&printed)) || events(&printed) == 0,
         "seed {seed}: printed, not saved"
     );
-    [whole(&printed), &rows].map(|rows| rows.lines().count().saturating_sub(1))
+    [&printed[..], &rows].map(events)
 }
 
 #[test]
@@ -135,9 +140,9 @@ fn full(bytes: usize) -> usize {
     says(error, &format!("{partial} has what was recorded"));
     let printed = String::from_utf8(output.stdout).unwrap();
     let rows = left(&scratch);
-    assert!(rows.starts_with(whole(&printed)) || rows.is_empty());
+    assert!(rows.starts_with(whole(&printed)) || events(&printed) == 0);
     // All that fits is there: the rest is less than a word, or than what one may need.
-    let saved = rows.lines().count().saturating_sub(1);
+    let saved = events(&rows);
     assert!(
         64 + 16 * saved + 32 + 16 > bytes,
         "{bytes} bytes hold {saved} events"
@@ -148,7 +153,7 @@ fn full(bytes: usize) -> usize {
 #[test]
 fn a_recording_on_a_full_disk_keeps_what_came_and_says_where() {
     if !Path::new("/usr/bin/prlimit").exists() {
-        eprintln!("SKIPPED: a recording on a full disk: no prlimit");
+        skipped("a recording on a full disk", "prlimit");
         return;
     }
     let limits = [0, 1, 63, 64, 65, 79, 80, 95, 96, 97, 200, 500, 1000, 1234];

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use super::common::says;
+use super::common::{npy, says, skipped};
 use super::{Files, Work, files, partial, through, times};
 
 /// Whether the tools of a test are here; says so if not.
@@ -11,7 +11,7 @@ fn is_there(test: &str, tool: &[&str]) -> bool {
     let ran = Command::new(tool[0]).args(&tool[1..]).output();
     let is_there = ran.is_ok_and(|ran| ran.status.success());
     if !is_there {
-        eprintln!("SKIPPED: {test}: no {}", tool.join(" "));
+        skipped(test, &tool.join(" "));
     }
     is_there
 }
@@ -121,9 +121,30 @@ fn a_disk_that_fills_up_changes_nothing_on_it() {
 }
 
 #[test]
+fn warnings_that_nobody_can_take_stop_nothing() {
+    if !Path::new("/dev/full").exists() {
+        skipped("a full standard error", "/dev/full");
+        return;
+    }
+    let work = Work::new();
+    let counts: Vec<u8> = [1, 0].into_iter().cycle().take(2 * 2 * 32 * 2).collect();
+    work.scratch
+        .file("in.npy", npy("<u2", "(2, 2, 32)", &counts));
+    let line = "replay --input in.npy --bins 16 --out warned";
+    let said = work.scratch.run(line);
+    assert!(
+        String::from_utf8(said.stderr)
+            .unwrap()
+            .contains("warning: ")
+    );
+    let output = through("exec \"$@\" 2>/dev/full", &work.scratch, line);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+}
+
+#[test]
 fn a_table_that_nobody_can_take_is_an_error() {
     if !Path::new("/dev/full").exists() {
-        eprintln!("SKIPPED: a full standard output: no /dev/full");
+        skipped("a full standard output", "/dev/full");
         return;
     }
     let work = Work::new();

@@ -99,6 +99,8 @@ fn a_run_killed_while_files_move_to_their_places_has_no_summary() {
         let is_new = check(&found, &earlier, &new);
         between += u32::from(!is_new);
     }
+    // Some of them come in time.
+    assert!(between > 0 || all < 30, "all of {all} came too late");
     println!(
         "faults: killed {all} times once files moved to their places: {between} times there was no \
          summary, else all was there"

@@ -18,6 +18,8 @@ use dtof::progress::Progress;
 use dtof::rows::{Row, grouped};
 use dtof::settings::{Sensor, SettingsFile};
 
+use crate::command::complain;
+
 /// How long photons are collected, unless somebody says.
 const SECONDS: u32 = 10;
 
@@ -129,7 +131,9 @@ impl Desk {
         drop(client);
         if collected.full > 0 && !quiet {
             let full = grouped(collected.full);
-            eprintln!("warning: {name}: {full} exposures with a full counter were left out");
+            complain(&format!(
+                "warning: {name}: {full} exposures with a full counter were left out"
+            ));
         }
         let (length, cycles) = length(&collected, said, recording)?;
         let captures = [collected.histograms];
