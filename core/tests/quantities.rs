@@ -1,8 +1,9 @@
-//! Quantities, flags and statistics: their limits, their text, and how they add up.
+//! Quantities, flags, errors and statistics: their limits, their text, and how they add up.
 
 use dtof_core::{
-    BinIndex, BinPosition, BlockLevel, EchoNumber, Flags, LaserCycle, Look, PixelAddress,
-    PixelConfig, Statistics, SubBinOffset, checked,
+    AsyncPixel, BinIndex, BinPosition, BlockLevel, ConfigError, EchoNumber, Flags, GateError,
+    LaserCycle, Look, PixelAddress, PixelConfig, RangeScaleError, Statistics, SubBinOffset,
+    WindowWidthError, ZeroThresholdError, checked,
 };
 
 #[test]
@@ -13,6 +14,66 @@ fn flags_have_six_bits_and_read_as_their_number() {
         if let Some(flags) = flags {
             assert_eq!(flags.to_string(), bits.to_string());
         }
+    }
+}
+
+#[test]
+fn every_error_names_what_is_wrong() {
+    let texts = [
+        (
+            GateError::PastLastBin.text(),
+            GateError::PastLastBin.to_string(),
+            "past the last bin",
+        ),
+        (
+            GateError::TooNarrow.text(),
+            GateError::TooNarrow.to_string(),
+            "fewer than 8 bins",
+        ),
+        (
+            RangeScaleError::ZeroBinWidth.text(),
+            RangeScaleError::ZeroBinWidth.to_string(),
+            "the bin width is zero",
+        ),
+        (
+            RangeScaleError::OutOfRange.text(),
+            RangeScaleError::OutOfRange.to_string(),
+            "reach beyond 8388 m",
+        ),
+        (
+            WindowWidthError.text(),
+            WindowWidthError.to_string(),
+            "1 to 7 bins wide",
+        ),
+        (
+            ZeroThresholdError.text(),
+            ZeroThresholdError.to_string(),
+            "less than 1/512 bin",
+        ),
+        (
+            ConfigError::ZeroX.text(),
+            ConfigError::ZeroX.to_string(),
+            "X must be at least 1",
+        ),
+        (
+            ConfigError::XAboveL1.text(),
+            ConfigError::XAboveL1.to_string(),
+            "X must not be greater than L1",
+        ),
+        (
+            ConfigError::L2NotAboveL1.text(),
+            ConfigError::L2NotAboveL1.to_string(),
+            "L2 must be greater than L1",
+        ),
+        (
+            ConfigError::NoLook.text(),
+            ConfigError::NoLook.to_string(),
+            "no multiple of X lies strictly between L1 and L2",
+        ),
+    ];
+    for (text, display, part) in texts {
+        assert!(text.contains(part), "{text}");
+        assert_eq!(text, display);
     }
 }
 
@@ -71,7 +132,7 @@ fn a_pixel_has_reported_while_its_event_waits_or_its_exposure_goes_on() {
     const ONE: PixelConfig<64> = checked!(PixelConfig::paper().build());
     let two = PixelConfig::<64>::paper().echoes(EchoNumber::LAST, 4);
     for (config, goes_on) in [(ONE, false), (two.build().unwrap(), true)] {
-        let mut pixel = dtof_core::AsyncPixel::<64>::new(PixelAddress(0));
+        let mut pixel = AsyncPixel::<64>::new(PixelAddress(0));
         let mut statistics = Statistics::default();
         assert!(!pixel.has_reported());
         (0..50).for_each(|_| pixel.count(&config, 20));

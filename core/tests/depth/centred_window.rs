@@ -156,6 +156,27 @@ fn a_window_past_the_gate_is_clipped() {
     }
 }
 
+/// In the middle of the histogram only an offset at its limit is.
+#[test]
+fn an_offset_at_its_limit_is_clipped() {
+    let mut at_limits = [0; 2];
+    for bin in 12..=20 {
+        let mut counts = [0; BINS];
+        counts[bin] = 900;
+        let Depth { offset, flags } = depth::<Count10>(&counts, 16, 1024, U24F8::ZERO);
+        let limits = [SubBinOffset::MIN, SubBinOffset::MAX].map(|limit| offset == limit);
+        assert_eq!(
+            flags.contains(Flags::CLIPPED),
+            limits != [false; 2],
+            "{bin}"
+        );
+        for (sum, is_at) in at_limits.iter_mut().zip(limits) {
+            *sum += u32::from(is_at);
+        }
+    }
+    assert!(at_limits.iter().all(|&sum| sum > 0), "{at_limits:?}");
+}
+
 #[test]
 fn a_full_counter_is_flagged() {
     fn flags<W: CounterWidth>(count: u32) -> Flags {
@@ -208,6 +229,31 @@ proptest! {
             depth::<Count10>(&counts, bin, half_width, level).offset,
             depth::<Count10>(&shifted, bin + 1, half_width, level).offset
         );
+    }
+
+    /// Whatever is in them.
+    #[test]
+    fn bins_outside_the_gate_count_as_background(
+        counts in counts(1023),
+        first in 0u16..12,
+        last in 19u16..32,
+        half_width in 256u16..=1024,
+        level in 0u32..4,
+    ) {
+        let gate = RangeGate::<BINS>::new(first, last).unwrap();
+        let mut filled = counts;
+        for (bin, count) in (0..).zip(&mut filled) {
+            if !gate.contains(bin) {
+                *count = level;
+            }
+        }
+        let mean = U24F8::from_bits(level << 8);
+        for bin in first..=last {
+            let peak = peak(&counts, bin.into());
+            let gated = window(half_width).estimate(&histogram::<Count10>(&counts), &gate, peak, mean);
+            let full = depth::<Count10>(&filled, bin.into(), half_width, mean);
+            prop_assert_eq!(gated.offset, full.offset, "bin {}", bin);
+        }
     }
 
     /// Wide counters drop what 10 bits do not hold.

@@ -164,13 +164,6 @@ fn a_change_is_not_zero_and_no_more_than_two_positions_can_be_apart() {
 }
 
 #[test]
-fn a_threshold_of_nothing_says_so() {
-    let error = DynamicDepthConfig::new(U24F8::ZERO, &scale(), Reference::Previous).unwrap_err();
-    let text = "the threshold of dynamic depth is less than 1/512 bin";
-    assert_eq!((error.text(), error.to_string()), (text, text.to_owned()));
-}
-
-#[test]
 fn it_takes_the_memory_it_says() {
     assert_eq!(size_of::<DynamicDepthPixel<3>>(), 24);
     assert_eq!(size_of::<DynamicDepthPixel<10>>(), 60);

@@ -41,22 +41,6 @@ fn small_configurations_are_valid_if_and_only_if_there_is_a_look() {
 }
 
 #[test]
-fn every_error_names_what_is_wrong() {
-    let texts = [
-        (ConfigError::ZeroX, "X must be at least 1"),
-        (ConfigError::XAboveL1, "X must not be greater than L1"),
-        (ConfigError::L2NotAboveL1, "L2 must be greater than L1"),
-        (
-            ConfigError::NoLook,
-            "no multiple of X lies strictly between L1 and L2",
-        ),
-    ];
-    for (error, text) in texts {
-        assert_eq!((error.text(), error.to_string()), (text, text.to_owned()));
-    }
-}
-
-#[test]
 fn what_is_not_set_is_the_papers() {
     const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().build());
     assert_eq!((CONFIG.x(), CONFIG.l1(), CONFIG.l2()), (4, 40, 2000));
