@@ -93,7 +93,7 @@ impl Recording {
             ..
         } = self;
         let moved = || -> Result<()> {
-            ensure!(!is_broken, "an event is missing");
+            ensure!(!is_broken, "the disk did not take an event");
             let file = flushed(aer.finish()?)?;
             file.persist(&path).map_err(|error| error.error)?;
             Ok(())
