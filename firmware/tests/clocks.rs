@@ -86,24 +86,34 @@ fn session(percent: u32, one_in: u32, seed: u64) -> u32 {
     panic!("{percent} %: {:?}", host.endpoint.counters());
 }
 
-#[test]
-fn a_link_between_clocks_2_percent_apart_changes_no_event() {
-    for one_in in [u32::MAX / 2, 1_000] {
-        let took = [100, 98, 102].map(|percent| session(percent, one_in, 8));
-        let [same, slow, fast] = took;
-        println!(
-            "faults: device clock 98, 100, 102 % of the host's, {} bytes wrong: {slow}, {same}, {fast} ms, all \
-             events right",
-            if one_in == 1_000 {
-                "one in 1,000"
-            } else {
-                "no"
-            }
-        );
-        // 2 % of the waiting, and what chance makes of the faults.
-        for off in [slow, fast] {
-            assert!(off.abs_diff(same) <= same / 2, "{took:?}");
+/// How long one session takes on average, with 98, 100 and 102 milliseconds to 100 of the host.
+fn sessions(one_in: u32, seeds: u32) -> [u32; 3] {
+    let took = [98, 100, 102].map(|percent| {
+        let took = (0..seeds).map(|seed| session(percent, one_in, u64::from(seed)));
+        took.sum::<u32>() / seeds
+    });
+    println!(
+        "faults: device clock 98, 100, 102 % of the host's, {} bytes wrong: {took:?} ms a session, all \
+         events right",
+        if one_in == 1_000 {
+            "one in 1,000"
+        } else {
+            "no"
         }
+    );
+    took
+}
+
+#[test]
+fn a_link_between_clocks_2_percent_apart_changes_no_event_and_takes_no_longer() {
+    // Nothing waits for a clock: the line takes the time.
+    let [slow, same, fast] = sessions(u32::MAX / 2, 1);
+    assert_eq!([slow, fast], [same; 2]);
+    // Most of it is waiting, of which 2 % are the clocks'. The rest is chance: one session with
+    // these faults differs from another by 17 %, the means of so many by 1.7 %.
+    let [slow, same, fast] = sessions(1_000, 200);
+    for off in [slow, fast] {
+        assert!(off.abs_diff(same) <= same / 20, "{slow}, {same}, {fast}");
     }
 }
 
@@ -167,8 +177,6 @@ fn tolerance(sign: f64) -> u32 {
     tenths
 }
 
-/// The receiver samples the stop bit 9.5 bits after the edge of the start bit: 2 % are 0.19 bit
-/// there, so it is sampled at 0.31 or 0.69 of its length instead of 0.5.
 #[test]
 fn bytes_arrive_with_bits_2_percent_too_long_or_too_short() {
     let [long, short] = [1.0, -1.0].map(tolerance);
@@ -179,7 +187,4 @@ fn bytes_arrive_with_bits_2_percent_too_long_or_too_short() {
     );
     // In tenths of a percent, as docs/boards.md says.
     assert_eq!((long, short), (55, 37));
-    let off: f64 = 0.02;
-    let sampled = [0.5 - 9.5 * off, 0.5 + 9.5 * off];
-    assert!((sampled[0] - 0.31).abs() < 1e-9 && (sampled[1] - 0.69).abs() < 1e-9);
 }
