@@ -39,11 +39,12 @@ pub trait Board {
     /// fetches what there is to send. Never waits; harmless if there is nothing.
     fn start_sending();
 
-    /// Sleeps until an interrupt comes, unless `has_work` says that there is
-    /// something to do. It is asked with interrupts held back, so that none can
-    /// come between the question and the sleep. At least the timer's comes within
-    /// a millisecond.
-    fn wait_for_interrupt(&mut self, has_work: impl FnOnce() -> bool);
+    /// Does `work`, and lets no interrupt handler run meanwhile.
+    fn hold_interrupts(&mut self, work: impl FnOnce(&mut Self));
+
+    /// Sleeps until an interrupt comes, also one that is held back; at least the
+    /// timer's comes within a millisecond. It may return sooner.
+    fn sleep(&mut self);
 }
 
 /// The main loop, once round: `work` is given the port and the time, does what
@@ -56,7 +57,12 @@ pub fn turn<B: Board>(
 ) {
     work(serial, board.now_ms());
     board.feed_watchdog();
-    board.wait_for_interrupt(|| serial.has_received());
+    // No byte can come between the question and the sleep.
+    board.hold_interrupts(|board| {
+        if !serial.has_received() {
+            board.sleep();
+        }
+    });
 }
 
 #[cfg(test)]
@@ -87,11 +93,13 @@ mod tests {
 
         fn start_sending() {}
 
-        fn wait_for_interrupt(&mut self, has_work: impl FnOnce() -> bool) {
-            if !has_work() {
-                self.slept.push(self.now_ms);
-            }
+        fn hold_interrupts(&mut self, work: impl FnOnce(&mut Self)) {
+            work(self);
             self.now_ms += 1;
+        }
+
+        fn sleep(&mut self) {
+            self.slept.push(self.now_ms);
         }
     }
 

@@ -120,13 +120,13 @@ impl Board for Mps2An386 {
         NVIC::pend(Interrupt::Uart0Transmit);
     }
 
-    fn wait_for_interrupt(&mut self, has_work: impl FnOnce() -> bool) {
-        cortex_m::interrupt::free(|_| {
-            if !has_work() {
-                // An interrupt that is held back ends the sleep all the same.
-                cortex_m::asm::wfi();
-            }
-        });
+    fn hold_interrupts(&mut self, work: impl FnOnce(&mut Self)) {
+        cortex_m::interrupt::free(|_| work(self));
+    }
+
+    fn sleep(&mut self) {
+        // An interrupt that is held back ends it all the same.
+        cortex_m::asm::wfi();
     }
 }
 
@@ -161,7 +161,7 @@ unsafe fn DefaultHandler(number: i16) {
         };
         match number {
             0 => uart::on_receive(port),
-            1 => uart::on_transmit(port),
+            1 => transmit(port, &mut uart::Uart),
             _ => panic!("interrupt {number} has no handler"),
         }
     });
@@ -240,15 +240,13 @@ mod uart {
         }
     }
 
-    pub fn on_transmit(port: &mut SerialInterrupt<'_>) {
-        // First, so that room that comes from now on interrupts again.
-        write(Register::IntClear, TX_INTERRUPT);
-        transmit(port, &mut Uart);
-    }
-
-    struct Uart;
+    pub struct Uart;
 
     impl Transmitter for Uart {
+        fn acknowledge(&mut self) {
+            write(Register::IntClear, TX_INTERRUPT);
+        }
+
         fn has_room(&mut self) -> bool {
             read(Register::State) & TX_FULL == 0
         }

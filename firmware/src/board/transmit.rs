@@ -9,6 +9,9 @@ use crate::serial::SerialInterrupt;
 
 /// The sending half of a serial port.
 pub trait Transmitter {
+    /// Clears its interrupt, if that stays until it is cleared. Room that comes from now on
+    /// interrupts again.
+    fn acknowledge(&mut self);
     /// Whether it takes a byte now.
     fn has_room(&mut self) -> bool;
     /// Takes a byte, for which there is room.
@@ -19,10 +22,11 @@ pub trait Transmitter {
     fn rest(&mut self);
 }
 
-/// Hands over what there is to send and what the transmitter takes. For the interrupt handler,
-/// after it has cleared the interrupt.
+/// Hands over what there is to send and what the transmitter takes. For the interrupt handler.
 #[inline]
 pub fn transmit(port: &mut SerialInterrupt<'_>, transmitter: &mut impl Transmitter) {
+    // First: room that comes while this goes on is not to be overlooked.
+    transmitter.acknowledge();
     while port.has_to_send() {
         if !transmitter.has_room() {
             return transmitter.wake();

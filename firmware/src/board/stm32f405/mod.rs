@@ -168,14 +168,15 @@ impl Board for Stm32F405 {
         NVIC::pend(Interrupt::USART2);
     }
 
-    fn wait_for_interrupt(&mut self, has_work: impl FnOnce() -> bool) {
-        cortex_m::interrupt::free(|_| {
-            let sensor_ready = SENSOR_READY.swap(false, Ordering::Relaxed);
-            if !sensor_ready && !has_work() {
-                // An interrupt that is held back ends the sleep all the same.
-                cortex_m::asm::wfi();
-            }
-        });
+    fn hold_interrupts(&mut self, work: impl FnOnce(&mut Self)) {
+        cortex_m::interrupt::free(|_| work(self));
+    }
+
+    fn sleep(&mut self) {
+        if !SENSOR_READY.swap(false, Ordering::Relaxed) {
+            // An interrupt that is held back ends it all the same.
+            cortex_m::asm::wfi();
+        }
     }
 }
 
@@ -219,6 +220,9 @@ impl Port {
 }
 
 impl Transmitter for Tx<USART2> {
+    // It interrupts as long as it listens and has room.
+    fn acknowledge(&mut self) {}
+
     fn has_room(&mut self) -> bool {
         self.is_tx_empty()
     }
