@@ -1,12 +1,15 @@
 //! An hour on a wire that drops, flips, doubles and swaps bytes, stands still and is pulled,
 //! with a host and a device that restart again and again. Each session gets the events of its
-//! photons, once, in order and as they were; one that breaks gets the first of them, and both
-//! ends know that it broke.
+//! photons, once, in order and as they were; one that breaks gets the first of them. Both ends know
+//! that it broke: the host when it gives up or the device says so, the device as soon as it was
+//! restarted or has begun another session. It says so to a host of the one before.
 
 mod common;
 
+use common::host::deliver;
 use common::session::{End, Line, Outcome, Plan, Script, WHOLE, check, script, session};
-use dtof_link::endpoint::LinkCounters;
+use dtof_link::endpoint::{Endpoint, LinkCounters, RETRANSMIT_MOST_MS};
+use dtof_link::frame::{Deframer, WIRE_BYTES};
 use rand_core::Rng;
 
 const HOUR_MS: u32 = 3_600_000;
@@ -27,6 +30,8 @@ struct Totals {
     undelivered: u64,
     repeated: u64,
     damaged: u64,
+    /// Hosts of broken sessions that the device has told so afterwards.
+    told: u32,
 }
 
 impl Totals {
@@ -39,7 +44,7 @@ impl Totals {
     fn add(&mut self, line: &Line, script: &Script, outcome: &Outcome) {
         self.sessions += 1;
         self.events += outcome.events.len() as u64;
-        self.add_counters(&outcome.host);
+        self.add_counters(outcome.host.counters());
         match outcome.end {
             End::Done => self.done += 1,
             End::Stopped => self.stopped += 1,
@@ -63,9 +68,26 @@ impl Totals {
     }
 }
 
+/// The host of a session that broke comes back, on a good wire. Whether the device says that there
+/// is no such session.
+fn is_told(line: &mut Line, mut host: Endpoint) -> bool {
+    let mut wire = [0; WIRE_BYTES];
+    // After so long there is something to send.
+    let length = host.transmit(line.now + RETRANSMIT_MOST_MS, &mut wire);
+    deliver(&mut Deframer::new(), &wire[..length], |frame| {
+        line.device.receive(frame, line.now);
+    });
+    let length = line.device.transmit(line.now, &mut wire);
+    deliver(&mut Deframer::new(), &wire[..length], |frame| {
+        host.receive(frame, line.now);
+    });
+    host.is_lost()
+}
+
 /// An hour on a wire with more and fewer faults.
 fn hour(seed: u64, totals: &mut Totals) {
     let mut line = Line::new(seed);
+    let mut broken = Vec::new();
     while line.now < HOUR_MS {
         let mut random = |below: u32| line.rng.next_u32() % below;
         let one_in = [0, 20_000, 5_000, 1_000, 400][random(5) as usize];
@@ -86,6 +108,9 @@ fn hour(seed: u64, totals: &mut Totals) {
         let number = (totals.sessions % 65_521) as u16;
         let outcome = session(&mut line, number, &script, plan);
         totals.add(&line, &script, &outcome);
+        if outcome.end != End::Done && outcome.host.is_open() && !outcome.host.is_lost() {
+            broken.push(outcome);
+        }
     }
     for end in line
         .earlier
@@ -96,6 +121,13 @@ fn hour(seed: u64, totals: &mut Totals) {
     }
     totals.faults += line.up.faults + line.down.faults;
     totals.stalls += line.up.stalls + line.down.stalls;
+    for outcome in broken {
+        // The device may still wait for the host of the last session.
+        if line.tap.session != Some(outcome.session) {
+            assert!(is_told(&mut line, outcome.host), "{}", outcome.session);
+            totals.told += 1;
+        }
+    }
 }
 
 fn hours(hours: u64) {
@@ -114,16 +146,18 @@ fn hours(hours: u64) {
         undelivered,
         repeated,
         damaged,
+        told,
     } = totals;
     println!(
         "soak: link: {hours} h, {faults} faults, {stalls} of them stalls, {sessions} sessions, \
          {stopped} ended by the host, {lost} by the device, {silent} by silence; {events} events, \
          0 wrong, 0 lost in silence, {undelivered} undelivered at breaks; \
-         {damaged} damaged frames, {repeated} repeated"
+         {damaged} damaged frames, {repeated} repeated; {told} hosts told afterwards"
     );
     assert_eq!(stuck, 0);
     assert_eq!(done + stopped + lost + silent, sessions);
     assert!(done > sessions / 2 && stopped > 5 && lost > 5 && undelivered > 0);
+    assert!(told > 5);
     // A fault may hit a frame that is damaged already, or the end of one.
     assert!(stalls > 20 && damaged > u64::from(faults / 2) && repeated > 1_000);
 }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use dtof_core::DepthEvent;
 use dtof_firmware::sidecar::Sidecar;
-use dtof_link::endpoint::LinkCounters;
+use dtof_link::endpoint::{Endpoint, LinkCounters};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::{Configuration, Report, Source, message};
 use rand_core::SeedableRng;
@@ -115,7 +115,8 @@ pub struct Outcome {
     pub end: End,
     pub events: Vec<DepthEvent>,
     pub report: Option<Report>,
-    pub host: LinkCounters,
+    /// The host's end.
+    pub host: Endpoint,
     pub milliseconds: u32,
 }
 
@@ -201,7 +202,7 @@ pub fn session(line: &mut Line, number: u16, script: &Script, plan: Plan) -> Out
         session: number,
         end,
         report,
-        host: *host.endpoint.counters(),
+        host: host.endpoint,
         events: host.events,
         milliseconds: line.now - began,
     }
@@ -211,7 +212,7 @@ pub fn session(line: &mut Line, number: u16, script: &Script, plan: Plan) -> Out
 #[track_caller]
 pub fn check(script: &Script, outcome: &Outcome) {
     let Some(report) = outcome.report else {
-        panic!("{:?}: {:?}", outcome.end, outcome.host);
+        panic!("{:?}: {:?}", outcome.end, outcome.host.counters());
     };
     let (got, wanted) = (outcome.events.len(), script.events.len());
     assert!(outcome.events == script.events, "{got} of {wanted} events");
