@@ -1,9 +1,11 @@
 //! Quantities, flags, errors and statistics: their limits, their text, and how they add up.
 
+use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AsyncPixel, BinIndex, BinPosition, BlockLevel, ConfigError, EchoNumber, Flags, GateError,
-    LaserCycle, Look, PixelAddress, PixelConfig, RangeScaleError, Statistics, SubBinOffset,
-    WindowWidthError, ZeroThresholdError, checked,
+    AsyncPixel, BinIndex, BinPosition, BlockLevel, CentredWindow, ConfigError, DepthEstimator,
+    EchoNumber, Flags, GateError, Histogram, LaserCycle, Look, PixelAddress, PixelConfig,
+    RangeGate, RangeScaleError, Statistics, SubBinOffset, WindowWidthError, ZeroThresholdError,
+    checked,
 };
 
 #[test]
@@ -142,5 +144,70 @@ fn a_pixel_has_reported_while_its_event_waits_or_its_exposure_goes_on() {
         assert!(pixel.has_reported(), "its event waits");
         assert!(pixel.acknowledge().is_some());
         assert_eq!(pixel.has_reported(), goes_on);
+    }
+}
+
+/// Losses of the same number do not hide each other.
+#[test]
+fn every_kind_of_loss_is_counted_beside_the_others() {
+    let gate = RangeGate::new(8, 63).unwrap();
+    let config = PixelConfig::<64>::paper().gate(gate).build().unwrap();
+    for losses in 0..27 {
+        let [saturated, rejected, gated_out] = [losses % 3, losses / 3 % 3, losses / 9];
+        let mut pixel = AsyncPixel::<64>::new(PixelAddress(0));
+        let mut statistics = Statistics::default();
+        for (code, photons) in [(20, 1023 + saturated), (64, rejected), (7, gated_out)] {
+            (0..photons).for_each(|_| pixel.count(&config, code));
+        }
+        pixel.add_photons_to(&mut statistics);
+        let expected = Statistics {
+            counted: 1023,
+            saturated,
+            rejected,
+            gated_out,
+            ..Statistics::default()
+        };
+        assert_eq!(statistics, expected);
+    }
+}
+
+/// A frame with more photons in a bin than it holds, alone and on top of others.
+#[test]
+fn a_frame_fills_counters_and_counts_what_they_do_not_hold() {
+    for before in [0u32, 1, 1000] {
+        for photons in [1022u32, 1023, 1024, 1025, 70_000] {
+            let mut histogram = Histogram::<16>::new();
+            let full = RangeGate::full();
+            let mut frame = [2; 16];
+            frame[9] = before;
+            histogram.add_frame(&frame, &full);
+            frame[9] = photons;
+            histogram.add_frame(&frame, &full);
+            let held = (before + photons).min(1023);
+            assert_eq!(histogram.count(9), Some(held));
+            assert_eq!(histogram.saturated(), before + photons - held);
+            assert_eq!(histogram.total(), 15 * 4 + held);
+
+            let mut histogram = Histogram::<16>::new();
+            histogram.add_frame(&frame, &full);
+            assert_eq!(histogram.count(9), Some(photons.min(1023)));
+            assert_eq!(histogram.saturated(), photons - photons.min(1023));
+        }
+    }
+}
+
+#[test]
+fn an_estimator_reaches_as_far_as_its_wider_side() {
+    assert_eq!(DepthEstimator::Centroid3.reach(), 1);
+    for before in (256..=1024u16).step_by(64) {
+        for after in (256..=1024u16).step_by(64) {
+            let [half, other] = [before, after].map(U8F8::from_bits);
+            let window = CentredWindow::with_sides(half, other).unwrap();
+            let reach = DepthEstimator::CentredWindow(window).reach();
+            assert_eq!(
+                f64::from(reach),
+                (f64::from(before.max(after)) / 256.0).ceil()
+            );
+        }
     }
 }
