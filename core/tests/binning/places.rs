@@ -1,6 +1,9 @@
 //! Where blocks lie, and who feeds them.
 
-use dtof_core::{Array, Binning, BlockLevel, Feed, PixelAddress};
+use dtof_core::{
+    Array, Binning, Block, BlockLevel, Feed, Flags, LaserCycle, PixelAddress, PixelConfig,
+    Statistics, count_in_blocks, end_laser_cycles_of_blocks,
+};
 
 use crate::level;
 
@@ -111,4 +114,41 @@ fn a_feed_is_on_from_a_tick_to_an_event_and_past_the_tick_after_it() {
     let mut none = Feed::NONE;
     none.tick(false);
     assert_eq!(none.block(), None);
+}
+
+/// A TDC for each pixel, so that a photon a pixel in every second laser cycle is no pile-up of any.
+#[test]
+fn a_block_piles_up_when_its_pixels_do() {
+    for (number, pixels) in [(1, 4), (2, 16), (3, 64)] {
+        let side = 1 << number;
+        let binning = Binning::new(Array::new(side, side).unwrap(), level(number)).unwrap();
+        let mut config = PixelConfig::<32>::paper().l2(4000).build().unwrap();
+        config = config.with_one_hit_tdc();
+        for (more, piles_up) in [(0, false), (1, true)] {
+            let mut feeds: Vec<Feed> = (0..pixels)
+                .map(|pixel| binning.feed_of(PixelAddress(pixel)))
+                .collect();
+            let mut blocks: Vec<Block<32>> = binning.blocks().map(Block::new).collect();
+            // Twice as often as there are levels: all the way up.
+            for _ in 0..2 * number {
+                feeds.iter_mut().for_each(|feed| feed.tick(false));
+                blocks.iter_mut().for_each(Block::tick);
+            }
+            for photon in 0..22 * pixels + more {
+                let feed = &feeds[usize::from(photon % pixels)];
+                count_in_blocks(&mut blocks, feed, &config, 9);
+            }
+            let mut statistics = Statistics::default();
+            let last = LaserCycle(43);
+            end_laser_cycles_of_blocks(&mut blocks, &config, &mut statistics, last, 44);
+            let block = blocks.last_mut().unwrap();
+            let event = block.acknowledge().unwrap();
+            assert_eq!(event.level, level(number));
+            assert_eq!(
+                event.flags.contains(Flags::PILE_UP),
+                piles_up,
+                "{number} {more}"
+            );
+        }
+    }
 }
