@@ -243,4 +243,6 @@ fn laser_cycles_that_are_asked_for_are_those_of_the_clock() {
     assert_eq!(ended(&given), 1_000);
     assert_eq!(photons(&given), by_clock);
     assert_eq!(sensor.skipped(), 0);
+    // Nor does it keep photons of a laser cycle back.
+    assert!(!sensor.is_one_hit());
 }
