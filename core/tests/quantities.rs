@@ -1,11 +1,11 @@
 //! Quantities, flags, errors and statistics: their limits, their text, and how they add up.
 
-use dtof_core::fixed::types::U8F8;
+use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
     AsyncPixel, BinIndex, BinPosition, BlockLevel, CentredWindow, ConfigError, DepthEstimator,
     EchoNumber, Flags, GateError, Histogram, LaserCycle, Look, PixelAddress, PixelConfig,
-    RangeGate, RangeScaleError, Statistics, SubBinOffset, WindowWidthError, ZeroThresholdError,
-    checked,
+    RangeGate, RangeScale, RangeScaleError, Statistics, SubBinOffset, WindowWidthError,
+    ZeroThresholdError, checked,
 };
 
 #[test]
@@ -207,6 +207,25 @@ fn an_estimator_reaches_as_far_as_its_wider_side() {
             assert_eq!(
                 f64::from(reach),
                 (f64::from(before.max(after)) / 256.0).ceil()
+            );
+        }
+    }
+}
+
+/// To the nearest 1/256 mm, half of it up, for bins of every fraction.
+#[test]
+fn distances_are_rounded_to_the_nearest() {
+    for picoseconds in [0x1_0000u32, 0x1_2345, 0x64_8000, 0xfa_0001] {
+        let scale = RangeScale::new(U16F16::from_bits(picoseconds), I24F8::ZERO).unwrap();
+        // A bin in 1/65536 of 1/256 mm, from a distance so long that its rounding does not count.
+        let bin = scale.distance(1 << 24).to_bits() << 16 >> 24;
+        for bins in -2000..2000i32 {
+            let exact = i64::from(bins) * bin;
+            let nearest = (exact + (1 << 15)) >> 16;
+            assert_eq!(
+                scale.distance(bins).to_bits(),
+                nearest,
+                "{bins} of {picoseconds}"
             );
         }
     }
