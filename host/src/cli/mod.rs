@@ -59,7 +59,7 @@ fn is_broken_pipe(error: &anyhow::Error) -> bool {
 }
 
 /// One line on standard error; if that cannot be written, nobody reads it.
-fn complain(message: &str) {
+pub fn complain(message: &str) {
     let line: Vec<&str> = message.lines().collect();
     let _ = writeln!(io::stderr(), "{}", printable(&line.join(" ")));
 }

@@ -15,6 +15,7 @@ mod view;
 use std::io::{self, Write};
 use std::path::Path;
 
+use dtof::cli::complain;
 use dtof::events::summary::Summary;
 use dtof::rows::{Row, aligned, printable};
 
@@ -24,11 +25,6 @@ fn warn(file: &Path, warnings: impl IntoIterator<Item = String>, quiet: bool) {
         let warning = format!("warning: {}: {warning}", file.display());
         complain(&printable(&warning));
     }
-}
-
-/// A line on standard error. If that cannot be written, nobody reads it.
-fn complain(line: &str) {
-    let _ = writeln!(io::stderr(), "{line}");
 }
 
 /// Prints the summary of a run.

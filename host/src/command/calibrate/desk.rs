@@ -7,7 +7,7 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::calibrate::{Asked, Calibration, Length, Observed, calibrate};
 use dtof::cli::arguments::{MOST_WHOLE, whole};
-use dtof::cli::interrupt;
+use dtof::cli::{complain, interrupt};
 use dtof::device::histograms::{Collected, SoFar, collect};
 use dtof::device::monitor::array;
 use dtof::device::{self, Client, Port};
@@ -17,8 +17,6 @@ use dtof::jobs::recording::{Recording, opening};
 use dtof::progress::Progress;
 use dtof::rows::{Row, grouped};
 use dtof::settings::{Sensor, SettingsFile};
-
-use crate::command::complain;
 
 /// How long photons are collected, unless somebody says.
 const SECONDS: u32 = 10;
