@@ -5,16 +5,15 @@
 mod common;
 
 use common::host::{CONFIGURATION, Host, configured, device_with_blocks};
+use common::mocks::Broken;
 use common::mocks::plug::{Answers, Bus, Tdc, Tmf};
-use common::mocks::{Broken, Line};
-use common::scene;
-use dtof_core::fixed::types::U16F16;
-use dtof_core::{DepthEvent, PixelAddress, Statistics};
+use common::{plugged, scene};
+use dtof_core::{DepthEvent, Statistics};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::message;
-use dtof_link::{Configuration, FaultRecord, Refusal, Report, Source, Token};
-use dtof_sensors::tmf882x::{BootCommand, Command, Tmf882x, Waiting};
+use dtof_link::{Configuration, FaultRecord, Refusal, Source, Token};
+use dtof_sensors::tmf882x::{BootCommand, Command, Waiting};
 use dtof_sensors::{Sensor, SensorFault, tdc7200, tmf882x};
 
 /// One that takes photons from the link.
@@ -31,29 +30,6 @@ const AVERAGE_TRACKS: [u8; 22] = {
     fields
 };
 
-/// A second with `sensor` and a host that reads; what the device says then. The
-/// sensor is asked three times a millisecond, as by a busy main loop.
-fn second<Chip: Default>(
-    sensor: &mut impl Sensor,
-    bus: &Bus<Chip>,
-    device: &mut Sidecar,
-    host: &mut Host,
-    now_ms: &mut u32,
-) -> Report {
-    for _ in 0..1000 {
-        *now_ms += 1;
-        for _ in 0..3 {
-            let before = bus.transfers();
-            device.poll_sensor(sensor, *now_ms);
-            // Four polls; that which configures a TDC7200 takes 19.
-            assert!(bus.transfers() - before <= 4 * 19);
-        }
-        host.exchange(device, *now_ms);
-        host.read(8);
-    }
-    host.report(device, *now_ms)
-}
-
 /// The sensor gives data, is unplugged for a minute, and gives data again.
 fn unplug<Chip: Default>(
     mut sensor: impl Sensor,
@@ -69,7 +45,7 @@ fn unplug<Chip: Default>(
     let (mut device, mut host) = configured::<9>(&wanted);
     let mut now_ms = 0;
     let mut second = || {
-        let report = second(&mut sensor, bus, &mut device, &mut host, &mut now_ms);
+        let report = plugged::second(&mut sensor, bus, &mut device, &mut host, &mut now_ms);
         let events = host.events.len() as u64;
         assert_eq!(report.statistics.events, events);
         (report, events)
@@ -114,13 +90,7 @@ fn an_unplugged_tdc7200_is_reported_and_found_again() {
         (Answers::Ones, FaultRecord::NoAnswer),
     ] {
         let bus = Bus::<Tdc>::new();
-        let settings = tdc7200::Settings {
-            first_bin_ps: 240_000,
-            ..tdc7200::Settings::new(PixelAddress(0), 8_000, U16F16::lit("250"))
-        };
-        let config = tdc7200::Config::new(settings).unwrap();
-        let (interrupt, enable) = (bus.interrupt.clone(), Line::new(false));
-        let sensor = tdc7200::Tdc7200::<_, _, _>::new(bus.clone(), interrupt, enable, config);
+        let sensor = plugged::tdc7200(&bus);
         unplug(sensor, &bus, how, 200, said);
     }
 }
@@ -128,9 +98,7 @@ fn an_unplugged_tdc7200_is_reported_and_found_again() {
 #[test]
 fn an_unplugged_tmf882x_is_reported_and_found_again() {
     let bus = Bus::<Tmf>::new();
-    let config = tmf882x::Config::new(tmf882x::Settings::new(PixelAddress(0))).unwrap();
-    let (interrupt, enable) = (bus.interrupt.clone(), Line::new(false));
-    let sensor = Tmf882x::<_, _, _>::new(bus.clone(), interrupt, enable, &[1, 2, 3], config);
+    let sensor = plugged::tmf882x(&bus);
     unplug(sensor, &bus, Answers::Error, 60, FaultRecord::NoAnswer);
 }
 

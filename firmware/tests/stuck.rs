@@ -11,18 +11,15 @@ use std::cell::RefCell;
 use std::convert::Infallible;
 
 use common::host::{CONFIGURATION, Host, configured, device};
-use common::mocks::Line;
 use common::mocks::plug::{Answers, Bus, Tdc, Tmf};
-use common::script;
-use dtof_core::fixed::types::U16F16;
-use dtof_core::{DepthEvent, PixelAddress};
+use common::{plugged, script};
+use dtof_core::DepthEvent;
 use dtof_firmware::serial::{Buffers, Serial, SerialInterrupt};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::frame::WIRE_BYTES;
 use dtof_link::{Configuration, FaultRecord, Source, message};
 use dtof_sensors::simulated;
-use dtof_sensors::tmf882x::Tmf882x;
-use dtof_sensors::{About, Sensor, tdc7200, tmf882x};
+use dtof_sensors::{About, Sensor};
 use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -311,18 +308,10 @@ fn stuck<Chip: Default>(
     let (mut device, mut host) = configured::<9>(&wanted);
     let mut now_ms = 0;
     let mut seconds = |count: u32| {
-        for _ in 0..count {
-            for _ in 0..1000 {
-                now_ms += 1;
-                let before = bus.transfers();
-                device.poll_sensor(&mut sensor, now_ms);
-                assert!(bus.transfers() - before <= 4 * 19);
-                host.exchange(&mut device, now_ms);
-                host.read(8);
-            }
-        }
         // The device answers at once, whatever its sensor does.
-        let report = host.report(&mut device, now_ms);
+        let reports = (0..count)
+            .map(|_| plugged::second(&mut sensor, bus, &mut device, &mut host, &mut now_ms));
+        let report = reports.last().unwrap();
         assert!(host.events.iter().all(|event| event.peak_bin.raw() == bin));
         (report, host.events.len())
     };
@@ -354,19 +343,11 @@ fn a_line_that_is_stuck_is_named_and_the_device_answers() {
         (true, FaultRecord::Timeout),
     ] {
         let bus = Bus::<Tdc>::new();
-        let settings = tdc7200::Settings {
-            first_bin_ps: 240_000,
-            ..tdc7200::Settings::new(PixelAddress(0), 8_000, U16F16::lit("250"))
-        };
-        let config = tdc7200::Config::new(settings).unwrap();
-        let (interrupt, enable) = (bus.interrupt.clone(), Line::new(false));
-        let sensor = tdc7200::Tdc7200::<_, _, _>::new(bus.clone(), interrupt, enable, config);
+        let sensor = plugged::tdc7200(&bus);
         stuck(sensor, &bus, level, said, 28);
 
         let bus = Bus::<Tmf>::new();
-        let config = tmf882x::Config::new(tmf882x::Settings::new(PixelAddress(0))).unwrap();
-        let (interrupt, enable) = (bus.interrupt.clone(), Line::new(false));
-        let sensor = Tmf882x::<_, _, _>::new(bus.clone(), interrupt, enable, &[1, 2, 3], config);
+        let sensor = plugged::tmf882x(&bus);
         stuck(sensor, &bus, level, said, 40);
     }
 }

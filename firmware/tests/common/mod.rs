@@ -7,6 +7,7 @@ pub mod host;
 /// Mocked buses and pins.
 #[path = "../../../sensors/tests/common/mod.rs"]
 pub mod mocks;
+pub mod plugged;
 pub mod scene;
 pub mod script;
 pub mod session;
