@@ -21,6 +21,7 @@ pub fn sidecar(data: &[u8]) {
     let mut host = Host::new();
     let mut input = Input::new(data);
     let mut now = 0;
+    let mut cycles = 0;
     while !input.is_empty() {
         // Kinds that there are, mostly.
         let kind = match input.byte() {
@@ -34,6 +35,13 @@ pub fn sidecar(data: &[u8]) {
         };
         let length = usize::from(input.byte());
         let body = input.bytes(length.min(BODY_BYTES));
+        // Three bytes ask for up to 65,535 laser cycles, each of which all pixels may look at.
+        if kind == message::PHOTONS {
+            cycles += cycles_of(body);
+            if cycles > MOST_CYCLES {
+                break;
+            }
+        }
         for _ in 0..200 {
             now += 1;
             host.exchange(&mut device, now);
@@ -46,8 +54,9 @@ pub fn sidecar(data: &[u8]) {
             }
         }
     }
-    // All that was asked has an answer.
-    for _ in 0..5000 {
+    // All that was asked has an answer. The device looks 64 times, and then sees what else there
+    // is to do.
+    for _ in 0..5000 + cycles / 64 {
         now += 1;
         host.exchange(&mut device, now);
         if host.endpoint.is_lost() || (host.endpoint.is_open() && host.endpoint.is_settled()) {
@@ -55,6 +64,20 @@ pub fn sidecar(data: &[u8]) {
         }
     }
     panic!("the device takes no more messages");
+}
+
+/// Laser cycles of one input.
+const MOST_CYCLES: u64 = 1 << 19;
+
+fn cycles_of(mut body: &[u8]) -> u64 {
+    let mut all = 0;
+    while let Some((token, rest)) = Token::split_first(body) {
+        if let Token::EndOfCycles { cycles } = token {
+            all += u64::from(cycles);
+        }
+        body = rest;
+    }
+    all
 }
 
 struct Host {
