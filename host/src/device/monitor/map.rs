@@ -1,7 +1,6 @@
 //! The ranges of a device's pixels as a picture on a terminal, drawn in place.
-//!
-//! A character shows two pixels, one above the other: the upper half of a block in one
-//! colour, on the other colour. Colours are those of the maps, and span what is shown.
+
+mod picture;
 
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
@@ -11,8 +10,8 @@ use dtof_core::{EchoNumber, RangeScale};
 use crate::events::aer_file::Event;
 use crate::events::reports::LastReports;
 use crate::input::source::Geometry;
-use dtof_draw::palette;
-use dtof_draw::picture::{levels, span};
+use dtof_draw::picture::span;
+use picture::{PLAIN, block, picture};
 
 /// How often it is drawn.
 const EVERY: Duration = Duration::from_millis(200);
@@ -20,7 +19,6 @@ const EVERY: Duration = Duration::from_millis(200);
 const HIDE_CURSOR: &str = "\x1b[?25l";
 /// Shows it again, however the program ends.
 pub const SHOW_CURSOR: &str = "\x1b[?25h";
-const PLAIN: &str = "\x1b[0m";
 const CLEAR_REST: &str = "\x1b[K";
 /// Everything gone, and the cursor in the first line.
 const CLEAR_ALL: &str = "\x1b[2J\x1b[H";
@@ -142,36 +140,6 @@ impl Drop for LiveMap {
     }
 }
 
-/// `ranges`, `columns` in a row, as lines of text with colours, at most as many and as
-/// wide as there is room for: where there is too little, only every second pixel of
-/// every second row is shown, or every third, and so on. Pixels without a range are left
-/// empty.
-#[must_use]
-pub fn picture(
-    ranges: &[Option<f64>],
-    columns: usize,
-    most_lines: usize,
-    most_columns: usize,
-) -> Vec<String> {
-    let levels = levels(ranges);
-    let rows: Vec<&[Option<u8>]> = levels.chunks(columns.max(1)).collect();
-    let step = columns
-        .div_ceil(most_columns.max(1))
-        .max(rows.len().div_ceil(2 * most_lines.max(1)))
-        .max(1);
-    let rows: Vec<_> = rows.into_iter().step_by(step).collect();
-    let mut lines = Vec::new();
-    for pair in rows.chunks(2) {
-        let mut line = String::new();
-        for column in (0..columns).step_by(step) {
-            let level = |row: usize| pair.get(row)?.get(column).copied().flatten();
-            line += &block(level(0), level(1));
-        }
-        lines.push(line + PLAIN);
-    }
-    lines
-}
-
 /// The first `columns` characters of `line`, and all of its colours.
 fn cut(line: &str, columns: usize) -> String {
     let (mut seen, mut in_code) = (0, false);
@@ -188,21 +156,6 @@ fn cut(line: &str, columns: usize) -> String {
     kept.collect()
 }
 
-/// A character with the colours of an upper and a lower pixel.
-fn block(upper: Option<u8>, lower: Option<u8>) -> String {
-    let code = |ground: u8, level: u8| {
-        let [red, green, blue] = palette::level(level);
-        format!("\x1b[{ground};2;{red};{green};{blue}m")
-    };
-    let (fore, back) = (38, 48);
-    match (upper, lower) {
-        (None, None) => format!("{PLAIN} "),
-        (Some(upper), None) => format!("{PLAIN}{}▀", code(fore, upper)),
-        (None, Some(lower)) => format!("{PLAIN}{}▄", code(fore, lower)),
-        (Some(upper), Some(lower)) => format!("{}{}▀", code(fore, upper), code(back, lower)),
-    }
-}
-
 /// The legend of the colours.
 fn legend(ranges: &[Option<f64>]) -> String {
     let reporting = ranges.iter().flatten().count();
@@ -210,7 +163,7 @@ fn legend(ranges: &[Option<f64>]) -> String {
     match span(ranges) {
         None => format!("no event yet of {pixels} pixels"),
         Some((low, high)) => {
-            let (purple, yellow) = (block(Some(0), Some(0)), block(Some(255), Some(255)));
+            let (purple, yellow) = (block(Some(0), Some(0), 1), block(Some(255), Some(255), 1));
             format!(
                 "{purple}{PLAIN} {low:.0} mm to {yellow}{PLAIN} {high:.0} mm, \
                  {reporting} of {pixels} pixels"

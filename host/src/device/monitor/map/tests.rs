@@ -2,6 +2,8 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use dtof_core::{BlockLevel, DepthEvent};
+use dtof_draw::palette;
+use proptest::prelude::*;
 
 use super::*;
 use crate::events::fixtures::{self, event, scale};
@@ -19,7 +21,7 @@ fn characters(text: &str) -> String {
 #[test]
 fn two_rows_share_a_line_and_no_range_is_empty() {
     let (near, far) = (Some(1000.0), Some(2000.0));
-    let lines = picture(&[near, None, far, far, None, None], 2, 10, 10);
+    let lines = picture(&[near, None, far, far, None, None], 2, 2, 2);
     assert_eq!(lines.len(), 2);
     assert_eq!(characters(&lines[0]), "▀▄");
     assert_eq!(characters(&lines[1]), "  ");
@@ -50,6 +52,58 @@ fn too_little_room_leaves_pixels_out() {
     }
 }
 
+proptest! {
+    /// As large as the room allows, and no larger. Each number stands once, where it fits.
+    #[test]
+    fn a_picture_fills_its_room(
+        rows in 1..20usize,
+        columns in 1..20usize,
+        missing in 0..20usize,
+        most_lines in 1..60usize,
+        most_columns in 1..250usize,
+        first in 100..99_000u32,
+    ) {
+        let pixels = (rows * columns).saturating_sub(missing.min(columns - 1));
+        let ranges: Vec<_> = (first..).take(pixels).map(|range| Some(f64::from(range))).collect();
+        let lines = picture(&ranges, columns, most_lines, most_columns);
+        let lines: Vec<_> = lines.iter().map(|line| characters(line)).collect();
+        let width = lines[0].chars().count();
+        prop_assert!(lines.iter().all(|line| line.chars().count() == width));
+        prop_assert!(width <= most_columns && lines.len() <= most_lines);
+
+        let side = (most_columns / columns).min(2 * most_lines / rows);
+        if side == 0 {
+            return Ok(());
+        }
+        prop_assert_eq!((width, lines.len()), (side * columns, (side * rows).div_ceil(2)));
+        let fits = (first as usize + pixels - 1).to_string().len() < side;
+        let text = lines.join("\n");
+        for number in (first..).take(pixels) {
+            prop_assert_eq!(text.matches(&number.to_string()).count(), usize::from(fits));
+        }
+    }
+}
+
+#[test]
+fn a_small_array_has_its_ranges_in_it() {
+    let ranges = [Some(812.4), None, Some(1204.0), Some(-31.0)];
+    let lines = picture(&ranges, 2, 5, 99);
+    let text: Vec<_> = lines.iter().map(|line| characters(line)).collect();
+    // Five squares a pixel, three characters' height and then two.
+    let expected = [
+        "▀▀▀▀▀     ",
+        " 812      ",
+        "▀▀▀▀▀▄▄▄▄▄",
+        "1204  -31 ",
+        "▀▀▀▀▀▀▀▀▀▀",
+    ];
+    assert_eq!(text, expected);
+    // Black on yellow, white on purple.
+    let (bright, dark) = ("\x1b[38;2;0;0;0m", "\x1b[38;2;255;255;255m");
+    assert_eq!(lines[3].matches(bright).count(), 1);
+    assert_eq!(lines[3].matches(dark).count(), 1);
+}
+
 /// What was written, for all to see.
 #[derive(Clone, Default)]
 struct Screen(Rc<RefCell<Vec<u8>>>);
@@ -78,7 +132,7 @@ fn it_is_drawn_in_place_and_gives_the_cursor_back() {
     let first = screen.taken();
     assert!(first.starts_with(HIDE_CURSOR));
     assert!(characters(&first).contains("no event yet of 4 pixels"));
-    assert_eq!(first.matches('\n').count(), 3);
+    assert_eq!(first.matches('\n').count(), 21);
 
     let [known, foreign] = [3, 4].map(|pixel| Event::Depth(event(pixel, 9, 40)));
     map.add(&[known, foreign], &scale());
@@ -87,11 +141,11 @@ fn it_is_drawn_in_place_and_gives_the_cursor_back() {
     assert_eq!(screen.taken(), "", "not so soon");
     map.draw().unwrap();
     let second = screen.taken();
-    // Back over three lines, and the same three lines again.
-    assert!(second.starts_with("\r\x1b[3A"));
-    assert_eq!(second.matches('\n').count(), 3);
+    // Back over these lines, and the same lines again.
+    assert!(second.starts_with("\r\x1b[21A"));
+    assert_eq!(second.matches('\n').count(), 21);
     let second = characters(&second);
-    assert!(second.contains(" ▄") && second.contains("1 of 4 pixels"));
+    assert!(second.contains(&"▀".repeat(19)) && second.contains("1 of 4 pixels"));
     assert!(second.contains("events/s 12, and so much more than fits") && !second.contains("here"));
 
     drop(map);
