@@ -33,7 +33,19 @@ pub fn significant(value: f64, digits: u8) -> String {
 /// The text without what a terminal obeys: a name in a file does not move the cursor.
 #[must_use]
 pub fn printable(text: &str) -> String {
-    text.replace(char::is_control, "\u{fffd}")
+    // Unicode's marks of direction, after which text is read the other way, are not among its controls.
+    let turns = |character: char| {
+        let marks = [
+            '\u{200e}'..='\u{200f}',
+            '\u{202a}'..='\u{202e}',
+            '\u{2066}'..='\u{2069}',
+        ];
+        marks.iter().any(|marks| marks.contains(&character))
+    };
+    text.replace(
+        |character: char| character.is_control() || turns(character),
+        "\u{fffd}",
+    )
 }
 
 /// Rows as lines of text, names to the left, values aligned, all [`printable`].
@@ -53,6 +65,15 @@ pub fn aligned(rows: &[Row]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_neither_move_the_cursor_nor_turn_the_line() {
+        let name = "a\u{1b}[2J\u{202e}b\u{2067}\u{200f}\n é 漢 ש";
+        assert_eq!(
+            printable(name),
+            "a\u{fffd}[2J\u{fffd}b\u{fffd}\u{fffd}\u{fffd} é 漢 ש"
+        );
+    }
 
     #[test]
     fn digits_count_from_the_first_that_is_not_0() {

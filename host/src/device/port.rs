@@ -26,7 +26,7 @@ pub trait Port: Send {
 
 impl Port for TcpStream {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.write_all(bytes).map_err(gone)
+        send(self, bytes)
     }
 
     fn receive(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
@@ -38,22 +38,26 @@ impl Port for TcpStream {
 }
 
 impl Port for Box<dyn serialport::SerialPort> {
-    fn send(&mut self, mut bytes: &[u8]) -> io::Result<()> {
-        let since = Instant::now();
-        while !bytes.is_empty() {
-            // A full buffer is no error until it stays full.
-            let sent = patient(self.write(bytes))?;
-            bytes = &bytes[sent..];
-            if since.elapsed() > STUCK {
-                return Err(ErrorKind::TimedOut.into());
-            }
-        }
-        Ok(())
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        send(self, bytes)
     }
 
     fn receive(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         patient(self.read(bytes))
     }
+}
+
+/// A full buffer is no error until it stays full.
+fn send(port: &mut impl Write, mut bytes: &[u8]) -> io::Result<()> {
+    let since = Instant::now();
+    while !bytes.is_empty() {
+        let sent = patient(port.write(bytes))?;
+        bytes = &bytes[sent..];
+        if since.elapsed() > STUCK {
+            return Err(ErrorKind::TimedOut.into());
+        }
+    }
+    Ok(())
 }
 
 /// Nothing yet is no error.
@@ -75,27 +79,42 @@ fn patient(result: io::Result<usize>) -> io::Result<usize> {
 fn gone(error: io::Error) -> io::Error {
     match error.kind() {
         ErrorKind::BrokenPipe => io::Error::new(ErrorKind::NotConnected, "the port is gone"),
-        // As a write says that has waited for room.
-        ErrorKind::WouldBlock => ErrorKind::TimedOut.into(),
         _ => error,
     }
 }
 
-/// The same connection, which sends at once, does not wait long for a byte, and not for ever for
-/// room.
+/// The same connection, which sends at once, and does not wait long for a byte or for room.
 ///
 /// # Errors
 /// If it is gone.
 pub fn prompt(stream: TcpStream) -> io::Result<TcpStream> {
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(PATIENCE))?;
-    stream.set_write_timeout(Some(STUCK))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
     Ok(stream)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Whatever it takes at first.
+    #[test]
+    fn a_tcp_port_that_takes_nothing_is_gone() {
+        let listener = std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap();
+        let stream = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        let mut port = prompt(stream).unwrap();
+        let began = Instant::now();
+        let bytes = [0; 1 << 16];
+        let error = loop {
+            if let Err(error) = port.send(&bytes) {
+                break error;
+            }
+            assert!(began.elapsed() < 12 * STUCK, "the buffers have no end");
+        };
+        assert_eq!(error.kind(), ErrorKind::TimedOut);
+        assert!(began.elapsed() >= STUCK);
+    }
 
     /// Else the program would end as if all were well.
     #[test]
