@@ -2,8 +2,8 @@
 
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
-    AnyRule, AverageRule, CentredWindow, Count, Count10, Count24, CounterWidth, DepthEstimator,
-    Detection, DetectionRule, Histogram, PaperRule, RangeGate, WindowRule, detect,
+    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, Count10, Count24, CounterWidth,
+    DepthEstimator, Detection, DetectionRule, Histogram, PaperRule, RangeGate, WindowRule, detect,
 };
 use proptest::prelude::*;
 use rand_core::SeedableRng;
@@ -59,6 +59,37 @@ proptest! {
         check::<128, Count10>(histogram, (alpha, z, width), minimum, half_width)?;
         check::<128, Count24>(histogram, (alpha, z, width), minimum, half_width)?;
     }
+}
+
+/// Only a window rule tracks, and asks more of blocks.
+#[test]
+fn tracking_and_blocks_are_those_of_the_rule_inside() {
+    let levels = (0..4).map(|level| BlockLevel::new(level).unwrap());
+    let mut others_of_blocks = 0;
+    for (width, z, minimum) in [(1, 4 << 12, 2), (3, 18_000, 0), (7, 30_000, 9)] {
+        let minimum = Count::saturating(minimum);
+        let window = WindowRule::new(width, U4F12::from_bits(z), minimum).unwrap();
+        let alpha = U8F8::lit("4");
+        let others = [
+            AnyRule::from(PaperRule::new(alpha, minimum)),
+            AnyRule::from(AverageRule::new(alpha, minimum)),
+        ];
+        for gate in [RangeGate::<128>::full(), RangeGate::new(20, 60).unwrap()] {
+            let expected = window.tracking(&gate);
+            let found = AnyRule::from(window).tracking(&gate).unwrap();
+            assert_eq!(*found.near(), AnyRule::Window(*expected.near()));
+            assert_eq!(*found.far(), AnyRule::Window(*expected.far()));
+            assert_eq!(found.reach(), expected.reach());
+            assert!(others.iter().all(|rule| rule.tracking(&gate).is_none()));
+        }
+        for level in levels.clone() {
+            let expected = window.of_blocks(level);
+            others_of_blocks += u32::from(expected != window);
+            assert_eq!(AnyRule::from(window).of_blocks(level), expected.into());
+            assert!(others.iter().all(|rule| rule.of_blocks(level) == *rule));
+        }
+    }
+    assert!(others_of_blocks > 0);
 }
 
 /// The histograms above are some on either side of each rule.

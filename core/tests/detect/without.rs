@@ -207,3 +207,34 @@ fn no_bins_at_all() {
         }
     }
 }
+
+/// A rule of somebody else, which compares no parts of the histogram.
+#[derive(Clone, Copy)]
+struct Above(Count);
+
+impl DetectionRule for Above {
+    fn detect<const BINS: usize, W: CounterWidth>(
+        &self,
+        _histogram: &Histogram<BINS, W>,
+        _gate: &RangeGate<BINS>,
+        peak: Peak,
+    ) -> Option<U24F8> {
+        (peak.count > self.0).then_some(U24F8::lit("0.5"))
+    }
+}
+
+/// It decides alike with bins left out.
+#[test]
+fn a_rule_without_a_way_of_its_own_takes_no_account() {
+    let mut rng = Pcg32::seed_from_u64(5);
+    let mut decided = [0; 2];
+    for round in 0..100 {
+        let case = Case::<64, Count10>::random(&mut rng, round);
+        let rule = Above(Count::saturating(case.most / 2));
+        let peak = case.histogram.peak();
+        let found = rule.detect_without(&case.histogram, &case.gate, peak, &case.peeled);
+        assert_eq!(found, rule.detect(&case.histogram, &case.gate, peak));
+        decided[usize::from(found.is_some())] += 1;
+    }
+    assert!(decided.iter().all(|&times| times > 0), "{decided:?}");
+}
