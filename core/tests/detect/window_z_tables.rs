@@ -6,6 +6,7 @@
 //! bins, one photon a bin and look, windows of 2, 3 and 5 bins. The z that one exposure
 //! in 300 exceeds says how many independent trials that is; a single look counts as 1.
 
+use dtof_core::{RangeGate, z_for};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -37,6 +38,57 @@ fn z_is_that_of_the_normal_distribution() {
         .collect();
     let table: Vec<f64> = table("Z").into_iter().map(f64::from).collect();
     assert_eq!(table, expected);
+}
+
+/// What so many looks are worth, in whole 1/16, with a straight line between powers of two.
+fn worth(looks: u32) -> f64 {
+    let table = table("LOOKS");
+    let power = looks.max(1).ilog2();
+    let index = power.min(9) as usize;
+    let [low, rise] = [table[index], table[index + 1] - table[index]].map(f64::from);
+    let part = f64::from(looks.max(1)) / f64::from(power).exp2() - 1.0;
+    let beyond = f64::from(power) - index as f64 + part;
+    (low + rise * beyond).floor() / 16.0
+}
+
+/// The looks from L1 to L2, of all bins, of so many exposures; the line between powers of two is
+/// straight for the trials and for z.
+#[test]
+fn z_for_is_that_of_its_tables() {
+    let z = table("Z");
+    let exposures = [
+        (4, 40, 1000),
+        (1, 1, 2),
+        (1, 1, 3),
+        (2, 2, 9),
+        (4, 4, 41),
+        (8, 64, 8 * 700),
+        (1, 3, u16::MAX),
+        (5, 0, 999),
+        (0, 9, 9),
+        (40, 40, 40),
+    ];
+    for one_in in [1, 3, 100, 1000, 1_000_000, u32::MAX] {
+        for (x, l1, l2) in exposures {
+            let look = |cycles: u16| u32::from(cycles.checked_div(x).unwrap_or(0));
+            let (first, last) = (look(l1) + 1, look(l2 - 1));
+            let looks = 1.0 + (worth(last) - worth(first)).max(0.0);
+            for (first, last) in [(0, 127), (20, 27), (3, 90)] {
+                let gate = RangeGate::<128>::new(first, last).unwrap();
+                let trials = f64::from(one_in) * f64::from(last - first + 1) * looks;
+                let trials = trials.floor();
+                let power = trials.log2().floor();
+                let steps = ((power - 6.0 + trials / power.exp2() - 1.0) / 2.0).clamp(0.0, 14.0);
+                let low = (steps as usize).min(13);
+                let [low_z, high_z] = [z[low], z[low + 1]].map(f64::from);
+                let expected = low_z + (high_z - low_z) * (steps - low as f64);
+                let found = f64::from(z_for(one_in, &gate, x, l1, l2).to_bits());
+                // Of the logarithm 8 bits are kept.
+                let context = format!("1 in {one_in}, {x} {l1} {l2}: {found} for {expected}");
+                assert!((found - expected).abs() <= 8.0, "{context}");
+            }
+        }
+    }
 }
 
 /// For 1, 2, 4, … looks, in 1/16. Takes minutes, so `.ci/long` asks for it.
