@@ -183,6 +183,61 @@ fn it_decides_as_it_is_written_at_the_extremes() {
     all::<256, Count24>();
 }
 
+/// Of an even background and a peak of one bin: three counts on either side of where the answer
+/// turns.
+#[test]
+fn it_decides_as_it_is_written_where_the_answer_turns() {
+    fn all<const BINS: usize, W: CounterWidth>(rounds: u32) {
+        let mut rng = Pcg32::seed_from_u64(BINS as u64 + u64::from(W::BITS));
+        let gate = RangeGate::<BINS>::full();
+        let mut turned = 0;
+        for _ in 0..rounds {
+            let background = rng.next_u32() % (W::MAX >> (1 + rng.next_u32() % (W::BITS - 1)));
+            let z = U4F12::from_bits(rng.next_u32() as u16 >> (rng.next_u32() % 8));
+            let width = 1 + (rng.next_u32() % 7) as u8;
+            let rule = WindowRule::new(width, z, Count::default()).unwrap();
+            let bin = (rng.next_u32() as usize) % BINS;
+            let of = |count: u32| {
+                let mut counts = [background; BINS];
+                counts[bin] = count;
+                let mut histogram = Histogram::<BINS, W>::new();
+                histogram.add_frame(&counts, &gate);
+                histogram
+            };
+            let peak = BinIndex::new(bin as u16).unwrap();
+            let expected = |count| as_written(&rule, &of(count), &gate, peak, 0);
+            let (mut low, mut high) = (background + 1, W::MAX);
+            if expected(low).is_some() || expected(high).is_none() {
+                continue;
+            }
+            while high - low > 1 {
+                let middle = low.midpoint(high);
+                *(if expected(middle).is_some() {
+                    &mut high
+                } else {
+                    &mut low
+                }) = middle;
+            }
+            for count in high.saturating_sub(3).max(background + 1)..=(high + 3).min(W::MAX) {
+                let histogram = of(count);
+                let found = rule.detect(&histogram, &gate, histogram.peak());
+                assert_eq!(
+                    found,
+                    expected(count),
+                    "{count} above {background}, {rule:?}"
+                );
+            }
+            turned += 1;
+        }
+        assert!(turned > rounds / 2, "{turned} of {rounds}");
+    }
+    all::<8, Count10>(300);
+    all::<8, Count24>(600);
+    all::<128, Count10>(300);
+    all::<128, Count24>(300);
+    all::<1024, Count16>(30);
+}
+
 #[test]
 fn only_windows_that_can_be_used() {
     for width in 0..=u8::MAX {
@@ -193,6 +248,7 @@ fn only_windows_that_can_be_used() {
             assert_eq!((rule.width(), rule.z(), minimum), (width, U4F12::ONE, 9));
         } else {
             assert_eq!(rule, Err(WindowWidthError));
+            assert!(WindowWidthError.text().contains("1 to 7 bins"));
         }
     }
 }
