@@ -181,7 +181,9 @@ mod tests {
     #[test]
     fn both_rates_fall_with_alpha() {
         let alphas: Vec<f64> = (0..100).map(|step| f64::from(step) / 10.0).collect();
-        for pair in COUNTS.roc(&alphas).windows(2) {
+        let rates = COUNTS.roc(&alphas);
+        assert_eq!(rates.len(), alphas.len());
+        for pair in rates.windows(2) {
             assert!(pair[1].0 < pair[0].0 && pair[1].1 < pair[0].1, "{pair:?}");
         }
         // And the true positive rate stays below the hit probability.

@@ -305,3 +305,6 @@ fn calibrated(
         detections: Detections::default(),
     })
 }
+
+#[cfg(test)]
+mod tests;

@@ -137,7 +137,8 @@ fn pixels_have_three_quarters_where_there_are_blocks() {
                             "{one_in} {l2} {last}: {share}"
                         );
                     } else {
-                        assert!(alone <= z);
+                        // Nearly as high alone.
+                        assert!(alone <= z && HIGHEST_Z - alone < U4F12::lit("0.1"));
                     }
                 }
             }

@@ -1,0 +1,146 @@
+use dtof_core::{BlockLevel, Count, Threshold};
+
+use super::*;
+
+const REQUEST: Request = Request {
+    background: 0.05,
+    signal: 0.5,
+    sigma: 1.0,
+    bins: 128,
+    minimum_count: MINIMUM_COUNT,
+    x: 4,
+    l1: Some(40),
+    l2: 1000,
+    wanted: Wanted::PerExposure(0.01),
+    levels: BlockLevel::PIXEL,
+    seed: 1,
+};
+
+/// False alarms over the mean length of exposures, those with an event ending at the first look.
+#[test]
+fn a_rate_is_that_of_the_shortest_exposures() {
+    for (x, l1, l2, rate) in [(4, 40, 1000, 1e-6), (1, 1, 3, 0.2), (10, 100, 5000, 1e-3)] {
+        let looks = Looks::new(x, l1, l2);
+        let probability = Wanted::PerCycle(rate).in_an_exposure(looks);
+        let [expiry, first] = [looks.expiry(), looks.first * looks.x].map(f64::from);
+        let length = (1.0 - probability) * expiry + probability * first;
+        assert!((probability / length / rate - 1.0).abs() < 1e-12);
+        assert_eq!(Wanted::PerExposure(0.1).in_an_exposure(looks), 0.1);
+    }
+}
+
+#[test]
+fn candidates_go_from_x_to_half_of_an_exposure() {
+    let of = |x, l1, l2| {
+        candidates(&Request {
+            x,
+            l1,
+            l2,
+            ..REQUEST
+        })
+    };
+    assert_eq!(of(4, None, 100), [4, 8, 12, 16, 24, 36]);
+    assert_eq!(of(4, None, 97), [4, 8, 12, 16, 24, 36]);
+    assert_eq!(of(4, None, 72), [4, 8, 12, 16, 24]);
+    assert_eq!(of(4, None, 9), [4]);
+    assert_eq!(of(4, Some(7), 100), [7]);
+}
+
+#[test]
+fn what_is_refused_says_how_it_would_go() {
+    let refused = |request: &Request| check(request).unwrap_err().to_string();
+    let full = |background, x, l1| Request {
+        background,
+        x,
+        l1,
+        l2: 5000,
+        ..REQUEST
+    };
+    let too_long = full(0.5, 4, None);
+    let error = refused(&too_long);
+    assert!(
+        error.ends_with("before L2 = 5000: lower --l2 to 1720"),
+        "{error}"
+    );
+    assert!(
+        check(&Request {
+            l2: 1720,
+            ..too_long
+        })
+        .is_ok()
+    );
+    for (l1, way_out) in [
+        (Some(1716), "lower --l2 to 1720"),
+        (Some(1720), "lower --l1, --x or the background"),
+    ] {
+        let error = refused(&full(0.5, 4, l1));
+        assert!(error.ends_with(way_out), "{error}");
+    }
+    let error = refused(&full(0.5, 860, None));
+    assert!(
+        error.ends_with("lower --l1, --x or the background"),
+        "{error}"
+    );
+
+    let looks = |l2| Request {
+        background: 1e-3,
+        x: 1,
+        l2,
+        ..REQUEST
+    };
+    assert!(check(&looks(5001)).is_ok());
+    let error = refused(&looks(5002));
+    assert!(
+        error.contains("5001 looks an exposure, at most 5000"),
+        "{error}"
+    );
+}
+
+/// α in the smallest step that keeps the upper limit of false alarms below what is wanted.
+#[test]
+fn alpha_is_the_smallest_that_keeps_false_alarms_down() {
+    let table = Table::kept().unwrap();
+    let mut sources = Vec::new();
+    for (bins, background, wanted) in [
+        (64, 0.05, 0.01),
+        (128, 0.05, 0.01),
+        (128, 0.1, 1e-4),
+        (128, 0.05, 1e-9),
+    ] {
+        let request = Request {
+            bins,
+            background,
+            ..REQUEST
+        };
+        let looks = Looks::new(4, 40, 1000);
+        let steps = single_looks(bins.into(), background * 4.0, looks.last);
+        let request = Request {
+            wanted: Wanted::PerExposure(wanted),
+            ..request
+        };
+        let found = tune(&request, &table).unwrap();
+        assert_eq!((found.l1, found.looks, found.wanted), (40, looks, wanted));
+
+        let repeated = RepeatedLooks::new(&steps, looks.first, looks.last);
+        // The most there may be, as the table or the sum over looks says.
+        let most = |alpha: u16| {
+            let minimum = Count::saturating(MINIMUM_COUNT.into());
+            let bounds = repeated.bounds(&Threshold::new(U8F8::from_bits(alpha), minimum));
+            let first_mean = background * 44.0;
+            let found = table.look_up(first_mean, 11, 249, bounds.independent);
+            match found.filter(|found| bins == 128 && found.probability < bounds.sum) {
+                Some(found) => (found.at_most.max(bounds.worst_look) * MARGIN).min(bounds.sum),
+                None => bounds.sum,
+            }
+        };
+        let alpha = found.alpha.to_bits();
+        assert!(
+            most(alpha) <= wanted && most(alpha - 1) > wanted,
+            "{found:?}"
+        );
+        assert!(found.false_alarms <= wanted);
+        sources.push(found.source);
+    }
+    assert_eq!(sources[0], Source::Bound);
+    assert!(sources.contains(&Source::Table), "{sources:?}");
+}
