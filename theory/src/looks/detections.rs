@@ -112,3 +112,74 @@ impl std::ops::AddAssign for Detections {
         self.squared_errors += other.squared_errors;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use dtof_core::fixed::types::U8F8;
+    use dtof_core::{Count, PaperRule};
+
+    use super::*;
+
+    fn trial(signal: f64, alpha: &str) -> Detections {
+        let rates = Rates {
+            background: 0.05,
+            signal,
+            position: 40.25,
+            sigma: 1.0,
+        };
+        let decisions = Decisions {
+            looks: Looks::new(4, 40, 1000),
+            rule: PaperRule::new(alpha.parse::<U8F8>().unwrap(), Count::saturating(2)).into(),
+            estimator: DepthEstimator::Centroid3,
+        };
+        Detections::trial::<128>(3, 7, &rates, &decisions, 200).unwrap()
+    }
+
+    #[test]
+    fn a_bright_target_is_found_at_the_first_look() {
+        let found = trial(3.0, "4");
+        let expected = Detections {
+            exposures: 200,
+            cycles: 200 * 44,
+            near: 200,
+            far: 0,
+            near_cycles: 200 * 44,
+            squared_errors: found.squared_errors,
+        };
+        assert_eq!(found, expected);
+        assert_eq!((found.detected(), found.cycles_to_event()), (1.0, 44.0));
+        // 132 photons of a pulse of one bin: a tenth, and what the centroid of three bins is off by.
+        let error = found.depth_error_bins();
+        assert!((0.05..0.3).contains(&error), "{error}");
+        let squares = found.squared_errors as f64 / 200.0;
+        assert!(((error * 256.0).powi(2) / squares - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn false_alarms_are_anywhere_and_parts_add_up() {
+        let found = trial(0.0, "1");
+        // Within three bins of 128 lie one in twenty.
+        assert!(found.far > 120 && found.near < found.far / 4, "{found:?}");
+        assert!(found.near_cycles < found.cycles);
+
+        let other = trial(3.0, "4");
+        let mut sum = found;
+        sum += other;
+        let of = |of: &Detections| {
+            [
+                of.exposures,
+                of.cycles,
+                of.near,
+                of.far,
+                of.near_cycles,
+                of.squared_errors,
+            ]
+        };
+        let expected: Vec<u64> = of(&found)
+            .iter()
+            .zip(of(&other))
+            .map(|(a, b)| a + b)
+            .collect();
+        assert_eq!(of(&sum).to_vec(), expected);
+    }
+}
