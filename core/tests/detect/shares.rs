@@ -70,6 +70,9 @@ fn each_of_both_has_half_of_the_false_alarms() {
         for last in [7, 15, 30, 127, 500, 1023] {
             let gate = RangeGate::<1024>::new(0, last).unwrap();
             let (all, tracking) = (rule(z), rule(z).tracking(&gate));
+            // Wherever the gate begins.
+            let end = RangeGate::<1024>::new(1023 - last, 1023).unwrap();
+            assert_eq!(all.tracking(&end), tracking);
             let far = rate(tracking.far()) / rate(&all);
             assert!((0.48..0.52).contains(&far), "{z} {last}: {far}");
             let near = rate(tracking.near());

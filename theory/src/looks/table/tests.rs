@@ -51,3 +51,33 @@ fn few_events_leave_more_room_above() {
         assert!(found.at_most >= found.probability, "{row:?}");
     }
 }
+
+/// A thousand exposures of other seeds, at four of the points.
+#[test]
+fn the_kept_table_is_what_is_simulated() {
+    let table = Table::kept().unwrap();
+    let all = points();
+    let of_grid = FIRST_MEANS.len() * FIRSTS.len();
+    assert_eq!(all.len(), of_grid);
+    let mut compared = 0;
+    for at in [7, 22, 41, 63] {
+        let point = &all[at];
+        let last = point.lasts.last().copied().unwrap();
+        assert!(last <= LAST && point.lasts[0] == point.first, "{point:?}");
+        let tally = simulate(99, 5000, point, 2).unwrap();
+        assert_eq!(tally.exposures, 2 * u64::from(TRIAL));
+        let rows = rows(point, &tally);
+        for row in &rows {
+            assert!((FEWEST_EVENTS..=950).contains(&row.events));
+            let found = table.look_up(row.first_mean, row.first, row.last, row.intensity);
+            let expected = found.unwrap().probability * tally.exposures as f64;
+            let error = (row.events as f64 - expected).abs();
+            assert!(
+                error < 5.0 * expected.sqrt() + 0.05 * expected,
+                "{row:?} {expected}"
+            );
+        }
+        compared += rows.len();
+    }
+    assert!(compared > 100, "{compared}");
+}
