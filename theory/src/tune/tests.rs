@@ -144,3 +144,49 @@ fn alpha_is_the_smallest_that_keeps_false_alarms_down() {
     assert_eq!(sources[0], Source::Bound);
     assert!(sources.contains(&Source::Table), "{sources:?}");
 }
+
+/// In exposures that α was not found with, too.
+#[test]
+fn alpha_of_the_average_keeps_false_alarms_down() {
+    let wanted = 0.02;
+    let found = average::tune(&Request {
+        background: 0.2,
+        bins: 8,
+        l2: 200,
+        signal: 2.0,
+        wanted: Wanted::PerExposure(wanted),
+        ..REQUEST
+    })
+    .unwrap();
+    assert_eq!((found.l1, found.exposures), (40, 64 * 2000));
+    let (exposures, events) = found.false_alarms;
+    assert_eq!(exposures, 8 * 500);
+    let share = events as f64 / exposures as f64 / wanted;
+    // Steps of α are coarse; 80 events are wanted.
+    assert!((0.5..1.3).contains(&share), "{share}");
+    assert!(found.detections.detected() > 0.9);
+}
+
+/// Near enough: L1 is chosen by fewer exposures.
+#[test]
+fn no_other_l1_is_much_faster() {
+    let time = |l1| {
+        let request = Request {
+            signal: 0.3,
+            l1,
+            ..REQUEST
+        };
+        let found = window::tune(&request).unwrap();
+        (found.l1, found.detections.cycles_to_event())
+    };
+    let (chosen, best) = time(None);
+    let others = [12, 48, 108, 364].map(|l1| (l1, time(Some(l1)).1));
+    assert!(
+        others.iter().all(|&(_, other)| best < 1.1 * other),
+        "{chosen} {best} {others:?}"
+    );
+    assert!(
+        others.iter().any(|&(_, other)| best < 0.8 * other),
+        "{chosen} {best} {others:?}"
+    );
+}
