@@ -190,3 +190,27 @@ fn no_other_l1_is_much_faster() {
         "{chosen} {best} {others:?}"
     );
 }
+
+/// z holds from 0.4 background photons a bin at the first look on: 40 laser cycles here.
+#[test]
+fn a_bright_target_waits_until_z_holds() {
+    let found = window::tune(&Request {
+        background: 0.01,
+        signal: 3.0,
+        l1: None,
+        ..REQUEST
+    });
+    assert_eq!(found.unwrap().l1, 36);
+}
+
+/// So many exposures that their photons take a second.
+#[test]
+fn much_background_has_fewer_exposures_without_a_target() {
+    let found = window::tune(&Request {
+        background: 0.4,
+        signal: 3.0,
+        ..REQUEST
+    });
+    // Of the 1e8 photons an exposure of 996 laser cycles has 50,995.
+    assert_eq!(found.unwrap().false_alarms.0, 8 * 245);
+}
