@@ -139,6 +139,7 @@ fn alpha_is_the_smallest_that_keeps_false_alarms_down() {
             "{found:?}"
         );
         assert!(found.false_alarms <= wanted);
+        assert!(found.detections.detected() > 0.99);
         sources.push(found.source);
     }
     assert_eq!(sources[0], Source::Bound);
