@@ -104,6 +104,8 @@ fn alpha_is_the_smallest_that_keeps_false_alarms_down() {
     for (bins, background, wanted) in [
         (64, 0.05, 0.01),
         (128, 0.05, 0.01),
+        (128, 0.1, 0.03),
+        (128, 0.3, 0.003),
         (128, 0.1, 1e-4),
         (128, 0.05, 1e-9),
     ] {
