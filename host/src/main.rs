@@ -42,6 +42,8 @@ enum Command {
     Monitor(Box<command::monitor::Monitor>),
     /// Find α and L1 for a wanted rate of false alarms, and say what to expect.
     Tune(Box<command::tune::Tune>),
+    /// Show a device or a recording live in a browser on this computer.
+    View(Box<command::view::View>),
 }
 
 fn main() -> ExitCode {
@@ -56,5 +58,6 @@ fn main() -> ExitCode {
         Some(Command::Export(export)) => export.run(),
         Some(Command::Monitor(monitor)) => monitor.run(),
         Some(Command::Tune(tune)) => tune.run(),
+        Some(Command::View(view)) => view.run(),
     })
 }

@@ -4,13 +4,15 @@ pub mod calibrate;
 pub mod compare;
 pub mod decode;
 pub mod demo;
+mod device_options;
 mod dynamic_depth;
 pub mod export;
 pub mod monitor;
 pub mod replay;
+mod seen;
 pub mod simulate;
 pub mod tune;
-mod view;
+pub mod view;
 
 use std::io::{self, Write};
 use std::path::Path;

@@ -26,7 +26,7 @@ use dtof_link::DynamicDepth;
 
 use super::dynamic_depth::Shown;
 use super::print_summary;
-use super::view::View;
+use super::seen::View;
 
 #[derive(Args)]
 pub struct Simulate {

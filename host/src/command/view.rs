@@ -1,123 +1,69 @@
-//! The options of `dtof simulate` that say what the array sees beside a scene file.
+//! `dtof view`: a device or a recording, live in a browser.
 
-use std::path::{Path, PathBuf};
+use std::io::{self, Write};
+use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
-use dtof::cli::arguments::{path, real};
-use dtof::geometry::FieldOfView;
-use dtof::rows::Row;
-use dtof::simulate::scene::{Along, DepthMap, Scene};
+use dtof::cli::arguments::{path, positive, whole};
+use dtof::cli::interrupt;
+use dtof::device;
+use dtof::view::live::{Device, Feed, Folder, Playback, Served};
 
-/// Photons a bin and laser cycle in a scene without a file.
-const BACKGROUND: f64 = 0.02;
+use super::device_options::DeviceOptions;
 
 #[derive(Args)]
 pub struct View {
-    /// A depth map as a surface, alone or with those of --scene: an .npy array of rows and
-    /// columns, floats in metres or integers in millimetres. No surface where it is 0, negative,
-    /// infinite or NaN
-    #[arg(long, value_name = "FILE", value_parser = path())]
-    pub depth: Option<PathBuf>,
-    /// What the depth map holds
-    #[arg(long, value_enum, default_value_t = Along::Axis, requires = "depth")]
-    depth_along: Along,
-    /// The reflectivity of the depth map: an .npy picture as large, grey or of three colours,
-    /// bytes from 0 to 255 or floats, white being 1 [default: white]
-    #[arg(long, value_name = "FILE", value_parser = path(), requires = "depth")]
-    albedo: Option<PathBuf>,
-    /// Horizontal and vertical angle in degrees, from edge to edge of the array [default: the
-    /// scene file's, or 60 along the longer side, with square pixels]
-    #[arg(long, value_name = "HxV", allow_hyphen_values = true)]
-    fov: Option<FieldOfView>,
-    /// Signal photons a laser cycle from a white surface at one metre [default: the scene file's,
-    /// or 4]
-    #[arg(long, value_name = "PHOTONS", value_parser = within::<1_000_000>, allow_hyphen_values = true)]
-    signal_at_one_metre: Option<f64>,
-    /// Background photons a bin and laser cycle [default: the scene file's, or 0.02]
-    #[arg(long, value_name = "PHOTONS", value_parser = within::<100>, allow_hyphen_values = true)]
-    background: Option<f64>,
-    /// Standard deviation of the simulated pulse in bins [default: the scene file's, or 1]
-    #[arg(long, value_name = "BINS", value_parser = within::<1000>, allow_hyphen_values = true)]
-    pulse_sigma_bins: Option<f64>,
+    /// An AER file, which is played at the rate of its laser
+    #[arg(value_name = "FILE.aer", value_parser = path(), required_unless_present = "device", conflicts_with = "device")]
+    file: Option<PathBuf>,
+    /// tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated device
+    #[arg(long, value_name = "DEVICE")]
+    device: Option<String>,
+    /// Of a file: so many times as fast as it was [default: 1]
+    #[arg(long, value_name = "N", value_parser = positive, conflicts_with = "device")]
+    speed: Option<f64>,
+    /// Of a file: laser cycles a second [default: as the file says]
+    #[arg(long, value_name = "HZ", value_parser = whole(1..=u64::MAX / 1000), conflicts_with = "device")]
+    laser_hz: Option<u64>,
+    /// The port of the page on this computer [default: any that is free]
+    #[arg(long, value_name = "PORT", value_parser = whole(0..=u16::MAX), default_value_t = 0, hide_default_value = true)]
+    port: u16,
+    /// The folder for recordings and settings that the page saves. Files there are not replaced
+    /// [default: the page saves nothing]
+    #[arg(long, value_name = "DIR", value_parser = path())]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    options: DeviceOptions,
 }
 
 impl View {
-    /// The scene of `file`, or one with its defaults and some background, as the options change it.
-    ///
-    /// # Errors
-    /// What is wrong with a file.
-    pub fn scene(&self, file: Option<&Path>) -> Result<Scene> {
-        let mut scene = match file {
-            Some(file) => Scene::read(file)?,
-            None => Scene {
-                background: BACKGROUND,
-                ..Scene::parse("")?
-            },
+    pub fn run(self) -> Result<()> {
+        let feed = match (self.device, self.file) {
+            (Some(name), _) => {
+                let image = self.options.image.clone();
+                Feed::Device(Device {
+                    said: self.options.said()?,
+                    pixels: self.options.pixels,
+                    dynamic_depth: self.options.changes()?,
+                    open: Box::new({
+                        let name = name.clone();
+                        move || device::open(&name, image.as_deref())
+                    }),
+                    name,
+                })
+            }
+            (None, file) => {
+                let file = file.unwrap_or_default();
+                let speed = self.speed.unwrap_or(1.0);
+                Feed::Playback(Playback::new(file, self.laser_hz, speed)?)
+            }
         };
-        scene.background = self.background.unwrap_or(scene.background);
-        let sigma = self.pulse_sigma_bins;
-        scene.pulse_sigma_bins = sigma.unwrap_or(scene.pulse_sigma_bins);
-        let signal = self.signal_at_one_metre;
-        scene.signal_at_one_metre = signal.unwrap_or(scene.signal_at_one_metre);
-        scene.field_of_view = self.fov.or(scene.field_of_view);
-        let Some(depth) = &self.depth else {
-            return Ok(scene);
-        };
-        let mut map = DepthMap::read(depth, self.depth_along)?;
-        if let Some(albedo) = &self.albedo {
-            map = map.with_picture(albedo)?;
-        }
-        if file.is_none() {
-            (scene.geometry, scene.layout) = (map.size(), map.size());
-        }
-        let name = || depth.display().to_string();
-        scene.add_depth_map(map).with_context(name)?;
-        Ok(scene)
+        interrupt::listen(|| ())?;
+        let served = Served::begin(feed, self.port, Folder::new(self.out.as_deref())?)?;
+        let mut out = io::stdout();
+        writeln!(out, "{}", served.address)?;
+        out.flush()?;
+        served.until(interrupt::is_interrupted)
     }
-
-    /// The files of the scene, for people.
-    pub fn input(&self, file: Option<&Path>) -> String {
-        let files = [file, self.depth.as_deref(), self.albedo.as_deref()];
-        let names = files.into_iter().flatten();
-        let names: Vec<_> = names.map(|file| file.display().to_string()).collect();
-        names.join(", ")
-    }
-
-    /// What no file says, and what of it was assumed.
-    pub fn rows(&self, scene: &Scene) -> Vec<Row> {
-        if self.depth.is_none() {
-            return Vec::new();
-        }
-        let row = |name: &str, value: String| (name.to_owned(), value);
-        let along = match self.depth_along {
-            Along::Axis => "depth along the optical axis",
-            Along::Ray => "range along the ray",
-        };
-        vec![
-            row("depth map", along.to_owned()),
-            row("field of view", format!("{} degrees", scene.view())),
-            row(
-                "signal",
-                format!(
-                    "{} photons a laser cycle from a white surface at 1 m",
-                    scene.signal_at_one_metre
-                ),
-            ),
-            row(
-                "background",
-                format!("{} photons a bin and laser cycle", scene.background),
-            ),
-            row(
-                "pulse",
-                format!("standard deviation {} bins", scene.pulse_sigma_bins),
-            ),
-        ]
-    }
-}
-
-/// Reads a number from 0 to `MOST`.
-fn within<const MOST: u32>(text: &str) -> Result<f64, String> {
-    let number = real(text).filter(|number| (0.0..=f64::from(MOST)).contains(number));
-    number.ok_or_else(|| format!("must be a number from 0 to {MOST}"))
 }

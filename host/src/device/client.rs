@@ -1,5 +1,7 @@
 //! The host's end of the link over a real port.
 
+mod wait;
+
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail, ensure};
@@ -12,23 +14,10 @@ use dtof_link::{Configuration, Refusal, Report, SensorRecord};
 use super::assembly::{Assembly, HistogramAnswer};
 use super::port::Port;
 use crate::events::aer_file::Event;
+use wait::Wait;
 
 /// A device that says nothing for so long is gone.
 const SILENCE: Duration = Duration::from_secs(5);
-/// So is one that speaks, and does not answer for so long, nor sends an event.
-const ANSWER: Duration = Duration::from_secs(30);
-/// So is one that sends events, and does not answer for so long. A message of photons may make
-/// events for a minute on a slow line.
-const EVENTS_ALONE: Duration = Duration::from_secs(600);
-
-/// Waiting for an answer.
-#[derive(Clone, Copy)]
-struct Wait {
-    began: Instant,
-    /// The beginning, or the last event.
-    heard: Instant,
-    arrived: u64,
-}
 
 /// A session with a device.
 pub struct Client {
@@ -80,10 +69,11 @@ impl Client {
             configured: 0,
             asked: None,
         };
+        let mut wait = Wait::new(0);
         while !client.endpoint.is_open() {
             let answered = client.exchange();
             answered
-                .and_then(|()| within(now, ANSWER))
+                .and_then(|()| wait.goes_on(0))
                 .context("no device answered")?;
         }
         let [a, b, c, d, e, f, g, h] = *client.endpoint.peer_greeting();
@@ -176,7 +166,7 @@ impl Client {
     /// # Errors
     /// If the device is gone.
     pub fn request_report(&mut self) -> Result<()> {
-        self.asked = Some(self.wait());
+        self.asked = Some(Wait::new(self.arrived));
         self.send(message::STATISTICS_REQUEST, &[])
     }
 
@@ -196,7 +186,7 @@ impl Client {
             return report(&answer).map(Some);
         }
         if let Some(mut wait) = self.asked {
-            self.goes_on(&mut wait)?;
+            wait.goes_on(self.arrived)?;
             self.asked = Some(wait);
         }
         Ok(None)
@@ -221,11 +211,16 @@ impl Client {
         if let Some(message) = self.next()? {
             bail!("the device sends message {:#04x} unasked", message.kind);
         }
-        let answer = self.histograms.next();
+        let answer = self.take_histogram();
         if answer.is_none() {
             self.exchange()?;
         }
         Ok(answer)
+    }
+
+    /// The next answer to [`Self::request_histogram`] that has arrived.
+    pub fn take_histogram(&mut self) -> Option<HistogramAnswer> {
+        self.histograms.next()
     }
 
     /// The events that have arrived.
@@ -238,13 +233,13 @@ impl Client {
     /// # Errors
     /// If the device is gone.
     pub fn send(&mut self, kind: u8, body: &[u8]) -> Result<()> {
-        let mut wait = self.wait();
+        let mut wait = Wait::new(self.arrived);
         while self.endpoint.offer(kind, body).is_err() {
             self.exchange()?;
             if let Some(message) = self.next()? {
                 bail!("the device sends message {:#04x} unasked", message.kind);
             }
-            self.goes_on(&mut wait)?;
+            wait.goes_on(self.arrived)?;
         }
         Ok(())
     }
@@ -263,32 +258,14 @@ impl Client {
 
     /// Waits for the next message that is not events.
     fn answer(&mut self) -> Result<Message> {
-        let mut wait = self.wait();
+        let mut wait = Wait::new(self.arrived);
         loop {
             if let Some(message) = self.next()? {
                 return Ok(message);
             }
-            self.goes_on(&mut wait)?;
+            wait.goes_on(self.arrived)?;
             self.exchange()?;
         }
-    }
-
-    fn wait(&self) -> Wait {
-        let now = Instant::now();
-        Wait {
-            began: now,
-            heard: now,
-            arrived: self.arrived,
-        }
-    }
-
-    /// Fails once a device has kept the host waiting for too long.
-    fn goes_on(&self, wait: &mut Wait) -> Result<()> {
-        if self.arrived > wait.arrived {
-            (wait.heard, wait.arrived) = (Instant::now(), self.arrived);
-        }
-        within(wait.heard, ANSWER)?;
-        within(wait.began, EVENTS_ALONE)
     }
 
     /// Takes messages until one is not events and no histogram.
@@ -376,15 +353,6 @@ impl Client {
     fn now_ms(&self) -> u32 {
         self.started.elapsed().as_millis() as u32
     }
-}
-
-fn within(since: Instant, most: Duration) -> Result<()> {
-    ensure!(
-        since.elapsed() < most,
-        "the device does not answer for {} seconds",
-        most.as_secs()
-    );
-    Ok(())
 }
 
 /// A message that must be a report.

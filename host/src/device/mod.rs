@@ -9,6 +9,7 @@ pub mod monitor;
 mod open;
 mod port;
 mod qemu;
+mod setup;
 
 use anyhow::{Result, bail, ensure};
 use dtof_core::{DepthEvent, PixelAddress, Statistics};
@@ -19,6 +20,7 @@ pub use assembly::{HistogramAnswer, PixelHistogram};
 pub use client::Client;
 pub use open::open;
 pub use port::Port;
+pub use setup::Setup;
 
 use crate::engine::Engine;
 use crate::engine::settings::Settings;

@@ -1,6 +1,7 @@
 //! A device with a sensor: its events as they come, and once a second what it
 //! does.
 
+pub mod losses;
 pub mod map;
 mod recording;
 
@@ -10,13 +11,14 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, ensure};
 use dtof_core::RangeScale;
 use dtof_link::endpoint::LinkCounters;
-use dtof_link::{DynamicDepth, FaultRecord, Report, Source};
+use dtof_link::{DynamicDepth, Report, Source};
 
 use crate::device::{Client, configuration};
 use crate::engine::settings::Settings;
 use crate::events::aer_file::Event;
 use crate::events::events_csv;
 use crate::input::source::Geometry;
+use losses::{Losses, since};
 use map::LiveMap;
 pub use recording::Recording;
 
@@ -51,6 +53,18 @@ pub fn array(pixels: u16, columns: Option<u32>) -> Geometry {
         columns,
         rows: pixels.div_ceil(columns),
     }
+}
+
+/// Checks that no pixel is left out whose photons count all the same.
+///
+/// # Errors
+/// If there are blocks of pixels.
+pub fn check_masked(settings: &Settings) -> Result<()> {
+    ensure!(
+        settings.masked.is_empty() || settings.binning.is_none(),
+        "the blocks of a device count masked pixels, too; leave out --mask or --binning"
+    );
+    Ok(())
 }
 
 /// Where what it does is written.
@@ -171,10 +185,7 @@ fn watch(
             task.dynamic_depth,
         )
     };
-    ensure!(
-        task.settings.masked.is_empty() || task.settings.binning.is_none(),
-        "the blocks of a device count masked pixels, too; leave out --mask or --binning"
-    );
+    check_masked(task.settings)?;
     client.configure(&configuration(Source::Sensor)?)?;
     // From now on there may be events, which are written also if nothing else comes.
     let columns = match task.dynamic_depth {
@@ -273,71 +284,17 @@ impl Figures {
             rate(now[0], self.last[0]),
             rate(now[1], self.last[1]),
         );
-        line += &losses(report, &self.first, &since(client.counters(), &self.here));
+        let losses = Losses {
+            first: &self.first,
+            here: &since(client.counters(), &self.here),
+        };
+        line += &losses.line(report);
         if masked > 0 {
             line += &format!(", events left out {masked}");
         }
         self.since = Instant::now();
         self.last = now;
         line
-    }
-}
-
-/// The losses and errors since the device had counted `first`, each with a comma before
-/// it. Counts of 0 are left out. `here` is what this end of the link has counted.
-fn losses(report: &Report, first: &Report, here: &LinkCounters) -> String {
-    let (pixels, blocks) = (&report.statistics, &report.blocks);
-    let there = since(&report.link, &first.link);
-    let both = |count: fn(&LinkCounters) -> u32| u64::from(count(&there)) + u64::from(count(here));
-    let sensor_errors = report.sensor_errors.wrapping_sub(first.sensor_errors);
-    let overrun = report.overrun.wrapping_sub(first.overrun);
-    let unknown = report.unknown.wrapping_sub(first.unknown);
-    let counts = [
-        ("saturated", pixels.saturated),
-        ("saturated in blocks", blocks.saturated),
-        ("rejected", pixels.rejected),
-        ("gated out", pixels.gated_out),
-        ("unaddressed", report.unaddressed),
-        ("deferred", pixels.deferred + blocks.deferred),
-        ("expired", pixels.expired),
-        (
-            "expired and deferred",
-            pixels.expired_deferred + blocks.expired_deferred,
-        ),
-        ("lost bytes", overrun.into()),
-        ("corrupt frames", both(|link| link.corrupt)),
-        ("oversized frames", both(|link| link.oversized)),
-        ("foreign frames", both(|link| link.foreign)),
-        ("out of order", both(|link| link.out_of_order)),
-        ("duplicates", both(|link| link.duplicate)),
-        ("retransmissions", both(|link| link.retransmitted)),
-        ("unknown messages", unknown.into()),
-        ("sensor errors", sensor_errors.into()),
-    ];
-    let mut line = String::new();
-    for (name, count) in counts.into_iter().filter(|&(_, count)| count > 0) {
-        line += &format!(", {name} {count}");
-    }
-    if sensor_errors > 0 {
-        let number = report.last_sensor_error;
-        line += &match FaultRecord::from_number(number) {
-            Some(fault) => format!(" (last: {fault})"),
-            None => format!(" (last: number {number})"),
-        };
-    }
-    line
-}
-
-/// The counts since `first`.
-fn since(now: &LinkCounters, first: &LinkCounters) -> LinkCounters {
-    LinkCounters {
-        frames: now.frames.wrapping_sub(first.frames),
-        corrupt: now.corrupt.wrapping_sub(first.corrupt),
-        oversized: now.oversized.wrapping_sub(first.oversized),
-        foreign: now.foreign.wrapping_sub(first.foreign),
-        out_of_order: now.out_of_order.wrapping_sub(first.out_of_order),
-        duplicate: now.duplicate.wrapping_sub(first.duplicate),
-        retransmitted: now.retransmitted.wrapping_sub(first.retransmitted),
     }
 }
 
@@ -357,44 +314,5 @@ mod tests {
         let rows = [1, 1, 2, 3, 8, 8, 32, 1, 0];
         assert_eq!(pixels.map(|pixels| array(pixels, None).1), rows);
         assert_eq!(array(64, Some(10)), (10, 7));
-    }
-
-    #[test]
-    fn every_loss_is_shown_and_only_losses() {
-        // A report whose numbers are `number` in one field after the other, little-endian.
-        let report = |number: fn(u64) -> u64| {
-            let wide = (0..20).flat_map(|at| number(at).to_le_bytes());
-            let narrow = (20..30).flat_map(|at| u32::try_from(number(at)).unwrap().to_le_bytes());
-            let bytes: Vec<u8> = wide.chain(narrow).chain([1]).collect();
-            Report::from_le_bytes(&bytes).unwrap()
-        };
-        let none = LinkCounters::default();
-        assert_eq!(losses(&report(|_| 0), &report(|_| 0), &none), "");
-        // The counts of the link and of the sensor began before.
-        assert_eq!(
-            losses(&report(|at| 101 + at), &report(|_| 100), &none),
-            ", saturated 105, saturated in blocks 114, rejected 106, gated out 107, unaddressed 102, \
-             deferred 227, expired 110, expired and deferred 231, lost bytes 21, corrupt frames 25, \
-             oversized frames 26, foreign frames 27, out of order 28, duplicates 29, \
-             retransmissions 30, unknown messages 22, sensor errors 23 (last: no answer)"
-        );
-        // Errors of before are not this one's.
-        assert_eq!(losses(&report(|_| 0), &Report::default(), &none), "");
-
-        // Each end sees other frames.
-        let here = LinkCounters {
-            frames: 1,
-            corrupt: 2,
-            oversized: 3,
-            foreign: 4,
-            out_of_order: 5,
-            duplicate: 6,
-            retransmitted: 7,
-        };
-        assert_eq!(
-            losses(&report(|_| 0), &report(|_| 0), &here),
-            ", corrupt frames 2, oversized frames 3, foreign frames 4, out of order 5, duplicates 6, \
-             retransmissions 7"
-        );
     }
 }

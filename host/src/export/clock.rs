@@ -38,7 +38,8 @@ impl LaserClock {
     }
 
     /// That of a file which says so.
-    pub(super) fn of(header: &Header) -> Option<Self> {
+    #[must_use]
+    pub fn of(header: &Header) -> Option<Self> {
         let millihertz = u128::from(header.laser_millihertz);
         (millihertz > 0).then_some(Self { millihertz })
     }

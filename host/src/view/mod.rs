@@ -1,3 +1,4 @@
 //! Pages to look at.
 
+pub mod live;
 pub mod report;

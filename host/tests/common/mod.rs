@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "not every test needs all of it")]
 
 pub mod aer;
+pub mod port;
 pub mod sensed;
 
 use std::io::Write;

@@ -19,6 +19,8 @@ pub struct Recording {
     path: PathBuf,
     aside: PathBuf,
     is_empty: bool,
+    /// What is at its place stays there.
+    is_new: bool,
     /// The disk did not take an event: the file aside is not whole, and never will be.
     is_broken: bool,
 }
@@ -47,8 +49,16 @@ impl Recording {
             path: place.file,
             aside,
             is_empty: true,
+            is_new: false,
             is_broken: false,
         })
+    }
+
+    /// The same, which fails at its end if something has come to its place meanwhile.
+    #[must_use]
+    pub fn that_replaces_nothing(mut self) -> Self {
+        self.is_new = true;
+        self
     }
 
     /// Writes events in the order they come.
@@ -89,13 +99,19 @@ impl Recording {
             aer,
             path,
             aside,
+            is_new,
             is_broken,
             ..
         } = self;
         let moved = || -> Result<()> {
             ensure!(!is_broken, "the disk did not take an event");
             let file = flushed(aer.finish()?)?;
-            file.persist(&path).map_err(|error| error.error)?;
+            let moved = if is_new {
+                file.persist_noclobber(&path)
+            } else {
+                file.persist(&path)
+            };
+            moved.map_err(|error| error.error)?;
             Ok(())
         };
         moved().with_context(|| {
@@ -132,6 +148,18 @@ mod tests {
             assert!(format!("{error:#}").contains(part), "{error:#}");
         }
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_new_one_replaces_nothing_that_came_meanwhile() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("events.aer");
+        let recording = Recording::new(&path, &[], &HEADER).unwrap();
+        let recording = recording.that_replaces_nothing();
+        fs::write(&path, "older").unwrap();
+        let error = format!("{:#}", recording.finish().unwrap_err());
+        assert!(error.contains(" has what was recorded"), "{error}");
+        assert_eq!(fs::read(path).unwrap(), b"older");
     }
 
     #[test]

@@ -31,6 +31,8 @@ pub struct Cloud<'a> {
 /// The only script of the page, between its tags. A module: it has names of its own.
 pub(super) const SCRIPT: &str = concat!(
     "\n",
+    include_str!("helpers.js"),
+    "\n",
     include_str!("events.js"),
     "\n",
     include_str!("projection.js"),
@@ -38,6 +40,8 @@ pub(super) const SCRIPT: &str = concat!(
     include_str!("cloud.js"),
     "\n",
     include_str!("spikes.js"),
+    "\n",
+    include_str!("turn.js"),
     "\n",
     include_str!("controls.js"),
 );

@@ -88,70 +88,11 @@ play.addEventListener("click", () => {
 });
 start.addEventListener("pointerdown", stop);
 
-// Turning: one finger or button turns, two fingers change the size.
-const fingers = new Map();
-let moved = 0;
-cloud.addEventListener("pointerdown", (event) => {
-  cloud.setPointerCapture(event.pointerId);
-  fingers.set(event.pointerId, event);
-  moved = 0;
-});
-cloud.addEventListener("pointermove", (event) => {
-  const before = fingers.get(event.pointerId);
-  if (!before) return;
-  const [x, y] = [event.clientX - before.clientX, event.clientY - before.clientY];
-  moved += Math.hypot(x, y);
-  if (fingers.size === 1) {
-    turn(-x / 150, y / 150);
-  } else {
-    const other = [...fingers.values()].find((finger) => finger.pointerId !== event.pointerId);
-    const away = (finger) =>
-      Math.hypot(finger.clientX - other.clientX, finger.clientY - other.clientY) + 1;
-    enlarge(away(event) / away(before));
-  }
-  fingers.set(event.pointerId, event);
-  redraw();
-});
-for (const type of ["pointerup", "pointercancel"]) {
-  cloud.addEventListener(type, (event) => {
-    const click = type === "pointerup" && moved < 5 && fingers.size === 1;
-    fingers.delete(event.pointerId);
-    if (!click) return;
-    picked = eventAt(event.offsetX, event.offsetY);
-    tell(picked >= 0 ? showSpikes(events.pixel[picked]) : "");
-    redraw();
-  });
-}
-cloud.addEventListener("wheel", (event) => {
-  if (!event.ctrlKey) return; // The page scrolls.
-  event.preventDefault();
-  enlarge(Math.exp(-event.deltaY / 200));
-  redraw();
-}, { passive: false });
-
-const KEYS = {
-  ArrowLeft: () => turn(0.1, 0),
-  ArrowRight: () => turn(-0.1, 0),
-  ArrowUp: () => turn(0, -0.1),
-  ArrowDown: () => turn(0, 0.1),
-  "+": () => enlarge(1.2),
-  "=": () => enlarge(1.2),
-  "-": () => enlarge(1 / 1.2),
-  0: () => Object.assign(view, VIEWS.reset),
-};
-cloud.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.key]) return;
-  event.preventDefault();
-  KEYS[event.key]();
-  redraw();
+turnable(cloud, redraw, (x, y) => {
+  picked = eventAt(x, y);
+  tell(picked >= 0 ? showSpikes(events.pixel[picked]) : "");
 });
 
-for (const button of document.querySelectorAll("[data-view]")) {
-  button.addEventListener("click", () => {
-    Object.assign(view, VIEWS[button.dataset.view]);
-    redraw();
-  });
-}
 const far = element("far");
 function chooseFar() {
   const open = far.value === far.max;

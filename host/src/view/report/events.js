@@ -18,10 +18,6 @@ const colours = data.colours.match(/.{6}/g).map((hex) => `#${hex}`);
  */
 const shown = { start: 0, end: data.cycles, first: 0, last: events.count, far: Infinity };
 
-function element(id) {
-  return document.getElementById(id);
-}
-
 /** Columns of equal length, from records of eleven little-endian bytes in base64. */
 function decode(base64, unit) {
   const text = atob(base64);
@@ -65,35 +61,6 @@ function firstFrom(cycle) {
   return low;
 }
 
-/** Where a value lies between low and high: 0 to 1. */
-function share(value, low, high) {
-  return (value - low) / (high - low);
-}
-
-/** Round values from low to high, at most `most` of them. */
-function ticks(low, high, most, whole) {
-  const least = (high - low) / Math.max(1, most);
-  const power = 10 ** Math.floor(Math.log10(least));
-  let step = power * [1, 2, 5, 10].find((factor) => factor * power >= least * 0.999);
-  if (whole) step = Math.max(1, Math.round(step));
-  const values = [];
-  for (let at = Math.ceil(low / step) + 0; at * step <= high; at++) values.push(at * step + 0); // never −0
-  return values;
-}
-
-function number(value, digits = 0) {
-  return value.toLocaleString("en", { maximumFractionDigits: digits });
-}
-
-function capital(word) {
-  return word[0].toUpperCase() + word.slice(1);
-}
-
-function pixelName(pixel) {
-  const [column, row] = data.sides;
-  return `${column} ${pixel % data.columns}, ${row} ${Math.floor(pixel / data.columns)}`;
-}
-
 /** Whether an event is of the pixel, or of a block with it. */
 function isOf(event, pixel) {
   const level = events.level[event];
@@ -111,18 +78,4 @@ function kindName(event) {
   const block = side > 1 ? `${side}x${side} block from ` : "";
   const echo = manyEchoes ? `, echo ${events.echo[event]}` : "";
   return `${block}${pixelName(events.pixel[event])}${echo}`;
-}
-
-/** The context of a canvas that has as many pixels as the screen shows of it. */
-function context(canvas) {
-  const ratio = Math.min(2, window.devicePixelRatio || 1);
-  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-  canvas.width = Math.max(1, Math.round(width * ratio));
-  canvas.height = Math.max(1, Math.round(height * ratio));
-  const context = canvas.getContext("2d");
-  context.scale(ratio, ratio);
-  const style = getComputedStyle(canvas);
-  context.font = `13px ${style.fontFamily}`;
-  return { context, width, height, ratio, ink: style.getPropertyValue("--ink"),
-    soft: style.getPropertyValue("--soft"), line: style.getPropertyValue("--line") };
 }

@@ -1,0 +1,86 @@
+//! A device with a sensor, and how it is to operate: what was said, what the device says, and
+//! what follows.
+
+use anyhow::{Result, bail, ensure};
+use dtof_core::fixed::types::I24F8;
+use dtof_link::SensorRecord;
+
+use super::Client;
+use super::monitor::array;
+use crate::engine::settings::Settings;
+use crate::events::aer_file::Header;
+use crate::input::masked;
+use crate::input::source::Geometry;
+use crate::settings::{Sensor, SettingsFile};
+
+/// How a device operates.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// What was said, and of the rest what the device says.
+    pub said: SettingsFile,
+    /// What follows from it.
+    pub settings: Settings,
+    /// Pixels, addresses 0 up.
+    pub pixels: u16,
+    /// Their array.
+    pub geometry: Geometry,
+    /// Laser cycles in a thousand seconds; 0 if that is not known.
+    pub laser_millihertz: u64,
+}
+
+impl Setup {
+    /// That of a device with its first `pixels`, or as many as its sensor has.
+    ///
+    /// # Errors
+    /// If the device is gone, or what was `said` does not suit it.
+    pub fn of(client: &mut Client, said: SettingsFile, pixels: Option<u16>) -> Result<Self> {
+        // A device without a sensor says so when it is configured.
+        let sensor = client.sensor()?.unwrap_or(SensorRecord {
+            pixels: client.pixels(),
+            bin_width: None,
+            offset: I24F8::ZERO,
+            laser_millihertz: 0,
+        });
+        let pixels = pixels.unwrap_or(sensor.pixels.min(client.pixels()));
+        let said = said.or(SettingsFile {
+            sensor: Sensor {
+                bin_width_ps: sensor.bin_width,
+                offset_mm: Some(sensor.offset),
+                ..Sensor::default()
+            },
+            ..SettingsFile::default()
+        });
+        ensure!(
+            said.sensor.bins.is_none_or(|bins| bins == client.bins()),
+            "the settings are for {} bins, the device has {}",
+            said.sensor.bins.unwrap_or_default(),
+            client.bins()
+        );
+        let columns = said.sensor.columns;
+        let setup = Self {
+            settings: said.settings(client.bins().into())?,
+            said,
+            pixels,
+            geometry: array(pixels, columns),
+            laser_millihertz: sensor.laser_millihertz,
+        };
+        masked::check(&setup.settings.masked, pixels.into())?;
+        if let Some(columns) = columns.filter(|&columns| columns > u32::from(pixels)) {
+            bail!("--columns {columns}: there are {pixels} pixels");
+        }
+        Ok(setup)
+    }
+
+    /// The header of its events.
+    #[must_use]
+    pub fn header(&self) -> Header {
+        Header {
+            #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
+            bins: self.settings.bins as u32,
+            geometry: self.geometry,
+            bin_width_ps: self.settings.bin_width_ps,
+            offset_mm: self.settings.offset_mm,
+            laser_millihertz: self.laser_millihertz,
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Where events come from: a thread that takes them, and commands.
+
+mod device;
+mod playback;
+mod session;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Receiver;
+
+use anyhow::Result;
+use tokio::sync::oneshot;
+
+pub use device::Device;
+pub use playback::Playback;
+
+use super::hub::{Hub, Kind};
+use super::outputs::{Folder, Recorded, Recorder};
+use crate::events::aer_file::Header;
+
+/// Where an answer goes: what was done, or why not, in a line.
+pub type Answer = oneshot::Sender<Result<String, String>>;
+
+/// A wish of a page.
+pub struct Command {
+    pub wish: Wish,
+    pub answer: Answer,
+}
+
+/// What pages can wish for.
+#[derive(Debug)]
+pub enum Wish {
+    /// Settings, in the form of a settings file.
+    Settings(String),
+    /// The settings in force into a file.
+    Save,
+    /// Record, or stop it.
+    Record(bool),
+    /// Play a recording, or pause it.
+    Play(bool),
+}
+
+/// A source of events.
+pub enum Feed {
+    /// A device.
+    Device(Device),
+    /// A recording.
+    Playback(Playback),
+}
+
+impl Feed {
+    /// For people.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self {
+            Self::Device(device) => device.name.clone(),
+            Self::Playback(playback) => playback.name(),
+        }
+    }
+
+    /// Which kind it is.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Device(_) => Kind::Device,
+            Self::Playback(_) => Kind::Recording,
+        }
+    }
+
+    /// Runs until it is to `stop`.
+    pub(super) fn run(
+        self,
+        hub: &Arc<Hub>,
+        commands: &Receiver<Command>,
+        folder: Folder,
+        stop: &AtomicBool,
+    ) -> Result<()> {
+        let mut work = Work {
+            hub,
+            commands,
+            stop,
+            recorder: Recorder::new(folder),
+            recorded: Recorded::default(),
+        };
+        match self {
+            Self::Device(device) => device.run(&mut work),
+            Self::Playback(playback) => playback.run(&mut work),
+        }
+        // What was recorded is whole, also at the end.
+        work.recorder.stop(&mut work.recorded)
+    }
+}
+
+/// What a feed works with.
+struct Work<'a> {
+    hub: &'a Hub,
+    commands: &'a Receiver<Command>,
+    stop: &'a AtomicBool,
+    recorder: Recorder,
+    recorded: Recorded,
+}
+
+impl Work<'_> {
+    fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Records events of a `header`, or stops it.
+    fn wish_to_record(&mut self, on: bool, header: Option<&Header>) -> Result<String> {
+        let done = if on {
+            self.recorder.start(header, &mut self.recorded)
+        } else {
+            self.recorder.stop(&mut self.recorded)
+        };
+        self.tell_recorded();
+        done?;
+        let recorded = &self.recorded;
+        Ok(match (on, header) {
+            (true, Some(_)) => format!("Recording into {}.", recorded.file),
+            (true, None) => "Recording begins with the device.".to_owned(),
+            (false, _) => format!("Saved {} events as {}.", recorded.events, recorded.file),
+        })
+    }
+
+    /// Tells pages how far the recording is.
+    fn tell_recorded(&self) {
+        self.hub.recorded(&self.recorded);
+    }
+}
+
+/// Answers a wish. A page that has gone does not read it.
+fn reply(answer: Answer, result: Result<String>) {
+    let _ = answer.send(result.map_err(|error| format!("{error:#}")));
+}

@@ -1,0 +1,287 @@
+//! A session with a device: events, reports, histograms and wishes, each in its turn.
+
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, anyhow, ensure};
+use dtof_core::PixelAddress;
+use dtof_link::endpoint::LinkCounters;
+use dtof_link::{Configuration, DynamicDepth, Refusal, Report, Source};
+
+use super::{Answer, Command, Wish, Work, reply};
+use crate::device::monitor::check_masked;
+use crate::device::monitor::losses::{Losses as Lost, since};
+use crate::device::{Client, Setup, configuration};
+use crate::events::aer_file::Event;
+use crate::input::masked;
+use crate::settings::{Rays, Run, Sensor, SettingsFile};
+use crate::view::live::hub::Losses;
+
+/// How often the device is asked what it does.
+const REPORTS: Duration = Duration::from_millis(500);
+/// How often it is asked for a histogram, of each pixel that is looked at in turn.
+const HISTOGRAMS: Duration = Duration::from_millis(50);
+
+/// A device that sends events.
+pub struct Session<'a> {
+    client: &'a mut Client,
+    setup: Setup,
+    dynamic_depth: Option<DynamicDepth>,
+    /// The counts of both ends at the beginning.
+    first: Report,
+    here: LinkCounters,
+    /// The report before, and when.
+    last: (u64, Instant),
+    asked: bool,
+    reported: Instant,
+    histogram: Option<Instant>,
+    turn: usize,
+}
+
+impl<'a> Session<'a> {
+    /// Puts settings in force; from now on events come.
+    pub fn begin(
+        client: &'a mut Client,
+        said: SettingsFile,
+        pixels: Option<u16>,
+        dynamic_depth: Option<DynamicDepth>,
+        work: &mut Work,
+    ) -> Result<Self> {
+        let setup = Setup::of(client, said, pixels)?;
+        check_masked(&setup.settings)?;
+        let here = *client.counters();
+        let mut session = Self {
+            client,
+            setup,
+            dynamic_depth,
+            first: Report::default(),
+            here,
+            last: (0, Instant::now()),
+            asked: false,
+            reported: Instant::now(),
+            histogram: None,
+            turn: 0,
+        };
+        session.configure(session.setup.clone(), work)?;
+        session.first = session.client.report()?;
+        work.hub.connection("live", "");
+        Ok(session)
+    }
+
+    /// What is in force.
+    pub fn said(&self) -> SettingsFile {
+        self.setup.said.clone()
+    }
+
+    /// Goes on until it is stopped: the device rests then.
+    pub fn run(&mut self, work: &mut Work) -> Result<()> {
+        while !work.is_stopped() {
+            if let Ok(command) = work.commands.try_recv() {
+                self.fulfil(command, work)?;
+            }
+            if !self.asked && self.reported.elapsed() >= REPORTS {
+                self.client.request_report()?;
+                self.asked = true;
+            }
+            // A report that comes while a request waits for room would be in its way.
+            let due = self.histogram.is_none_or(|at| at.elapsed() >= HISTOGRAMS);
+            if due && !self.asked {
+                self.ask_for_histogram(work)?;
+            }
+            self.exchange(work)?;
+        }
+        self.drain(work)?;
+        let resting = self.configuration(&self.setup, Source::Link)?;
+        let rested = self.client.configure(&resting);
+        self.take(work);
+        rested
+    }
+
+    /// Takes what has arrived.
+    fn exchange(&mut self, work: &mut Work) -> Result<()> {
+        let polled = self.client.poll_report();
+        // What came before the device was gone, too.
+        self.take(work);
+        if let Some(report) = polled? {
+            self.asked = false;
+            self.reported = Instant::now();
+            self.tell(&report, work);
+        }
+        while let Some(answer) = self.client.take_histogram() {
+            self.histogram = Some(Instant::now());
+            work.hub.histogram(&answer);
+        }
+        Ok(())
+    }
+
+    /// Waits for a report that is on its way.
+    fn drain(&mut self, work: &mut Work) -> Result<()> {
+        while self.asked {
+            self.exchange(work)?;
+        }
+        Ok(())
+    }
+
+    fn ask_for_histogram(&mut self, work: &Work) -> Result<()> {
+        let pixels = work.hub.watched();
+        let is_there = |pixel: &&u16| **pixel < self.setup.pixels;
+        let pixels: Vec<_> = pixels.iter().filter(is_there).collect();
+        if pixels.is_empty() {
+            return Ok(());
+        }
+        self.turn = (self.turn + 1) % pixels.len();
+        // The next is asked for once this one has come: one is on its way at a time.
+        self.histogram = Some(Instant::now() + Duration::from_secs(1 << 30));
+        let pixel = PixelAddress(*pixels[self.turn]);
+        self.client.request_histogram(pixel)
+    }
+
+    /// Records and shows the events that have arrived, but for those of masked pixels.
+    fn take(&mut self, work: &mut Work) {
+        let mut events = self.client.take_events();
+        if events.is_empty() {
+            return;
+        }
+        let masked = &self.setup.settings.masked;
+        let all = events.len();
+        if !masked.is_empty() {
+            events.retain(|event: &Event| !masked.contains(&event.pixel().0));
+        }
+        work.recorder.write(&events, &mut work.recorded);
+        work.hub.events(&events, (all - events.len()) as u64);
+        work.tell_recorded();
+    }
+
+    fn tell(&mut self, report: &Report, work: &Work) {
+        let photons = report.statistics.photons();
+        let (before, at) = self.last;
+        let seconds = at.elapsed().as_secs_f64().max(1e-3);
+        let lost = Lost {
+            first: &self.first,
+            here: &since(self.client.counters(), &self.here),
+        };
+        work.hub.losses(Losses {
+            cycles: report.cycles,
+            photons,
+            photon_rate: photons.saturating_sub(before) as f64 / seconds,
+            counts: lost.counts(report).to_vec(),
+            last_fault: lost.last_fault(report),
+        });
+        self.last = (photons, Instant::now());
+    }
+
+    fn fulfil(&mut self, command: Command, work: &mut Work) -> Result<()> {
+        let done = match command.wish {
+            Wish::Settings(text) => return self.change(&text, command.answer, work),
+            Wish::Save => {
+                let said = self.setup.said.with(&self.setup.settings);
+                let saved = work.recorder.folder().save(&said);
+                saved.map(|path| format!("Saved as {}.", path.display()))
+            }
+            Wish::Record(on) => work.wish_to_record(on, Some(&self.setup.header())),
+            Wish::Play(_) => Err(anyhow!("a device does not wait")),
+        };
+        reply(command.answer, done);
+        Ok(())
+    }
+
+    /// Puts other settings in force, unless they are wrong or the device refuses them: then the old
+    /// ones stay.
+    fn change(&mut self, text: &str, answer: Answer, work: &mut Work) -> Result<()> {
+        let setup = match self.changed_setup(text) {
+            Ok(setup) => setup,
+            Err(error) => {
+                reply(answer, Err(error));
+                return Ok(());
+            }
+        };
+        self.drain(work)?;
+        match self.configure(setup, work) {
+            Ok(()) => {
+                reply(answer, Ok("The settings are in force.".to_owned()));
+                Ok(())
+            }
+            Err(error) if error.downcast_ref::<Refusal>().is_some() => {
+                reply(answer, Err(error));
+                Ok(())
+            }
+            Err(error) => {
+                reply(answer, Err(anyhow!("{error:#}")));
+                Err(error)
+            }
+        }
+    }
+
+    fn changed_setup(&self, text: &str) -> Result<Setup> {
+        let said = Self::changed(&self.setup.said, text)?;
+        let bins = self.client.bins();
+        ensure!(
+            said.sensor.bins.is_none_or(|of| of == bins),
+            "the device has {bins} bins"
+        );
+        let setup = Setup {
+            settings: said.settings(bins.into())?,
+            said,
+            ..self.setup.clone()
+        };
+        masked::check(&setup.settings.masked, setup.pixels.into())?;
+        check_masked(&setup.settings)?;
+        self.configuration(&setup, Source::Sensor)?;
+        Ok(setup)
+    }
+
+    fn configuration(&self, setup: &Setup, source: Source) -> Result<Configuration> {
+        let columns = setup.geometry.columns;
+        let depth = self.dynamic_depth;
+        configuration(&setup.settings, setup.pixels, columns, source, depth)
+    }
+
+    /// Puts a setup in force. Events from before are taken as they were; a recording goes on in
+    /// another file, as laser cycles begin at 0.
+    fn configure(&mut self, setup: Setup, work: &mut Work) -> Result<()> {
+        let wanted = self.configuration(&setup, Source::Sensor)?;
+        let configured = self.client.configure(&wanted);
+        self.take(work);
+        configured?;
+        // A disk that is full is told to pages.
+        let _ = work.recorder.end_file(&mut work.recorded);
+        work.hub.begin(&setup);
+        work.recorder.resume(&setup.header(), &mut work.recorded);
+        work.tell_recorded();
+        self.last = (0, Instant::now());
+        self.setup = setup;
+        Ok(())
+    }
+
+    /// What was said before, with what a page says in place of it.
+    ///
+    /// # Errors
+    /// What is wrong with the text, or that something cannot change while the device runs.
+    pub fn changed(before: &SettingsFile, text: &str) -> Result<SettingsFile> {
+        let new = SettingsFile::parse(text)?;
+        let changes = Sensor {
+            gate: new.sensor.gate,
+            masked: new.sensor.masked.clone(),
+            sigma_bins: new.sensor.sigma_bins,
+            one_hit_tdc: new.sensor.one_hit_tdc,
+            ..Sensor::default()
+        };
+        ensure!(
+            new.sensor == changes && new.rays == Rays::default() && new.run == Run::default(),
+            "only gate, masked, sigma_bins, one_hit_tdc and the keys of [detection] can change while \
+             the device runs"
+        );
+        Ok(SettingsFile {
+            sensor: Sensor {
+                gate: changes.gate,
+                masked: changes.masked,
+                sigma_bins: changes.sigma_bins,
+                one_hit_tdc: changes.one_hit_tdc,
+                ..before.sensor.clone()
+            },
+            detection: new.detection,
+            rays: before.rays.clone(),
+            run: before.run.clone(),
+            origin: None,
+        })
+    }
+}

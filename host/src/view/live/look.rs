@@ -1,0 +1,147 @@
+//! What the rule makes of a histogram, with the integers of the core.
+
+use dtof_core::{
+    BinIndex, Count, Count10, Count16, Count24, CounterWidth, DetectionRule, Histogram, Peak,
+};
+use serde::Serialize;
+
+use crate::engine::settings::Settings;
+
+/// A look at a histogram.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Look {
+    /// The highest bin within the gate, and its photons.
+    pub peak: (u16, u32),
+    /// The fewest photons in that bin, all others as they are, that the rule reports; `None` if
+    /// no counter holds as many.
+    pub needed: Option<u32>,
+    /// The background a bin at that number of photons, as the rule has it.
+    pub background: Option<f64>,
+    /// Where the quadrants begin, and where the last ends.
+    pub quadrants: [u16; 5],
+}
+
+/// Looks at `counts`, a histogram that came whole from a sensor or an exposure so far; `None` if
+/// the settings are for other histograms.
+#[must_use]
+pub fn look(settings: &Settings, counts: &[u32], is_whole: bool) -> Option<Look> {
+    match (counts.len(), is_whole) {
+        (8, false) => of::<8, Count10>(settings, counts),
+        (16, false) => of::<16, Count10>(settings, counts),
+        (32, false) => of::<32, Count10>(settings, counts),
+        (64, false) => of::<64, Count10>(settings, counts),
+        (128, false) => of::<128, Count10>(settings, counts),
+        (256, false) => of::<256, Count10>(settings, counts),
+        (512, false) => of::<512, Count10>(settings, counts),
+        (1024, false) => of::<1024, Count10>(settings, counts),
+        (64, true) => of::<64, Count24>(settings, counts),
+        (128, true) => of::<128, Count24>(settings, counts),
+        (256, true) => of::<256, Count24>(settings, counts),
+        (512, true) => of::<512, Count16>(settings, counts),
+        (1024, true) => of::<1024, Count16>(settings, counts),
+        _ => None,
+    }
+}
+
+fn of<const BINS: usize, W: CounterWidth>(settings: &Settings, counts: &[u32]) -> Option<Look> {
+    let counts: &[u32; BINS] = counts.try_into().ok()?;
+    let config = settings.config::<BINS>().ok()?;
+    let gate = config.gate();
+    let histogram = |counts: &[u32; BINS]| {
+        let mut histogram = Histogram::<BINS, W>::new();
+        histogram.add_frame(counts, gate);
+        histogram
+    };
+    let peak = histogram(counts).peak();
+    let bin = peak.bin.raw();
+    // The rule's answer if the peak bin held so many.
+    let answer = |photons: u32| {
+        let mut counts = *counts;
+        counts[usize::from(bin)] = photons;
+        let histogram = histogram(&counts);
+        let peak = Peak {
+            bin: BinIndex::saturating(bin),
+            count: Count::saturating(photons),
+        };
+        config.rule().detect(&histogram, gate, peak)
+    };
+    // More photons in the peak never make it less clear.
+    let (mut low, mut high) = (0, W::MAX);
+    let mut background = answer(high);
+    while let (Some(_), true) = (background, low < high) {
+        let middle = low + (high - low) / 2;
+        match answer(middle) {
+            None => low = middle + 1,
+            found => (high, background) = (middle, found),
+        }
+    }
+    Some(Look {
+        peak: (bin, peak.count.raw()),
+        needed: background.map(|_| high),
+        background: background.map(|background| background.to_num()),
+        quadrants: gate.quadrant_starts(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::scene;
+    use dtof_core::fixed::types::U8F8;
+    use dtof_core::{AverageRule, PaperRule, WindowRule, detect};
+    use proptest::prelude::*;
+
+    fn counts() -> impl Strategy<Value = Vec<u32>> {
+        let counts = prop::collection::vec(0..12_u32, 128);
+        (counts, 0..128_usize, 0..60_u32).prop_map(|(mut counts, bin, more)| {
+            counts[bin] += more;
+            counts
+        })
+    }
+
+    proptest! {
+        /// The rule itself reports at the number that is told, and with one photon less does not.
+        #[test]
+        fn the_number_needed_is_the_first_that_is_reported(counts in counts(), which in 0..3, gate in 0..60_u16) {
+            let alpha = U8F8::lit("4");
+            let minimum = Count::saturating(5);
+            let settings = Settings {
+                rule: match which {
+                    0 => PaperRule::new(alpha, minimum).into(),
+                    1 => AverageRule::new(alpha, minimum).into(),
+                    _ => WindowRule::new(3, "4.5".parse().unwrap(), minimum).unwrap().into(),
+                },
+                gate: Some((gate, 127)),
+                ..scene::settings(0)
+            };
+            let look = look(&settings, &counts, false).unwrap();
+            let (bin, peak) = look.peak;
+            let within = &counts[usize::from(gate)..];
+            prop_assert_eq!(peak, *within.iter().max().unwrap());
+            let config = settings.config::<128>().unwrap();
+            let reports = |photons: u32| {
+                let mut counts: [u32; 128] = counts.clone().try_into().unwrap();
+                counts[usize::from(bin)] = photons;
+                let mut histogram = Histogram::<128>::new();
+                histogram.add_frame(&counts, config.gate());
+                // Another bin may be the highest then.
+                let is_peak = histogram.peak().bin.raw() == bin;
+                let found = detect(&histogram, config.gate(), config.rule(), config.estimator());
+                (is_peak, found.is_some())
+            };
+            let needed = look.needed.unwrap();
+            if let (true, reported) = reports(needed) {
+                prop_assert!(reported);
+            }
+            if let (true, reported) = reports(needed - 1) {
+                prop_assert!(!reported);
+            }
+            prop_assert_eq!(reports(peak).1, peak >= needed);
+        }
+    }
+
+    #[test]
+    fn other_histograms_have_no_look() {
+        assert_eq!(look(&scene::settings(0), &[1; 100], false), None);
+    }
+}

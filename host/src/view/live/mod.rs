@@ -1,0 +1,88 @@
+//! The live page: what a device or a recording does, in a browser on this computer.
+//!
+//! ```text
+//! device, recording → feed (a thread) → Hub → server → pages
+//!                       ↑ commands               ↓
+//!                       └────────────────────────┘
+//! ```
+//!
+//! The feed never waits for a page. A page is sent what has changed since its last frame; what is
+//! drawn is thinned, what is recorded never.
+
+mod feed;
+mod hub;
+mod look;
+mod outputs;
+mod server;
+
+use std::net::{Ipv4Addr, TcpListener};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+use std::thread;
+
+use anyhow::{Context, Result, anyhow};
+
+pub use feed::{Device, Feed, Playback};
+pub use hub::{Hub, MOST_EVENTS, MOST_PAGES, MOST_PIXELS};
+pub use outputs::Folder;
+
+/// Commands that wait for the feed, at most.
+const COMMANDS: usize = 16;
+
+/// A page that is served until [`Served::end`].
+pub struct Served {
+    /// Its address.
+    pub address: String,
+    listener: TcpListener,
+    hub: Arc<Hub>,
+    commands: mpsc::SyncSender<feed::Command>,
+    stop: Arc<AtomicBool>,
+    thread: thread::JoinHandle<Result<()>>,
+}
+
+impl Served {
+    /// Begins: `feed` on a thread of its own, and a page on `port` of this computer, 0 for any
+    /// that is free. Files are written into `folder` only.
+    ///
+    /// # Errors
+    /// If the port is taken.
+    pub fn begin(feed: Feed, port: u16, folder: Folder) -> Result<Self> {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
+            .with_context(|| format!("--port {port}"))?;
+        let address = format!("http://{}/", listener.local_addr()?);
+        let hub = Arc::new(Hub::new(feed.name(), feed.kind()));
+        let (commands, receiver) = mpsc::sync_channel(COMMANDS);
+        let stop = Arc::new(AtomicBool::new(false));
+        let thread = thread::spawn({
+            let (hub, stop) = (Arc::clone(&hub), Arc::clone(&stop));
+            move || feed.run(&hub, &receiver, folder, &stop)
+        });
+        Ok(Self {
+            address,
+            listener,
+            hub,
+            commands,
+            stop,
+            thread,
+        })
+    }
+
+    /// What is known now.
+    #[must_use]
+    pub fn hub(&self) -> &Arc<Hub> {
+        &self.hub
+    }
+
+    /// Serves the page until `done`, asked some times a second, says so. Then the device rests, and
+    /// a recording is ended.
+    ///
+    /// # Errors
+    /// If there is no more serving, or the recording cannot be written.
+    pub fn until(self, done: impl Fn() -> bool) -> Result<()> {
+        let served = server::serve(self.listener, &self.hub, self.commands, done);
+        self.stop.store(true, Ordering::Relaxed);
+        let ended = self.thread.join();
+        served.and(ended.map_err(|_| anyhow!("the thread of the device has failed"))?)
+    }
+}

@@ -1,0 +1,91 @@
+// Numbers: totals, losses, and how the source is.
+
+const STATES = {
+  live: ["live", "good"], playing: ["playing", "good"], opening: ["opening", "still"],
+  gone: ["no device", "bad"], paused: ["paused", "still"], ended: ["at its end", "still"],
+  failed: ["failed", "bad"], lost: ["program ended", "bad"],
+};
+
+function showState({ state, reason, returned }) {
+  const [text, kind] = STATES[state];
+  const badge = element("state");
+  badge.textContent = text;
+  badge.className = `badge ${kind}`;
+  const again = returned > 0 ? `came back ${number(returned)} ${returned > 1 ? "times" : "time"}` : "";
+  element("reason").textContent = reason || again;
+  element("play").textContent = state === "playing" ? "Pause recording" : state === "ended" ? "Play again" : "Play";
+  element("play").dataset.on = state !== "playing";
+}
+
+function showTotals(frame, framesPerSecond) {
+  const { losses, recorded } = frame;
+  const rows = [["events", number(frame.events)], ["events a second", number(frame.rate)]];
+  if (about?.kind === "recording") {
+    rows.push(["seconds", number(frame.seconds, 1)]);
+  } else {
+    rows.push(["photons a second", number(losses.photon_rate)], ["laser cycles", number(losses.cycles)]);
+  }
+  if (frame.masked > 0) rows.push(["events left out", number(frame.masked)]);
+  rows.push(["frames a second", number(framesPerSecond, 1)]);
+  if (recorded.file) {
+    rows.push([recorded.on ? "recording" : "recorded", `${number(recorded.events)} events, ${recorded.file}`]);
+  }
+  element("totals").replaceChildren(...rows.map(([name, value]) => {
+    const part = document.createElement("div");
+    const [title, text] = [document.createElement("dt"), document.createElement("dd")];
+    [title.textContent, text.textContent] = [name, value];
+    part.append(title, text);
+    return part;
+  }));
+  const button = element("record");
+  button.textContent = recorded.on ? "Stop" : "Record";
+  button.classList.toggle("recording-now", recorded.on);
+  button.dataset.on = !recorded.on;
+}
+
+function showLosses({ counts, last_fault: fault }) {
+  const rows = counts.map(([name, count]) => {
+    const row = document.createElement("tr");
+    row.classList.toggle("some", count > 0);
+    const [title, value] = [document.createElement("th"), document.createElement("td")];
+    title.scope = "row";
+    title.textContent = fault && name === "sensor errors" ? `${name} (last: ${fault})` : name;
+    value.textContent = number(count);
+    row.append(title, value);
+    return row;
+  });
+  element("losses").replaceChildren(...rows);
+}
+
+/** How many pixels and events this page draws of those that came. */
+function showDrawn({ pixels: drawn, left, events: arrived }) {
+  const rest = left > 0 ? `, ${number(left)} in the next frames` : "";
+  const thinned = arrived > drawn ? `${number(drawn)} of ${number(arrived)} events drawn` : `${number(arrived)} events drawn`;
+  element("drawn").value = `${thinned} in this frame${rest}. All are counted; a recording holds all.`;
+}
+
+let newsTimer = 0;
+/** A line for all: what was done, or why not. */
+function tell(text, isBad = false) {
+  const news = element("news");
+  news.textContent = text;
+  news.classList.toggle("bad", isBad);
+  news.hidden = !text;
+  clearTimeout(newsTimer);
+  if (!isBad) newsTimer = setTimeout(() => { news.hidden = true; }, 8000);
+}
+
+/** Asks the server; gives whether it did it, and what it says. */
+async function ask(path, body, kind = "application/json") {
+  try {
+    const answer = await fetch(path, { method: "POST", headers: { "content-type": kind }, body });
+    return { done: answer.ok, text: (await answer.text()).trim() };
+  } catch {
+    return { done: false, text: "the program does not answer" };
+  }
+}
+
+async function command(path, body) {
+  const { done, text } = await ask(path, JSON.stringify(body));
+  tell(text, !done);
+}

@@ -1,0 +1,126 @@
+//! Who may ask: a page of this server, and nobody else.
+//!
+//! The server listens on this computer alone. Pages of other sites, which a browser here shows,
+//! can reach it all the same. So a request names this server as its host, which one that was
+//! led here by a name of another site does not, and comes from a page of this server.
+
+use hyper::header::{CONTENT_TYPE, HOST, HeaderMap, HeaderName, HeaderValue, ORIGIN};
+use hyper::{Method, Request, StatusCode};
+
+const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
+
+/// Why not, in a line.
+pub type Refused = (StatusCode, &'static str);
+
+/// Checks a request to the server at `port`.
+///
+/// # Errors
+/// Why it is not answered.
+pub fn check<B>(request: &Request<B>, port: u16) -> Result<(), Refused> {
+    let headers = request.headers();
+    let forbidden = |why| Err((StatusCode::FORBIDDEN, why));
+    let hosts = [format!("127.0.0.1:{port}"), format!("localhost:{port}")];
+    let is_host = |name: &str| hosts.iter().any(|host| host == name);
+    if request.uri().authority().is_some() || !one(headers, &HOST)?.is_some_and(is_host) {
+        return forbidden("this server is 127.0.0.1 and localhost only");
+    }
+    let origin = one(headers, &ORIGIN)?;
+    if origin.is_some_and(|origin| !origin.strip_prefix("http://").is_some_and(is_host)) {
+        return forbidden("a page of another site may not ask");
+    }
+    let site = one(headers, &SEC_FETCH_SITE)?;
+    let is_read = request.method() == Method::GET;
+    if !matches!(
+        (site, is_read),
+        (None | Some("same-origin"), _) | (Some("none"), true)
+    ) {
+        return forbidden("a page of another site may not ask");
+    }
+    if !is_read && origin.is_none() && site.is_none() {
+        return forbidden("a request that changes something must say which page sends it");
+    }
+    Ok(())
+}
+
+/// Checks that a body is of a kind that forms of other sites cannot send.
+///
+/// # Errors
+/// If it is not.
+pub fn check_kind(headers: &HeaderMap<HeaderValue>, kind: &str) -> Result<(), Refused> {
+    let is_kind = one(headers, &CONTENT_TYPE)?.is_some_and(|said| said == kind);
+    is_kind.then_some(()).ok_or((
+        StatusCode::UNSUPPORTED_MEDIA_TYPE,
+        "the content type must be application/toml of settings, and application/json of all else",
+    ))
+}
+
+/// The only value of a header.
+fn one<'a>(
+    headers: &'a HeaderMap<HeaderValue>,
+    name: &HeaderName,
+) -> Result<Option<&'a str>, Refused> {
+    let bad = || (StatusCode::BAD_REQUEST, "a header makes no sense");
+    let mut values = headers.get_all(name).iter();
+    let Some(value) = values.next() else {
+        return Ok(None);
+    };
+    if values.next().is_some() {
+        return Err(bad());
+    }
+    value.to_str().map(Some).map_err(|_| bad())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HERE: &str = "127.0.0.1:8000";
+
+    fn checked(method: &str, headers: &[(&str, &str)]) -> Option<u16> {
+        let mut request = Request::builder().method(method).uri("/");
+        for (name, value) in headers {
+            request = request.header(*name, *value);
+        }
+        let refused = check(&request.body(()).unwrap(), 8000).err();
+        refused.map(|(status, _)| status.as_u16())
+    }
+
+    #[test]
+    fn a_page_of_this_server_may_ask_and_no_other() {
+        let here = ("host", HERE);
+        let own = ("origin", "http://127.0.0.1:8000");
+        let ok: [(&str, &[(&str, &str)]); 6] = [
+            ("GET", &[here]),
+            ("GET", &[("host", "localhost:8000")]),
+            ("GET", &[here, ("sec-fetch-site", "none")]),
+            ("GET", &[here, own, ("sec-fetch-site", "same-origin")]),
+            ("POST", &[here, own]),
+            ("POST", &[here, ("sec-fetch-site", "same-origin")]),
+        ];
+        for (method, headers) in ok {
+            assert_eq!(checked(method, headers), None, "{method} {headers:?}");
+        }
+        let refused: [(&str, &[(&str, &str)]); 12] = [
+            ("GET", &[]),
+            ("GET", &[("host", "127.0.0.1")]),
+            ("GET", &[("host", "127.0.0.1:80")]),
+            ("GET", &[("host", "example.com:8000")]),
+            ("GET", &[("host", "127.0.0.1:8000.example.com")]),
+            ("GET", &[here, ("origin", "http://example.com")]),
+            ("GET", &[here, ("origin", "https://127.0.0.1:8000")]),
+            ("GET", &[here, ("origin", "null")]),
+            ("GET", &[here, ("sec-fetch-site", "cross-site")]),
+            ("GET", &[here, ("sec-fetch-site", "same-site")]),
+            ("POST", &[here]),
+            ("POST", &[here, own, ("sec-fetch-site", "none")]),
+        ];
+        for (method, headers) in refused {
+            assert_eq!(checked(method, headers), Some(403), "{method} {headers:?}");
+        }
+        assert_eq!(
+            checked("GET", &[here, ("host", "localhost:8000")]),
+            Some(400)
+        );
+        assert_eq!(checked("GET", &[here, own, own]), Some(400));
+    }
+}

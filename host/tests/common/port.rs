@@ -1,0 +1,60 @@
+//! Devices behind a TCP port of this computer.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use dtof_firmware::sidecar::Sidecar;
+use dtof_link::frame::{Deframer, WIRE_BYTES};
+
+/// A TCP port of this computer, and its connections one after the other.
+pub fn listen(mut serve: impl FnMut(&mut TcpStream) -> bool + Send + 'static) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let name = format!("tcp:{}", listener.local_addr().unwrap());
+    thread::spawn(move || while serve(&mut listener.accept().unwrap().0) {});
+    name
+}
+
+/// Runs `sidecar` until the host is gone, and says whether `lives` passed before. `poll` is
+/// called at each turn and once more when the host is gone.
+pub fn serve(
+    stream: &mut TcpStream,
+    sidecar: &mut Sidecar<'_>,
+    lives: Duration,
+    mut poll: impl FnMut(&mut Sidecar<'_>, u32),
+) -> io::Result<bool> {
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(Duration::from_millis(1)))?;
+    let mut deframer = Deframer::new();
+    let started = Instant::now();
+    while started.elapsed() < lives {
+        let now = u32::try_from(started.elapsed().as_millis()).unwrap();
+        let mut bytes = [0; 1024];
+        let length = match stream.read(&mut bytes) {
+            Ok(0) => {
+                poll(sidecar, now);
+                return Ok(false);
+            }
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => 0,
+            read => read?,
+        };
+        for &byte in &bytes[..length] {
+            if let Some(frame) = deframer.push(byte) {
+                sidecar.receive(frame, now);
+            }
+        }
+        sidecar.work(0);
+        poll(sidecar, now);
+        sidecar.work(0);
+        let mut wire = [0; WIRE_BYTES];
+        loop {
+            let length = sidecar.transmit(now, &mut wire);
+            if length == 0 {
+                break;
+            }
+            stream.write_all(&wire[..length])?;
+        }
+    }
+    Ok(true)
+}

@@ -1,0 +1,77 @@
+//! The firmware's sidecar with a simulated sensor behind a port, which can be unplugged.
+
+use std::num::NonZeroU16;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use crate::common::port::{listen, serve};
+use dtof::device;
+use dtof::settings::SettingsFile;
+use dtof::view::live::{Device, Feed};
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::{U0F32, U8F24};
+use dtof_firmware::sidecar::Sidecar;
+use dtof_sensors::Sensor;
+use dtof_sensors::simulated::{self, Pulse, Simulated, SimulatedPixel};
+
+const PIXELS: u16 = 16;
+const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
+
+/// Sixteen pixels, each with a target of its own.
+fn sensor() -> Simulated<'static> {
+    let half = U8F24::lit("0.5");
+    let pixels: Vec<_> = (0..PIXELS)
+        .map(|pixel| SimulatedPixel::new(PixelAddress(pixel), 20 + 5 * pixel, half, half).unwrap())
+        .collect();
+    let settings = simulated::Settings {
+        seed: 1,
+        bins: 128,
+        cycles_per_second: 1000,
+        cycles_per_poll: NonZeroU16::new(50).unwrap(),
+    };
+    Simulated::new(pixels.leak(), PULSE, settings)
+}
+
+/// A device on a cable.
+pub struct Plugged {
+    pub name: String,
+    /// The cable is pulled for a moment when this is set.
+    pub pull: Arc<AtomicBool>,
+}
+
+pub fn plugged() -> Plugged {
+    let pull = Arc::new(AtomicBool::new(false));
+    let pulled = Arc::clone(&pull);
+    let name = listen(move |stream| {
+        let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
+        let mut blocks = heapless::Vec::<_, 4>::new();
+        let mut sensor = sensor();
+        let about = Some(sensor.about());
+        let mut sidecar = Sidecar::new(&mut pixels, &mut blocks, about);
+        // A part of a second at a time, to see whether the cable is pulled.
+        let lives = Duration::from_secs(600);
+        let stream2 = stream.try_clone().unwrap();
+        let poll = |sidecar: &mut Sidecar<'_>, now| {
+            if pulled.swap(false, Ordering::Relaxed) {
+                let _ = stream2.shutdown(std::net::Shutdown::Both);
+            }
+            sidecar.poll_sensor(&mut sensor, now);
+        };
+        let _ = serve(stream, &mut sidecar, lives, poll);
+        true
+    });
+    Plugged { name, pull }
+}
+
+/// The feed of the device of this name.
+pub fn feed(name: &str, settings: &str) -> Feed {
+    let port = name.to_owned();
+    Feed::Device(Device {
+        name: name.to_owned(),
+        open: Box::new(move || device::open(&port, None)),
+        said: SettingsFile::parse(settings).unwrap(),
+        pixels: None,
+        dynamic_depth: None,
+    })
+}

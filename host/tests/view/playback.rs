@@ -1,0 +1,106 @@
+//! Recordings, played at the rate of their laser.
+
+use std::time::{Duration, Instant};
+
+use crate::Live;
+use crate::common::aer::{HEADER, depth, file};
+use crate::common::{Scratch, says};
+use crate::http::{Stream, post};
+use dtof::events::aer_file::Header;
+use dtof::view::live::{Feed, Playback};
+
+/// Ten events in a second: one laser cycle a millisecond.
+fn recording() -> Vec<u8> {
+    let header = Header {
+        laser_millihertz: 1_000_000,
+        ..HEADER
+    };
+    let events: Vec<_> = (1..=10)
+        .map(|number| depth(number, 100 * u64::from(number), 60))
+        .collect();
+    file(&header, &events)
+}
+
+#[test]
+fn a_recording_is_played_at_its_rate_paused_and_played_again() {
+    let scratch = Scratch::new();
+    let path = scratch.file("events.aer", recording());
+    let begun = Instant::now();
+    let live = Live::of(
+        Feed::Playback(Playback::new(path, None, 1.0).unwrap()),
+        None,
+    );
+    let mut page = Stream::open(live.port, 5);
+    let frame = page.frame();
+    assert_eq!(
+        (&frame["about"]["kind"], &frame["about"]["laserHz"]),
+        (&"recording".into(), &1000.0.into())
+    );
+    let frame = page.until("half", |frame| frame["events"].as_u64() >= Some(3));
+    assert!(begun.elapsed() > Duration::from_millis(300) && frame["events"].as_u64() < Some(10));
+    says(&post(live.port, "/play", "{\"on\":false}").body, "paused");
+    let frame = page.until("paused", |frame| frame["connection"]["state"] == "paused");
+    for _ in 0..5 {
+        assert_eq!(page.frame()["events"], frame["events"]);
+    }
+    says(&post(live.port, "/play", "{\"on\":true}").body, "playing");
+    let frame = page.until("the end", |frame| frame["connection"]["state"] == "ended");
+    assert_eq!(frame["events"], 10);
+    post(live.port, "/play", "{\"on\":true}");
+    page.until("again", |frame| frame["events"] == 20);
+    // What a recording does not do is said.
+    for (path, body, reason) in [
+        (
+            "/settings",
+            "[detection]\nl1 = 4",
+            "a recording has no settings to change",
+        ),
+        ("/save", "{}", "a recording has no settings to change"),
+        ("/record", "{\"on\":true}", "this is a recording already"),
+    ] {
+        let answer = post(live.port, path, body);
+        assert_eq!((answer.status, answer.body.trim()), (422, reason));
+    }
+}
+
+#[test]
+fn a_recording_is_played_faster_and_a_damaged_one_is_named() {
+    let scratch = Scratch::new();
+    let mut bytes = recording();
+    let path = scratch.file("events.aer", &bytes);
+    let live = Live::of(
+        Feed::Playback(Playback::new(path, None, 100.0).unwrap()),
+        None,
+    );
+    let begun = Instant::now();
+    Stream::open(live.port, 0).until("the end", |frame| frame["events"] == 10);
+    assert!(begun.elapsed() < Duration::from_millis(900));
+
+    bytes[64 + 16 * 5] ^= 1;
+    let path = scratch.file("damaged.aer", bytes);
+    let live = Live::of(
+        Feed::Playback(Playback::new(path, None, 100.0).unwrap()),
+        None,
+    );
+    let frame = Stream::open(live.port, 0)
+        .until("failed", |frame| frame["connection"]["state"] == "failed");
+    let reason = frame["connection"]["reason"].as_str().unwrap();
+    says(reason, "damaged.aer: byte ");
+}
+
+#[test]
+fn the_command_says_what_is_wrong() {
+    let scratch = Scratch::new();
+    scratch.file("slow.aer", file(&HEADER, &[depth(1, 5, 60)]));
+    scratch.file("none.aer", "no");
+    scratch.all_refused(
+        "view",
+        "slow.aer | slow.aer: does not say how fast its laser was; say --laser-hz
+         none.aer | none.aer: not an AER file
+         gone.aer | gone.aer: 
+         --out x | required
+         slow.aer --device qemu | cannot be used with
+         slow.aer --speed 0 | must be a number above 0
+         --device tcp:127.0.0.1:1 --settings gone.toml | gone.toml",
+    );
+}
