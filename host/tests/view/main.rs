@@ -25,13 +25,16 @@ use dtof::view::live::{Feed, Folder, Hub, Served};
 
 /// A page that is served in this process until it is dropped.
 pub struct Live {
+    /// Of this computer.
     pub port: u16,
+    /// What is known.
     pub hub: Arc<Hub>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Live {
+    /// That of a feed; files go into a folder.
     pub fn of(feed: Feed, folder: Option<&Path>) -> Self {
         let served = Served::begin(feed, 0, Folder::new(folder).unwrap()).unwrap();
         let port = served

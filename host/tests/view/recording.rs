@@ -14,7 +14,7 @@ fn a_recording_holds_all_events_while_drawing_is_thinned() {
     let out = scratch.path("out");
     fs::create_dir(&out).unwrap();
     fs::write(out.join("events.aer"), "older").unwrap();
-    let (feed, sent) = fast::feed(None);
+    let (feed, _) = fast::feed(None);
     let live = Live::of(feed, Some(&out));
     let mut page = Stream::open(live.port, 0);
     page.until("live", |frame| frame["connection"]["state"] == "live");
@@ -59,7 +59,6 @@ fn a_recording_holds_all_events_while_drawing_is_thinned() {
         assert_eq!(event.cycle().0, 10 * events, "an event is missing");
     }
     says(&answer, &format!("Saved {events} events as "));
-    assert!(events <= sent.load(std::sync::atomic::Ordering::Relaxed));
     assert_eq!(names(&out), ["events-2.aer", "events-3.aer", "events.aer"]);
     assert_eq!(fs::read(out.join("events.aer")).unwrap(), b"older");
 }

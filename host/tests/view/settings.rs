@@ -55,7 +55,7 @@ fn settings_are_put_in_force_or_refused_with_the_reason() {
         ),
         (
             "[detection]\nrule = \"paper\"\ntracking = true",
-            "refuses the configuration: ",
+            "--tracking is for --rule window",
         ),
         (
             "[detection]\nbinning = 3",

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::common::Scratch;
 use crate::http::{Stream, post};
-use crate::{Live, fast};
+use crate::{Live, device, fast};
 use dtof::view::live::{MOST_EVENTS, MOST_PIXELS};
 
 /// Two pages and a recording for so long. Gives frames a second of each page and events a second.
@@ -64,14 +64,22 @@ fn a_minute_at_100_000_events_a_second() {
     println!("view: unpaced {rate:.0} events/s, frames/s of two pages {frames:.1?}");
 }
 
-/// Serves a page of the fast device, for a browser.
+/// Serves pages for a browser: of the fast device, of a sensor, and of no device.
 #[test]
 #[ignore = "for looking at, as long as DTOF_VIEW_SECONDS says"]
-fn a_page_to_look_at() {
+fn pages_to_look_at() {
     let seconds = std::env::var("DTOF_VIEW_SECONDS").map_or(60, |text| text.parse().unwrap());
     let scratch = Scratch::new();
-    let (feed, _) = fast::feed(Some(100_000));
-    let live = Live::of(feed, Some(&scratch.path("out")));
-    println!("http://127.0.0.1:{}/", live.port);
+    let plugged = device::plugged();
+    let feeds = [
+        fast::feed(Some(100_000)).0,
+        device::feed(&plugged.name, ""),
+        device::feed("tcp:127.0.0.1:1", ""),
+    ];
+    let out = scratch.path("out");
+    let pages = feeds.map(|feed| Live::of(feed, Some(&out)));
+    for page in &pages {
+        println!("http://127.0.0.1:{}/", page.port);
+    }
     std::thread::sleep(Duration::from_secs(seconds));
 }

@@ -6,14 +6,19 @@ const STATES = {
   failed: ["failed", "bad"], lost: ["program ended", "bad"],
 };
 
+/** Sets a text, if it is another: what is the same is not read out again. */
+function put(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
 function showState({ state, reason, returned }) {
   const [text, kind] = STATES[state];
   const badge = element("state");
-  badge.textContent = text;
+  put(badge, text);
   badge.className = `badge ${kind}`;
   const again = returned > 0 ? `came back ${number(returned)} ${returned > 1 ? "times" : "time"}` : "";
-  element("reason").textContent = reason || again;
-  element("play").textContent = state === "playing" ? "Pause recording" : state === "ended" ? "Play again" : "Play";
+  put(element("reason"), reason || again);
+  put(element("play"), state === "playing" ? "Pause recording" : state === "ended" ? "Play again" : "Play");
   element("play").dataset.on = state !== "playing";
 }
 
@@ -30,31 +35,33 @@ function showTotals(frame, framesPerSecond) {
   if (recorded.file) {
     rows.push([recorded.on ? "recording" : "recorded", `${number(recorded.events)} events, ${recorded.file}`]);
   }
-  element("totals").replaceChildren(...rows.map(([name, value]) => {
-    const part = document.createElement("div");
-    const [title, text] = [document.createElement("dt"), document.createElement("dd")];
-    [title.textContent, text.textContent] = [name, value];
-    part.append(title, text);
-    return part;
-  }));
+  const totals = element("totals");
+  while (totals.children.length > rows.length) totals.lastChild.remove();
+  rows.forEach(([name, value], at) => {
+    const part = totals.children[at] ?? totals.appendChild(document.createElement("div"));
+    if (!part.firstChild) part.append(document.createElement("dt"), document.createElement("dd"));
+    put(part.firstChild, name);
+    put(part.lastChild, value);
+  });
   const button = element("record");
-  button.textContent = recorded.on ? "Stop" : "Record";
+  put(button, recorded.on ? "Stop recording" : "Record");
   button.classList.toggle("recording-now", recorded.on);
   button.dataset.on = !recorded.on;
 }
 
 function showLosses({ counts, last_fault: fault }) {
-  const rows = counts.map(([name, count]) => {
-    const row = document.createElement("tr");
+  const body = element("losses");
+  counts.forEach(([name, count], at) => {
+    const row = body.children[at] ?? body.appendChild(document.createElement("tr"));
+    if (!row.firstChild) {
+      const title = document.createElement("th");
+      title.scope = "row";
+      row.append(title, document.createElement("td"));
+    }
     row.classList.toggle("some", count > 0);
-    const [title, value] = [document.createElement("th"), document.createElement("td")];
-    title.scope = "row";
-    title.textContent = fault && name === "sensor errors" ? `${name} (last: ${fault})` : name;
-    value.textContent = number(count);
-    row.append(title, value);
-    return row;
+    put(row.firstChild, fault && name === "sensor errors" ? `${name} (last: ${fault})` : name);
+    put(row.lastChild, number(count));
   });
-  element("losses").replaceChildren(...rows);
 }
 
 /** How many pixels and events this page draws of those that came. */

@@ -5,6 +5,7 @@ let page = null;
 let asked = false;
 let last = null;
 let times = [];
+let isChosen = false;
 let rated = performance.now();
 
 /** Everything, before the next picture of the screen. */
@@ -33,7 +34,10 @@ function takeFrame(frame) {
     const isDevice = about.kind === "device";
     for (const part of document.querySelectorAll(".of-device")) part.hidden = !isDevice;
     for (const part of document.querySelectorAll(".of-recording")) part.hidden = isDevice;
-    choose(Math.min(chosen.pixel, Math.max(0, pixels.count - 1)));
+    // At first the one in the middle.
+    const middle = Math.floor(data.rows / 2) * data.columns + Math.floor(data.columns / 2);
+    choose(chosen.pixel < pixels.count && isChosen ? chosen.pixel : Math.min(middle, pixels.count - 1));
+    isChosen = pixels.count > 0;
     fillSettings();
   }
   takePixels(frame.pixels);
@@ -60,6 +64,7 @@ function takeFrame(frame) {
 
 /** Looks at another pixel. */
 function choose(pixel) {
+  if (pixel < 0) return;
   element("pixel-name").value = `${pixel}: ${pixelName(pixel)}`;
   if (pixel === chosen.pixel) return;
   Object.assign(chosen, { pixel, events: [], drawn: 0, arrived: 0, histogram: null });
