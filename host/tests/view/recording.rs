@@ -7,6 +7,7 @@ use crate::common::{Scratch, names, says};
 use crate::http::{Stream, post};
 use crate::{Live, fast};
 use dtof::events::aer_file::Reader;
+use dtof::rows::grouped;
 
 #[test]
 fn a_recording_holds_all_events_while_drawing_is_thinned() {
@@ -58,7 +59,7 @@ fn a_recording_holds_all_events_while_drawing_is_thinned() {
         events += 1;
         assert_eq!(event.cycle().0, 10 * events, "an event is missing");
     }
-    says(&answer, &format!("Saved {events} events as "));
+    says(&answer, &format!("Saved {} events as ", grouped(events)));
     assert_eq!(names(&out), ["events-2.aer", "events-3.aer", "events.aer"]);
     assert_eq!(fs::read(out.join("events.aer")).unwrap(), b"older");
 }

@@ -17,6 +17,7 @@ pub use playback::Playback;
 use super::hub::{Hub, Kind};
 use super::outputs::{Folder, Recorded, Recorder};
 use crate::events::aer_file::Header;
+use crate::rows::grouped;
 
 /// Where an answer goes: what was done, or why not, in a line.
 pub type Answer = oneshot::Sender<Result<String, String>>;
@@ -118,7 +119,11 @@ impl Work<'_> {
         Ok(match (on, header) {
             (true, Some(_)) => format!("Recording into {}.", recorded.file),
             (true, None) => "Recording begins with the device.".to_owned(),
-            (false, _) => format!("Saved {} events as {}.", recorded.events, recorded.file),
+            (false, _) => format!(
+                "Saved {} events as {}.",
+                grouped(recorded.events),
+                recorded.file
+            ),
         })
     }
 

@@ -284,6 +284,7 @@ impl State {
             self.pixels = Pixels::new(header.geometry);
         }
         self.pixels.restart();
+        self.pages.restart();
         self.header = header;
         self.scale = RangeScale::new(header.bin_width_ps, header.offset_mm).ok();
         self.losses = Losses::default();

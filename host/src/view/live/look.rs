@@ -1,7 +1,8 @@
 //! What the rule makes of a histogram, with the integers of the core.
 
 use dtof_core::{
-    BinIndex, Count, Count10, Count16, Count24, CounterWidth, DetectionRule, Histogram, Peak,
+    AnyRule, BinIndex, Count, Count10, Count16, Count24, CounterWidth, DetectionRule, Histogram,
+    Peak, RangeGate,
 };
 use serde::Serialize;
 
@@ -19,6 +20,8 @@ pub struct Look {
     pub background: Option<f64>,
     /// Where the quadrants begin, and where the last ends.
     pub quadrants: [u16; 5],
+    /// First and last bin of the window with the peak that has the most photons, of that rule.
+    pub window: Option<(u16, u16)>,
 }
 
 /// Looks at `counts`, a histogram that came whole from a sensor or an exposure so far; `None` if
@@ -80,7 +83,29 @@ fn of<const BINS: usize, W: CounterWidth>(settings: &Settings, counts: &[u32]) -
         needed: background.map(|_| high),
         background: background.map(|background| background.to_num()),
         quadrants: gate.quadrant_starts(),
+        window: match settings.rule {
+            AnyRule::Window(rule) => window(counts, bin, u16::from(rule.width()), gate),
+            AnyRule::Paper(_) | AnyRule::Average(_) => None,
+        },
     })
+}
+
+/// The window of so many bins with the peak in `bin` that has the most photons.
+fn window<const BINS: usize>(
+    counts: &[u32; BINS],
+    bin: u16,
+    width: u16,
+    gate: &RangeGate<BINS>,
+) -> Option<(u16, u16)> {
+    let first = (bin + 1).saturating_sub(width).max(gate.first());
+    let last = bin.min((gate.last() + 1).saturating_sub(width));
+    let sum = |start: u16| -> u64 {
+        let bins = usize::from(start)..usize::from(start + width);
+        counts[bins].iter().map(|&count| u64::from(count)).sum()
+    };
+    // Of several the first.
+    let start = (first..=last).rev().max_by_key(|&start| sum(start))?;
+    Some((start, start + width - 1))
 }
 
 #[cfg(test)]
@@ -137,6 +162,14 @@ mod tests {
                 prop_assert!(!reported);
             }
             prop_assert_eq!(reports(peak).1, peak >= needed);
+            if let Some((first, last)) = look.window {
+                prop_assert!(first >= gate && last < 128 && last - first == 2);
+                prop_assert!((first..=last).contains(&bin));
+                let sum = |first: u16| (first..first + 3).map(|bin| counts[usize::from(bin)]).sum::<u32>();
+                let starts = (gate..126).filter(|start| (*start..start + 3).contains(&bin));
+                prop_assert_eq!(starts.map(sum).max(), Some(sum(first)));
+            }
+            prop_assert_eq!(look.window.is_some(), which == 2);
         }
     }
 

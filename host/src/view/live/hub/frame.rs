@@ -17,8 +17,6 @@ use crate::view::live::look::Look;
 
 /// Pixels in a frame, at most; the others are in the next.
 pub const MOST_PIXELS: usize = 4096;
-/// Events of its pixel in a frame, at most: the newest.
-pub const MOST_EVENTS: usize = 256;
 
 /// Bytes of a pixel: its number (2), level and echo (1), flags (1), events (4), range in
 /// millimetres, relative reflectivity (floats of 4), photons of the peak (4).

@@ -4,12 +4,14 @@ use std::collections::VecDeque;
 
 use dtof_core::PixelAddress;
 
-use super::frame::MOST_EVENTS;
 use crate::events::aer_file::Event;
 use crate::input::source::Geometry;
 
 /// Pages that are open at a time, at most.
 pub const MOST_PAGES: usize = 16;
+
+/// Events of its pixel in a frame, at most: the newest.
+pub const MOST_EVENTS: usize = 256;
 
 /// What a page was sent.
 #[derive(Debug)]
@@ -84,6 +86,14 @@ impl Pages {
             }
             true
         })
+    }
+
+    /// Laser cycles begin at 0 again: what waits is not to be drawn among what comes.
+    pub fn restart(&mut self) {
+        for page in &mut self.open {
+            page.events.clear();
+            page.arrived = 0;
+        }
     }
 
     pub fn leave(&mut self, page: &Page) {

@@ -38,12 +38,11 @@ function drawHistogram() {
   lines.fillText("bin", (box.left + box.right) / 2, height - 5);
 
   // The window or the quadrants of the rule.
-  const window = about?.settings?.detection?.window;
-  if (about?.settings?.detection?.rule === "window" && window) {
+  if (shot.look?.window) {
+    const [first, last] = shot.look.window;
     lines.fillStyle = colours[200];
     lines.globalAlpha = 0.35;
-    const first = Math.max(gate[0], peak[0] - (window >> 1));
-    lines.fillRect(x(first), box.top, x(first + window) - x(first), box.bottom - box.top);
+    lines.fillRect(x(first), box.top, x(last + 1) - x(first), box.bottom - box.top);
     lines.globalAlpha = 1;
   } else {
     lines.strokeStyle = soft;
@@ -97,11 +96,11 @@ function axisOf(lines, box, top, soft, line) {
 
 function histogramNote(shot) {
   if (about?.kind === "recording") return "A recording has no histograms.";
-  if (!shot) return "No histogram yet: events come first.";
+  if (!shot) return "No histogram yet; a device sends events first.";
   if (shot.none) return `No histogram: ${shot.none}.`;
   const { peak, needed } = shot.look ?? {};
   const kind = shot.whole ? "A whole histogram of the sensor" : `An exposure of ${number(shot.exposure)} laser cycles so far`;
   const rest = peak ? ` Peak: ${number(peak[1])} photons in bin ${peak[0]}; ${
-    needed === null ? "no number would be reported" : `${number(needed)} are reported`}.` : "";
+    needed === null ? "no number is enough for the rule" : `the rule needs ${number(needed)}`}.` : "";
   return `${kind}.${rest}`;
 }

@@ -38,6 +38,7 @@ function takeFrame(frame) {
     const middle = Math.floor(data.rows / 2) * data.columns + Math.floor(data.columns / 2);
     choose(chosen.pixel < pixels.count && isChosen ? chosen.pixel : Math.min(middle, pixels.count - 1));
     isChosen = pixels.count > 0;
+    document.body.classList.toggle("filled", isChosen);
     fillSettings();
   }
   takePixels(frame.pixels);
