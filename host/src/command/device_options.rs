@@ -57,6 +57,15 @@ impl DeviceOptions {
         })
     }
 
+    /// Whether any was given.
+    ///
+    /// # Errors
+    /// What is wrong with them.
+    pub fn are_given(&self) -> Result<bool> {
+        let is_given = self.image.is_some() || self.pixels.is_some() || self.changes()?.is_some();
+        Ok(is_given || self.said()? != SettingsFile::default())
+    }
+
     /// Whether changes of depth are asked for, and which.
     ///
     /// # Errors

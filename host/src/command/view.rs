@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use clap::Args;
 use dtof::cli::arguments::{path, positive, whole};
 use dtof::cli::interrupt;
@@ -31,7 +31,7 @@ pub struct View {
     port: u16,
     /// The folder for recordings and settings that the page saves. Files there are not replaced
     /// [default: the page saves nothing]
-    #[arg(long, value_name = "DIR", value_parser = path())]
+    #[arg(long, value_name = "DIR", value_parser = path(), conflicts_with = "file")]
     out: Option<PathBuf>,
     #[command(flatten)]
     options: DeviceOptions,
@@ -55,6 +55,11 @@ impl View {
             }
             (None, file) => {
                 let file = file.unwrap_or_default();
+                ensure!(
+                    !self.options.are_given()?,
+                    "{}: is what it was recorded with; leave out the options of a device",
+                    file.display()
+                );
                 let speed = self.speed.unwrap_or(1.0);
                 Feed::Playback(Playback::new(file, self.laser_hz, speed)?)
             }

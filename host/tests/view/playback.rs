@@ -100,7 +100,52 @@ fn the_command_says_what_is_wrong() {
          gone.aer | gone.aer: 
          --out x | required
          slow.aer --device qemu | cannot be used with
+         slow.aer --laser-hz 5 --alpha 4 | slow.aer: is what it was recorded with
+         slow.aer --laser-hz 5 --pixels 4 | leave out the options of a device
+         slow.aer --out x | cannot be used with
          slow.aer --speed 0 | must be a number above 0
          --device tcp:127.0.0.1:1 --settings gone.toml | gone.toml",
     );
+}
+
+#[cfg(unix)]
+#[test]
+fn the_command_prints_its_address_and_ends_at_ctrl_c() {
+    use std::io::{BufRead, BufReader};
+    use std::process::{Command, Stdio};
+
+    let scratch = Scratch::new();
+    scratch.file("events.aer", recording());
+    let mut program = scratch
+        .command("view events.aer --speed 0.5")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    let mut out = BufReader::new(program.stdout.take().unwrap());
+    out.read_line(&mut line).unwrap();
+    let port = line
+        .strip_prefix("http://127.0.0.1:")
+        .unwrap()
+        .trim()
+        .trim_end_matches('/');
+    let port = port.parse().unwrap();
+    // Also while a page is open.
+    let mut page = Stream::open(port, 0);
+    page.until("playing", |frame| frame["events"].as_u64() > Some(0));
+    let killed = Command::new("kill")
+        .args(["-INT", &program.id().to_string()])
+        .status();
+    assert!(killed.unwrap().success());
+    let output = program.wait_with_output().unwrap();
+    assert!(
+        output.status.success() && output.stderr.is_empty(),
+        "{output:?}"
+    );
+    // Two do not share a port.
+    let holder = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let taken = holder.local_addr().unwrap().port();
+    let output = scratch.run(&format!("view events.aer --port {taken}"));
+    scratch.refused(&output, &[format!("--port {taken}: ")]);
 }

@@ -3,6 +3,8 @@
 mod frame;
 mod pages;
 mod pixels;
+#[cfg(test)]
+mod tests;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -18,9 +20,9 @@ use dtof_core::fixed::types::{I24F8, U16F16};
 
 use super::look::look;
 use super::outputs::Recorded;
-pub use frame::{MOST_EVENTS, MOST_PIXELS};
+pub use frame::MOST_PIXELS;
 use pages::Pages;
-pub use pages::{MOST_PAGES, Page};
+pub use pages::{MOST_EVENTS, MOST_PAGES, Page};
 use pixels::Pixels;
 
 /// Where events come from.
