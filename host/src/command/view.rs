@@ -42,7 +42,7 @@ impl View {
         let feed = match (self.device, self.file) {
             (Some(name), _) => {
                 let image = self.options.image.clone();
-                Feed::Device(Device {
+                Feed::Device(Box::new(Device {
                     said: self.options.said()?,
                     pixels: self.options.pixels,
                     dynamic_depth: self.options.changes()?,
@@ -51,7 +51,7 @@ impl View {
                         move || device::open(&name, image.as_deref())
                     }),
                     name,
-                })
+                }))
             }
             (None, file) => {
                 let file = file.unwrap_or_default();

@@ -67,11 +67,11 @@ pub fn plugged() -> Plugged {
 /// The feed of the device of this name.
 pub fn feed(name: &str, settings: &str) -> Feed {
     let port = name.to_owned();
-    Feed::Device(Device {
+    Feed::Device(Box::new(Device {
         name: name.to_owned(),
         open: Box::new(move || device::open(&port, None)),
         said: SettingsFile::parse(settings).unwrap(),
         pixels: None,
         dynamic_depth: None,
-    })
+    }))
 }

@@ -86,8 +86,10 @@ impl Fast {
                 )
             }
             message::STATISTICS_REQUEST => {
-                let mut report = Report::default();
-                report.cycles = self.cycle;
+                let mut report = Report {
+                    cycles: self.cycle,
+                    ..Report::default()
+                };
                 report.statistics.events = self.since;
                 report.statistics.counted = 37 * self.since;
                 (message::STATISTICS, report.to_le_bytes().to_vec())
@@ -118,6 +120,11 @@ impl Fast {
     }
 
     /// A hill that moves.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "from 40 to 90"
+    )]
     fn bin(pixel: u16, cycle: u64) -> u16 {
         let (column, row) = (f64::from(pixel % 64) - 32.0, f64::from(pixel / 64) - 32.0);
         let time = cycle as f64 / 4e6;
@@ -127,6 +134,11 @@ impl Fast {
     }
 
     /// A message of as many events as fit, if they are due.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "events of some hours"
+    )]
     fn events(&mut self) -> Option<Vec<u8>> {
         let due = self.runs.map(|runs| match self.rate {
             None => u64::MAX,
@@ -211,5 +223,5 @@ pub fn feed(rate: Option<u64>) -> (Feed, Arc<AtomicU64>) {
         pixels: None,
         dynamic_depth: None,
     };
-    (Feed::Device(device), sent)
+    (Feed::Device(Box::new(device)), sent)
 }

@@ -35,6 +35,7 @@ pub struct Live {
 
 impl Live {
     /// That of a feed; files go into a folder.
+    #[must_use]
     pub fn of(feed: Feed, folder: Option<&Path>) -> Self {
         let served = Served::begin(feed, 0, Folder::new(folder).unwrap()).unwrap();
         let port = served

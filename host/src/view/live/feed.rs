@@ -44,7 +44,7 @@ pub enum Wish {
 /// A source of events.
 pub enum Feed {
     /// A device.
-    Device(Device),
+    Device(Box<Device>),
     /// A recording.
     Playback(Playback),
 }

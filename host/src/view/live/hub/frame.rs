@@ -89,10 +89,11 @@ impl State {
         });
         if let (Kind::Device, Some((said, settings))) = (self.kind, &self.settings) {
             let said = said.with(settings);
+            let last_bin = u16::try_from(header.bins.max(1) - 1).unwrap_or(u16::MAX);
             about["settings"] = json!({
                 "sensor": said.sensor,
                 "detection": said.detection,
-                "gate": settings.gate.unwrap_or((0, (header.bins.max(1) - 1) as u16)),
+                "gate": settings.gate.unwrap_or((0, last_bin)),
             });
         }
         about
