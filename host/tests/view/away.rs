@@ -84,6 +84,9 @@ fn settings_are_mended_while_the_device_refuses_them() {
         frame["connection"]["reason"].as_str().unwrap(),
         "refuses the configuration",
     );
+    // They are in the form, to be mended.
+    let told = Stream::open(live.port, 2).frame();
+    assert_eq!(told["about"]["settings"]["detection"]["l2"], 3);
     let mut answer = post(live.port, "/settings", "[detection]\nl1 = 60\n");
     until("taken", || {
         if answer.status != 200 {

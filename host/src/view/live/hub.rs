@@ -76,6 +76,8 @@ struct State {
     version: u64,
     header: Header,
     settings: Option<(SettingsFile, Settings)>,
+    /// What was said of settings before any were in force.
+    said: SettingsFile,
     scale: Option<RangeScale>,
     connection: Connection,
     pixels: Pixels,
@@ -120,6 +122,7 @@ impl Hub {
             version: 1,
             header,
             settings: None,
+            said: SettingsFile::default(),
             scale: None,
             connection: Connection {
                 state: "opening",
@@ -146,6 +149,13 @@ impl Hub {
     fn state(&self) -> MutexGuard<'_, State> {
         // Each change is whole before anything can fail.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Settings that are to be put in force.
+    pub(super) fn said(&self, said: &SettingsFile) {
+        let mut state = self.state();
+        state.version += 1;
+        state.said = said.clone();
     }
 
     /// Settings are in force: laser cycles begin at 0.

@@ -32,6 +32,7 @@ pub struct Device {
 
 impl Device {
     pub(super) fn run(mut self, work: &mut Work) {
+        work.hub.said(&self.said);
         // Settings that a page wishes for while there is no device.
         let mut wished: Option<Command> = None;
         while !work.is_stopped() {

@@ -87,13 +87,19 @@ impl State {
             "offsetMm": header.offset_mm.to_num::<f64>(),
             "laserHz": header.laser_millihertz as f64 / 1000.0,
         });
-        if let (Kind::Device, Some((said, settings))) = (self.kind, &self.settings) {
-            let said = said.with(settings);
+        if self.kind == Kind::Device {
             let last_bin = u16::try_from(header.bins.max(1) - 1).unwrap_or(u16::MAX);
+            let (said, gate) = match &self.settings {
+                Some((said, settings)) => {
+                    let gate = settings.gate.unwrap_or((0, last_bin));
+                    (&said.with(settings), Some(gate))
+                }
+                None => (&self.said, self.said.sensor.gate),
+            };
             about["settings"] = json!({
                 "sensor": said.sensor,
                 "detection": said.detection,
-                "gate": settings.gate.unwrap_or((0, last_bin)),
+                "gate": gate,
             });
         }
         about
