@@ -10,6 +10,7 @@ function takeHistogram(news) {
 }
 
 function drawHistogram() {
+  element("histogram").hidden = about?.kind === "recording";
   const { context: lines, width, height, ink, soft, line } = context(element("histogram"));
   const shot = chosen.histogram;
   element("histogram-note").textContent = histogramNote(shot);

@@ -59,7 +59,7 @@ function drawMaps() {
     Number.isNaN(pixels.range[pixel]) ? NaN : value);
   drawMap(element("range"), pixels.range, data.low, data.high, "mm", 0);
   const fastest = pixels.rate.reduce((most, rate) => Math.max(most, rate), 0);
-  drawMap(element("rate"), pixels.rate, 0, fastest, "/s", 1);
+  drawMap(element("rate"), pixels.rate, 0, fastest || 1, "/s", 1);
   const isPeak = element("light-of").value === "peak";
   const light = known(isPeak ? pixels.peak : pixels.reflectivity);
   const [, brightest] = span(light.filter((value) => !Number.isNaN(value)));
