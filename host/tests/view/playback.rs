@@ -27,17 +27,15 @@ fn a_recording_is_played_at_its_rate_paused_and_played_again() {
     let path = scratch.file("events.aer", recording());
     let begun = Instant::now();
     let live = Live::of(
-        Feed::Playback(Playback::new(path, None, 1.0).unwrap()),
+        Feed::Playback(Playback::new(path, None, 0.4).unwrap()),
         None,
     );
     let mut page = Stream::open(live.port, 5);
-    let frame = page.frame();
-    assert_eq!(
-        (&frame["about"]["kind"], &frame["about"]["laserHz"]),
-        (&"recording".into(), &1000.0.into())
-    );
-    let frame = page.until("half", |frame| frame["events"].as_u64() >= Some(3));
-    assert!(begun.elapsed() > Duration::from_millis(300) && frame["events"].as_u64() < Some(10));
+    let frame = page.until("begun", |frame| frame["about"]["laserHz"] == 1000.0);
+    assert_eq!(frame["about"]["kind"], "recording");
+    let frame = page.until("some", |frame| frame["events"].as_u64() >= Some(2));
+    // One each quarter of a second.
+    assert!(begun.elapsed() > Duration::from_millis(450) && frame["events"].as_u64() < Some(10));
     says(&post(live.port, "/play", "{\"on\":false}").body, "paused");
     let frame = page.until("paused", |frame| frame["connection"]["state"] == "paused");
     for _ in 0..5 {
@@ -68,13 +66,14 @@ fn a_recording_is_played_faster_and_a_damaged_one_is_named() {
     let scratch = Scratch::new();
     let mut bytes = recording();
     let path = scratch.file("events.aer", &bytes);
+    // A hundred seconds of a slower laser.
     let live = Live::of(
-        Feed::Playback(Playback::new(path, None, 100.0).unwrap()),
+        Feed::Playback(Playback::new(path, Some(10), 100.0).unwrap()),
         None,
     );
     let begun = Instant::now();
     Stream::open(live.port, 0).until("the end", |frame| frame["events"] == 10);
-    assert!(begun.elapsed() < Duration::from_millis(900));
+    assert!(begun.elapsed() < Duration::from_secs(30));
 
     bytes[64 + 16 * 5] ^= 1;
     let path = scratch.file("damaged.aer", bytes);
