@@ -16,7 +16,9 @@ use crate::settings::{Sensor, SettingsFile};
 /// How a device operates.
 #[derive(Clone, Debug)]
 pub struct Setup {
-    /// What was said, and of the rest what the device says.
+    /// What was said.
+    pub asked: SettingsFile,
+    /// The same, and of the rest what the device says.
     pub said: SettingsFile,
     /// What follows from it.
     pub settings: Settings,
@@ -42,6 +44,7 @@ impl Setup {
             laser_millihertz: 0,
         });
         let pixels = pixels.unwrap_or(sensor.pixels.min(client.pixels()));
+        let asked = said.clone();
         let said = said.or(SettingsFile {
             sensor: Sensor {
                 bin_width_ps: sensor.bin_width,
@@ -59,6 +62,7 @@ impl Setup {
         let columns = said.sensor.columns;
         let setup = Self {
             settings: said.settings(client.bins().into())?,
+            asked,
             said,
             pixels,
             geometry: array(pixels, columns),

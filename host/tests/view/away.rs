@@ -41,8 +41,10 @@ fn a_device_that_is_unplugged_comes_back_and_so_does_the_recording() {
     live.end();
     assert_eq!(names(&out), ["events-2.aer", "events.aer"]);
     let mut recorded = 0;
-    for name in names(&out) {
+    // What each device says of itself.
+    for (name, offset_mm) in [("events.aer", 0), ("events-2.aer", 100)] {
         let mut reader = Reader::new(std::fs::File::open(out.join(name)).unwrap()).unwrap();
+        assert_eq!(reader.header().offset_mm, offset_mm, "{name}");
         while reader.next_event().unwrap().is_some() {
             recorded += 1;
         }

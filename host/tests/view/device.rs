@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU16;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::time::Duration;
 
 use crate::common::port::{listen, serve};
@@ -10,10 +10,10 @@ use dtof::device;
 use dtof::settings::SettingsFile;
 use dtof::view::live::{Device, Feed};
 use dtof_core::PixelAddress;
-use dtof_core::fixed::types::{U0F32, U8F24};
+use dtof_core::fixed::types::{I24F8, U0F32, U8F24};
 use dtof_firmware::sidecar::Sidecar;
-use dtof_sensors::Sensor;
 use dtof_sensors::simulated::{self, Pulse, Simulated, SimulatedPixel};
+use dtof_sensors::{About, Sensor};
 
 const PIXELS: u16 = 16;
 const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
@@ -40,15 +40,20 @@ pub struct Plugged {
     pub pull: Arc<AtomicBool>,
 }
 
+/// Each time it is plugged in its sensor stands 100 mm farther away.
 pub fn plugged() -> Plugged {
+    let times = AtomicI32::new(0);
     let pull = Arc::new(AtomicBool::new(false));
     let pulled = Arc::clone(&pull);
     let name = listen(move |stream| {
         let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
         let mut blocks = heapless::Vec::<_, 4>::new();
         let mut sensor = sensor();
-        let about = Some(sensor.about());
-        let mut sidecar = Sidecar::new(&mut pixels, &mut blocks, about);
+        let about = About {
+            offset: I24F8::from_num(100 * times.fetch_add(1, Ordering::Relaxed)),
+            ..sensor.about()
+        };
+        let mut sidecar = Sidecar::new(&mut pixels, &mut blocks, Some(about));
         // A part of a second at a time, to see whether the cable is pulled.
         let lives = Duration::from_secs(600);
         let stream2 = stream.try_clone().unwrap();

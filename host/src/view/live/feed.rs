@@ -83,12 +83,16 @@ impl Feed {
             recorder: Recorder::new(folder),
             recorded: Recorded::default(),
         };
-        match self {
+        let rests = match self {
             Self::Device(device) => device.run(&mut work),
-            Self::Playback(playback) => playback.run(&mut work),
-        }
+            Self::Playback(playback) => {
+                playback.run(&mut work);
+                Ok(())
+            }
+        };
         // What was recorded is whole, also at the end.
-        work.recorder.stop(&mut work.recorded)
+        let kept = work.recorder.stop(&mut work.recorded);
+        rests.and(kept)
     }
 }
 
@@ -119,6 +123,7 @@ impl Work<'_> {
         Ok(match (on, header) {
             (true, Some(_)) => format!("Recording into {}.", recorded.file),
             (true, None) => "Recording begins with the device.".to_owned(),
+            (false, _) if recorded.file.is_empty() => "Nothing was recorded.".to_owned(),
             (false, _) => format!(
                 "Saved {} events as {}.",
                 grouped(recorded.events),

@@ -1,8 +1,8 @@
 //! What the rule makes of a histogram, with the integers of the core.
 
 use dtof_core::{
-    AnyRule, BinIndex, Count, Count10, Count16, Count24, CounterWidth, DetectionRule, Histogram,
-    Peak, RangeGate,
+    AnyRule, BinIndex, Count, Count10, Count16, Count24, CounterWidth, DetectionRule, EchoNumber,
+    Histogram, Peak, RangeGate,
 };
 use serde::Serialize;
 
@@ -16,6 +16,9 @@ pub struct Look {
     /// The fewest photons in that bin, all others as they are, that the rule reports; `None` if
     /// no counter holds as many.
     pub needed: Option<u32>,
+    /// What is needed depends on the events before, as the pixel tracks or reports more than one
+    /// echo: it is not told then.
+    pub depends: bool,
     /// The background a bin at that number of photons, as the rule has it.
     pub background: Option<f64>,
     /// Where the quadrants begin, and where the last ends.
@@ -70,7 +73,8 @@ fn of<const BINS: usize, W: CounterWidth>(settings: &Settings, counts: &[u32]) -
     };
     // More photons in the peak never make it less clear.
     let (mut low, mut high) = (0, W::MAX);
-    let mut background = answer(high);
+    let depends = settings.tracking || settings.echoes != EchoNumber::FIRST;
+    let mut background = if depends { None } else { answer(high) };
     while let (Some(_), true) = (background, low < high) {
         let middle = low + (high - low) / 2;
         match answer(middle) {
@@ -81,6 +85,7 @@ fn of<const BINS: usize, W: CounterWidth>(settings: &Settings, counts: &[u32]) -
     Some(Look {
         peak: (bin, peak.count.raw()),
         needed: background.map(|_| high),
+        depends,
         background: background.map(|background| background.to_num()),
         quadrants: gate.quadrant_starts(),
         window: match settings.rule {
@@ -170,6 +175,35 @@ mod tests {
                 prop_assert_eq!(starts.map(sum).max(), Some(sum(first)));
             }
             prop_assert_eq!(look.window.is_some(), which == 2);
+        }
+    }
+
+    #[test]
+    fn a_threshold_that_depends_on_events_is_not_told() {
+        let counts: Vec<u32> = (0..128).map(|bin| u32::from(bin == 40) * 50).collect();
+        let look = |settings: Settings| look(&settings, &counts, false).unwrap();
+        let window = WindowRule::new(3, "4.5".parse().unwrap(), Count::saturating(5)).unwrap();
+        let plain = Settings {
+            rule: window.into(),
+            ..scene::settings(0)
+        };
+        let told = look(plain.clone());
+        assert!(told.needed.is_some() && !told.depends);
+        let tracks = Settings {
+            tracking: true,
+            ..plain.clone()
+        };
+        let echoes = Settings {
+            echoes: EchoNumber::new(2).unwrap(),
+            ..plain
+        };
+        for settings in [tracks, echoes] {
+            let look = look(settings);
+            assert_eq!(
+                (look.needed, look.background, look.depends),
+                (None, None, true)
+            );
+            assert_eq!((look.peak, look.window), (told.peak, told.window));
         }
     }
 

@@ -30,20 +30,19 @@ pub use outputs::Folder;
 /// Commands that wait for the feed, at most.
 const COMMANDS: usize = 16;
 
-/// A page that is served until [`Served::end`].
+/// A page that is ready to be served.
 pub struct Served {
     /// Its address.
     pub address: String,
     listener: TcpListener,
     hub: Arc<Hub>,
-    commands: mpsc::SyncSender<feed::Command>,
-    stop: Arc<AtomicBool>,
-    thread: thread::JoinHandle<Result<()>>,
+    feed: Feed,
+    folder: Folder,
 }
 
 impl Served {
-    /// Begins: `feed` on a thread of its own, and a page on `port` of this computer, 0 for any
-    /// that is free. Files are written into `folder` only.
+    /// A page of `feed` on `port` of this computer, 0 for any that is free. Files are written into
+    /// `folder` only. Nothing runs yet.
     ///
     /// # Errors
     /// If the port is taken.
@@ -52,19 +51,12 @@ impl Served {
             .with_context(|| format!("--port {port}"))?;
         let address = format!("http://{}/", listener.local_addr()?);
         let hub = Arc::new(Hub::new(feed.name(), feed.kind()));
-        let (commands, receiver) = mpsc::sync_channel(COMMANDS);
-        let stop = Arc::new(AtomicBool::new(false));
-        let thread = thread::spawn({
-            let (hub, stop) = (Arc::clone(&hub), Arc::clone(&stop));
-            move || feed.run(&hub, &receiver, folder, &stop)
-        });
         Ok(Self {
             address,
             listener,
             hub,
-            commands,
-            stop,
-            thread,
+            feed,
+            folder,
         })
     }
 
@@ -74,15 +66,28 @@ impl Served {
         &self.hub
     }
 
-    /// Serves the page until `done`, asked some times a second, says so. Then the device rests, and
-    /// a recording is ended.
+    /// Runs the feed on a thread of its own, and serves the page until `done`, asked some times a
+    /// second, says so. Then the device rests, and a recording is ended.
     ///
     /// # Errors
-    /// If there is no more serving, or the recording cannot be written.
+    /// If there is no more serving, the device does not rest, or the recording cannot be written.
     pub fn until(self, done: impl Fn() -> bool) -> Result<()> {
-        let served = server::serve(self.listener, &self.hub, self.commands, done);
-        self.stop.store(true, Ordering::Relaxed);
-        let ended = self.thread.join();
+        let Self {
+            listener,
+            hub,
+            feed,
+            folder,
+            ..
+        } = self;
+        let (commands, receiver) = mpsc::sync_channel(COMMANDS);
+        let stop = AtomicBool::new(false);
+        let (served, ended) = thread::scope(|scope| {
+            let (hub, stop) = (&hub, &stop);
+            let thread = scope.spawn(move || feed.run(hub, &receiver, folder, stop));
+            let served = server::serve(listener, hub, commands, done);
+            stop.store(true, Ordering::Relaxed);
+            (served, thread.join())
+        });
         served.and(ended.map_err(|_| anyhow!("the thread of the device has failed"))?)
     }
 }

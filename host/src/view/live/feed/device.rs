@@ -31,7 +31,11 @@ pub struct Device {
 }
 
 impl Device {
-    pub(super) fn run(mut self, work: &mut Work) {
+    /// Until it is stopped.
+    ///
+    /// # Errors
+    /// If the device does not rest then.
+    pub(super) fn run(mut self, work: &mut Work) -> Result<()> {
         work.hub.said(&self.said);
         // Settings that a page wishes for while there is no device.
         let mut wished: Option<Command> = None;
@@ -40,6 +44,10 @@ impl Device {
             let kept = work.recorder.end_file(&mut work.recorded);
             work.tell_recorded();
             let Err(ended) = ended else { break };
+            if work.is_stopped() {
+                let name = self.name;
+                return Err(ended.context(format!("{name}: it may still be running")));
+            }
             let reason = match kept {
                 Ok(()) => format!("{ended:#}"),
                 Err(kept) => format!("{ended:#}; {kept:#}"),
@@ -50,6 +58,7 @@ impl Device {
             work.hub.connection("gone", &reason);
             wished = self.wait(work, &reason);
         }
+        Ok(())
     }
 
     /// One session: until it is stopped, or the device is gone.
@@ -68,7 +77,7 @@ impl Device {
             reply(command.answer, Ok("The settings are in force.".to_owned()));
         }
         let ended = session.run(work);
-        self.said = session.said();
+        self.said = session.asked();
         ended
     }
 

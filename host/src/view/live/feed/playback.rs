@@ -83,9 +83,11 @@ impl Playback {
             }
             let elapsed = turn.elapsed();
             turn = Instant::now();
-            if plays && at.next.is_some() {
-                at.seconds += elapsed.as_secs_f64() * self.speed;
-                self.hand_on(&mut at, work)?;
+            if plays {
+                if at.next.is_some() {
+                    at.seconds += elapsed.as_secs_f64() * self.speed;
+                    self.hand_on(&mut at, work)?;
+                }
                 if at.next.is_none() {
                     plays = false;
                     work.hub.connection("ended", "");
@@ -105,7 +107,14 @@ impl Playback {
                 break;
             }
             batch.push(event);
-            at.next = at.reader.next_event()?;
+            at.next = match at.reader.next_event() {
+                Ok(next) => next,
+                Err(error) => {
+                    // What came before the damage is good.
+                    work.hub.events(&batch, 0);
+                    return Err(error);
+                }
+            };
             if batch.len() == BATCH {
                 // What is read more slowly than it was is played as fast as it can be.
                 at.seconds = seconds;

@@ -67,13 +67,20 @@ impl<'a> Session<'a> {
         Ok(session)
     }
 
-    /// What is in force.
-    pub fn said(&self) -> SettingsFile {
-        self.setup.said.clone()
+    /// What was said, without what the device says.
+    pub fn asked(&self) -> SettingsFile {
+        self.setup.asked.clone()
     }
 
     /// Goes on until it is stopped: the device rests then.
     pub fn run(&mut self, work: &mut Work) -> Result<()> {
+        let ended = self.go_on(work);
+        // What has arrived before the device was gone, too.
+        self.take(work);
+        ended
+    }
+
+    fn go_on(&mut self, work: &mut Work) -> Result<()> {
         while !work.is_stopped() {
             if let Ok(command) = work.commands.try_recv() {
                 self.fulfil(command, work)?;
@@ -212,7 +219,8 @@ impl<'a> Session<'a> {
     }
 
     fn changed_setup(&self, text: &str) -> Result<Setup> {
-        let said = Self::changed(&self.setup.said, text)?;
+        let [asked, said] = [&self.setup.asked, &self.setup.said];
+        let [asked, said] = [Self::changed(asked, text)?, Self::changed(said, text)?];
         let bins = self.client.bins();
         ensure!(
             said.sensor.bins.is_none_or(|of| of == bins),
@@ -221,6 +229,7 @@ impl<'a> Session<'a> {
         let setup = Setup {
             settings: said.settings(bins.into())?,
             said,
+            asked,
             ..self.setup.clone()
         };
         masked::check(&setup.settings.masked, setup.pixels.into())?;
@@ -242,6 +251,10 @@ impl<'a> Session<'a> {
         let configured = self.client.configure(&wanted);
         self.take(work);
         configured?;
+        // A histogram that came meanwhile is one of before.
+        while self.client.take_histogram().is_some() {
+            self.histogram = None;
+        }
         // A disk that is full is told to pages.
         let _ = work.recorder.end_file(&mut work.recorded);
         work.hub.begin(&setup);

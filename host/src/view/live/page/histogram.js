@@ -99,9 +99,11 @@ function histogramNote(shot) {
   if (about?.kind === "recording") return "A recording has no histograms.";
   if (!shot) return "No histogram yet; a device sends events first.";
   if (shot.none) return `No histogram: ${shot.none}.`;
-  const { peak, needed } = shot.look ?? {};
+  const { peak, needed, depends } = shot.look ?? {};
   const kind = shot.whole ? "A whole histogram of the sensor" : `An exposure of ${number(shot.exposure)} laser cycles so far`;
-  const rest = peak ? ` Peak: ${number(peak[1])} photons in bin ${peak[0]}; ${
-    needed === null ? "no number is enough for the rule" : `the rule needs ${number(needed)}`}.` : "";
+  let needs = `the rule needs ${number(needed)}`;
+  if (depends) needs = "what the rule needs depends on the events before";
+  else if (needed === null) needs = "no number is enough for the rule";
+  const rest = peak ? ` Peak: ${number(peak[1])} photons in bin ${peak[0]}; ${needs}.` : "";
   return `${kind}.${rest}`;
 }
