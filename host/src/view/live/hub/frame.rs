@@ -19,10 +19,12 @@ use crate::view::live::look::Look;
 pub const MOST_PIXELS: usize = 4096;
 
 /// Bytes of a pixel: its number (2), level and echo (1), flags (1), events (4), range in
-/// millimetres, relative reflectivity (floats of 4), photons of the peak (4).
+/// millimetres, relative reflectivity, photons of the peak (floats of 4). The last two are NaN of
+/// a pixel that has had changes of depth only, as these do not measure light.
 const PIXEL: usize = 20;
-/// Bytes of an event: laser cycle (8), range (a float of 4), photons of the peak (4), exposure
-/// (2), level and echo (1), flags (1), background (4).
+/// Bytes of an event: laser cycle (8), range, photons of the peak (floats of 4), exposure (2),
+/// level and echo (1), flags (1), background (a float of 4). Of a change of depth, photons and
+/// background are NaN, and the exposure means nothing.
 const EVENT: usize = 24;
 
 impl State {
@@ -140,8 +142,13 @@ fn record(records: &mut Vec<u8>, number: usize, pixel: &Pixel) {
     records.extend([pixel.level_echo, pixel.flags]);
     records.extend(pixel.count.to_le_bytes());
     records.extend(pixel.range_mm.to_le_bytes());
-    records.extend(pixel.reflectivity.to_le_bytes());
-    records.extend(pixel.peak.to_le_bytes());
+    // No event is reported of a peak of 0 photons.
+    let (reflectivity, peak) = match pixel.peak {
+        0 => (f32::NAN, f32::NAN),
+        peak => (pixel.reflectivity, peak as f32),
+    };
+    records.extend(reflectivity.to_le_bytes());
+    records.extend(peak.to_le_bytes());
     debug_assert_eq!(records.len(), before + PIXEL);
 }
 
@@ -150,11 +157,11 @@ fn events(waiting: &[Waiting]) -> Vec<u8> {
     for Waiting { event, range_mm } in waiting {
         let (peak, exposure, background) = match event {
             Event::Depth(event) => (
-                event.peak_count.raw(),
+                event.peak_count.raw() as f32,
                 event.exposure,
-                event.background.raw(),
+                event.background.raw() as f32,
             ),
-            Event::DynamicDepth(_) => (0, 0, 0),
+            Event::DynamicDepth(_) => (f32::NAN, 0, f32::NAN),
         };
         records.extend(event.cycle().0.to_le_bytes());
         records.extend(range_mm.to_le_bytes());

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
+use dtof_core::DynamicDepthEvent;
 use proptest::prelude::*;
 use serde_json::Value;
 
@@ -88,6 +89,43 @@ fn the_newest_events_of_a_pixel_wait_and_the_others_are_counted() {
     assert_eq!(frame(&hub, &mut page).2["pixel"]["drawn"], 0);
     hub.leave(&page);
     assert_eq!((hub.pages(), hub.watched()), (0, Vec::new()));
+}
+
+/// A number of a record.
+fn float(record: &[u8], at: usize) -> f32 {
+    f32::from_le_bytes(record[at..at + 4].try_into().unwrap())
+}
+
+#[test]
+fn light_that_was_not_measured_is_no_number() {
+    let hub = hub();
+    let mut page = hub.join(7).unwrap();
+    let mut told = |event| {
+        hub.events(&[event], 0);
+        let told = frame(&hub, &mut page).2;
+        let bytes = |text: &Value| BASE64.decode(text.as_str().unwrap()).unwrap();
+        let (pixel, event) = (bytes(&told["pixels"]), bytes(&told["pixel"]["events"]));
+        let of_pixel = [8, 12, 16].map(|at| float(&pixel, at));
+        (of_pixel, [8, 12, 20].map(|at| float(&event, at)))
+    };
+    let of_change = |cycle| {
+        let depth = fixtures::event(7, cycle, 3);
+        let (pixel, level, position) = (depth.pixel, depth.level, depth.position());
+        let change = DynamicDepthEvent::new(pixel, level, depth.cycle, position, 256, depth.flags);
+        Event::DynamicDepth(change.unwrap())
+    };
+    let ([range, reflectivity, peak], [same, of_event, background]) = told(of_change(9));
+    assert!(range > 0.0 && range == same);
+    for light in [reflectivity, peak, of_event, background] {
+        assert!(light.is_nan(), "{light}");
+    }
+    // Of a depth event it is what the event says, and stays when a change follows.
+    let ([_, reflectivity, peak], [_, of_event, background]) = told(event(7, 99));
+    assert_eq!((peak, of_event, background), (9.0, 9.0, 1.0));
+    assert!(reflectivity > 0.0);
+    let ([_, kept, peak], [_, of_event, _]) = told(of_change(199));
+    assert_eq!((kept, peak), (reflectivity, 9.0));
+    assert!(of_event.is_nan());
 }
 
 proptest! {

@@ -32,7 +32,8 @@ function drawMap(canvas, values, low, high, unit, digits) {
     lines.fillStyle = ink;
     lines.fillText("no array yet", 12, 24);
   }
-  drawScaleOf(canvas.id, values.length > 0 ? [low, high] : null, unit, digits);
+  const isAny = values.some((value) => !Number.isNaN(value));
+  drawScaleOf(canvas.id, isAny ? [low, high] : null, unit, digits);
 }
 const mapPicture = document.createElement("canvas");
 
@@ -55,13 +56,11 @@ function drawScaleOf(id, ends, unit, digits) {
 }
 
 function drawMaps() {
-  const known = (values) => Float32Array.from(values, (value, pixel) =>
-    Number.isNaN(pixels.range[pixel]) ? NaN : value);
   drawMap(element("range"), pixels.range, data.low, data.high, "mm", 0);
   const fastest = pixels.rate.reduce((most, rate) => Math.max(most, rate), 0);
   drawMap(element("rate"), pixels.rate, 0, fastest || 1, "/s", 1);
   const isPeak = element("light-of").value === "peak";
-  const light = known(isPeak ? pixels.peak : pixels.reflectivity);
+  const light = isPeak ? pixels.peak : pixels.reflectivity;
   const [, brightest] = span(light.filter((value) => !Number.isNaN(value)));
   drawMap(element("light"), light, 0, brightest, isPeak ? "photons" : "photons × m²", isPeak ? 0 : 3);
   const range = pixels.range[chosen.pixel];

@@ -58,8 +58,9 @@ function drawEvents() {
     const flags = FLAGS.filter((_, bit) => event.flags & (1 << bit));
     if (event.level > 0) flags.push(`${1 << event.level}×${1 << event.level} block`);
     if (event.echo > 1) flags.push(`echo ${event.echo}`);
-    const cells = [number(event.cycle), number(event.range, 1), number(event.peak),
-      number(event.background), number(event.exposure), flags.join(", ")];
+    const measured = (value) => (Number.isNaN(value) ? "–" : number(value));
+    const cells = [number(event.cycle), number(event.range, 1), measured(event.peak),
+      measured(event.background), measured(event.exposure), flags.join(", ")];
     row.append(...cells.map((cell) => {
       const part = document.createElement("td");
       part.textContent = cell;

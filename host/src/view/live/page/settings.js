@@ -19,8 +19,10 @@ const FIELDS = [
   ["detection", "binning", "levels of blocks", number32(0, 1)],
   ["detection", "patience", "patience, laser cycles", number32(1, 1)],
 ];
+/** Names of the fields that hold what is not in force yet. */
+const edited = new Set();
 /** Keys that the device takes, and that the form has no field for, go along as they are. */
-const TAKEN = { sensor: ["gate", "masked", "sigma_bins", "one_hit_tdc"] };
+const TAKEN = { sensor: ["masked", "sigma_bins", "one_hit_tdc"] };
 
 function makeFields() {
   for (const [section, key, name, input, rules, at] of FIELDS) {
@@ -31,7 +33,10 @@ function makeFields() {
     label.append(name, field);
     Object.assign(label.dataset, { rules: rules ?? "" });
     Object.assign(field, { name: `${section}.${key}${at ?? ""}` });
-    field.addEventListener("input", markChanged);
+    field.addEventListener("input", () => {
+      edited.add(field.name);
+      markChanged();
+    });
     element("fields").append(label);
   }
 }
@@ -45,24 +50,30 @@ function fieldOf([section, key, , , , at]) {
   return element("settings").elements[`${section}.${key}${at ?? ""}`];
 }
 
-/** Fills the form with what is in force. */
+/** Fills the form with what is in force, and leaves alone what the reader has edited. */
 function fillSettings() {
-  for (const field of FIELDS) fieldOf(field).value = inForce(field);
+  for (const field of FIELDS) {
+    const input = fieldOf(field);
+    if (!edited.has(input.name)) input.value = inForce(field);
+  }
   markChanged();
 }
 
 function markChanged() {
   const rule = element("settings").elements["detection.rule"].value;
-  let changed = 0;
   for (const field of FIELDS) {
     const input = fieldOf(field);
     const label = input.closest("label");
     label.hidden = label.dataset.rules !== "" && !label.dataset.rules.split(",").includes(rule);
     const isChanged = String(inForce(field)) !== input.value;
     label.classList.toggle("changed", isChanged);
-    changed += isChanged && !label.hidden;
+    if (!isChanged) edited.delete(input.name);
   }
-  return changed;
+}
+
+/** The ends of the gate as they are typed. */
+function gateEnds() {
+  return ["sensor.gate0", "sensor.gate1"].map((name) => element("settings").elements[name].value);
 }
 
 /** The settings as a TOML text; a value in JSON is the same in TOML. */
@@ -82,8 +93,9 @@ function settingsText() {
     if (value === "" || !isOf) delete said[section][key];
     else said[section][key] = Array.isArray(input) ? value : Number(value);
   }
-  const gate = ["sensor.gate0", "sensor.gate1"].map((name) => element("settings").elements[name].value);
-  if (gate.every((end) => end !== "")) said.sensor.gate = gate.map(Number);
+  // Without ends it is all bins.
+  const gate = gateEnds();
+  said.sensor.gate = gate.includes("") ? null : gate.map(Number);
   if (!(said.detection.binning > 0)) delete said.detection.patience;
   if (!(said.detection.echoes > 1)) delete said.detection.echo_wait;
   const lines = (section) => Object.entries(said[section])
@@ -103,11 +115,21 @@ function showAnswer(text, isBad) {
 makeFields();
 element("settings").addEventListener("submit", async (event) => {
   event.preventDefault();
+  if (gateEnds().filter((end) => end === "").length === 1) {
+    showAnswer("Refused: a gate has both ends, or none for all bins", true);
+    return;
+  }
   showAnswer("The device is asked …", false);
+  const [before, sent] = [about, FIELDS.map((field) => fieldOf(field).value)];
   const { done, text } = await ask("/settings", settingsText(), "application/toml");
   showAnswer(done ? text : `Refused: ${text}`, !done);
+  if (!done) return;
+  // What was sent is in force, perhaps rounded; what was edited meanwhile is not.
+  FIELDS.map(fieldOf).forEach((input, at) => input.value === sent[at] && edited.delete(input.name));
+  if (about !== before) fillSettings();
 });
 element("undo").addEventListener("click", () => {
+  edited.clear();
   fillSettings();
   showAnswer("", false);
 });

@@ -19,8 +19,9 @@ function emptyPixels(count) {
   return {
     count,
     range: new Float32Array(count).fill(NaN),
-    reflectivity: new Float32Array(count),
-    peak: new Uint32Array(count),
+    /** Of light, NaN where it is not measured. */
+    reflectivity: new Float32Array(count).fill(NaN),
+    peak: new Float32Array(count).fill(NaN),
     events: new Uint32Array(count),
     rate: new Float32Array(count),
     /** Events at the last time that rates were told. */
@@ -39,9 +40,11 @@ function takePixels(base64) {
     const pixel = bytes.getUint16(at, true);
     if (pixel >= pixels.count) continue;
     pixels.events[pixel] = bytes.getUint32(at + 4, true);
+    // Those from before its first record are of no rate.
+    if (Number.isNaN(pixels.range[pixel])) pixels.before[pixel] = pixels.events[pixel];
     pixels.range[pixel] = bytes.getFloat32(at + 8, true);
     pixels.reflectivity[pixel] = bytes.getFloat32(at + 12, true);
-    pixels.peak[pixel] = bytes.getUint32(at + 16, true);
+    pixels.peak[pixel] = bytes.getFloat32(at + 16, true);
   }
 }
 
@@ -50,25 +53,28 @@ function takeEvents(base64) {
   const bytes = bytesOf(base64);
   for (let at = 0; at < bytes.byteLength; at += 24) {
     const levelAndEcho = bytes.getUint8(at + 18);
+    const peak = bytes.getFloat32(at + 12, true);
     chosen.events.push({
       cycle: Number(bytes.getBigUint64(at, true)),
       range: bytes.getFloat32(at + 8, true),
-      peak: bytes.getUint32(at + 12, true),
-      exposure: bytes.getUint16(at + 16, true),
+      peak,
+      // A change of depth has none of the three.
+      exposure: Number.isNaN(peak) ? NaN : bytes.getUint16(at + 16, true),
       level: levelAndEcho >> 4,
       echo: levelAndEcho & 15,
       flags: bytes.getUint8(at + 19),
-      background: bytes.getUint32(at + 20, true),
+      background: bytes.getFloat32(at + 20, true),
     });
   }
   if (chosen.events.length > MOST_KEPT) chosen.events.splice(0, chosen.events.length - MOST_KEPT);
 }
 
-function takeAbout(news) {
+/** The first of a connection has all pixels anew: the program may be another. */
+function takeAbout(news, isFirst) {
   const isOther = !about || news.columns !== data.columns || news.rows !== data.rows;
   about = news;
   Object.assign(data, { columns: news.columns, rows: news.rows });
-  if (isOther) pixels = emptyPixels(news.columns * news.rows);
+  if (isFirst || isOther) pixels = emptyPixels(news.columns * news.rows);
   // Laser cycles begin at 0 again.
   chosen.events = [];
   chosen.histogram = null;
@@ -78,7 +84,7 @@ function takeAbout(news) {
 /** The rate of each pixel since the last time, `seconds` ago. */
 function takeRates(seconds) {
   for (let pixel = 0; pixel < pixels.count; pixel++) {
-    const more = (pixels.events[pixel] - pixels.before[pixel]) >>> 0;
+    const more = Math.max(0, pixels.events[pixel] - pixels.before[pixel]);
     pixels.rate[pixel] = more / seconds;
     pixels.before[pixel] = pixels.events[pixel];
   }

@@ -7,6 +7,10 @@ let last = null;
 let times = [];
 let isChosen = false;
 let rated = performance.now();
+/** Whether the server is being told of the chosen pixel. */
+let isWatching = false;
+/** The end of a recording that was told. */
+let toldEnd = "";
 
 /** Everything, before the next picture of the screen. */
 function redraw() {
@@ -27,7 +31,9 @@ function takeFrame(frame) {
   const now = performance.now();
   times = [...times.filter((time) => now - time < 2000), now];
   if (frame.about) {
-    takeAbout(frame.about);
+    const isFirst = frame.frame === 1;
+    if (isFirst) rated = now;
+    takeAbout(frame.about, isFirst);
     page = frame.about.page;
     element("name").textContent = `dtof view: ${about.name}`;
     document.title = `${about.name} · dtof view`;
@@ -46,6 +52,8 @@ function takeFrame(frame) {
     takeEvents(frame.pixel.events);
     chosen.drawn += frame.pixel.drawn;
     chosen.arrived += frame.pixel.arrived;
+  } else {
+    void watch();
   }
   if (frame.histogram) takeHistogram(frame.histogram);
   if (now - rated > 1000) {
@@ -56,11 +64,26 @@ function takeFrame(frame) {
   showState(frame.connection);
   const seconds = Math.max(0.1, (now - times[0]) / 1000);
   showTotals(frame, times.length > 1 ? (times.length - 1) / seconds : 0);
-  if (paused) return;
   showLosses(frame.losses);
+  tellEnd(frame.recorded);
+  if (paused) return;
   showDrawn(frame.drawn);
-  if (frame.recorded.error) tell(`The recording has ended: ${frame.recorded.error}`, true);
   redraw();
+}
+
+/** Tells once why a recording has ended. */
+function tellEnd({ file, events, error }) {
+  const end = error && `${file} ${events} ${error}`;
+  if (end && end !== toldEnd) tell(`The recording has ended: ${error}`, true);
+  toldEnd = end;
+}
+
+/** Has the server look at the chosen pixel. Frames ask again until it does. */
+async function watch() {
+  if (isWatching || page === null) return;
+  isWatching = true;
+  await ask("/watch", JSON.stringify({ page, pixel: chosen.pixel }));
+  isWatching = false;
 }
 
 /** Looks at another pixel. */
@@ -69,7 +92,7 @@ function choose(pixel) {
   element("pixel-name").value = `${pixel}: ${pixelName(pixel)}`;
   if (pixel === chosen.pixel) return;
   Object.assign(chosen, { pixel, events: [], drawn: 0, arrived: 0, histogram: null });
-  if (page !== null) void ask("/watch", JSON.stringify({ page, pixel }));
+  void watch();
   redraw();
 }
 
@@ -77,7 +100,9 @@ function open() {
   const source = new EventSource(`/stream?pixel=${chosen.pixel}`);
   source.addEventListener("message", (event) => takeFrame(JSON.parse(event.data)));
   source.addEventListener("error", () => {
-    showState({ state: "lost", reason: "this page tries again every few seconds", returned: 0 });
+    // Why is not said here: a refused page looks like one whose server is gone.
+    const reason = "the program has ended, or too many pages are open; this page tries again every few seconds";
+    showState({ state: "lost", reason, returned: 0 });
     // One that was refused does not try again by itself; one that lost its way has another pixel.
     source.close();
     setTimeout(open, 2000);
