@@ -222,7 +222,7 @@ def page_of(browser, data, records):
     data |= {"colours": "000000" * 256, "records": base64.b64encode(records).decode()}
     page = browser.new_page()
     page.set_content(f'<script type="application/json" id="data">{json.dumps(data)}</script>')
-    for script in ["events.js", "projection.js"]:
+    for script in ["helpers.js", "events.js", "projection.js"]:
         page.add_script_tag(content=(SCRIPTS / script).read_text())
     return page
 
