@@ -67,6 +67,13 @@ pub fn check_masked(settings: &Settings) -> Result<()> {
     Ok(())
 }
 
+/// Takes the events of masked pixels out, and says how many there were.
+pub fn leave_out_masked(events: &mut Vec<Event>, settings: &Settings) -> u64 {
+    let all = events.len();
+    events.retain(|event| !settings.masked.contains(&event.pixel().0));
+    (all - events.len()) as u64
+}
+
 /// Where what it does is written.
 pub struct Outputs<'a> {
     /// Its events as CSV, as they come.
@@ -107,9 +114,7 @@ impl Outputs<'_> {
         readers: &mut Readers,
     ) -> Result<()> {
         let scale = &settings.range_scale()?;
-        let all = events.len();
-        events.retain(|event| !settings.masked.contains(&event.pixel().0));
-        self.masked += (all - events.len()) as u64;
+        self.masked += leave_out_masked(&mut events, settings);
         let events = &events[..];
         if let Some(recording) = &mut self.recording {
             recording.write(events)?;

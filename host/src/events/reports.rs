@@ -2,6 +2,8 @@
 
 use dtof_core::{BlockLevel, LaserCycle};
 
+use crate::events::aer_file::Event;
+
 /// When a pixel was reported last, by itself and in a block of each level.
 ///
 /// A block's event stands for those of its pixels that have not reported by themselves, or in
@@ -25,6 +27,15 @@ impl LastReports {
             self.ends[level] = end;
         }
         stands
+    }
+
+    /// The same of an event that has arrived. A change of depth has no exposure.
+    pub fn take_event(&mut self, event: &Event) -> bool {
+        let exposure = match event {
+            Event::Depth(event) => event.exposure.into(),
+            Event::DynamicDepth(_) => 0,
+        };
+        self.take(event.level(), event.cycle(), exposure)
     }
 }
 

@@ -2,11 +2,34 @@
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
+use std::num::NonZeroU16;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::{U0F32, U8F24};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_sensors::simulated::{Pulse, Settings, Simulated, SimulatedPixel};
+
+const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
+
+/// A sensor of so many pixels, each with a target so many bins behind that of the one before.
+pub fn sensor(pixels: u16, bins_apart: u16, cycles_per_second: u32) -> Simulated<'static> {
+    let half = U8F24::lit("0.5");
+    let pixels: Vec<_> = (0..pixels)
+        .map(|pixel| {
+            SimulatedPixel::new(PixelAddress(pixel), 20 + bins_apart * pixel, half, half).unwrap()
+        })
+        .collect();
+    let settings = Settings {
+        seed: 1,
+        bins: 128,
+        cycles_per_second,
+        cycles_per_poll: NonZeroU16::new(50).unwrap(),
+    };
+    Simulated::new(pixels.leak(), PULSE, settings)
+}
 
 /// A TCP port of this computer, and its connections one after the other.
 pub fn listen(mut serve: impl FnMut(&mut TcpStream) -> bool + Send + 'static) -> String {

@@ -2,12 +2,12 @@
 //! port of this computer.
 
 use std::io::{BufRead, BufReader, Write};
-use std::num::NonZeroU16;
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use crate::common::port;
 use crate::common::sensed::Photons;
 use crate::common::{Scratch, names, says};
 use crate::{Closing, client, listen, serve, settings};
@@ -18,32 +18,20 @@ use dtof::engine::host::host_engine;
 use dtof::engine::settings::Settings;
 use dtof::events::events_csv;
 use dtof::input::source::Geometry;
-use dtof_core::fixed::types::{U0F32, U8F24, U16F16, U24F8};
+use dtof_core::fixed::types::{U16F16, U24F8};
 use dtof_core::{DepthEvent, DynamicDepthPixel, PixelAddress, Reference};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::DynamicDepth;
-use dtof_sensors::simulated::{self, Pulse, Simulated, SimulatedPixel};
+use dtof_sensors::simulated::Simulated;
 use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
 
 const PIXELS: u16 = 4;
 /// Longer than any test.
 pub const LONG: Duration = Duration::from_secs(60);
-const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
 
-/// Four pixels, each with a target of its own.
+/// Four pixels, slow enough that no hiccup of this computer puts a decision off.
 fn sensor() -> Simulated<'static> {
-    let half = U8F24::lit("0.5");
-    let pixels: Vec<_> = (0..PIXELS)
-        .map(|pixel| SimulatedPixel::new(PixelAddress(pixel), 20 + 20 * pixel, half, half).unwrap())
-        .collect();
-    // Slow enough that no hiccup of this computer puts a decision off.
-    let settings = simulated::Settings {
-        seed: 1,
-        bins: 128,
-        cycles_per_second: 500,
-        cycles_per_poll: NonZeroU16::new(50).unwrap(),
-    };
-    Simulated::new(pixels.leak(), PULSE, settings)
+    port::sensor(PIXELS, 20, 500)
 }
 
 /// A sensor, if there is one on the bus, and whether it has been asked.

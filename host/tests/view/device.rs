@@ -1,37 +1,18 @@
 //! The firmware's sidecar with a simulated sensor behind a port, which can be unplugged.
 
-use std::num::NonZeroU16;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::time::Duration;
 
-use crate::common::port::{listen, serve};
+use crate::common::port::{listen, sensor, serve};
 use dtof::device;
 use dtof::settings::SettingsFile;
 use dtof::view::live::{Device, Feed};
-use dtof_core::PixelAddress;
-use dtof_core::fixed::types::{I24F8, U0F32, U8F24};
+use dtof_core::fixed::types::I24F8;
 use dtof_firmware::sidecar::Sidecar;
-use dtof_sensors::simulated::{self, Pulse, Simulated, SimulatedPixel};
 use dtof_sensors::{About, Sensor};
 
 const PIXELS: u16 = 16;
-const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
-
-/// Sixteen pixels, each with a target of its own.
-fn sensor() -> Simulated<'static> {
-    let half = U8F24::lit("0.5");
-    let pixels: Vec<_> = (0..PIXELS)
-        .map(|pixel| SimulatedPixel::new(PixelAddress(pixel), 20 + 5 * pixel, half, half).unwrap())
-        .collect();
-    let settings = simulated::Settings {
-        seed: 1,
-        bins: 128,
-        cycles_per_second: 1000,
-        cycles_per_poll: NonZeroU16::new(50).unwrap(),
-    };
-    Simulated::new(pixels.leak(), PULSE, settings)
-}
 
 /// A device on a cable.
 pub struct Plugged {
@@ -48,7 +29,7 @@ pub fn plugged() -> Plugged {
     let name = listen(move |stream| {
         let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
         let mut blocks = heapless::Vec::<_, 4>::new();
-        let mut sensor = sensor();
+        let mut sensor = sensor(PIXELS, 5, 1000);
         let about = About {
             offset: I24F8::from_num(100 * times.fetch_add(1, Ordering::Relaxed)),
             ..sensor.about()

@@ -2,8 +2,6 @@
 
 use std::collections::VecDeque;
 use std::io;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::common::aer::depth_event;
@@ -32,12 +30,11 @@ pub struct Fast {
     runs: Option<Instant>,
     since: u64,
     /// Of all sessions.
-    sent: Arc<AtomicU64>,
     cycle: u64,
 }
 
 impl Fast {
-    pub fn new(rate: Option<u64>, sent: Arc<AtomicU64>) -> Self {
+    pub fn new(rate: Option<u64>) -> Self {
         let mut greeting = greeting(128, PIXELS);
         for (place, version) in greeting
             .chunks_exact_mut(2)
@@ -54,7 +51,6 @@ impl Fast {
             rate,
             runs: None,
             since: 0,
-            sent,
             cycle: 0,
         }
     }
@@ -183,9 +179,6 @@ impl Port for Fast {
                 if self.endpoint.offer(*kind, body).is_err() {
                     break;
                 }
-                if *kind == message::EVENTS {
-                    self.sent.store(self.since, Ordering::Relaxed);
-                }
                 self.answers.pop_front();
             }
             if self.answers.is_empty()
@@ -212,16 +205,14 @@ impl Port for Fast {
     }
 }
 
-/// The feed of such a device, and how many events it has sent.
-pub fn feed(rate: Option<u64>) -> (Feed, Arc<AtomicU64>) {
-    let sent = Arc::new(AtomicU64::new(0));
-    let counts = Arc::clone(&sent);
+/// The feed of such a device.
+pub fn feed(rate: Option<u64>) -> Feed {
     let device = Device {
         name: "a fast device".to_owned(),
-        open: Box::new(move || Ok(Box::new(Fast::new(rate, Arc::clone(&counts))))),
+        open: Box::new(move || Ok(Box::new(Fast::new(rate)))),
         said: SettingsFile::default(),
         pixels: None,
         dynamic_depth: None,
     };
-    (Feed::Device(Box::new(device)), sent)
+    Feed::Device(Box::new(device))
 }

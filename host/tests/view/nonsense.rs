@@ -124,7 +124,7 @@ fn those_who_are_slow_are_given_up_and_others_served() {
 /// It is given up, and its place is free.
 #[test]
 fn a_page_that_reads_nothing_is_given_up() {
-    let (feed, _) = crate::fast::feed(Some(100_000));
+    let feed = crate::fast::feed(Some(100_000));
     let live = Live::of(feed, None);
     Stream::open(live.port, 0).until("live", |frame| frame["connection"]["state"] == "live");
     let mut stuck = connect(live.port);

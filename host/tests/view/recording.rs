@@ -15,7 +15,7 @@ fn a_recording_holds_all_events_while_drawing_is_thinned() {
     let out = scratch.path("out");
     fs::create_dir(&out).unwrap();
     fs::write(out.join("events.aer"), "older").unwrap();
-    let (feed, _) = fast::feed(None);
+    let feed = fast::feed(None);
     let live = Live::of(feed, Some(&out));
     let mut page = Stream::open(live.port, 0);
     page.until("live", |frame| frame["connection"]["state"] == "live");
@@ -68,7 +68,7 @@ fn a_recording_holds_all_events_while_drawing_is_thinned() {
 fn a_recording_that_goes_on_at_the_end_is_whole() {
     let scratch = Scratch::new();
     let out = scratch.path("out");
-    let (feed, _) = fast::feed(Some(10_000));
+    let feed = fast::feed(Some(10_000));
     let live = Live::of(feed, Some(&out));
     let mut page = Stream::open(live.port, 0);
     page.until("live", |frame| frame["connection"]["state"] == "live");

@@ -11,7 +11,7 @@ use dtof::view::live::{MOST_EVENTS, MOST_PIXELS};
 /// second.
 fn run(length: Duration, rate: Option<u64>) -> ([f64; 2], f64) {
     let scratch = Scratch::new();
-    let (feed, _) = fast::feed(rate);
+    let feed = fast::feed(rate);
     let live = Live::of(feed, Some(&scratch.path("out")));
     Stream::open(live.port, 0).until("live", |frame| frame["connection"]["state"] == "live");
     assert_eq!(post(live.port, "/record", "{\"on\":true}").status, 200);
@@ -74,7 +74,7 @@ fn pages_to_look_at() {
     let scratch = Scratch::new();
     let plugged = device::plugged();
     let feeds = [
-        fast::feed(Some(100_000)).0,
+        fast::feed(Some(100_000)),
         device::feed(&plugged.name, ""),
         device::feed("tcp:127.0.0.1:1", ""),
     ];

@@ -70,10 +70,6 @@ impl LiveMap {
                 continue;
             }
             let range_mm = scale.range(event.position()).to_num();
-            let exposure = match event {
-                Event::Depth(event) => event.exposure.into(),
-                Event::DynamicDepth(_) => 0,
-            };
             for pixel in self.array.block(event.pixel(), event.level()) {
                 let pixel = usize::from(pixel.0);
                 let (Some(range), Some(reports)) =
@@ -81,7 +77,7 @@ impl LiveMap {
                 else {
                     continue;
                 };
-                if reports.take(event.level(), event.cycle(), exposure) {
+                if reports.take_event(event) {
                     *range = Some(range_mm);
                 }
             }

@@ -8,10 +8,9 @@ use dtof_link::endpoint::LinkCounters;
 use dtof_link::{Configuration, DynamicDepth, Refusal, Report, Source};
 
 use super::{Answer, Command, Wish, Work, reply};
-use crate::device::monitor::check_masked;
 use crate::device::monitor::losses::{Losses as Lost, since};
+use crate::device::monitor::{check_masked, leave_out_masked};
 use crate::device::{Client, Setup, configuration};
-use crate::events::aer_file::Event;
 use crate::input::masked;
 use crate::settings::{Rays, Run, Sensor, SettingsFile};
 use crate::view::live::hub::Losses;
@@ -148,13 +147,9 @@ impl<'a> Session<'a> {
         if events.is_empty() {
             return;
         }
-        let masked = &self.setup.settings.masked;
-        let all = events.len();
-        if !masked.is_empty() {
-            events.retain(|event: &Event| !masked.contains(&event.pixel().0));
-        }
+        let masked = leave_out_masked(&mut events, &self.setup.settings);
         work.recorder.write(&events, &mut work.recorded);
-        work.hub.events(&events, (all - events.len()) as u64);
+        work.hub.events(&events, masked);
         work.tell_recorded();
     }
 

@@ -74,11 +74,7 @@ impl Pixels {
                 pixel.changed = self.changes;
                 continue;
             }
-            let exposure = match event {
-                Event::Depth(event) => event.exposure.into(),
-                Event::DynamicDepth(_) => 0,
-            };
-            if !pixel.reports.take(event.level(), event.cycle(), exposure) {
+            if !pixel.reports.take_event(event) {
                 continue;
             }
             if let Event::Depth(event) = event {
