@@ -11,7 +11,9 @@ use std::path::PathBuf;
 use common::host::{CONFIGURATION, configured};
 use common::mocks::tmf882x::{Bench, Counts, packet, packets, settings};
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{Count, Count24, DepthEstimator, Histogram, PaperRule, RangeGate, detect};
+use dtof_core::{
+    Count, Count24, DepthEstimator, DepthEvent, Histogram, PaperRule, RangeGate, detect,
+};
 use dtof_link::Configuration;
 use dtof_sensors::Sensor;
 use serde_json::Value;
@@ -112,19 +114,29 @@ fn the_sidecar_decides_recorded_histograms_as_the_core_does() {
     let decided = captures.len() as u64 * 9;
     let statistics = report.statistics;
     assert_eq!(statistics.events + statistics.expired, decided);
-    assert_eq!(report.cycles, captures.len() as u64 * 10);
+    assert_eq!(report.cycles, captures.len() as u64 * 537 * 1024);
     assert_eq!(statistics.deferred, 0);
     let reference = captures.iter().flat_map(|capture| capture[0]);
     assert_eq!(report.unaddressed, reference.map(u64::from).sum::<u64>());
 
+    // All zones of a capture end with its last laser cycle.
+    let ends = |event: &DepthEvent| (event.cycle.0 + 1).is_multiple_of(537 * 1024);
+    assert!(host.events.iter().all(ends));
     let mut events = host.events.iter().filter(|event| event.pixel.0 == 14);
-    for detection in expected.iter().flatten() {
+    for (capture, detection) in (1..).zip(&expected) {
+        let Some(detection) = detection else {
+            continue;
+        };
         let event = events.next().unwrap();
+        assert_eq!(event.cycle.0 + 1, capture * 537 * 1024);
         assert_eq!(event.peak_bin, detection.peak.bin);
         assert_eq!(event.peak_count, detection.peak.count);
         assert_eq!(event.offset, detection.depth.offset);
         assert_eq!(event.background, detection.background);
-        assert_eq!((event.flags, event.exposure), (detection.depth.flags, 1));
+        assert_eq!(
+            (event.flags, event.exposure),
+            (detection.depth.flags, u16::MAX)
+        );
     }
     assert!(events.next().is_none());
     let centre = expected.iter().flatten().count();

@@ -276,6 +276,7 @@ fn a_whole_histogram_has_several_echoes_and_no_block() {
     let [config, _] = configs(&wanted);
     let (mut device, mut host) = configured(&wanted);
     let calls = vec![
+        Call::Frame(9),
         Call::Histogram(3, two_peaks(40)),
         // The tail of the near peak is not left over, and the far one is outside of none.
         Call::Histogram(5, two_peaks(41)),
@@ -290,24 +291,24 @@ fn a_whole_histogram_has_several_echoes_and_no_block() {
     let report = host.report(&mut device, 10);
 
     let gate = RangeGate::new(10, 99).unwrap();
-    let by_hand = |pixel: u16, near: usize, cycle| {
+    let by_hand = |pixel: u16, near: usize| {
         let mut histogram = Histogram::<128, Count24>::new();
         histogram.add_frame(&two_peaks(near), &gate);
         let first = detect(&histogram, &gate, config.rule(), config.estimator()).unwrap();
-        let (pixel, cycle) = (PixelAddress(pixel), LaserCycle(cycle));
+        let (pixel, cycle) = (PixelAddress(pixel), LaserCycle(8));
         let mut peeled = PeeledBins::new(4);
         peeled.push(first.peak.bin);
         assert_eq!(peeled.empty(&mut histogram), 70_000 * 49 / 40 + 600);
-        (first.event(pixel, cycle, 1), histogram.peak())
+        (first.event(pixel, cycle, 9), histogram.peak())
     };
     let mut events = host.events.iter();
-    for (pixel, near, cycle) in [(3, 40, 0), (5, 41, 1)] {
-        let (first, peak) = by_hand(pixel, near, cycle);
+    for (pixel, near) in [(3, 40), (5, 41)] {
+        let (first, peak) = by_hand(pixel, near);
         assert_eq!(events.next(), Some(&first));
         let second = events.next().unwrap();
         assert_eq!((second.pixel, second.cycle), (first.pixel, first.cycle));
         assert_eq!((second.peak_bin, second.peak_count), (peak.bin, peak.count));
-        assert_eq!((second.echo.raw(), second.exposure), (2, 1));
+        assert_eq!((second.echo.raw(), second.exposure), (2, 9));
         assert_eq!((second.peak_bin.raw(), second.background.raw()), (90, 100));
         assert_eq!(second.flags, Flags::NONE);
     }

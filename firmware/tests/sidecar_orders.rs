@@ -25,6 +25,7 @@ impl Sensor for Told {
     fn about(&self) -> About {
         About {
             bin_width: Some(U16F16::lit("160")),
+            laser_millihertz: 0x0102_0304_0506_0708,
             ..About::new(3)
         }
     }
@@ -105,13 +106,14 @@ fn the_host_is_told_what_the_sensor_is() {
         pixels: told.pixels,
         bin_width: told.bin_width,
         offset: told.offset,
-        laser_millihertz: 0,
+        laser_millihertz: told.laser_millihertz,
     };
     let mut host = Host::new(1, 0);
     let mut with_one = device::<8>(Some(told));
     let body = host.answer(&mut with_one, 0, message::SENSOR_REQUEST, &[]);
-    // Then the range of bin 0, and a laser rate that is not known.
-    let expected = [[3, 0, 0, 0, 160, 0].as_slice(), &[0; 4], &[0; 8]].concat();
+    // Then the range of bin 0, and the laser rate.
+    let rate = [8, 7, 6, 5, 4, 3, 2, 1];
+    let expected = [[3, 0, 0, 0, 160, 0].as_slice(), &[0; 4], &rate].concat();
     assert_eq!(body, expected);
     assert_eq!(SensorRecord::from_le_bytes(&body), Some(Some(told_record)));
 

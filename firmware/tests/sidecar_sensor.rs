@@ -232,9 +232,12 @@ fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<1
     let mut outside = histogram(40);
     outside[120] = 100_000;
     let calls = vec![
+        Call::Frame(700),
         Call::Histogram(3, outside.clone()),
         Call::Histogram(4, Box::new([100; 128])),
         Call::Histogram(8, Box::new([1; 128])),
+        // More than the exposure of an event holds.
+        Call::Frame(100_000),
         Call::Histogram(3, histogram(41)),
     ];
     let mut sensor = scripted([None, Some(calls), None].into_iter());
@@ -244,7 +247,7 @@ fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<1
     let report = host.report(&mut device, 3);
     assert_eq!(report.sensor_errors, 2);
     assert_eq!(report.last_sensor_error, FaultRecord::Data as u8);
-    assert_eq!((report.cycles, report.unaddressed), (4, 128));
+    assert_eq!((report.cycles, report.unaddressed), (100_700, 128));
     let statistics = report.statistics;
     assert_eq!(
         (statistics.events, statistics.expired, statistics.deferred),
@@ -253,15 +256,18 @@ fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<1
     assert_eq!(statistics.gated_out, 38 * 100 * 3 + 100_000 - 100);
 
     let gate = RangeGate::new(10, 99).unwrap();
-    let expected = |counts: &[u32; 128], cycle| {
+    let expected = |counts: &[u32; 128], cycle, exposure| {
         let mut histogram = Histogram::<128, Count24>::new();
         histogram.add_frame(counts, &gate);
         let detection = detect(&histogram, &gate, config.rule(), config.estimator()).unwrap();
-        detection.event(PixelAddress(3), LaserCycle(cycle), 1)
+        detection.event(PixelAddress(3), LaserCycle(cycle), exposure)
     };
     assert_eq!(
         host.events,
-        [expected(&outside, 0), expected(&histogram(41), 3)]
+        [
+            expected(&outside, 699, 700),
+            expected(&histogram(41), 100_699, u16::MAX)
+        ]
     );
 }
 

@@ -22,6 +22,9 @@ impl PhotonSink for Calls {
     fn end_laser_cycles(&mut self, cycles: u16) {
         self.0.push(Call::End(cycles));
     }
+    fn begin_frame(&mut self, _: u32) {
+        panic!("a frame");
+    }
     fn histogram(&mut self, _: PixelAddress, _: &[u32; 128]) {
         panic!("a histogram");
     }

@@ -50,19 +50,26 @@ fn a_whole_histogram_is_the_next_one_of_its_pixel_to_the_last_photon() {
         // Others of it do not wait.
         host.ask(message::SYNCHRONISE, &[]);
         host.exchange(&mut device, now_ms);
-        let calls = [of((pixel + 1) % 3, 7), of(pixel, scale), of(pixel, 9)];
+        // Two frames, and the second has the one that is asked for after it came.
+        let calls = [
+            Call::Frame(70_000),
+            of((pixel + 1) % 3, 7),
+            of(pixel, scale),
+            Call::Frame(2),
+            of(pixel, 9),
+        ];
         let mut sensor = scripted([Some(calls.to_vec())].into_iter());
         host.run(&mut device, &mut sensor, now_ms..now_ms + 1, usize::MAX);
         assert_eq!(host.answers[before].0, message::SYNCHRONISED);
         let [Ok((head, counts))] = &histograms(&host.answers[before..])[..] else {
             panic!("{:?}", host.answers);
         };
-        let cycle = LaserCycle(u64::from(now_ms) * 3 + 2);
+        let cycle = LaserCycle(u64::from(now_ms) * 70_002 + 70_000);
         let expected = HistogramHead {
             pixel: PixelAddress(pixel),
             is_whole: true,
             cycle,
-            exposure: 1,
+            exposure: 70_000,
         };
         assert_eq!(*head, expected);
         let Call::Histogram(_, expected) = of(pixel, scale) else {

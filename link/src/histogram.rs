@@ -20,7 +20,7 @@
 //! assert_eq!(messages.len(), 1);
 //! let mut body = heapless::Vec::new();
 //! messages.next().unwrap().write(&mut body);
-//! assert_eq!(body.len(), 17 + 9 * 128 / 8);
+//! assert_eq!(body.len(), 19 + 9 * 128 / 8);
 //! let part = HistogramPart::from_le_bytes(&body).unwrap().unwrap();
 //! assert_eq!((part.head(), part.first_bin()), (head, 0));
 //! assert!(part.counts().eq(counts));
@@ -33,7 +33,7 @@ use crate::endpoint::BODY_BYTES;
 use crate::numbered::numbered;
 
 /// Bytes before the counts.
-const HEAD_BYTES: usize = 17;
+const HEAD_BYTES: usize = 19;
 /// Counts that are packed together.
 const EIGHT: usize = 8;
 /// No count is wider; a larger one is sent as the largest.
@@ -50,8 +50,8 @@ pub struct HistogramHead {
     pub is_whole: bool,
     /// Laser cycles that had ended when it was taken.
     pub cycle: LaserCycle,
-    /// Its own laser cycles: it began at `cycle - exposure`. 1 of one that came whole.
-    pub exposure: u16,
+    /// Its own laser cycles: it began at `cycle - exposure`.
+    pub exposure: u32,
 }
 
 numbered! {
@@ -152,7 +152,8 @@ impl<'a> HistogramPart<'a> {
         }
         let (&[whole], rest) = rest.split_first_chunk()?;
         let (&cycle, rest) = rest.split_first_chunk()?;
-        let (&[c, d, e, f, width], packed) = rest.split_first_chunk()?;
+        let (&exposure, rest) = rest.split_first_chunk()?;
+        let (&[c, d, width], packed) = rest.split_first_chunk()?;
         let is_packed = (1..=WIDEST).contains(&u32::from(width))
             && !packed.is_empty()
             && packed.len().is_multiple_of(width.into());
@@ -161,9 +162,9 @@ impl<'a> HistogramPart<'a> {
                 pixel,
                 is_whole: whole == 1,
                 cycle: LaserCycle(u64::from_le_bytes(cycle)),
-                exposure: u16::from_le_bytes([c, d]),
+                exposure: u32::from_le_bytes(exposure),
             },
-            first_bin: u16::from_le_bytes([e, f]),
+            first_bin: u16::from_le_bytes([c, d]),
             width,
             packed,
         }))

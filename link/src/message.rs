@@ -23,7 +23,7 @@ use dtof_core::AER_VERSION;
 use crate::endpoint::GREETING_BYTES;
 
 /// The version both ends announce when a session begins.
-pub const LINK_VERSION: u16 = 4;
+pub const LINK_VERSION: u16 = 5;
 
 /// Host to device: a [`Configuration`](crate::Configuration).
 pub const CONFIGURE: u8 = 0x01;

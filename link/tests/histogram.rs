@@ -34,9 +34,9 @@ fn read(head: HistogramHead, bodies: &[Vec<u8>]) -> Vec<u32> {
         let part = HistogramPart::from_le_bytes(body).unwrap().unwrap();
         assert_eq!(part.head(), head);
         assert_eq!(usize::from(part.first_bin()), counts.len());
-        let width = usize::from(body[16]);
-        let bit = |at: usize| u32::from(body[17 + at / 8] >> (at % 8)) & 1;
-        let ours: Vec<u32> = (0..(body.len() - 17) * 8 / width)
+        let width = usize::from(body[18]);
+        let bit = |at: usize| u32::from(body[19 + at / 8] >> (at % 8)) & 1;
+        let ours: Vec<u32> = (0..(body.len() - 19) * 8 / width)
             .map(|number| (0..width).map(|at| bit(number * width + at) << at).sum())
             .collect();
         assert!(part.counts().eq(ours.iter().copied()));
@@ -56,12 +56,12 @@ fn the_width_is_the_smallest_and_decides_how_many_messages_there_are() {
             if width <= 14 { 1 } else { 2 },
             "{width} bits"
         );
-        let bytes: usize = bodies.iter().map(|body| body.len() - 17).sum();
+        let bytes: usize = bodies.iter().map(|body| body.len() - 19).sum();
         assert_eq!(bytes, 128 * width / 8);
         assert_eq!(read(HEAD, &bodies), counts);
     }
     // Nothing at all has a bit a bin, and no histogram no message.
-    assert_eq!(bodies(HEAD, &[0; 128])[0].len(), 17 + 16);
+    assert_eq!(bodies(HEAD, &[0; 128])[0].len(), 19 + 16);
     assert_eq!(bodies(HEAD, &[]), [[0u8; 0]; 0]);
     // A count that is too large for a sensor is the largest there may be.
     let mut counts = [5; 128];
@@ -98,7 +98,7 @@ fn the_ends_send_the_golden_frames() {
 proptest! {
     #[test]
     fn histograms_come_back(
-        pixel: u16, is_whole: bool, cycle: u64, exposure: u16, eights in 1usize..=128,
+        pixel: u16, is_whole: bool, cycle: u64, exposure: u32, eights in 1usize..=128,
         width in 1u32..=24, seed: u64,
     ) {
         let head = HistogramHead {
@@ -119,12 +119,12 @@ proptest! {
         mut body in prop::collection::vec(any::<u8>(), 0..=BODY_BYTES), reason in 0u8..7,
         whole in 0u8..3, width in 0u8..26,
     ) {
-        for (at, byte) in [(2, reason), (3, whole), (16, width)] {
+        for (at, byte) in [(2, reason), (3, whole), (18, width)] {
             if let Some(place) = body.get_mut(at) {
                 *place = byte;
             }
         }
-        let packed = body.len().saturating_sub(17);
+        let packed = body.len().saturating_sub(19);
         let is_histogram = reason == 0 && whole < 2 && (1..=24).contains(&width) && packed > 0
             && packed.is_multiple_of(width.into());
         let is_none = body.len() == 3 && (1..=4).contains(&reason);

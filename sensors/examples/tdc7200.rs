@@ -51,6 +51,8 @@ impl PhotonSink for Macropixel {
         }
     }
 
+    fn begin_frame(&mut self, _: u32) {}
+
     fn histogram(&mut self, _: PixelAddress, _: &[u32; 128]) {}
 }
 

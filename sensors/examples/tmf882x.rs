@@ -36,6 +36,8 @@ impl PhotonSink for Zones {
 
     fn end_laser_cycles(&mut self, _: u16) {}
 
+    fn begin_frame(&mut self, _: u32) {}
+
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]) {
         let mut histogram = Histogram::<128, Count24>::new();
         histogram.add_frame(counts, ZONE.gate());

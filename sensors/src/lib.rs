@@ -34,7 +34,10 @@ pub trait PhotonSink {
     fn photon(&mut self, pixel: PixelAddress, code: u16);
     /// The present laser cycle and `cycles - 1` empty ones after it have ended.
     fn end_laser_cycles(&mut self, cycles: u16);
-    /// A whole histogram of `pixel`, complete in itself.
+    /// `cycles` laser cycles have ended, at least one, and the sensor has integrated them:
+    /// the histograms that follow are of them.
+    fn begin_frame(&mut self, cycles: u32);
+    /// A whole histogram of `pixel`, of the frame that was begun last.
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]);
 }
 
@@ -89,10 +92,13 @@ pub struct About {
     pub offset: I24F8,
     /// It gives whole histograms, not photons.
     pub is_whole: bool,
+    /// Laser cycles that it gives in a thousand seconds; 0 if that is not known. Of a sensor
+    /// that pauses between measurements it is the mean: laser cycle ÷ rate is a time.
+    pub laser_millihertz: u64,
 }
 
 impl About {
-    /// Bins of any width, from the laser pulse on.
+    /// Bins of any width, from the laser pulse on, of a laser whose rate is not known.
     #[must_use]
     pub const fn new(pixels: u16) -> Self {
         Self {
@@ -100,6 +106,7 @@ impl About {
             bin_width: None,
             offset: I24F8::ZERO,
             is_whole: false,
+            laser_millihertz: 0,
         }
     }
 

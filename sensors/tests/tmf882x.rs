@@ -98,7 +98,8 @@ fn a_reference_that_nobody_wants_is_not_given() {
     for bytes in packets(&some_counts()) {
         bench.packet(&bytes).unwrap();
     }
-    assert_eq!(bench.sink.take().len(), 9);
+    // The frame and the zones.
+    assert_eq!(bench.sink.take().len(), 1 + 9);
 }
 
 /// Histograms come out as they went in, whatever the counts and the chunks.
@@ -240,5 +241,25 @@ fn two_sensors_share_a_bus() {
             bus.done();
         }
     }
-    assert_eq!(sink.take().len(), 20);
+    assert_eq!(sink.take().len(), 2 * (1 + 10));
+}
+
+#[test]
+fn the_laser_rate_is_the_mean_over_a_period() {
+    let rate = |kilo_iterations, period_ms| {
+        let settings = Settings {
+            kilo_iterations,
+            period_ms,
+            ..settings()
+        };
+        let mut bench = Bench::<128>::new(settings, IMAGE);
+        bench.i2c.done();
+        bench.sensor.about().laser_millihertz
+    };
+    // 549,888 pulses in 132 ms: 4,165,818.18 Hz.
+    assert_eq!(rate(537, 132), 4_165_818_181);
+    assert_eq!(rate(1, 500), 2_048_000);
+    assert_eq!(rate(537, 0), 0);
+    let config = Settings::new(PixelAddress(0));
+    assert_eq!((config.kilo_iterations, config.period_ms), (537, 132));
 }

@@ -910,14 +910,16 @@ dtof_status_t dtof_pixel_histogram_write(const struct dtof_pixel_t *pixel,
                                          uint8_t *body,
                                          size_t *length);
 
-// The same of a histogram that came whole from the sensor: `counts` are DTOF_BINS numbers of
-// photons. A count above 16,777,215 is written as that.
+// The same of a histogram that came whole from the sensor, which integrated `exposure` laser
+// cycles for it: `counts` are DTOF_BINS numbers of photons. A count above 16,777,215 is written
+// as that.
 //
 // Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
 // Threads: any.
 dtof_status_t dtof_counts_write(const uint32_t *counts,
                                 size_t part,
                                 uint64_t cycles,
+                                uint32_t exposure,
                                 uint16_t pixel,
                                 uint8_t *body,
                                 size_t *length);

@@ -47,7 +47,7 @@ pub unsafe extern "C" fn dtof_pixel_histogram_write(
             pixel: pixel.address(),
             is_whole: false,
             cycle: LaserCycle(cycles),
-            exposure: pixel.exposure(),
+            exposure: pixel.exposure().into(),
         };
         let counts = pixel.histogram().counts().map(u32::from);
         // SAFETY: the same promise.
@@ -55,8 +55,9 @@ pub unsafe extern "C" fn dtof_pixel_histogram_write(
     })
 }
 
-/// The same of a histogram that came whole from the sensor: `counts` are DTOF_BINS numbers of
-/// photons. A count above 16,777,215 is written as that.
+/// The same of a histogram that came whole from the sensor, which integrated `exposure` laser
+/// cycles for it: `counts` are DTOF_BINS numbers of photons. A count above 16,777,215 is written
+/// as that.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
 /// Threads: any.
@@ -65,6 +66,7 @@ pub unsafe extern "C" fn dtof_counts_write(
     counts: *const u32,
     part: usize,
     cycles: u64,
+    exposure: u32,
     pixel: u16,
     body: *mut u8,
     length: *mut usize,
@@ -77,7 +79,7 @@ pub unsafe extern "C" fn dtof_counts_write(
             pixel: PixelAddress(pixel),
             is_whole: true,
             cycle: LaserCycle(cycles),
-            exposure: 1,
+            exposure,
         };
         // SAFETY: the same promise.
         unsafe { part_of(head, counts, part, body, length) }

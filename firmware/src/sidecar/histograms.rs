@@ -68,7 +68,7 @@ impl Sidecar<'_> {
             pixel,
             is_whole: false,
             cycle: LaserCycle(self.cycle),
-            exposure: detector.detector.exposure(),
+            exposure: detector.detector.exposure().into(),
         };
         let counts = detector.detector.histogram().counts().map(u32::from);
         self.send_histogram(head, &counts);
@@ -76,18 +76,13 @@ impl Sidecar<'_> {
 
     /// Answers a request with the histogram that the sensor gives, if events leave room. If
     /// not, the next one will do.
-    pub(super) fn send_whole(
-        &mut self,
-        pixel: PixelAddress,
-        cycle: LaserCycle,
-        counts: &[u32; BINS],
-    ) {
+    pub(super) fn send_whole(&mut self, pixel: PixelAddress, counts: &[u32; BINS]) {
         if self.wanted == Some(pixel) && self.waits_for_sensor() && !self.events_wait() {
             let head = HistogramHead {
                 pixel,
                 is_whole: true,
-                cycle: LaserCycle(cycle.0 + 1),
-                exposure: 1,
+                cycle: LaserCycle(self.cycle),
+                exposure: self.frame,
             };
             self.send_histogram(head, counts);
         }

@@ -126,6 +126,8 @@ pub struct Sidecar<'a> {
     encoder: AerEncoder,
     words: Queue<AerWord, QUEUE>,
     cycle: u64,
+    /// Laser cycles of the histograms that come whole.
+    frame: u32,
     /// Laser cycles since the pixels looked last: all look at once.
     since_look: u16,
     /// Laser cycles from the last tick of the blocks to the last look.
@@ -180,6 +182,7 @@ impl<'a> Sidecar<'a> {
             encoder: AerEncoder::new(),
             words: Queue::new(),
             cycle: 0,
+            frame: 0,
             since_look: 0,
             since_tick: 0,
             statistics: Statistics::default(),
@@ -346,6 +349,7 @@ impl<'a> Sidecar<'a> {
 
     fn restart_counts(&mut self) {
         self.cycle = 0;
+        self.frame = 0;
         self.since_look = 0;
         self.since_tick = 0;
         self.statistics = Statistics::default();

@@ -8,7 +8,7 @@ pub(super) const fn sensor(about: &About) -> SensorRecord {
         pixels: about.pixels,
         bin_width: about.bin_width,
         offset: about.offset,
-        laser_millihertz: 0,
+        laser_millihertz: about.laser_millihertz,
     }
 }
 

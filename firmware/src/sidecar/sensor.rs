@@ -90,17 +90,18 @@ impl Sidecar<'_> {
     fn decide_whole(
         &mut self,
         pixel: PixelAddress,
-        cycle: LaserCycle,
         counts: &[u32; BINS],
         config: &PixelConfig<BINS, AnyRule>,
     ) {
+        let cycle = LaserCycle(self.cycle.saturating_sub(1));
+        let exposure = u16::try_from(self.frame).unwrap_or(u16::MAX);
         let mut histogram = Histogram::<BINS, Count24>::new();
         let gated_out = histogram.add_frame(counts, config.gate());
         self.statistics.add_photons_of(&histogram, gated_out);
         if has_room_for_events(&self.words, config.echoes().raw().into()) {
             let mut events = 0;
             config.detect_echoes(&mut histogram, |echo, detection| {
-                let event = detection.event(pixel, cycle, 1);
+                let event = detection.event(pixel, cycle, exposure);
                 self.enqueue(&DepthEvent { echo, ..event });
                 events += 1;
             });
@@ -147,23 +148,29 @@ impl PhotonSink for Sidecar<'_> {
         }
     }
 
-    /// Decides once, whatever L1, L2 and X are. The histogram stands for a laser
-    /// cycle of its own, and the event's exposure is 1. Without room for an event
+    /// All histograms of the frame end with its last laser cycle.
+    fn begin_frame(&mut self, cycles: u32) {
+        if self.takes_sensor() {
+            self.cycle += u64::from(cycles);
+            self.frame = cycles;
+        }
+    }
+
+    /// Decides once, whatever L1, L2 and X are. The event's exposure is the laser cycles of
+    /// the frame, as far as it holds them. Without room for an event
     /// it is counted as deferred and not looked at: the next one is as good. Blocks have
     /// no part in it, and nothing is tracked.
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; BINS]) {
         let (true, Some(config)) = (self.takes_sensor(), self.config) else {
             return;
         };
-        let cycle = LaserCycle(self.cycle);
-        self.cycle += 1;
         if usize::from(pixel.0) >= self.pixels.len() {
             let photons = counts.iter().map(|&count| u64::from(count));
             self.unaddressed += photons.sum::<u64>();
             return;
         }
-        self.decide_whole(pixel, cycle, counts, &config);
+        self.decide_whole(pixel, counts, &config);
         self.drain();
-        self.send_whole(pixel, cycle, counts);
+        self.send_whole(pixel, counts);
     }
 }

@@ -199,6 +199,7 @@ impl Host {
 pub enum Call {
     Photon(u16, u16),
     End(u16),
+    Frame(u32),
     Histogram(u16, Box<[u32; 128]>),
 }
 
@@ -237,6 +238,7 @@ impl<I: Iterator<Item = Option<Vec<Call>>>> Sensor for Scripted<I> {
             match call {
                 Call::Photon(pixel, code) => sink.photon(PixelAddress(pixel), code),
                 Call::End(cycles) => sink.end_laser_cycles(cycles),
+                Call::Frame(cycles) => sink.begin_frame(cycles),
                 Call::Histogram(pixel, counts) => sink.histogram(PixelAddress(pixel), &counts),
             }
         }

@@ -47,7 +47,7 @@ pub fn messages(script: &[Vec<Call>]) -> Vec<Vec<u8>> {
                     Token::Photon { code }
                 }
                 Call::End(cycles) => Token::EndOfCycles { cycles },
-                Call::Histogram(..) => unreachable!(),
+                Call::Frame(_) | Call::Histogram(..) => unreachable!(),
             };
             piece.extend(token.to_bytes());
         }
@@ -86,7 +86,7 @@ pub fn reference(script: &[Vec<Call>], config: &PixelConfig<128, AnyRule>) -> Ve
                     cycle += 1;
                 }
             }
-            Call::Histogram(..) => unreachable!(),
+            Call::Frame(_) | Call::Histogram(..) => unreachable!(),
         }
     }
     events

@@ -162,7 +162,7 @@ pub fn expected(script: &[Vec<Call>], wanted: &Configuration) -> Expected {
                     }
                 }
             }
-            Call::Histogram(..) => unreachable!(),
+            Call::Frame(_) | Call::Histogram(..) => unreachable!(),
         }
     }
     for cell in &pixels {

@@ -17,6 +17,7 @@ use crate::Input;
 enum Given {
     Photon(u16, u16),
     End(u16),
+    Frame(u32),
     Histogram(u16, Vec<u32>),
 }
 
@@ -31,6 +32,10 @@ impl PhotonSink for Notes {
 
     fn end_laser_cycles(&mut self, cycles: u16) {
         self.0.push(Given::End(cycles));
+    }
+
+    fn begin_frame(&mut self, cycles: u32) {
+        self.0.push(Given::Frame(cycles));
     }
 
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]) {

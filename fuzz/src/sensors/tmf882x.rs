@@ -81,7 +81,8 @@ struct Sets {
 }
 
 impl Sets {
-    /// What a packet completes: three of them have the bytes of all counts of a channel.
+    /// What a packet begins or completes: packet 0 a set, three of them have the bytes of all
+    /// counts of a channel.
     fn take(&mut self, packet: &[u8]) -> Option<Given> {
         let number = usize::from(packet[4]);
         if packet[0] != 0x81 || packet[5] != 128 || (number != 0 && number != self.packets.len()) {
@@ -92,6 +93,9 @@ impl Sets {
             self.packets.clear();
         }
         self.packets.push(packet[HEADER..].to_vec());
+        if number == 0 {
+            return Some(Given::Frame(537 * 1024));
+        }
         let channel = number.checked_sub(20)?;
         let counts = (0..128).map(|bin| {
             let byte = |plane: usize| u32::from(self.packets[10 * plane + channel][bin]);

@@ -195,6 +195,7 @@ impl PhotonSink for Altered<'_> {
     fn end_laser_cycles(&mut self, cycles: u16) {
         self.photons.end_laser_cycles(cycles);
     }
+    fn begin_frame(&mut self, _: u32) {}
     fn histogram(&mut self, _: PixelAddress, _: &[u32; 128]) {}
 }
 

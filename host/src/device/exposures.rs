@@ -79,7 +79,7 @@ impl Exposures {
         self.pixels.iter().map(|pixel| pixel.sums.as_slice())
     }
 
-    /// Their laser cycles; histograms of a sensor that gives whole ones.
+    /// Their laser cycles.
     pub fn cycles(&self) -> impl Iterator<Item = u64> {
         self.pixels.iter().map(|pixel| pixel.cycles)
     }
@@ -157,7 +157,7 @@ mod tests {
     use dtof_core::{LaserCycle, PixelAddress};
     use proptest::prelude::*;
 
-    fn histogram(pixel: u16, cycle: u64, exposure: u16, counts: &[u32]) -> PixelHistogram {
+    fn histogram(pixel: u16, cycle: u64, exposure: u32, counts: &[u32]) -> PixelHistogram {
         PixelHistogram {
             head: HistogramHead {
                 pixel: PixelAddress(pixel),
@@ -200,11 +200,14 @@ mod tests {
         assert!((exposures.brightest(6).unwrap() - most).abs() < 1e-9);
         assert_eq!(exposures.brightest(7), None);
         // A sensor's counters hold more.
-        let mut whole = histogram(0, 1, 1, &[1023, 0]);
+        let mut whole = histogram(0, 70_030, 70_000, &[1023, 0]);
         whole.head.is_whole = true;
         exposures.add(whole);
         exposures.close();
-        assert_eq!((exposures.full(), exposures.cycles().next()), (1, Some(7)));
+        assert_eq!(
+            (exposures.full(), exposures.cycles().next()),
+            (1, Some(70_006))
+        );
     }
 
     proptest! {
@@ -218,11 +221,11 @@ mod tests {
             let (mut cycle, mut seen) = (0, std::collections::BTreeMap::new());
             for (wait, pixel) in looks {
                 cycle += wait;
-                let exposure = u16::try_from(cycle % length).unwrap();
-                if u32::from(exposure) < FULL {
+                let exposure = u32::try_from(cycle % length).unwrap();
+                if exposure < FULL {
                     seen.insert((pixel, cycle - u64::from(exposure)), u64::from(exposure));
                 }
-                exposures.add(histogram(pixel, cycle, exposure, &[exposure.into()]));
+                exposures.add(histogram(pixel, cycle, exposure, &[exposure]));
             }
             exposures.close();
             let photons: u64 = exposures.sums().map(|sums| sums[0]).sum();

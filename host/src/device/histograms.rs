@@ -44,10 +44,8 @@ pub struct SoFar {
 pub struct Collected {
     /// Photons of each bin of each pixel.
     pub histograms: Vec<Vec<u64>>,
-    /// Laser cycles of each pixel; or histograms, if the sensor gives whole ones.
+    /// Laser cycles of each pixel.
     pub cycles: Vec<u64>,
-    /// Whether it does.
-    pub is_whole: bool,
     /// Exposures with a full counter, which were left out: as they were seen, or as many as there
     /// were events, which only a full counter brings.
     pub full: u64,
@@ -84,12 +82,10 @@ pub fn collect(
     }
     exposures.close();
     work.configure(Source::Link)?;
-    let is_whole = work.is_whole;
-    let events = if is_whole { 0 } else { work.events };
+    let events = if work.is_whole { 0 } else { work.events };
     let collected = Collected {
         histograms: exposures.sums().map(<[u64]>::to_vec).collect(),
         cycles: exposures.cycles().collect(),
-        is_whole,
         full: exposures.full().max(events),
     };
     if let Some(pixel) = collected.cycles.iter().position(|&cycles| cycles == 0) {

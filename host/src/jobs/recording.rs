@@ -113,6 +113,10 @@ impl Recording {
         for (option, is_there) in of_files {
             ensure!(!is_there, "{option} is of recordings, not of a device");
         }
+        ensure!(
+            !self.has_length(),
+            "--recorded-cycles and --photons-per-cycle: this device counts its laser cycles"
+        );
         Ok(())
     }
 

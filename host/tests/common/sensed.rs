@@ -32,6 +32,9 @@ impl PhotonSink for Photons {
     fn end_laser_cycles(&mut self, cycles: u16) {
         self.0.iter_mut().for_each(|pixel| pixel.cycles += cycles);
     }
+    fn begin_frame(&mut self, _: u32) {
+        panic!("a frame");
+    }
     fn histogram(&mut self, _: PixelAddress, _: &[u32; 128]) {
         panic!("a histogram");
     }

@@ -111,6 +111,7 @@ impl PhotonSink for Adding<'_> {
     fn end_laser_cycles(&mut self, cycles: u16) {
         self.1 += u32::from(cycles);
     }
+    fn begin_frame(&mut self, _: u32) {}
     fn histogram(&mut self, _: PixelAddress, _: &[u32; 128]) {}
 }
 
@@ -148,7 +149,7 @@ impl Sensor for Desk {
         if *ended < *length {
             return Ok(Polled::Idle);
         }
-        *ended = 0;
+        sink.begin_frame(std::mem::take(ended));
         for (pixel, counts) in (0..).map(PixelAddress).zip(&mut self.counts) {
             sink.histogram(pixel, counts);
             *counts = [0; 128];

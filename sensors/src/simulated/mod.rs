@@ -159,7 +159,8 @@ impl<'a> Simulated<'a> {
         }
     }
 
-    /// The same photons, but none by the clock: only [`Self::laser_cycles`] simulates.
+    /// The same photons, but none by the clock: only [`Self::laser_cycles`] simulates, and the
+    /// laser has no rate.
     #[must_use]
     pub const fn without_clock(mut self) -> Self {
         self.settings.cycles_per_second = 0;
@@ -228,7 +229,11 @@ impl Sensor for Simulated<'_> {
 
     fn about(&self) -> About {
         let addresses = self.pixels.iter().map(|pixel| pixel.address.0);
-        About::new(addresses.max().map_or(0, |last| last.saturating_add(1)))
+        let pixels = addresses.max().map_or(0, |last| last.saturating_add(1));
+        About {
+            laser_millihertz: 1000 * u64::from(self.settings.cycles_per_second),
+            ..About::new(pixels)
+        }
     }
 
     fn start(&mut self, _: U16F16) {

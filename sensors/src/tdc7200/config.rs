@@ -61,6 +61,10 @@ pub struct Settings {
     pub bin_width: U16F16,
     /// Where bin 0 starts, in picoseconds after START.
     pub first_bin_ps: u32,
+    /// Measurements in a thousand seconds, for who turns laser cycles into time; 0 if that is not
+    /// known. It is the rate of START if the driver arms in time for each. No register
+    /// depends on it.
+    pub laser_millihertz: u64,
     /// The measurement mode.
     pub mode: Mode,
     /// Stops a measurement.
@@ -98,6 +102,7 @@ impl Settings {
             clock_khz,
             bin_width,
             first_bin_ps: 0,
+            laser_millihertz: 0,
             mode: Mode::One,
             stops: Stops::One,
             calibration: CalibrationPeriods::Ten,

@@ -347,6 +347,7 @@ where
             bin_width: None,
             offset: self.config.offset(),
             is_whole: false,
+            laser_millihertz: settings.laser_millihertz,
         }
     }
 

@@ -142,6 +142,19 @@ impl Config {
         &self.0
     }
 
+    /// Laser pulses a measurement.
+    pub(super) const fn pulses(&self) -> u32 {
+        self.0.kilo_iterations as u32 * 1024
+    }
+
+    /// Laser pulses that are counted in a thousand seconds, on average, rounded down.
+    pub(super) const fn laser_millihertz(&self) -> u64 {
+        match (self.pulses() as u64 * 1_000_000).checked_div(self.0.period_ms as u64) {
+            Some(rate) => rate,
+            None => 0,
+        }
+    }
+
     /// Where the histogram of a channel goes.
     pub(super) const fn pixel(&self, channel: u8) -> Option<PixelAddress> {
         let PixelAddress(first) = self.0.first_pixel;

@@ -6,8 +6,16 @@
 //! It is loaded when the bootloader runs; a sensor that already runs the
 //! application is configured anew and not loaded again.
 //!
-//! Every histogram is complete in itself: the sensor says neither in how many
-//! laser cycles it was counted nor in which, so the driver ends none.
+//! # Laser cycles
+//!
+//! Every laser pulse of a measurement is a laser cycle. So a set of histograms ends
+//! `kilo_iterations` × 1,024 of them, 549,888 with [`Settings::new`], all for the same end. They
+//! end at the set's packet 0: a set that is damaged behind it has still lasted.
+//!
+//! The sensor pulses faster while it measures, and rests until the next period. The laser
+//! rate of [`About`] is the mean, pulses of a measurement ÷ `period_ms`: 4.166 MHz with
+//! [`Settings::new`]. Laser cycle ÷ rate is then a time, if a measurement is over within its
+//! period, and the sensor's clock is right. A period of 0 ms has no rate that is known.
 //!
 //! # Where the numbers come from
 //!
@@ -318,7 +326,8 @@ where
 {
     type Error = Error<I2C::Error, INT::Error>;
 
-    /// Bin width and offset are those fitted to the public log of one TMF8820.
+    /// Bin width and offset are those fitted to the public log of one TMF8820. The laser rate is
+    /// the mean over a period.
     fn about(&self) -> About {
         const ZONES: u16 = 9;
         const BIN_WIDTH: U16F16 = U16F16::lit("92.1");
@@ -328,6 +337,7 @@ where
             bin_width: Some(BIN_WIDTH),
             offset: OFFSET,
             is_whole: true,
+            laser_millihertz: self.config.laser_millihertz(),
         }
     }
 

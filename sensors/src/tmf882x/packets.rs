@@ -78,6 +78,9 @@ where
         }
         let packet = Packet::of(&bytes).inspect_err(|_| self.assembly.restart())?;
         count(&mut self.counts.packets);
+        if packet.number == 0 {
+            sink.begin_frame(self.config.pulses());
+        }
         match self.assembly.take(packet)? {
             Taken::Histogram { channel, counts } => {
                 let Some(pixel) = self.config.pixel(channel) else {

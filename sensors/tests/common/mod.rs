@@ -25,6 +25,7 @@ use embedded_hal::digital::{Error, ErrorKind, ErrorType, InputPin, OutputPin};
 pub enum Given {
     Photon(u16, u16),
     End(u16),
+    Frame(u32),
     Histogram(u16, Vec<u32>),
 }
 
@@ -45,6 +46,9 @@ impl PhotonSink for Notes {
     }
     fn end_laser_cycles(&mut self, cycles: u16) {
         self.0.push(Given::End(cycles));
+    }
+    fn begin_frame(&mut self, cycles: u32) {
+        self.0.push(Given::Frame(cycles));
     }
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]) {
         self.0.push(Given::Histogram(pixel.0, counts.to_vec()));

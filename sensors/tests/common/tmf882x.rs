@@ -228,10 +228,11 @@ impl<const CHUNK: usize> Bench<CHUNK> {
             assert_eq!(self.packet(bytes), Ok(expected));
         }
         let pixels = iter::once(99).chain(10..19);
-        let given: Vec<_> = pixels
+        let histograms = pixels
             .zip(counts)
-            .map(|(pixel, counts)| super::Given::Histogram(pixel, counts.to_vec()))
-            .collect();
+            .map(|(pixel, counts)| super::Given::Histogram(pixel, counts.to_vec()));
+        let frame = super::Given::Frame(537 * 1024);
+        let given: Vec<_> = iter::once(frame).chain(histograms).collect();
         assert_eq!(self.sink.take(), given);
     }
 }

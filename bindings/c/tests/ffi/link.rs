@@ -320,7 +320,8 @@ fn histograms_go_out_as_the_host_reads_them() {
     let whole = counts_of(|part, body| {
         let (counts, room, mut length) = (expected.as_ptr(), body.as_mut_ptr(), 9);
         // SAFETY: each pointer leads to what it should.
-        let status = unsafe { dtof_counts_write(counts, part, 1 << 40, 5, room, &mut length) };
+        let status =
+            unsafe { dtof_counts_write(counts, part, 1 << 40, 549_888, 5, room, &mut length) };
         assert_eq!(status, OK);
         length
     });

@@ -122,7 +122,7 @@ fn what_a_function_writes_may_be_written_by_nobody_before() {
         assert_eq!(written, OK);
         assert!(length.read() > 0);
         let mut length = Room::new();
-        let written = dtof_counts_write(wide.as_ptr(), 9, 0, 0, room, length.at());
+        let written = dtof_counts_write(wide.as_ptr(), 9, 0, 0, 0, room, length.at());
         assert_eq!((written, length.read()), (OK, 0));
         let mut length = Room::new();
         let written = dtof_no_histogram_write(0, DTOF_NO_HISTOGRAM_PIXEL, room, length.at());
@@ -264,7 +264,7 @@ const POINTERS: [(usize, Call); 28] = {
         (8, |p| dtof_link_peek(p.cast(), &mut 0)),
         (8, |p| dtof_link_state(p.cast(), &mut zeroed())),
         (8, |p| dtof_pixel_histogram_write(p.cast(), 0, 0, [0; 244].as_mut_ptr(), &mut 0)),
-        (4, |p| dtof_counts_write(p.cast(), 0, 0, 0, [0; 244].as_mut_ptr(), &mut 0)),
+        (4, |p| dtof_counts_write(p.cast(), 0, 0, 0, 0, [0; 244].as_mut_ptr(), &mut 0)),
         (8, |p| dtof_report_write(p.cast(), &zeroed(), &zeroed(), [0; 256].as_mut_ptr())),
     ]}
 };
@@ -316,7 +316,7 @@ fn bytes_that_do_not_lie_anywhere_are_refused() {
             dtof_device_config_read(none, 1, &mut zeroed()),
             dtof_no_histogram_write(0, 1, none, &mut length),
             dtof_no_histogram_write(0, 1, room, ptr::null_mut()),
-            dtof_counts_write([0; DTOF_BINS].as_ptr(), 0, 0, 0, room, ptr::null_mut()),
+            dtof_counts_write([0; DTOF_BINS].as_ptr(), 0, 0, 0, 0, room, ptr::null_mut()),
         ];
         assert_eq!(refused, [DTOF_ERROR_NULL; 16]);
         // The encoder has sent no time.

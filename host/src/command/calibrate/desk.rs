@@ -12,8 +12,7 @@ use dtof::device::histograms::{Collected, SoFar, collect};
 use dtof::device::monitor::array;
 use dtof::device::{self, Client, Port};
 use dtof::input::open::BIN_WIDTH_PS;
-use dtof::input::recorded::RecordingLength;
-use dtof::jobs::recording::{Recording, opening};
+use dtof::jobs::recording::Recording;
 use dtof::progress::Progress;
 use dtof::rows::{Row, grouped};
 use dtof::settings::{Sensor, SettingsFile};
@@ -83,7 +82,6 @@ impl Desk {
         &self,
         (name, port): (&str, Box<dyn Port>),
         said: &SettingsFile,
-        recording: &Recording,
         asked: &Asked,
         quiet: bool,
     ) -> Result<Gathered> {
@@ -133,13 +131,15 @@ impl Desk {
                 "warning: {name}: {full} exposures with a full counter were left out"
             ));
         }
-        let (length, cycles) = length(&collected, said, recording)?;
+        let mut cycles = collected.cycles.clone();
+        cycles.sort_unstable();
+        let median = cycles.get(cycles.len() / 2).copied().unwrap_or(0);
         let captures = [collected.histograms];
         let observed = Observed {
             geometry,
             captures: &captures,
-            length,
-            cycles: cycles.as_deref(),
+            length: Length::Cycles(median),
+            cycles: Some(&collected.cycles),
             bin_width_ps: settings.bin_width_ps.to_num(),
             truth_mm: None,
         };
@@ -151,7 +151,7 @@ impl Desk {
         Ok(Gathered {
             found,
             known,
-            rows: vec![row(&collected.cycles, collected.is_whole)],
+            rows: vec![row(&collected.cycles)],
         })
     }
 
@@ -181,43 +181,12 @@ impl Desk {
     }
 }
 
-/// How long it took, all in all and for each pixel.
-fn length(
-    collected: &Collected,
-    said: &SettingsFile,
-    recording: &Recording,
-) -> Result<(Length, Option<Vec<u64>>)> {
-    let median = |mut cycles: Vec<u64>| {
-        cycles.sort_unstable();
-        let middle = cycles.get(cycles.len() / 2);
-        Length::Cycles(middle.copied().unwrap_or(0))
-    };
-    let cycles = collected.cycles.clone();
-    if !collected.is_whole {
-        ensure!(
-            !recording.has_length(),
-            "--recorded-cycles and --photons-per-cycle: this device counts its laser cycles"
-        );
-        return Ok((median(cycles.clone()), Some(cycles)));
-    }
-    Ok(match opening(said).length {
-        Some(RecordingLength::Cycles(each)) => {
-            let cycles: Vec<u64> = cycles.iter().map(|of| of.saturating_mul(each)).collect();
-            (median(cycles.clone()), Some(cycles))
-        }
-        Some(RecordingLength::PhotonsPerCycle(rate)) => (Length::PhotonsPerCycle(rate), None),
-        None => (Length::Unknown, None),
-    })
-}
-
 /// How much was collected.
-fn row(cycles: &[u64], is_whole: bool) -> Row {
-    let name = if is_whole {
-        "histograms"
-    } else {
-        "laser cycles"
-    };
+fn row(cycles: &[u64]) -> Row {
     let [least, most] = [cycles.iter().min(), cycles.iter().max()];
     let [least, most] = [least, most].map(|end| grouped(end.copied().unwrap_or(0)));
-    (name.to_owned(), format!("{least} to {most} a pixel"))
+    (
+        "laser cycles".to_owned(),
+        format!("{least} to {most} a pixel"),
+    )
 }

@@ -65,7 +65,7 @@ impl Calibrate {
                 let (recording, asked) = (&self.options.recording, self.options.asked());
                 let port = self.desk.open(recording)?;
                 let desk = &self.desk;
-                let gathered = desk.calibrate((&name, port), said, recording, &asked, self.quiet);
+                let gathered = desk.calibrate((&name, port), said, &asked, self.quiet);
                 let Gathered { found, known, rows } = gathered.with_context(|| name.clone())?;
                 let settings = found.settings(said.clone().or(known))?;
                 (found, settings, rows)
