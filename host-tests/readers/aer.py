@@ -11,6 +11,7 @@ class Header(NamedTuple):
     rows: int
     bin_width_ps: float
     offset_mm: float
+    start_us: int = 0
 
 
 class Depth(NamedTuple):
@@ -34,8 +35,8 @@ class Dynamic(NamedTuple):
 
 def write(path, header, events):
     data = bytearray(struct.pack(
-        "<8sHHIIIIi", b"DTOF-AER", 3, 64, header.bins, header.columns, header.rows,
-        round(header.bin_width_ps * 65536), round(header.offset_mm * 256),
+        "<8sHHIIIIiQq", b"DTOF-AER", 3, 64, header.bins, header.columns, header.rows,
+        round(header.bin_width_ps * 65536), round(header.offset_mm * 256), 0, header.start_us,
     ).ljust(64, b"\0"))
     cycle_high = None
     for event in events:
@@ -59,7 +60,8 @@ def write(path, header, events):
 def read(path):
     """The header, and the events up to the end word or the end of a cut file."""
     data = open(path, "rb").read()
-    magic, version, length, bins, columns, rows, width, offset = struct.unpack_from("<8sHHIIIIi", data)
+    fields = struct.unpack_from("<8sHHIIIIiQq", data)
+    magic, version, length, bins, columns, rows, width, offset, _, start_us = fields
     assert (magic, version) == (b"DTOF-AER", 3), path
     events = []
     for at in range(length, len(data) - 15, 16):
@@ -78,4 +80,4 @@ def read(path):
             time = high << 16
         else:
             break
-    return Header(bins, columns, rows, width / 65536, offset / 256), events
+    return Header(bins, columns, rows, width / 65536, offset / 256, start_us), events

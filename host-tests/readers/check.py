@@ -16,14 +16,15 @@ import aer
 import expected
 import read
 
-FORMATS = {"csv": "csv", "pcd": "pcd", "ply": "ply", "mcap": "mcap", "evt2": "raw"}
+ENDINGS = {"csv": ".csv", "pcd": ".pcd", "ply": ".ply", "mcap": ".mcap", "ros2": "-ros2.mcap", "evt2": ".raw"}
+POINTS = ("csv", "pcd", "ply", "mcap", "ros2")
 
 
 def export(dtof, name, format, options=(), damaged=None):
     """Exports NAME.aer; it must fail and name the byte of the damage if there is any."""
-    out = f"{name}.{FORMATS[format]}"
+    out = f"{name}{ENDINGS[format]}"
     done = subprocess.run(
-        [dtof, "export", f"{name}.aer", "--format", format, "--out", out, *options],
+        [dtof, "export", f"{name}.aer", "--format", format, "--out", out, "--quiet", *options],
         capture_output=True, text=True,
     )
     if damaged is None:
@@ -44,7 +45,7 @@ def slice_ns(events, laser_hz, slice_us):
 
 
 def check_points(header, events, name, laser_hz, fov, decoded, slice_us=None):
-    """CSV, PCD, PLY and MCAP against the AER file, the decoder and each other."""
+    """CSV, PCD, PLY, MCAP and ROS 2 against the AER file, the decoder and each other."""
     columns, rows = read.from_csv(f"{name}.csv")
     assert columns[:4] == ["time_us", "x_m", "y_m", "z_m"], columns
     if decoded is not None:
@@ -85,7 +86,8 @@ def check_points(header, events, name, laser_hz, fov, decoded, slice_us=None):
     slices = {}
     for index in in_time:
         slices.setdefault(wanted[index][-1] // length, []).append(index)
-    assert [time for time, _ in clouds] == [number * length for number in slices]
+    start = header.start_us * 1000
+    assert [time for time, _ in clouds] == [start + number * length for number in slices]
     assert [time for time, _ in statistics] == [time for time, _ in clouds]
     so_far = 0
     for (time, cloud), (_, said), order in zip(clouds, statistics, slices.values()):
@@ -95,7 +97,7 @@ def check_points(header, events, name, laser_hz, fov, decoded, slice_us=None):
         compare(read.points_of(cloud), order)
         so_far += len(order)
         flags = [wanted[index][2] for index in order]
-        duration_s = (min(time + length, end) - time) / 1e9
+        duration_s = (min(time - start + length, end) - (time - start)) / 1e9
         assert said == {
             "timestamp": {"sec": time // 10**9, "nsec": time % 10**9},
             "duration_s": duration_s,
@@ -111,6 +113,21 @@ def check_points(header, events, name, laser_hz, fov, decoded, slice_us=None):
             "blocks": sum(wanted[index][3] > 0 for index in order),
             "events_so_far": so_far,
         }, said
+    check_ros2(f"{name}-ros2.mcap", fields, clouds)
+
+
+def check_ros2(path, fields, clouds):
+    """The same clouds as in MCAP, at the same times."""
+    bag = read.from_ros2(path)
+    assert [time for time, _ in bag] == [time for time, _ in clouds]
+    for (time, message), (_, cloud) in zip(bag, clouds):
+        stamp = message.header.stamp
+        assert stamp.sec * 10**9 + stamp.nanosec == time
+        assert message.header.frame_id == "dtof_optical"
+        assert [field.name for field in message.fields] == fields
+        assert message.height == 1 and message.is_dense and not message.is_bigendian
+        assert message.row_step == message.width * message.point_step == len(message.data)
+        assert np.array_equal(read.points_of_ros2(message), read.points_of(cloud))
 
 
 def check_evt2(header, events, name, laser_hz, threshold_mm=100, reference="previous"):
@@ -132,7 +149,7 @@ def check(dtof, name, laser_hz=10_000_000, fov=None, evt2=(), damaged=None):
     decoded = subprocess.run([dtof, "decode", f"{name}.aer"], capture_output=True, text=True)
     assert (decoded.returncode == 0) == (damaged is None)
     decoded = [line.split(",") for line in decoded.stdout.splitlines()]
-    for format in ("csv", "pcd", "ply", "mcap"):
+    for format in POINTS:
         export(dtof, name, format, options, damaged)
     check_points(header, events, name, laser_hz, fov, decoded)
     changes = 0
@@ -151,8 +168,8 @@ def check_rate(dtof):
     aer.write("rate.aer", array, events)
     for slice_us, slices in ((None, 100), (10_000, 3)):
         more = [] if slice_us is None else ["--slice-us", str(slice_us)]
-        for format in ("csv", "pcd", "ply", "mcap"):
-            export(dtof, "rate", format, more if format == "mcap" else [])
+        for format in POINTS:
+            export(dtof, "rate", format, more if format in ("mcap", "ros2") else [])
         header, events = aer.read("rate.aer")
         check_points(header, events, "rate", 10_000_000, None, None, slice_us)
         _, statistics = read.from_mcap("rate.mcap")
@@ -164,7 +181,7 @@ def check_empty(dtof):
     """Files without events, but for expelliarmus, which reads none."""
     array = aer.Header(bins=128, columns=64, rows=32, bin_width_ps=250.0, offset_mm=0.0)
     aer.write("empty.aer", array, [])
-    for format in FORMATS:
+    for format in ENDINGS:
         export(dtof, "empty", format)
     check_points(array, [], "empty", 10_000_000, None, None)
     for reader in read.EVT2_READERS:
@@ -217,7 +234,7 @@ def late_events(dynamic):
 def snippets(docs):
     """Runs the Python of the documentation as it stands there."""
     texts = re.findall(r"^```python\n(.*?)^```$", Path(docs).read_text(), re.MULTILINE | re.DOTALL)
-    assert len(texts) == 5, f"{docs}: {len(texts)} snippets, one a format should be there"
+    assert len(texts) == 6, f"{docs}: {len(texts)} snippets, one a format should be there"
     for text in texts:
         done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True)
         assert done.returncode == 0 and done.stdout, f"{text}\n{done.stderr}"
@@ -238,7 +255,8 @@ def main():
     Path("cut.aer").write_bytes(data[: 64 + 16 * words + 5])
     check(dtof, "cut", evt2=[(20, "previous")], damaged=64 + 16 * words)
 
-    array = aer.Header(bins=128, columns=1280, rows=51, bin_width_ps=250.0, offset_mm=-12.5)
+    array = aer.Header(bins=128, columns=1280, rows=51, bin_width_ps=250.0, offset_mm=-12.5,
+                       start_us=1_790_000_000_123_457)
     for name, dynamic in (("late", False), ("late-changes", True)):
         aer.write(f"{name}.aer", array, late_events(dynamic))
         check(dtof, name)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from pathlib import Path
 
 import numpy as np
 
@@ -44,6 +45,33 @@ def from_mcap(path):
             assert channel.message_encoding == "json"
             statistics.append((message.log_time, json.loads(message.data)))
     return clouds, statistics
+
+
+def from_ros2(path):
+    """The messages of a bag of ROS 2, each with its log time."""
+    from rosbags.highlevel import AnyReader
+
+    with AnyReader([Path(path)]) as bag:
+        assert {(topic, of.msgtype) for topic, of in bag.topics.items()} == {
+            ("/dtof/points", "sensor_msgs/msg/PointCloud2")
+        }
+        return [
+            (time, bag.deserialize(data, connection.msgtype))
+            for connection, time, data in bag.messages()
+        ]
+
+
+def points_of_ros2(message):
+    """The points of one cloud of a bag."""
+    types = {2: "<u1", 6: "<u4", 7: "<f4", 8: "<f8"}
+    assert all(field.count == 1 for field in message.fields)
+    dtype = np.dtype({
+        "names": [field.name for field in message.fields],
+        "formats": [types[field.datatype] for field in message.fields],
+        "offsets": [field.offset for field in message.fields],
+        "itemsize": message.point_step,
+    })
+    return np.frombuffer(message.data.tobytes(), dtype)
 
 
 def points_of(cloud):

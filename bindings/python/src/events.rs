@@ -47,6 +47,7 @@ pub struct Array {
     pub bin_width_ps: f64,
     pub offset_mm: f64,
     pub laser_millihertz: u64,
+    pub start_us: i64,
 }
 
 impl Array {
@@ -58,6 +59,7 @@ impl Array {
             bin_width_ps: header.bin_width_ps.to_num(),
             offset_mm: header.offset_mm.to_num(),
             laser_millihertz: header.laser_millihertz,
+            start_us: header.start_us,
         }
     }
 
@@ -85,6 +87,7 @@ impl Array {
             offset_mm: exact::<I24F8>(offset)
                 .with_context(|| format!("offset_mm {offset}: must be a multiple of 1/256"))?,
             laser_millihertz: self.laser_millihertz,
+            start_us: self.start_us,
         };
         RangeScale::new(header.bin_width_ps, header.offset_mm)
             .with_context(|| format!("bin_width_ps {width}, offset_mm {offset}"))?;

@@ -243,6 +243,7 @@ fn run(
         bin_width_ps: settings.bin_width_ps,
         offset_mm: settings.offset_mm,
         laser_millihertz: source.laser_hz().map_or(0, |hz| hz.saturating_mul(1000)),
+        start_us: 0,
     };
     let mut summary = Summary::new(engine.statistics(), source, reporting, settings);
     watch_glass(said, bins.as_deref(), &mut summary);

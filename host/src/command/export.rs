@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail, ensure};
 use clap::Args;
 use dtof::cli::arguments::{MOST_WHOLE, path, whole};
+use dtof::cli::complain;
 use dtof::events::aer_file::EventKind;
 use dtof::events::echoes::Echo;
 use dtof::export::{Format, LaserClock, Optics, Options, export};
@@ -41,7 +42,8 @@ pub struct Export {
     /// A direction and a range bias for each pixel, a TOML file; docs/export.md has its keys
     #[arg(long, value_name = "FILE", value_parser = path())]
     calibration: Option<PathBuf>,
-    /// Laser cycles a second [default: what the file says, else 10000000]
+    /// Laser cycles a second, for a file that does not say or is wrong [default: what the file
+    /// says, else 10000000 and a warning]
     #[arg(long, value_name = "HZ", value_parser = whole(1..=MOST_WHOLE))]
     laser_hz: Option<u64>,
     /// The kind of events to export from a file with both
@@ -50,7 +52,7 @@ pub struct Export {
     /// Which echo of each exposure of a pixel or block, of depth events
     #[arg(long, value_enum, default_value_t = Echo::All)]
     echo: Echo,
-    /// MCAP: microseconds of a point cloud [default: 1/100 of the run, 10 to 10,000]
+    /// MCAP and ROS 2: microseconds of a point cloud [default: 1/100 of the run, 10 to 10,000]
     #[arg(long, value_name = "N", value_parser = whole(1..=1_000_000_000_u64))]
     slice_us: Option<u64>,
     #[command(flatten)]
@@ -97,6 +99,9 @@ impl Export {
             );
         }
         if !self.quiet {
+            if let Some(warning) = exported.warning {
+                complain(&format!("warning: {}: {warning}", self.file.display()));
+            }
             writeln!(
                 io::stdout(),
                 "{out}: {written} events ({})",
@@ -109,11 +114,16 @@ impl Export {
     /// No option is left unused.
     fn check(&self) -> Result<()> {
         let evt2 = self.format == Format::Evt2;
-        let mcap = self.format == Format::Mcap;
+        let slices = matches!(self.format, Format::Mcap | Format::Ros2);
         let of_changes = self.dynamic_depth.are_given();
         let points = "points, which evt2 has not";
         for (given, has_use, option, of) in [
-            (self.slice_us.is_some(), mcap, "--slice-us", "mcap"),
+            (
+                self.slice_us.is_some(),
+                slices,
+                "--slice-us",
+                "mcap and ros2",
+            ),
             (of_changes, evt2, "--threshold-mm and --reference", "evt2"),
             (self.fov.is_some(), !evt2, "--fov", points),
             (self.calibration.is_some(), !evt2, "--calibration", points),

@@ -197,7 +197,7 @@ fn watch(
         None => events_csv::HEADER,
         Some(_) => events_csv::DYNAMIC_DEPTH_HEADER,
     };
-    readers.events = still_open(header(outputs.events, columns))?;
+    readers.events = still_open(write_header(outputs.events, columns))?;
     let started = Instant::now();
     let mut figures = Figures {
         since: started,
@@ -240,7 +240,7 @@ fn watch(
     client.configure(&configuration(Source::Link)?)
 }
 
-fn header(out: &mut dyn Write, columns: &str) -> io::Result<()> {
+fn write_header(out: &mut dyn Write, columns: &str) -> io::Result<()> {
     writeln!(out, "{columns}")?;
     out.flush()
 }

@@ -1,6 +1,8 @@
 //! A device with a sensor, and how it is to operate: what was said, what the device says, and
 //! what follows.
 
+use std::time::{SystemTime, UNIX_EPOCH};
+
 use anyhow::{Result, bail, ensure};
 use dtof_core::fixed::types::I24F8;
 use dtof_link::SensorRecord;
@@ -28,6 +30,8 @@ pub struct Setup {
     pub geometry: Geometry,
     /// Laser cycles in a thousand seconds; 0 if that is not known.
     pub laser_millihertz: u64,
+    /// When its laser cycles began.
+    pub began: SystemTime,
 }
 
 impl Setup {
@@ -60,13 +64,17 @@ impl Setup {
             client.bins()
         );
         let columns = said.sensor.columns;
+        // What the device says is exact; settings have whole hertz.
+        let told = said.sensor.laser_hz.map_or(0, |hz| hz.saturating_mul(1000));
+        let known = [sensor.laser_millihertz, told];
         let setup = Self {
             settings: said.settings(client.bins().into())?,
             asked,
             said,
             pixels,
             geometry: array(pixels, columns),
-            laser_millihertz: sensor.laser_millihertz,
+            laser_millihertz: known.into_iter().find(|&rate| rate > 0).unwrap_or(0),
+            began: SystemTime::now(),
         };
         masked::check(&setup.settings.masked, pixels.into())?;
         if let Some(columns) = columns.filter(|&columns| columns > u32::from(pixels)) {
@@ -78,6 +86,7 @@ impl Setup {
     /// The header of its events.
     #[must_use]
     pub fn header(&self) -> Header {
+        let start = self.began.duration_since(UNIX_EPOCH).unwrap_or_default();
         Header {
             #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
             bins: self.settings.bins as u32,
@@ -85,6 +94,7 @@ impl Setup {
             bin_width_ps: self.settings.bin_width_ps,
             offset_mm: self.settings.offset_mm,
             laser_millihertz: self.laser_millihertz,
+            start_us: i64::try_from(start.as_micros()).unwrap_or(0),
         }
     }
 }

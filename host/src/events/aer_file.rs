@@ -116,6 +116,8 @@ pub struct Header {
     pub offset_mm: I24F8,
     /// Laser cycles in a thousand seconds; 0 if that is not known.
     pub laser_millihertz: u64,
+    /// Microseconds from 1970-01-01 UTC to laser cycle 0; 0 if that is not known.
+    pub start_us: i64,
 }
 
 impl Header {
@@ -131,6 +133,7 @@ impl Header {
             &self.bin_width_ps.to_le_bytes(),
             &self.offset_mm.to_le_bytes(),
             &self.laser_millihertz.to_le_bytes(),
+            &self.start_us.to_le_bytes(),
         ]
         .concat();
         bytes[..fields.len()].copy_from_slice(&fields);
@@ -141,6 +144,7 @@ impl Header {
         let u16_at = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
         let four_at = |at: usize| [bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]];
         let u32_at = |at: usize| u32::from_le_bytes(four_at(at));
+        let u64_at = |at: usize| u64::from(u32_at(at)) | u64::from(u32_at(at + 4)) << 32;
         ensure!(bytes[..8] == *MAGIC.as_bytes(), "not an AER file");
         let version = u16_at(8);
         ensure!(
@@ -163,7 +167,8 @@ impl Header {
             geometry,
             bin_width_ps: U16F16::from_le_bytes(four_at(24)),
             offset_mm: I24F8::from_le_bytes(four_at(28)),
-            laser_millihertz: u64::from(u32_at(32)) | u64::from(u32_at(36)) << 32,
+            laser_millihertz: u64_at(32),
+            start_us: u64_at(40).cast_signed(),
         })
     }
 

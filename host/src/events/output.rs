@@ -98,6 +98,7 @@ impl Output {
             bin_width_ps: settings.bin_width_ps,
             offset_mm: settings.offset_mm,
             laser_millihertz: source.laser_hz().map_or(0, |hz| hz.saturating_mul(1000)),
+            start_us: 0,
         };
         let aer = BufWriter::new(aside(folder, OF_A_RUN)?);
         let aer = aer_file::Writer::new(aer, &header).with_context(name)?;

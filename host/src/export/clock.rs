@@ -44,6 +44,30 @@ impl LaserClock {
         (millihertz > 0).then_some(Self { millihertz })
     }
 
+    /// The one that holds for a file, and a warning if that is not the file's: `wanted` comes
+    /// before the file, and the paper's is for want of any. To the whole hertz they are the same.
+    pub(super) fn choose(wanted: Option<Self>, header: &Header) -> (Self, Option<String>) {
+        let own = Self::of(header);
+        match (wanted, own) {
+            (Some(wanted), Some(own)) if own.millihertz / 1000 * 1000 == wanted.millihertz => {
+                (own, None)
+            }
+            (Some(wanted), Some(own)) => {
+                let differ = format!("the file has a laser of {own}; times are for {wanted}");
+                (wanted, Some(differ))
+            }
+            (Some(clock), None) | (None, Some(clock)) => (clock, None),
+            (None, None) => {
+                let assumed = Self::default();
+                let warning = format!(
+                    "the laser rate is not known; times are for {assumed}, unless --laser-hz says \
+                     another"
+                );
+                (assumed, Some(warning))
+            }
+        }
+    }
+
     /// Nanoseconds from the start of laser cycle 0 to that of `cycle`, rounded down.
     #[must_use]
     pub fn nanoseconds(&self, cycle: u64) -> u128 {
@@ -68,7 +92,7 @@ impl LaserClock {
             return Ok(());
         };
         let time = self.nanoseconds(cycle);
-        let name = format!("{format:?}").to_uppercase();
+        let name = format.name();
         ensure!(
             time < end_ns,
             "laser cycle {cycle} lies beyond, {} s after the start: {name} holds {} s of time (--laser-hz {})",
@@ -87,13 +111,60 @@ impl fmt::Display for LaserClock {
     }
 }
 
+/// When the events of a file were.
+#[derive(Clone, Copy, Debug)]
+pub struct Span {
+    /// The nanosecond of 1970-01-01 UTC at which laser cycle 0 was; 0 if that is not known.
+    pub start_ns: u64,
+    /// The nanosecond after laser cycle 0 at which the last event's laser cycle ended, not 0.
+    pub end_ns: u64,
+}
+
+impl Span {
+    /// That of a file whose latest event is in laser cycle `latest`.
+    ///
+    /// # Errors
+    /// If `format` cannot hold the time of its events.
+    pub fn of(format: Format, clock: &LaserClock, header: &Header, latest: u64) -> Result<Self> {
+        let start_ns = i128::from(header.start_us) * 1000;
+        let end_ns = clock.end_ns(latest);
+        if let Some(seconds) = format.end_seconds() {
+            let end = start_ns + i128::from(end_ns);
+            ensure!(
+                start_ns >= 0 && end < i128::from(seconds) * 1_000_000_000,
+                "its events are {} s to {} s after 1970: {} holds those of less than {seconds} s",
+                start_ns / 1_000_000_000,
+                end / 1_000_000_000,
+                format.name()
+            );
+        }
+        // Others have no such time.
+        let start_ns = u64::try_from(start_ns).unwrap_or(0);
+        Ok(Self { start_ns, end_ns })
+    }
+}
+
 impl Format {
+    /// As people write it.
+    fn name(self) -> String {
+        format!("{self:?}").to_uppercase()
+    }
+
+    /// The second since 1970 from which on it does not hold the time, if it has that time.
+    fn end_seconds(self) -> Option<u64> {
+        match self {
+            Self::Csv | Self::Pcd | Self::Ply | Self::Evt2 => None,
+            Self::Mcap => Some(1 << 32),
+            Self::Ros2 => Some(1 << 31),
+        }
+    }
+
     /// The nanosecond from which on it does not hold the time of an event.
     fn end_ns(self) -> Option<u128> {
         match self {
             Self::Csv => None,
             // Whole numbers in a double.
-            Self::Pcd | Self::Ply | Self::Mcap => Some(1 << 53),
+            Self::Pcd | Self::Ply | Self::Mcap | Self::Ros2 => Some(1 << 53),
             // Readers differ in what they take time for that has wrapped.
             Self::Evt2 => Some(1000 << evt2::TIME_BITS),
         }

@@ -32,6 +32,8 @@ pub struct Survey {
     chosen: u64,
     /// How long a laser cycle is.
     pub clock: LaserClock,
+    /// What is to be said of it.
+    pub warning: Option<String>,
     /// The laser cycle of the latest event.
     pub latest: u64,
     /// Damage that ends the file too early: the byte, and what is wrong there.
@@ -55,12 +57,11 @@ impl Survey {
         ensure!(file.is_file(), "not a file that can be read twice");
         let mut reader = open(path)?;
         let header = *reader.header();
-        let clock = clock
-            .or_else(|| LaserClock::of(&header))
-            .unwrap_or_default();
+        let (clock, warning) = LaserClock::choose(clock, &header);
         let mut survey = Self {
             header,
             clock,
+            warning,
             counts: [0; 2],
             chosen: 0,
             latest: 0,

@@ -1,5 +1,5 @@
-//! MCAP: point clouds as Foxglove knows them, one for each slice of time, and
-//! statistics of the slice.
+//! MCAP: point clouds, one for each slice of time, as Foxglove knows them, with statistics of
+//! the slice; or as ROS 2 does.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -11,10 +11,11 @@ use foxglove::Encode;
 use foxglove::messages::{PackedElementField, PointCloud, Pose, Quaternion, Timestamp, Vector3};
 use serde::Serialize;
 
+use super::clock::Span;
 use super::points::{BYTES, fields, record};
 use super::projection::Projection;
 use super::reorder::{Reorder, WAITING};
-use super::{Finished, Out, Sink};
+use super::{Finished, Out, Sink, ros2};
 use crate::events::aer_file::{Event, EventKind};
 use crate::input::source::Geometry;
 
@@ -96,18 +97,26 @@ fn schema() -> String {
     .to_string()
 }
 
+/// When slices are, and how long.
+#[derive(Clone, Copy, Debug)]
+pub struct Slices {
+    /// Of all events: the last slice ends with it, at the latest.
+    pub span: Span,
+    /// Not 0.
+    pub slice_ns: u64,
+}
+
 /// Events put in order, gathered slice by slice.
 pub struct Mcap {
     writer: ::mcap::Writer<Out>,
     points_channel: u16,
-    statistics_channel: u16,
+    /// None in a bag of ROS 2, which has no message for them.
+    statistics_channel: Option<u16>,
     sequence: u32,
     kind: EventKind,
     projection: Projection,
     order: Reorder<Event>,
-    slice_ns: u64,
-    /// Where the last slice ends, at the latest.
-    end_ns: u64,
+    slices: Slices,
     /// The slice that is being gathered: its number, its points that are not written and
     /// their time, what happened.
     slice: Option<u64>,
@@ -126,32 +135,29 @@ pub fn slice_of(end_ns: u64) -> u64 {
 }
 
 impl Mcap {
-    /// Length of a slice, and where the last one ends: neither is 0.
+    /// Begins a file for Foxglove, or a bag of ROS 2.
     pub fn new(
         out: Out,
         projection: Projection,
         array: Geometry,
         kind: EventKind,
-        [slice_ns, end_ns]: [u64; 2],
+        slices: Slices,
+        for_ros2: bool,
     ) -> Result<Self> {
         let library = concat!("dtof ", env!("CARGO_PKG_VERSION"));
-        let mut writer = ::mcap::WriteOptions::new()
+        let mut options = ::mcap::WriteOptions::new()
             .compression(None)
-            .library(library)
-            .create(out)?;
-        let schema_of_points = PointCloud::get_schema().context("a point cloud has a schema")?;
-        let points_schema = writer.add_schema(
-            &schema_of_points.name,
-            &schema_of_points.encoding,
-            &schema_of_points.data,
-        )?;
-        let statistics_schema =
-            writer.add_schema("dtof.Statistics", "jsonschema", schema().as_bytes())?;
-        let none = Default::default();
-        let encoding = PointCloud::get_message_encoding();
-        let points_channel = writer.add_channel(points_schema, "/events", &encoding, &none)?;
-        let statistics_channel =
-            writer.add_channel(statistics_schema, "/statistics", "json", &none)?;
+            .library(library);
+        if for_ros2 {
+            options = options.profile(ros2::PROFILE);
+        }
+        let mut writer = options.create(out)?;
+        let (points_channel, statistics_channel) = if for_ros2 {
+            (channel_for_ros2(&mut writer)?, None)
+        } else {
+            let [points, statistics] = channels_for_foxglove(&mut writer)?;
+            (points, Some(statistics))
+        };
         Ok(Self {
             writer,
             points_channel,
@@ -160,8 +166,7 @@ impl Mcap {
             kind,
             projection,
             order: Reorder::new(WAITING),
-            slice_ns,
-            end_ns,
+            slices,
             slice: None,
             points: Vec::new(),
             points_ns: 0,
@@ -174,11 +179,11 @@ impl Mcap {
     /// Takes the next event in time.
     fn gather(&mut self, event: &Event) -> Result<()> {
         let time = u64::try_from(self.projection.nanoseconds(event))?;
-        let slice = time / self.slice_ns;
+        let slice = time / self.slices.slice_ns;
         if self.slice != Some(slice) {
             self.end_slice()?;
             self.slice = Some(slice);
-            self.points_ns = slice * self.slice_ns;
+            self.points_ns = slice * self.slices.slice_ns;
         } else if self.points.is_empty() {
             // The slice has a message already. Of two of one time viewers show the last.
             self.points_ns = time;
@@ -214,54 +219,35 @@ impl Mcap {
         let Some(slice) = self.slice else {
             return Ok(());
         };
-        let begin = slice * self.slice_ns;
+        let Slices { span, slice_ns } = self.slices;
+        let begin = slice * slice_ns;
         if !self.points.is_empty() {
             self.write_points()?;
         }
-        let end = begin.saturating_add(self.slice_ns).min(self.end_ns);
+        let end = begin.saturating_add(slice_ns).min(span.end_ns);
         let end = end.max(begin + 1);
         let duration_s = (end - begin) as f64 / 1e9;
+        let time = span.start_ns + begin;
         let statistics = Statistics {
-            timestamp: Time::of(begin),
+            timestamp: Time::of(time),
             duration_s,
             events_per_s: self.statistics.events as f64 / duration_s,
             events_so_far: self.written,
             ..std::mem::take(&mut self.statistics)
         };
-        let message = serde_json::to_vec(&statistics)?;
-        self.write_message(self.statistics_channel, begin, &message)
+        match self.statistics_channel {
+            Some(channel) => self.write_message(channel, time, &serde_json::to_vec(&statistics)?),
+            None => Ok(()),
+        }
     }
 
     fn write_points(&mut self) -> Result<()> {
-        let time = self.points_ns;
+        let time = self.slices.span.start_ns + self.points_ns;
         let data = std::mem::take(&mut self.points);
-        let Time { sec, nsec } = Time::of(time);
-        let mut offset = 0;
-        let mut fields_of_points = Vec::new();
-        for field in fields(self.kind) {
-            fields_of_points.push(PackedElementField {
-                name: field.name.to_owned(),
-                offset,
-                r#type: field.number.mcap.into(),
-            });
-            offset += field.number.bytes;
-        }
-        let cloud = PointCloud {
-            timestamp: Timestamp::new_checked(sec, nsec),
-            frame_id: FRAME.to_owned(),
-            pose: Some(Pose {
-                position: Some(Vector3::default()),
-                orientation: Some(Quaternion {
-                    w: 1.0,
-                    ..Quaternion::default()
-                }),
-            }),
-            point_stride: offset,
-            fields: fields_of_points,
-            data: data.into(),
+        let message = match self.statistics_channel {
+            Some(_) => cloud_for_foxglove(self.kind, time, data)?,
+            None => ros2::cloud(&fields(self.kind), FRAME, time, &data)?,
         };
-        let mut message = Vec::new();
-        cloud.encode(&mut message)?;
         self.write_message(self.points_channel, time, &message)
     }
 
@@ -275,6 +261,60 @@ impl Mcap {
         self.sequence = self.sequence.wrapping_add(1);
         Ok(self.writer.write_to_known_channel(&header, data)?)
     }
+}
+
+/// The channel of points.
+fn channel_for_ros2(writer: &mut ::mcap::Writer<Out>) -> Result<u16> {
+    let [name, encoding, definition] = ros2::SCHEMA;
+    let schema = writer.add_schema(name, encoding, definition.as_bytes())?;
+    let (key, value) = ros2::METADATA;
+    let metadata = BTreeMap::from([(key.to_owned(), value.to_owned())]);
+    Ok(writer.add_channel(schema, ros2::TOPIC, ros2::MESSAGES, &metadata)?)
+}
+
+/// The channels of points and of statistics.
+fn channels_for_foxglove(writer: &mut ::mcap::Writer<Out>) -> Result<[u16; 2]> {
+    let of_points = PointCloud::get_schema().context("a point cloud has a schema")?;
+    let points = writer.add_schema(&of_points.name, &of_points.encoding, &of_points.data)?;
+    let statistics = writer.add_schema("dtof.Statistics", "jsonschema", schema().as_bytes())?;
+    let none = BTreeMap::new();
+    let encoding = PointCloud::get_message_encoding();
+    Ok([
+        writer.add_channel(points, "/events", &encoding, &none)?,
+        writer.add_channel(statistics, "/statistics", "json", &none)?,
+    ])
+}
+
+/// Packed points as a message.
+fn cloud_for_foxglove(kind: EventKind, time: u64, data: Vec<u8>) -> Result<Vec<u8>> {
+    let Time { sec, nsec } = Time::of(time);
+    let mut offset = 0;
+    let mut fields_of_points = Vec::new();
+    for field in fields(kind) {
+        fields_of_points.push(PackedElementField {
+            name: field.name.to_owned(),
+            offset,
+            r#type: field.number.mcap.into(),
+        });
+        offset += field.number.bytes;
+    }
+    let cloud = PointCloud {
+        timestamp: Timestamp::new_checked(sec, nsec),
+        frame_id: FRAME.to_owned(),
+        pose: Some(Pose {
+            position: Some(Vector3::default()),
+            orientation: Some(Quaternion {
+                w: 1.0,
+                ..Quaternion::default()
+            }),
+        }),
+        point_stride: offset,
+        fields: fields_of_points,
+        data: data.into(),
+    };
+    let mut message = Vec::new();
+    cloud.encode(&mut message)?;
+    Ok(message)
 }
 
 impl Sink for Mcap {

@@ -15,6 +15,7 @@ mod ply;
 mod points;
 mod projection;
 mod reorder;
+mod ros2;
 
 use std::fmt::Write;
 use std::io::BufWriter;
@@ -34,7 +35,9 @@ use crate::input::source::Geometry;
 use crate::progress::Progress;
 
 pub use clock::LaserClock;
+use clock::Span;
 use events::Survey;
+use mcap::Slices;
 use points::Points;
 use projection::Projection;
 
@@ -49,6 +52,8 @@ pub enum Format {
     Ply,
     /// Points slice by slice and statistics, for Foxglove
     Mcap,
+    /// Points slice by slice as a bag of ROS 2 (MCAP)
+    Ros2,
     /// Changes of depth as an event camera's RAW file (EVT2)
     Evt2,
 }
@@ -87,7 +92,7 @@ pub struct Options {
     pub kind: Option<EventKind>,
     /// Which echo of each exposure, of depth events.
     pub echo: Echo,
-    /// MCAP: nanoseconds of a slice, not 0; 1/100 of the run unless given, see docs/export.md.
+    /// MCAP and ROS 2: nanoseconds of a slice, not 0; 1/100 of the run unless given, see docs/export.md.
     pub slice_ns: Option<u64>,
     /// EVT2: what is made of depth events.
     pub dynamic_depth: DynamicDepth,
@@ -119,6 +124,8 @@ pub struct Exported {
     pub damage: Option<String>,
     /// The assumptions behind points and times: "60x32.2 degrees, 10 MHz".
     pub assumed: String,
+    /// What is to be said of the laser rate, if it is not the file's.
+    pub warning: Option<String>,
 }
 
 /// A file on its way.
@@ -175,8 +182,10 @@ pub fn export(
         assumed.clear();
     }
     assumed += &clock.to_string();
-    let end_ns = clock.end_ns(survey.latest);
-    let slice_ns = options.slice_ns.unwrap_or_else(|| mcap::slice_of(end_ns));
+    let span = Span::of(format, &clock, &header, survey.latest).with_context(name)?;
+    let slice_ns = options
+        .slice_ns
+        .unwrap_or_else(|| mcap::slice_of(span.end_ns));
     let file = BufWriter::new(aside(&place.folder, ".dtof-export-")?);
     let points = survey.chosen(kind);
     let to = || out.display().to_string();
@@ -184,9 +193,11 @@ pub fn export(
         Format::Csv => csv::begin(file, projection, kind).map(boxed),
         Format::Pcd => Points::packed(file, projection, &pcd::header(kind, points)).map(boxed),
         Format::Ply => Points::packed(file, projection, &ply::header(kind, points)).map(boxed),
-        Format::Mcap => {
+        Format::Mcap | Format::Ros2 => {
             let _ = write!(assumed, ", clouds every {} µs", slice_ns as f64 / 1000.0);
-            mcap::Mcap::new(file, projection, array, kind, [slice_ns, end_ns]).map(boxed)
+            let for_ros2 = format == Format::Ros2;
+            let slices = Slices { span, slice_ns };
+            mcap::Mcap::new(file, projection, array, kind, slices, for_ros2).map(boxed)
         }
         Format::Evt2 => {
             let changes = &options.dynamic_depth;
@@ -229,6 +240,7 @@ pub fn export(
         late: finished.late,
         damage: survey.damage,
         assumed,
+        warning: survey.warning,
     })
 }
 
@@ -242,11 +254,11 @@ pub fn points<'a>(
     header: &Header,
     options: &Options,
 ) -> Result<Vec<u8>> {
-    let clock = options.clock.or_else(|| LaserClock::of(header));
+    let (clock, _) = LaserClock::choose(options.clock, header);
     let projection = Projection {
         rays: options.optics.rays(header.geometry)?.0,
         scale: RangeScale::new(header.bin_width_ps, header.offset_mm)?,
-        clock: clock.unwrap_or_default(),
+        clock,
     };
     let mut records = Vec::new();
     for event in events {

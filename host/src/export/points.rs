@@ -1,4 +1,4 @@
-//! Points as packed records, the same in PCD, PLY and MCAP.
+//! Points as packed records, the same in PCD, PLY, MCAP and ROS 2.
 
 use std::io::Write;
 
@@ -9,27 +9,36 @@ use super::projection::Projection;
 use super::{Finished, Out, Sink};
 use crate::events::aer_file::{Event, EventKind};
 
-/// The type of a field, little-endian: how many bytes it has, and its names in PCD, PLY
-/// and MCAP.
+/// The type of a field, little-endian: how many bytes it has, and its names in PCD, PLY,
+/// MCAP and ROS 2.
 #[derive(Clone, Copy, Debug)]
 pub struct Number {
     pub bytes: u32,
     pub pcd: &'static str,
     pub ply: &'static str,
     pub mcap: NumericType,
+    /// A constant of `sensor_msgs/msg/PointField`.
+    pub ros2: u8,
 }
 
-const U8: Number = number(1, "U", "uchar", NumericType::Uint8);
-const U32: Number = number(4, "U", "uint", NumericType::Uint32);
-const F32: Number = number(4, "F", "float", NumericType::Float32);
-const F64: Number = number(8, "F", "double", NumericType::Float64);
+const U8: Number = number(1, "U", "uchar", NumericType::Uint8, 2);
+const U32: Number = number(4, "U", "uint", NumericType::Uint32, 6);
+const F32: Number = number(4, "F", "float", NumericType::Float32, 7);
+const F64: Number = number(8, "F", "double", NumericType::Float64, 8);
 
-const fn number(bytes: u32, pcd: &'static str, ply: &'static str, mcap: NumericType) -> Number {
+const fn number(
+    bytes: u32,
+    pcd: &'static str,
+    ply: &'static str,
+    mcap: NumericType,
+    ros2: u8,
+) -> Number {
     Number {
         bytes,
         pcd,
         ply,
         mcap,
+        ros2,
     }
 }
 

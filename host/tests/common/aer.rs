@@ -18,6 +18,7 @@ pub const HEADER: Header = Header {
     bin_width_ps: U16F16::lit("250"),
     offset_mm: I24F8::lit("-12.5"),
     laser_millihertz: 0,
+    start_us: 0,
 };
 
 /// Byte at which the word of a number begins.

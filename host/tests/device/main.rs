@@ -8,6 +8,7 @@ mod bad_wire;
 mod cable;
 mod calibrate;
 mod calibrate_refused;
+mod clock;
 mod desk;
 mod engine;
 mod map;

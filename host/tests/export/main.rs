@@ -10,4 +10,5 @@ mod event_camera;
 mod memory;
 mod plane;
 mod points;
+mod rates;
 mod refused;

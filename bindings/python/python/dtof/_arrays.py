@@ -45,7 +45,8 @@ class Array(NamedTuple):
 
     ``bin_width_ps`` is in picoseconds, a multiple of 1/65536. ``offset_mm`` is in millimetres, a
     multiple of 1/256, and added to every range. ``laser_millihertz`` counts laser cycles in 1000
-    seconds; 0 is not known.
+    seconds. ``start_us`` is when laser cycle 0 was, in microseconds since 1970-01-01 UTC. Either is
+    0 if it is not known.
     """
 
     bins: int
@@ -54,6 +55,7 @@ class Array(NamedTuple):
     bin_width_ps: float
     offset_mm: float
     laser_millihertz: int = 0
+    start_us: int = 0
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -115,6 +115,7 @@ impl Hub {
             bin_width_ps: U16F16::ZERO,
             offset_mm: I24F8::ZERO,
             laser_millihertz: 0,
+            start_us: 0,
         };
         Self(Mutex::new(State {
             name,

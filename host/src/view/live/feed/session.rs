@@ -1,6 +1,6 @@
 //! A session with a device: events, reports, histograms and wishes, each in its turn.
 
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::{Result, anyhow, ensure};
 use dtof_core::PixelAddress;
@@ -241,7 +241,8 @@ impl<'a> Session<'a> {
 
     /// Puts a setup in force. Events from before are taken as they were; a recording goes on in
     /// another file, as laser cycles begin at 0.
-    fn configure(&mut self, setup: Setup, work: &mut Work) -> Result<()> {
+    fn configure(&mut self, mut setup: Setup, work: &mut Work) -> Result<()> {
+        setup.began = SystemTime::now();
         let wanted = self.configuration(&setup, Source::Sensor)?;
         let configured = self.client.configure(&wanted);
         self.take(work);

@@ -20,6 +20,7 @@ fn hub() -> Hub {
         bin_width_ps: U16F16::lit("250"),
         offset_mm: I24F8::ZERO,
         laser_millihertz: 0,
+        start_us: 0,
     });
     hub
 }
