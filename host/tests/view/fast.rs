@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::io;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use crate::common::aer::depth_event;
@@ -28,6 +29,10 @@ pub struct Fast {
     /// Events a second; without it as many as the link takes.
     rate: Option<u64>,
     runs: Option<Instant>,
+    /// When it began to run first.
+    pub ran: Arc<OnceLock<Instant>>,
+    /// All events are of pixel 0.
+    pub is_one_pixel: bool,
     since: u64,
     /// Of all sessions.
     cycle: u64,
@@ -50,6 +55,8 @@ impl Fast {
             began: Instant::now(),
             rate,
             runs: None,
+            ran: Arc::default(),
+            is_one_pixel: false,
             since: 0,
             cycle: 0,
         }
@@ -63,7 +70,7 @@ impl Fast {
         let answer = match kind {
             message::CONFIGURE => {
                 let runs = Configuration::from_le_bytes(body).unwrap().source == Source::Sensor;
-                self.runs = runs.then(Instant::now);
+                self.runs = runs.then(|| *self.ran.get_or_init(Instant::now));
                 self.since = 0;
                 self.cycle = 0;
                 self.encoder = AerEncoder::new();
@@ -143,7 +150,8 @@ impl Fast {
         let mut body = Vec::new();
         while self.since < due && body.len() + 2 * AerWord::BYTES <= BODY_BYTES {
             // Spread over the array; ten laser cycles each.
-            let pixel = u16::try_from(self.since * 1531 % u64::from(PIXELS)).unwrap();
+            let spread = if self.is_one_pixel { 0 } else { 1531 };
+            let pixel = u16::try_from(self.since * spread % u64::from(PIXELS)).unwrap();
             self.cycle += 10;
             let event = depth_event(pixel, self.cycle, Self::bin(pixel, self.cycle));
             let (time, word) = self.encoder.encode(&event);
@@ -207,9 +215,14 @@ impl Port for Fast {
 
 /// The feed of such a device.
 pub fn feed(rate: Option<u64>) -> Feed {
+    feed_of(move || Fast::new(rate))
+}
+
+/// The feed of the device that is made when it is opened.
+pub fn feed_of(make: impl Fn() -> Fast + Send + 'static) -> Feed {
     let device = Device {
         name: "a fast device".to_owned(),
-        open: Box::new(move || Ok(Box::new(Fast::new(rate)))),
+        open: Box::new(move || Ok(Box::new(make()))),
         said: SettingsFile::default(),
         pixels: None,
         dynamic_depth: None,

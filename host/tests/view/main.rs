@@ -8,6 +8,7 @@ mod away;
 mod device;
 mod fast;
 mod http;
+mod latency;
 mod nonsense;
 mod page;
 mod playback;
