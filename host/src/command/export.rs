@@ -12,7 +12,7 @@ use dtof::events::echoes::Echo;
 use dtof::export::{Format, LaserClock, Optics, Options, export};
 use dtof::geometry::FieldOfView;
 use dtof::rows::grouped;
-use dtof::settings::{Rays, SettingsFile};
+use dtof::settings::SettingsFile;
 
 use super::dynamic_depth;
 
@@ -70,7 +70,7 @@ impl Export {
         let optics = match (&self.calibration, self.fov) {
             (Some(file), _) => Optics::Calibration(file.clone()),
             (None, Some(view)) => Optics::Pinhole(Some(view)),
-            (None, None) => optics(&file.rays)?,
+            (None, None) => Optics::of(&file.rays)?,
         };
         let laser_hz = self.laser_hz.or(file.sensor.laser_hz);
         let options = Options {
@@ -132,13 +132,4 @@ impl Export {
         }
         Ok(())
     }
-}
-
-/// Where pixels look, as a settings file says.
-fn optics(rays: &Rays) -> Result<Optics> {
-    Ok(match (&rays.calibration, rays.field_of_view_degrees) {
-        (Some(file), _) => Optics::Calibration(file.into()),
-        (None, Some(degrees)) => Optics::Pinhole(Some(FieldOfView::new(degrees)?)),
-        (None, None) => Optics::Pinhole(None),
-    })
 }

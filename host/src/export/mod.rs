@@ -9,11 +9,12 @@ mod clock;
 mod csv;
 mod events;
 mod evt2;
+pub(crate) mod foxglove;
 mod mcap;
 mod pcd;
 mod ply;
-mod points;
-mod projection;
+pub(crate) mod points;
+pub(crate) mod projection;
 mod reorder;
 mod ros2;
 
@@ -33,6 +34,7 @@ use crate::files::{aside, flushed, place_of};
 use crate::geometry::{FieldOfView, Rays};
 use crate::input::source::Geometry;
 use crate::progress::Progress;
+use crate::settings::Rays as SaidRays;
 
 pub use clock::LaserClock;
 use clock::Span;
@@ -68,8 +70,20 @@ pub enum Optics {
 }
 
 impl Optics {
+    /// As a settings file says.
+    ///
+    /// # Errors
+    /// If its field of view is none.
+    pub fn of(said: &SaidRays) -> Result<Self> {
+        Ok(match (&said.calibration, said.field_of_view_degrees) {
+            (Some(file), _) => Self::Calibration(file.into()),
+            (None, Some(degrees)) => Self::Pinhole(Some(FieldOfView::new(degrees)?)),
+            (None, None) => Self::Pinhole(None),
+        })
+    }
+
     /// The rays, and what they are for people.
-    fn rays(&self, array: Geometry) -> Result<(Rays, String)> {
+    pub(crate) fn rays(&self, array: Geometry) -> Result<(Rays, String)> {
         Ok(match self {
             Self::Pinhole(view) => {
                 let view = view.unwrap_or_else(|| FieldOfView::of(array));
