@@ -1,5 +1,5 @@
-//! What `dtof export` writes, read by other projects' programs and compared by
-//! `host-tests/readers/check.py`. Needs Python; the readers are installed below the
+//! What `dtof export` writes and `dtof view --foxglove` serves, read by other projects' programs and
+//! compared by `host-tests/readers/check.py` and `live.py`. Needs Python; the readers are installed below the
 //! build folder, from the package index unless they are there.
 //!
 //! ```sh
@@ -7,6 +7,7 @@
 //! ```
 
 use std::fs;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::Result;
@@ -28,14 +29,7 @@ fn other_readers_find_in_exported_files_what_is_in_them() -> Result<()> {
     };
     let dtof = dtof()?;
     let root = root().canonicalize()?;
-    let folder = target_folder().join("readers");
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder)?;
-    let mut simulate = Command::new(&dtof);
-    simulate.arg("simulate").arg("--scene");
-    simulate.arg(root.join(SCENE));
-    simulate.args(["--cycles", CYCLES, "--quiet", "--out", "scene"]);
-    succeed(simulate.current_dir(&folder))?;
+    let folder = scene(&dtof, "readers")?;
 
     let mut compare = Command::new(python);
     compare
@@ -47,4 +41,40 @@ fn other_readers_find_in_exported_files_what_is_in_them() -> Result<()> {
     // No .pyc files in the repository.
     compare.env("PYTHONDONTWRITEBYTECODE", "1");
     succeed(compare.current_dir(&folder))
+}
+
+#[test]
+fn another_client_finds_in_live_data_what_is_in_the_recording() -> Result<()> {
+    let test = "live data in other readers";
+    let Some(_alone) = wanted(test, &["python3"]) else {
+        return Ok(());
+    };
+    let Some(python) = python(test, "host-tests/readers/requirements.txt") else {
+        return Ok(());
+    };
+    let dtof = dtof()?;
+    let folder = scene(&dtof, "live")?;
+    let root = root().canonicalize()?;
+    let mut compare = Command::new(python);
+    compare
+        .arg(root.join("host-tests/readers/live.py"))
+        .arg(&dtof);
+    compare
+        .arg("scene/events.aer")
+        .arg(root.join("docs/view.md"));
+    compare.env("PYTHONDONTWRITEBYTECODE", "1");
+    succeed(compare.current_dir(&folder))
+}
+
+/// A folder of this name with a simulation in `scene`.
+fn scene(dtof: &Path, name: &str) -> Result<PathBuf> {
+    let folder = target_folder().join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder)?;
+    let mut simulate = Command::new(dtof);
+    simulate.arg("simulate").arg("--scene");
+    simulate.arg(root().canonicalize()?.join(SCENE));
+    simulate.args(["--cycles", CYCLES, "--quiet", "--out", "scene"]);
+    succeed(simulate.current_dir(&folder))?;
+    Ok(folder)
 }

@@ -8,7 +8,7 @@ use clap::Args;
 use dtof::cli::arguments::{path, positive, whole};
 use dtof::cli::interrupt;
 use dtof::device;
-use dtof::view::live::{Device, Feed, Folder, Playback, Served};
+use dtof::view::live::{Device, Feed, Folder, Foxglove, Origin, Playback, Served};
 
 use super::device_options::DeviceOptions;
 
@@ -33,6 +33,14 @@ pub struct View {
     /// [default: the page saves nothing]
     #[arg(long, value_name = "DIR", value_parser = path(), conflicts_with = "file")]
     out: Option<PathBuf>,
+    /// Also serve Foxglove, at a port of this computer [default without PORT: 8765]
+    #[arg(long, value_name = "PORT", value_parser = whole(0..=u16::MAX), num_args = 0..=1, require_equals = true,
+        default_missing_value = "8765")]
+    foxglove: Option<u16>,
+    /// Pages of this origin may read, too, such as `http://localhost:8080`; may be repeated
+    /// [default: Foxglove's pages only]
+    #[arg(long, value_name = "ORIGIN", requires = "foxglove")]
+    foxglove_origin: Vec<Origin>,
     #[command(flatten)]
     options: DeviceOptions,
 }
@@ -65,10 +73,16 @@ impl View {
             }
         };
         interrupt::listen(|| ())?;
+        let foxglove = self.foxglove;
+        let foxglove = foxglove.map(|port| Foxglove::bind(port, self.foxglove_origin));
+        let foxglove = foxglove.transpose()?;
         let served = Served::begin(feed, self.port, Folder::new(self.out.as_deref())?)?;
         let mut out = io::stdout();
         writeln!(out, "{}", served.address)?;
+        if let Some(foxglove) = &foxglove {
+            writeln!(out, "{}", foxglove.address)?;
+        }
         out.flush()?;
-        served.until(interrupt::is_interrupted)
+        served.with(foxglove).until(interrupt::is_interrupted)
     }
 }

@@ -46,7 +46,7 @@ impl LaserClock {
 
     /// The one that holds for a file, and a warning if that is not the file's: `wanted` comes
     /// before the file, and the paper's is for want of any. To the whole hertz they are the same.
-    pub(super) fn choose(wanted: Option<Self>, header: &Header) -> (Self, Option<String>) {
+    pub(crate) fn choose(wanted: Option<Self>, header: &Header) -> (Self, Option<String>) {
         let own = Self::of(header);
         match (wanted, own) {
             (Some(wanted), Some(own)) if own.millihertz / 1000 * 1000 == wanted.millihertz => {
@@ -66,6 +66,12 @@ impl LaserClock {
                 (assumed, Some(warning))
             }
         }
+    }
+
+    /// Laser cycles in a thousand seconds, as a header has them.
+    #[must_use]
+    pub fn millihertz(&self) -> u64 {
+        u64::try_from(self.millihertz).unwrap_or(u64::MAX)
     }
 
     /// Nanoseconds from the start of laser cycle 0 to that of `cycle`, rounded down.

@@ -107,12 +107,28 @@ pub struct Statistics {
     tail: u64,
     /// Events of blocks of pixels.
     blocks: u64,
-    /// Events from the start of the file to the end of the slice.
+    /// Events from the start of the file, or of the program, to the end of the slice.
     events_so_far: u64,
 }
 
+impl Statistics {
+    /// Of a slice that began at `time` and lasted so many nanoseconds, not 0, after which there
+    /// were so many events.
+    #[must_use]
+    pub fn over(self, time: u64, duration_ns: u64, events_so_far: u64) -> Self {
+        let duration_s = duration_ns as f64 / 1e9;
+        Self {
+            timestamp: Time::of(time),
+            duration_s,
+            events_per_s: self.events as f64 / duration_s,
+            events_so_far,
+            ..self
+        }
+    }
+}
+
 /// As Foxglove has it in JSON.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Time {
     sec: u32,
     nsec: u32,
@@ -183,17 +199,9 @@ impl Tally {
         Ok(())
     }
 
-    /// Ends a slice that began at `time`, and lasted so many nanoseconds, not 0.
-    pub fn end(&mut self, time: u64, duration_ns: u64) -> Statistics {
-        let duration_s = duration_ns as f64 / 1e9;
-        let now = std::mem::take(&mut self.now);
-        Statistics {
-            timestamp: Time::of(time),
-            duration_s,
-            events_per_s: now.events as f64 / duration_s,
-            events_so_far: self.so_far,
-            ..now
-        }
+    /// The counts of a slice, which ends.
+    pub fn take(&mut self) -> Statistics {
+        std::mem::take(&mut self.now)
     }
 
     /// All events.

@@ -124,7 +124,8 @@ impl Mcap {
         let end = begin.saturating_add(slice_ns).min(span.end_ns);
         let end = end.max(begin + 1);
         let time = span.start_ns + begin;
-        let statistics = self.tally.end(time, end - begin);
+        let statistics = self.tally.take();
+        let statistics = statistics.over(time, end - begin, self.tally.so_far());
         match self.statistics_channel {
             Some(channel) => self.write_message(channel, time, &serde_json::to_vec(&statistics)?),
             None => Ok(()),

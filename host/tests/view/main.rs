@@ -7,6 +7,7 @@ mod common;
 mod away;
 mod device;
 mod fast;
+mod foxglove;
 mod http;
 mod latency;
 mod nonsense;
@@ -22,12 +23,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use dtof::view::live::{Feed, Folder, Hub, Served};
+use dtof::view::live::{Feed, Folder, Foxglove, Hub, Served};
 
 /// A page that is served in this process until it is dropped.
 pub struct Live {
     /// Of this computer.
     pub port: u16,
+    /// Of Foxglove, if it is served.
+    pub foxglove: u16,
     /// What is known.
     pub hub: Arc<Hub>,
     stop: Arc<AtomicBool>,
@@ -38,16 +41,28 @@ impl Live {
     /// That of a feed; files go into a folder.
     #[must_use]
     pub fn of(feed: Feed, folder: Option<&Path>) -> Self {
+        Self::with(feed, folder, None)
+    }
+
+    /// The same, with Foxglove, whose data pages of these origins may read.
+    #[must_use]
+    pub fn with_foxglove(feed: Feed, folder: Option<&Path>, origins: &[&str]) -> Self {
+        let origins = origins.iter().map(|origin| origin.parse().unwrap());
+        let foxglove = Foxglove::bind(0, origins.collect()).unwrap();
+        Self::with(feed, folder, Some(foxglove))
+    }
+
+    fn with(feed: Feed, folder: Option<&Path>, foxglove: Option<Foxglove>) -> Self {
         let served = Served::begin(feed, 0, Folder::new(folder).unwrap()).unwrap();
-        let port = served
-            .address
-            .trim_end_matches('/')
-            .rsplit_once(':')
-            .unwrap();
-        let port = port.1.parse().unwrap();
+        let port = port(&served.address);
+        let foxglove_port = foxglove
+            .as_ref()
+            .map_or(0, |foxglove| crate::port(&foxglove.address));
+        let served = served.with(foxglove);
         let stop = Arc::new(AtomicBool::new(false));
         Self {
             port,
+            foxglove: foxglove_port,
             hub: Arc::clone(served.hub()),
             thread: Some(thread::spawn({
                 let stop = Arc::clone(&stop);
@@ -75,6 +90,12 @@ impl Drop for Live {
     fn drop(&mut self) {
         self.join();
     }
+}
+
+/// The port of an address.
+fn port(address: &str) -> u16 {
+    let port = address.trim_end_matches('/').rsplit_once(':').unwrap();
+    port.1.parse().unwrap()
 }
 
 /// Waits until something is so.

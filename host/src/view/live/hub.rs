@@ -3,6 +3,8 @@
 mod frame;
 mod pages;
 mod pixels;
+mod seen;
+mod slice;
 #[cfg(test)]
 mod tests;
 
@@ -23,7 +25,10 @@ use super::outputs::Recorded;
 pub use frame::MOST_PIXELS;
 use pages::Pages;
 pub use pages::{MOST_EVENTS, MOST_PAGES, Page};
+pub use pixels::Pixel;
 use pixels::Pixels;
+pub use seen::{Seen, Wanted};
+use slice::Slice;
 
 /// Where events come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -82,6 +87,8 @@ struct State {
     connection: Connection,
     pixels: Pixels,
     pages: Pages,
+    /// For those who are sent points, if there are any.
+    slice: Option<Slice>,
     /// Events since the beginning, and of these those of masked pixels.
     events: u64,
     masked: u64,
@@ -132,6 +139,7 @@ impl Hub {
             },
             pixels: Pixels::new(header.geometry),
             pages: Pages::default(),
+            slice: None,
             events: 0,
             masked: 0,
             rate: Rate {
@@ -196,6 +204,9 @@ impl Hub {
             let range_mm = range_mm as f32;
             state.pixels.add(event, range_mm);
             state.pages.add(event, range_mm, state.header.geometry);
+            if let Some(slice) = &mut state.slice {
+                slice.add(event);
+            }
         }
     }
 
@@ -286,7 +297,8 @@ impl Hub {
     pub fn kept(&self) -> [usize; 3] {
         let state = self.state();
         let [pixels, shots] = [state.pixels.len(), state.shots.len()];
-        [pixels, state.pages.kept(), shots]
+        let events = state.pages.kept() + state.slice.as_ref().map_or(0, Slice::len);
+        [pixels, events, shots]
     }
 }
 
@@ -298,9 +310,13 @@ impl State {
         }
         self.pixels.restart();
         self.pages.restart();
+        if let Some(slice) = &mut self.slice {
+            slice.restart(header.geometry);
+        }
         self.header = header;
         self.scale = RangeScale::new(header.bin_width_ps, header.offset_mm).ok();
         self.losses = Losses::default();
+        self.seconds = 0.0;
         self.shots.clear();
     }
 

@@ -1,7 +1,7 @@
 //! The live page: what a device or a recording does, in a browser on this computer.
 //!
 //! ```text
-//! device, recording → feed (a thread) → Hub → server → pages
+//! device, recording → feed (a thread) → Hub → server → pages, Foxglove
 //!                       ↑ commands               ↓
 //!                       └────────────────────────┘
 //! ```
@@ -10,6 +10,7 @@
 //! drawn is thinned, what is recorded never.
 
 mod feed;
+mod foxglove;
 mod hub;
 mod look;
 mod outputs;
@@ -24,6 +25,7 @@ use std::thread;
 use anyhow::{Context, Result, anyhow};
 
 pub use feed::{Device, Feed, Playback};
+pub use foxglove::{Foxglove, MOST_CLIENTS, Origin};
 pub use hub::{Hub, MOST_EVENTS, MOST_PAGES, MOST_PIXELS};
 pub use outputs::Folder;
 
@@ -38,6 +40,7 @@ pub struct Served {
     hub: Arc<Hub>,
     feed: Feed,
     folder: Folder,
+    foxglove: Option<Foxglove>,
 }
 
 impl Served {
@@ -57,7 +60,15 @@ impl Served {
             hub,
             feed,
             folder,
+            foxglove: None,
         })
+    }
+
+    /// Foxglove is served, too.
+    #[must_use]
+    pub fn with(mut self, foxglove: Option<Foxglove>) -> Self {
+        self.foxglove = foxglove;
+        self
     }
 
     /// What is known now.
@@ -77,6 +88,7 @@ impl Served {
             hub,
             feed,
             folder,
+            foxglove,
             ..
         } = self;
         let (commands, receiver) = mpsc::sync_channel(COMMANDS);
@@ -84,7 +96,7 @@ impl Served {
         let (served, ended) = thread::scope(|scope| {
             let (hub, stop) = (&hub, &stop);
             let thread = scope.spawn(move || feed.run(hub, &receiver, folder, stop));
-            let served = server::serve(listener, hub, commands, done);
+            let served = server::serve(listener, foxglove, hub, commands, done);
             stop.store(true, Ordering::Relaxed);
             (served, thread.join())
         });

@@ -9,6 +9,7 @@ mod guard;
 mod routes;
 
 use std::net::TcpListener as Listener;
+use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 use std::time::Duration;
@@ -22,6 +23,7 @@ use tokio::sync::Semaphore;
 use tokio_io_timeout::TimeoutStream;
 
 use super::feed::Command;
+use super::foxglove::{App as Clients, Foxglove, MOST_CLIENTS};
 use super::hub::Hub;
 use routes::App;
 
@@ -36,9 +38,10 @@ const STUCK: Duration = Duration::from_secs(10);
 /// How often it is asked whether it is done.
 const ASK: Duration = Duration::from_millis(50);
 
-/// Serves pages until `done` says so.
+/// Serves pages and Foxglove until `done` says so.
 pub fn serve(
     listener: Listener,
+    foxglove: Option<Foxglove>,
     hub: &Arc<Hub>,
     commands: SyncSender<Command>,
     done: impl Fn() -> bool,
@@ -56,17 +59,35 @@ pub fn serve(
     });
     runtime.block_on(async {
         let listener = TcpListener::from_std(listener)?;
-        let accepting = tokio::spawn(accept(listener, app));
+        tokio::spawn(accept(listener, CONNECTIONS, move |stream| {
+            answer_all(stream, Arc::clone(&app))
+        }));
+        if let Some(foxglove) = foxglove {
+            let clients = Arc::new(Clients::new(Arc::clone(hub), &foxglove));
+            foxglove.listener.set_nonblocking(true)?;
+            let listener = TcpListener::from_std(foxglove.listener)?;
+            tokio::spawn(Arc::clone(&clients).make_frames());
+            tokio::spawn(accept(listener, MOST_CLIENTS, move |stream| {
+                Arc::clone(&clients).serve(stream)
+            }));
+        }
         while !done() {
             tokio::time::sleep(ASK).await;
         }
-        accepting.abort();
         anyhow::Ok(())
     })
 }
 
-async fn accept(listener: TcpListener, app: Arc<App>) {
-    let room = Arc::new(Semaphore::new(CONNECTIONS));
+/// A connection whose reader is given up if it takes nothing.
+type Stream = Pin<Box<TimeoutStream<TcpStream>>>;
+
+/// Takes at most so many connections at a time, and has each served.
+async fn accept<F: Future<Output = ()> + Send + 'static>(
+    listener: TcpListener,
+    most: usize,
+    serve: impl Fn(Stream) -> F,
+) {
+    let room = Arc::new(Semaphore::new(most));
     loop {
         let Ok(place) = Arc::clone(&room).acquire_owned().await else {
             return;
@@ -76,18 +97,18 @@ async fn accept(listener: TcpListener, app: Arc<App>) {
             tokio::time::sleep(ASK).await;
             continue;
         };
-        let app = Arc::clone(&app);
+        let mut stream = TimeoutStream::new(stream);
+        stream.set_write_timeout(Some(STUCK));
+        let served = serve(Box::pin(stream));
         tokio::spawn(async move {
-            answer_all(stream, app).await;
+            served.await;
             drop(place);
         });
     }
 }
 
 /// Answers the requests of a connection.
-async fn answer_all(stream: TcpStream, app: Arc<App>) {
-    let mut stream = TimeoutStream::new(stream);
-    stream.set_write_timeout(Some(STUCK));
+async fn answer_all(stream: Stream, app: Arc<App>) {
     let service = service_fn(move |request| {
         let app = Arc::clone(&app);
         async move { anyhow::Ok(app.answer(request).await) }
@@ -96,7 +117,7 @@ async fn answer_all(stream: TcpStream, app: Arc<App>) {
         .timer(TokioTimer::new())
         .header_read_timeout(HEAD_TIME)
         .max_buf_size(HEAD)
-        .serve_connection(TokioIo::new(Box::pin(stream)), service);
+        .serve_connection(TokioIo::new(stream), service);
     // One that was broken off concerns nobody else.
     let _ = connection.await;
 }

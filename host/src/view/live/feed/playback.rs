@@ -72,9 +72,17 @@ impl Playback {
         }
     }
 
+    /// That of the file, with the rate at which it is played.
+    fn header(&self, at: &Position) -> Header {
+        Header {
+            laser_millihertz: self.clock.millihertz(),
+            ..at.header
+        }
+    }
+
     fn play(&self, work: &mut Work) -> Result<()> {
         let mut at = open(&self.file)?;
-        work.hub.begin_recording(at.header);
+        work.hub.begin_recording(self.header(&at));
         work.hub.connection("playing", "");
         let (mut plays, mut turn) = (true, Instant::now());
         while !work.is_stopped() {
@@ -137,7 +145,7 @@ impl Playback {
             Wish::Play(on) => {
                 if on && at.next.is_none() {
                     *at = open(&self.file)?;
-                    work.hub.begin_recording(at.header);
+                    work.hub.begin_recording(self.header(at));
                 }
                 *plays = on;
                 let state = if on { "playing" } else { "paused" };

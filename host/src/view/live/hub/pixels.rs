@@ -55,6 +55,11 @@ impl Pixels {
         &self.all
     }
 
+    /// The number of the last change.
+    pub fn changes(&self) -> u64 {
+        self.changes
+    }
+
     /// Laser cycles begin at 0 again.
     pub fn restart(&mut self) {
         for pixel in &mut self.all {

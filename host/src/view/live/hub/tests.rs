@@ -150,3 +150,46 @@ proptest! {
         prop_assert_eq!(seen, counts);
     }
 }
+
+#[test]
+fn events_wait_only_for_those_who_want_them_the_newest_and_all_are_counted() {
+    let hub = hub();
+    let all: Vec<Event> = (0..3).map(|pixel| event(pixel, 9)).collect();
+    hub.events(&all, 0);
+    let wanted = Wanted {
+        events: true,
+        pixels: None,
+    };
+    // Those of before nobody wanted.
+    assert!(hub.seen(wanted).events.is_empty());
+    hub.events(&all, 7);
+    let seen = hub.seen(wanted);
+    assert_eq!((seen.events.len(), seen.left_out), (3, 0));
+    assert_eq!((seen.arrived, seen.masked), (6, 7));
+    let most = crate::export::foxglove::MOST_POINTS;
+    let many: Vec<Event> = (0..most as u64 + 5).map(|cycle| event(1, cycle)).collect();
+    hub.events(&many, 0);
+    assert_eq!(hub.kept()[1], most);
+    let seen = hub.seen(wanted);
+    assert_eq!((seen.events.len(), seen.left_out), (most, 5));
+    assert_eq!(seen.events[0].cycle().0, 5);
+    let statistics = seen.statistics.over(0, 1, 0);
+    let statistics = serde_json::to_value(statistics).unwrap();
+    assert_eq!(statistics["events"], most + 5);
+    assert_eq!(statistics["pixels"], 1);
+    // Those that wait when laser cycles begin at 0 again are left out, and those of no pixel.
+    hub.events(&all, 0);
+    hub.begin_recording(Header {
+        bins: 128,
+        geometry: Geometry::new(2, 1),
+        bin_width_ps: U16F16::lit("250"),
+        offset_mm: I24F8::ZERO,
+        laser_millihertz: 0,
+        start_us: 0,
+    });
+    hub.events(&all, 0);
+    let seen = hub.seen(Wanted::default());
+    assert_eq!((seen.events.len(), seen.left_out), (2, 4));
+    hub.events(&all, 0);
+    assert_eq!(hub.kept()[1], 0);
+}

@@ -1,0 +1,158 @@
+//! Who may connect: programs of this computer, and pages of Foxglove.
+//!
+//! A browser lets the pages of all sites connect to this computer, and says of which site a page
+//! is. It also says which name led to this computer: one of another site may have been led here.
+
+use std::str::FromStr;
+
+use hyper::header::{HOST, HeaderMap, HeaderValue, ORIGIN};
+
+/// Foxglove in a browser, and as a program of its own whose pages are files.
+const KNOWN: [&str; 2] = ["https://app.foxglove.dev", "file://"];
+
+/// Where pages come from, as browsers say: `https://example.com`, `http://localhost:8080`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Origin(String);
+
+impl FromStr for Origin {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let wrong = "must be http://HOST, https://HOST, or the same with :PORT";
+        let host = text.strip_prefix("http://");
+        let host = host
+            .or_else(|| text.strip_prefix("https://"))
+            .ok_or(wrong)?;
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-._:[]".contains(c);
+        if host.is_empty() || !host.chars().all(is_plain) {
+            return Err(wrong);
+        }
+        Ok(Self(text.to_ascii_lowercase()))
+    }
+}
+
+/// Origins whose pages may connect.
+pub struct Origins(Vec<String>);
+
+impl Origins {
+    /// Foxglove's, and these.
+    pub fn new(more: &[Origin]) -> Self {
+        let known = KNOWN.map(str::to_owned);
+        Self(
+            known
+                .into_iter()
+                .chain(more.iter().map(|origin| origin.0.clone()))
+                .collect(),
+        )
+    }
+
+    /// Checks the head of a request.
+    ///
+    /// # Errors
+    /// Why it is refused, in a line.
+    pub fn check(&self, headers: &HeaderMap<HeaderValue>) -> Result<(), String> {
+        let host = only(headers.get_all(HOST).iter())?.unwrap_or_default();
+        let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
+        if !["127.0.0.1", "localhost"].contains(&name) {
+            return Err("this server is 127.0.0.1 and localhost only".to_owned());
+        }
+        match only(headers.get_all(ORIGIN).iter())? {
+            // No browser.
+            None => Ok(()),
+            Some(origin) if self.0.iter().any(|known| known == origin) => Ok(()),
+            Some(origin) => {
+                let hint = match Origin::from_str(origin) {
+                    Ok(_) => format!("; --foxglove-origin {origin} would let it"),
+                    Err(_) => String::new(),
+                };
+                Err(format!("a page of {origin} may not read{hint}"))
+            }
+        }
+    }
+}
+
+/// The only value of a header.
+fn only<'a>(mut values: impl Iterator<Item = &'a HeaderValue>) -> Result<Option<&'a str>, String> {
+    let value = values.next();
+    let text = value.map(HeaderValue::to_str).transpose();
+    match (text, values.next()) {
+        (Ok(text), None) => Ok(text),
+        _ => Err("a header makes no sense".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hyper::header::HeaderName;
+
+    fn is_let_in(headers: &[(&'static str, &'static str)]) -> bool {
+        let headers = headers.iter().map(|&(name, value)| {
+            (
+                HeaderName::from_static(name),
+                HeaderValue::from_static(value),
+            )
+        });
+        let mut all = HeaderMap::new();
+        for (name, value) in headers {
+            all.append(name, value);
+        }
+        let more = ["http://localhost:8080".parse().unwrap()];
+        Origins::new(&more).check(&all).is_ok()
+    }
+
+    #[test]
+    fn programs_and_pages_of_foxglove_are_let_in_and_no_others() {
+        let here = ("host", "127.0.0.1:8765");
+        for headers in [
+            vec![here],
+            vec![("host", "localhost:9000")],
+            vec![here, ("origin", "https://app.foxglove.dev")],
+            vec![here, ("origin", "file://")],
+            vec![here, ("origin", "http://localhost:8080")],
+        ] {
+            assert!(is_let_in(&headers), "{headers:?}");
+        }
+        for headers in [
+            vec![],
+            vec![("host", "example.com:8765")],
+            vec![("host", "127.0.0.1.example.com")],
+            vec![here, ("host", "localhost")],
+            vec![here, ("origin", "null")],
+            vec![here, ("origin", "")],
+            vec![here, ("origin", "http://127.0.0.1:8765")],
+            vec![here, ("origin", "http://app.foxglove.dev")],
+            vec![here, ("origin", "https://app.foxglove.dev.example.com")],
+            vec![here, ("origin", "http://localhost:8081")],
+            vec![
+                here,
+                ("origin", "file://"),
+                ("origin", "http://example.com"),
+            ],
+        ] {
+            assert!(!is_let_in(&headers), "{headers:?}");
+        }
+    }
+
+    #[test]
+    fn an_origin_is_what_browsers_say() {
+        for good in [
+            "http://localhost:8080",
+            "https://example.com",
+            "http://[::1]:80",
+        ] {
+            assert!(good.parse::<Origin>().is_ok(), "{good}");
+        }
+        for bad in [
+            "",
+            "*",
+            "null",
+            "example.com",
+            "https://",
+            "https://a/b",
+            "http://a b",
+        ] {
+            assert!(bad.parse::<Origin>().is_err(), "{bad}");
+        }
+    }
+}
