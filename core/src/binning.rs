@@ -45,7 +45,7 @@ use crate::config::PixelConfig;
 use crate::detect::DetectionRule;
 use crate::event::DepthEvent;
 use crate::histogram::counter::Count16;
-use crate::pixel::{AsyncPixel, Look};
+use crate::pixel::{AsyncPixel, Decided, Look};
 use crate::statistics::Statistics;
 use crate::units::{BlockLevel, LaserCycle, PixelAddress};
 
@@ -260,12 +260,27 @@ pub fn end_laser_cycles_of_blocks<const BINS: usize, R: DetectionRule>(
     last: LaserCycle,
     cycles: u16,
 ) -> bool {
+    end_laser_cycles_of_blocks_seen(blocks, config, statistics, last, cycles, |_, _| ())
+}
+
+/// The same, and shows for each event the number of its block among these, and what it is
+/// decided from.
+pub fn end_laser_cycles_of_blocks_seen<const BINS: usize, R: DetectionRule>(
+    blocks: &mut [impl AsMut<Block<BINS>>],
+    config: &PixelConfig<BINS, R>,
+    statistics: &mut Statistics,
+    last: LaserCycle,
+    cycles: u16,
+    mut see: impl FnMut(usize, Decided<'_, BINS, Count16>),
+) -> bool {
     let mut fired = false;
-    for block in blocks {
+    for (number, block) in blocks.iter_mut().enumerate() {
         let block = block.as_mut();
         let look = block
             .pixel
-            .end_laser_cycles(config, statistics, last, cycles);
+            .end_laser_cycles_seen(config, statistics, last, cycles, |decided| {
+                see(number, decided);
+            });
         if look == Look::Event {
             block.feed.reported();
             fired = true;

@@ -86,7 +86,10 @@ pub use fixed;
 
 pub use aer::{AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord};
 pub use array::Array;
-pub use binning::{Binning, Block, BlockPlace, Feed, count_in_blocks, end_laser_cycles_of_blocks};
+pub use binning::{
+    Binning, Block, BlockPlace, Feed, count_in_blocks, end_laser_cycles_of_blocks,
+    end_laser_cycles_of_blocks_seen,
+};
 pub use config::{ConfigError, PixelConfig, PixelConfigBuilder};
 pub use depth::{CentredWindow, Depth, DepthEstimator, RangeScale, RangeScaleError, centroid};
 pub use detect::{
@@ -104,7 +107,7 @@ pub use histogram::counter::{Count10, Count16, Count24, CounterWidth, PhotonCoun
 pub use histogram::gate::{GateError, RangeGate};
 pub use histogram::peeled::PeeledBins;
 pub use histogram::{Histogram, Peak};
-pub use pixel::{AsyncPixel, Look};
+pub use pixel::{AsyncPixel, Decided, Look};
 pub use statistics::Statistics;
 pub use units::{
     BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,

@@ -1,21 +1,22 @@
 """Reports of `dtof` in a real browser, for the test `report` of `dtof-host-tests`.
 
-Arguments: the browser, the folder for the pictures, the report of a static scene, that of a
-moving one with more events than a report shows, and that of a large array. Ends with an error at the first thing that is
-not as it should be.
+Arguments: the browser, the folder for the pictures, the reports of a static scene, of a moving
+one with more events than a report shows, of a large array, of a target that moves before few
+pixels, and of a single pixel. Ends with an error at the first thing that is not as it should be.
 """
 
 import base64
+import csv
 import json
+import math
 import shutil
-import struct
 import sys
 from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
 MOST_BYTES = 5_000_000
-SCRIPTS = Path(__file__).parent.parent.parent / "host/src/view/report"
+SCRIPTS = Path(__file__).parent.parent.parent / "host/src/view"
 
 
 def check(what, holds):
@@ -127,9 +128,9 @@ def turns(report):
         report.changes(f"the view {view}", page.locator(f"[data-view={view}]").click)
     page.locator("[data-view=reset]").click()
     check("Reset gives back the first picture", report.picture() == first)
-    report.changes("the laser cycle as third axis", lambda: page.select_option("#third", "cycle"))
+    report.changes("the time as third axis", lambda: page.select_option("#third", "cycle"))
     label = cloud.get_attribute("aria-label")
-    check("the label names the third axis", "column, row and laser cycle," in label)
+    check("the label names the third axis", "column, row and time," in label)
     page.select_option("#third", "range")
     check("and the other", "row and range," in cloud.get_attribute("aria-label"))
     report.changes("leaving out what is far", lambda: page.locator("#far").fill("50"))
@@ -183,6 +184,153 @@ def shows_spikes(report):
     page.locator("[data-view=reset]").click()
 
 
+def rows_of(path):
+    """The events of the run, pixels of the demo's 64 columns among those of their blocks."""
+    with open(path.parent / "events.csv") as file:
+        return [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+
+
+def tenths(number):
+    """A number as the page writes it: away from zero where both are as near."""
+    return f"{math.floor(number * 10 + 0.5) / 10:,.1f}".removesuffix(".0")
+
+
+def events_of(rows, pixel, columns):
+    def holds(row):
+        first, level = int(row["pixel"]), int(row["level"])
+        return all(
+            here >> level == there >> level
+            for here, there in zip(divmod(pixel, columns), divmod(first, columns))
+        )
+
+    return [row for row in rows if holds(row)]
+
+
+def shows_a_pixel(report, path, columns, pixels):
+    """The chosen pixel's numbers are those of events.csv."""
+    page, rows = report.page, rows_of(path)
+    for pixel in pixels:
+        report.run(f"choose({pixel})")
+        report.settle()
+        expected = events_of(rows, pixel, columns)
+        found = report.run("chosen.events")
+        check(f"pixel {pixel} has its {len(expected)} events", len(found) == len(expected) > 0)
+        names = {"cycle": "cycle", "exposure": "exposure", "flags": "flags", "level": "level"}
+        names |= {"echo": "echo", "peak": "peak_count"}
+        for here, there in names.items():
+            same = [event[here] for event in found] == [row[there] for row in expected]
+            check(f"{there} of each is that of events.csv", same)
+        off = max(abs(event["range"] - row["range_mm"]) for event, row in zip(found, expected))
+        check(f"ranges are those of events.csv (off by {off})", off < 0.001)
+        shot, last = report.run("chosen.decision"), max(row["cycle"] for row in expected)
+        row = next(row for row in expected if (row["cycle"], row["level"]) == (last, shot["level"]))
+        check("the histogram is that of the last event", shot["cycle"] == last)
+        check("of its range", abs(shot["range"] - row["range_mm"]) < 0.001)
+        bin, photons = shot["look"]["peak"]
+        check("its peak is the event's", (bin, photons) == (row["peak_bin"], row["peak_count"]))
+        check("and in the histogram", shot["counts"][bin] == photons)
+        check("the range lies at the peak", abs(row["depth_bins"] - bin - 0.5) <= 3)
+        check("the rule needs no more", shot["look"]["needed"] <= photons)
+        check("the background is the event's", abs(shot["look"]["background"] - row["background"]) <= 0.5)
+        note = page.locator("#histogram-note").inner_text()
+        text = f"{tenths(row['range_mm'])} mm. Peak: {photons:,.0f} photons in bin {bin};"
+        check(f"the text says so: {text}", text in note)
+        first = page.locator("#events tbody tr").first.locator("td").all_inner_texts()
+        check(f"the table begins with it {first}", first[1] == f"{int(last):,}")
+
+
+def chooses_pixels(report):
+    page, place = report.page, report.page.locator("#map")
+    place.scroll_into_view_if_needed()
+    box = place.bounding_box()
+    page.mouse.click(box["x"] + box["width"] * 0.5, box["y"] + box["height"] * 0.5)
+    name = page.locator("#pixel-name").evaluate("e => e.value")
+    middle = report.run("Math.floor(data.rows / 2) * data.columns + data.columns / 2")
+    check(f"a click in the map chooses pixel {name}", report.run("chosen.pixel") == middle)
+    for key, by in [("ArrowRight", 1), ("ArrowDown", 64), ("ArrowLeft", -1), ("ArrowUp", -64)]:
+        before = report.run("chosen.pixel")
+        page.keyboard.press(key)
+        check(f"the key {key} chooses the next", report.run("chosen.pixel") == before + by)
+    report.settle()
+    drawn = "document.getElementById('{}').toDataURL()"
+    both = [report.run(drawn.format(id)) for id in ["histogram", "ranges"]]
+    page.keyboard.press("ArrowRight")
+    report.settle()
+    check("both plots are another's", all(
+        before != report.run(drawn.format(id)) for before, id in zip(both, ["histogram", "ranges"])
+    ))
+
+
+def last_map(path):
+    """The range of each pixel's last event, by the events alone: one of a block stands for
+    those of its pixels that reported no finer one in its exposure, and the first echo counts."""
+    ranges, ends = {}, {}
+    for row in rows_of(path):
+        if row["echo"] > 1:
+            continue
+        level, end = int(row["level"]), row["cycle"] + 1
+        y, x = divmod(int(row["pixel"]), 64)
+        for pixel in (64 * j + i for j in range(y, y + 2**level) for i in range(x, x + 2**level)):
+            finer = [ends.get((pixel, below), 0) for below in range(level)]
+            if all(other <= end - row["exposure"] for other in finer):
+                ends[pixel, level], ranges[pixel] = end, row["range_mm"]
+    return ranges
+
+
+def maps_time(report, path):
+    """The map at the end is that of the events; before, that of the time."""
+    expected = last_map(path)
+    found = report.run("(mapUntil(data.cycles), [...pixels.range].map((mm) => (isNaN(mm) ? null : mm)))")
+    off = [pixel for pixel, mm in enumerate(found) if abs((mm or 0) - expected.get(pixel, 0)) > 0.01]
+    check(f"the map at the end is that of events.csv {off}", not off)
+    half = report.run("(mapUntil(400), [...pixels.range].filter((mm) => !isNaN(mm)).length)")
+    check("early on, fewer pixels have a range", 0 < half < len(expected))
+    again = report.run("(mapUntil(data.cycles), [...pixels.range].map((mm) => (isNaN(mm) ? null : mm)))")
+    check("and at the end again the same", again == found)
+
+
+def plays_a_move(report, path, columns):
+    """While it plays, map, plots and text have the range of the time."""
+    page, pixel = report.page, report.run("chosen.pixel")
+    expected = events_of(rows_of(path), pixel, columns)
+    page.select_option("#width", index=3)
+    seen = []
+    for place in [20, 100, 180]:
+        page.locator("#start").fill(str(place))
+        report.settle()
+        end = report.run("shown.end")
+        last = [row for row in expected if row["cycle"] < end][-1]
+        note = page.locator("#ranges-note").inner_text()
+        check(f"the range at the time: {note}", f": {tenths(last['range_mm'])} mm, of" in note)
+        seen.append((last["range_mm"], report.run("document.getElementById('ranges').toDataURL()")))
+    ranges = [mm for mm, _ in seen]
+    check(f"the target has moved {ranges}", max(ranges) - min(ranges) > 200)
+    check("the cursor as well", len({picture for _, picture in seen}) == 3)
+    page.select_option("#width", index=0)
+
+
+def shows_few(report, path, columns, count):
+    """Plots, not squares."""
+    page = report.page
+    check("no cloud and no map", not page.locator("#cloud").is_visible() and not page.locator("#map").is_visible())
+    check("no pictures of squares", page.locator("figure svg").count() == 0)
+    plots = page.locator("#few button")
+    check(f"{count} plots", plots.count() == count)
+    check("a table of pixels", page.locator("h2", has_text="Pixels").count() == 1)
+    if count == 1:
+        check("one plot is enough", not page.locator("#few").is_visible())
+        return
+    plots.nth(1).click()
+    check("a click chooses a pixel", report.run("chosen.pixel") == 1)
+    page.keyboard.press("ArrowDown")
+    check("an arrow key the one below", report.run("chosen.pixel") == 1 + columns)
+    check("its plot says so", plots.nth(1 + columns).get_attribute("aria-pressed") == "true")
+    texts = plots.all_inner_texts()
+    rows = rows_of(path)
+    counts = [len(events_of(rows, pixel, columns)) for pixel in range(count)]
+    check(f"each with its events {counts}", all(f": {n:,} events" in text for n, text in zip(counts, texts)))
+
+
 def is_named(report):
     nameless = report.run(
         """[...document.querySelectorAll("button, input, select, canvas, output")]
@@ -216,13 +364,28 @@ def is_closed(report):
     report.complaints.clear()
 
 
-def page_of(browser, data, records):
-    """A page with these events and the scripts that place them, and nothing else."""
-    data |= {"sides": ["column", "row"], "events": "events"}
-    data |= {"colours": "000000" * 256, "records": base64.b64encode(records).decode()}
+def packed(numbers):
+    """Numbers as the page reads them: digits of three bits, the lowest first, two a byte."""
+    digits = []
+    for number in numbers:
+        while number > 7:
+            digits.append(number & 7 | 8)
+            number >>= 3
+        digits.append(number)
+    digits += [0] * (len(digits) % 2)
+    pairs = zip(digits[::2], digits[1::2])
+    return base64.b64encode(bytes(low | high << 4 for low, high in pairs)).decode()
+
+
+def page_of(browser, data, events):
+    """A page with these events (since the one before, pixel, level, echo, range) and the scripts
+    that place them, and nothing else."""
+    numbers = [(since, pixel, level << 2 | echo - 1, 40, mm * 512, 9) for since, pixel, level, echo, mm in events]
+    data |= {"sides": ["column", "row"], "events": "events", "laserHz": 1000, "histograms": None}
+    data |= {"colours": "000000" * 256, "packed": packed(sum(numbers, ())), "count": len(events)}
     page = browser.new_page()
     page.set_content(f'<script type="application/json" id="data">{json.dumps(data)}</script>')
-    for script in ["helpers.js", "events.js", "projection.js"]:
+    for script in ["shared/helpers.js", "report/events.js", "shared/projection.js"]:
         page.add_script_tag(content=(SCRIPTS / script).read_text())
     return page
 
@@ -230,9 +393,9 @@ def page_of(browser, data, records):
 def places_are_true(browser):
     """Ranges beyond the colours, too: the axis is linear over all of them."""
     ranges = [500, 1000, 2000, 9000]
-    records = b"".join(struct.pack("<IfHB", at, mm, 0, 0x01) for at, mm in enumerate(ranges))
-    data = {"columns": 1, "rows": 1, "cycles": 4, "unit": 1, "oneOf": 1, "low": 1000, "high": 2000}
-    page = page_of(browser, data, records)
+    events = [(1 if at > 0 else 0, 0, 0, 1, mm) for at, mm in enumerate(ranges)]
+    data = {"columns": 1, "rows": 1, "cycles": 4, "oneOf": 1, "low": 1000, "high": 2000}
+    page = page_of(browser, data, events)
     found = page.evaluate(
         """() => {
             Object.assign(view, VIEWS.side, { third: "range" });
@@ -252,10 +415,10 @@ def places_are_true(browser):
 
 def blocks_are_as_large_as_their_pixels(browser):
     """On 5x3 pixels: a pixel, blocks of each level, and one that the array cuts."""
-    events = [(7, 0x01), (2, 0x11), (0, 0x22), (0, 0x33), (14, 0x14)]
-    records = b"".join(struct.pack("<IfHB", 9, 1000, *event) for event in events)
-    data = {"columns": 5, "rows": 3, "cycles": 10, "unit": 1, "oneOf": 1, "low": 900, "high": 1100}
-    page = page_of(browser, data, records)
+    events = [(7, 0, 1), (2, 1, 1), (0, 2, 2), (0, 3, 3), (14, 1, 4)]
+    events = [(0, *event, 1000) for event in events]
+    data = {"columns": 5, "rows": 3, "cycles": 10, "oneOf": 1, "low": 900, "high": 1100}
+    page = page_of(browser, data, events)
     found = page.evaluate(
         """() => {
             Object.assign(view, VIEWS.front, { third: "range" });
@@ -267,7 +430,7 @@ def blocks_are_as_large_as_their_pixels(browser):
                 places.push([(x - left) / cell, (y - top) / cell, wide, high]));
             const pixels = [...Array(15).keys()];
             const of = places.map((place, event) => pixels.filter((pixel) => isOf(event, pixel)));
-            return { places, of, names: places.map((place, event) => kindName(event)) };
+            return { places, of, names: places.map((place, event) => kindName(eventOf(event))) };
         }"""
     )
     middles = [[2.5, 1.5, 1, 1], [3, 1, 2, 2], [2, 1.5, 4, 3], [2.5, 1.5, 5, 3], [4.5, 2.5, 1, 1]]
@@ -275,15 +438,16 @@ def blocks_are_as_large_as_their_pixels(browser):
     check("the point of a block lies in its middle", max(abs(a - b) for a, b in pairs) < 1e-6)
     four = [0, 1, 2, 3, 5, 6, 7, 8, 10, 11, 12, 13]
     check("a block has its pixels", found["of"] == [[7], [2, 3, 7, 8], four, list(range(15)), [14]])
-    names = ["column 2, row 1, echo 1", "2x2 block from column 2, row 0, echo 1"]
-    names += ["4x4 block from column 0, row 0, echo 2", "8x8 block from column 0, row 0, echo 3"]
-    names += ["2x2 block from column 4, row 2, echo 4"]
+    names = ["column 2, row 1, echo 1", "2×2 block from column 2, row 0, echo 1"]
+    names += ["4×4 block from column 0, row 0, echo 2", "8×8 block from column 0, row 0, echo 3"]
+    names += ["2×2 block from column 4, row 2, echo 4"]
     check("it says which block and echo it is", found["names"] == names)
     page.close()
 
 
-def main(chromium, pictures, static, moving, large):
-    pictures, static, moving, large = map(Path, (pictures, static, moving, large))
+def main(chromium, pictures, *reports):
+    pictures = Path(pictures)
+    static, moving, large, few, single = map(Path, reports)
     with sync_playwright() as driver:
         # Root, as in a container, has no sandbox.
         browser = driver.chromium.launch(executable_path=shutil.which(chromium), args=["--no-sandbox"])
@@ -303,10 +467,15 @@ def main(chromium, pictures, static, moving, large):
             turns(report)
             moves_in_time(report)
             shows_spikes(report)
+            chooses_pixels(report)
+            shows_a_pixel(report, static, 64, [942, 942 - 64 * 9, 20 * 64 + 5, 31 * 64 + 63])
+            maps_time(report, static)
             is_named(report)
         with Report(browser, static) as report:
             shot = pictures / "report.png"
-            report.page.locator("#interactive section").first.screenshot(path=shot)
+            top = report.page.locator(".panels").bounding_box()
+            size = {"x": 0, "y": 0, "width": 1100, "height": top["y"] + 760}
+            report.page.screenshot(path=shot, full_page=True, clip=size)
             report.page.screenshot(path=pictures / "light.png", full_page=True)
             is_closed(report)
             report.requests[:] = report.requests[:1]
@@ -326,6 +495,23 @@ def main(chromium, pictures, static, moving, large):
             text = report.page.locator("#cloud-hint").inner_text()
             check("says that not all events are shown", " events shown: " in text)
             check("drawn in colours", report.colours() > 50)
+
+            note = report.page.locator("#histogram-note").inner_text
+            report.run("choose(256 * 8 + 8)")
+            check("a pixel of the grid has its histogram", note().startswith("Histogram of the last event"))
+            report.run("choose(256 * 8 + 9)")
+            check("another one says where the next is", "every 4 columns and rows. The next is that of column 8, row 8." in note())
+
+        print("few pixels")
+        for path, columns, count in [(few, 3, 9), (single, 1, 1)]:
+            with Report(browser, path, color_scheme="dark") as report:
+                shows_few(report, path, columns, count)
+                shows_a_pixel(report, path, columns, range(count))
+                plays_a_move(report, path, columns)
+                is_named(report)
+        with Report(browser, few, width=390, height=740, has_touch=True) as report:
+            report.width_is(390)
+            report.page.screenshot(path=pictures / "few-narrow.png", full_page=True)
 
         print("dark")
         with Report(browser, static, color_scheme="dark") as report:

@@ -37,8 +37,11 @@
 //! Source: the flow chart of the paper's section II-B. The slot is its REQ (section IV-A);
 //! ACK is ours, as is what happens while the link is busy.
 
+mod count;
+mod decided;
 mod look;
 
+pub use self::decided::Decided;
 pub use self::look::Look;
 use self::look::State;
 use crate::config::PixelConfig;
@@ -46,7 +49,7 @@ use crate::detect::{Detection, DetectionRule};
 use crate::event::DepthEvent;
 use crate::flags::Flags;
 use crate::histogram::Histogram;
-use crate::histogram::counter::{Count10, CounterWidth, PhotonCount};
+use crate::histogram::counter::{Count10, CounterWidth};
 use crate::histogram::peeled::PeeledBins;
 use crate::statistics::Statistics;
 use crate::units::{
@@ -111,32 +114,6 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         pixel
     }
 
-    /// Counts one photon with the TDC code `code` in the present laser cycle.
-    #[inline]
-    pub fn count<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, code: u16) {
-        let gated_out = self.histogram.add_gated(code, config.gate());
-        self.leave_out(gated_out);
-    }
-
-    /// Counts one photon for each TDC code, as [`Self::count`] does.
-    #[inline]
-    pub fn count_batch<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, codes: &[u16]) {
-        let gated_out = self.histogram.add_gated_batch(codes, config.gate());
-        self.leave_out(gated_out);
-    }
-
-    /// Counts the photons of a whole mini-frame, a histogram over one or more
-    /// laser cycles. Follow it by [`Self::end_laser_cycles`] with as many.
-    #[inline]
-    pub fn count_frame<R: DetectionRule, C: PhotonCount>(
-        &mut self,
-        config: &PixelConfig<BINS, R>,
-        frame: &[C; BINS],
-    ) {
-        let gated_out = self.histogram.add_frame(frame, config.gate());
-        self.leave_out(gated_out);
-    }
-
     /// Ends laser cycle `cycle`, and looks if X have passed since the last look.
     /// `statistics` are those of the array.
     #[inline]
@@ -162,13 +139,27 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         last: LaserCycle,
         cycles: u16,
     ) -> Look {
+        self.end_laser_cycles_seen(config, statistics, last, cycles, |_| ())
+    }
+
+    /// The same, and shows what an event is decided from, if there is one: right after it the
+    /// pixel starts over.
+    #[inline]
+    pub fn end_laser_cycles_seen<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+        last: LaserCycle,
+        cycles: u16,
+        see: impl FnOnce(Decided<'_, BINS, W>),
+    ) -> Look {
         // An exposure stuck at the top is at least L2, and so expires.
         self.exposure = self.exposure.saturating_add(cycles);
         self.since_look = self.since_look.saturating_add(cycles);
         if self.since_look < config.x() {
             return Look::NotDue;
         }
-        self.look(config, statistics, last)
+        self.look(config, statistics, last, see)
     }
 
     /// Checks N and decides.
@@ -178,13 +169,14 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         config: &PixelConfig<BINS, R>,
         statistics: &mut Statistics,
         cycle: LaserCycle,
+        see: impl FnOnce(Decided<'_, BINS, W>),
     ) -> Look {
         self.since_look = 0;
         if self.exposure <= config.l1() {
             return Look::TooEarly;
         }
         if self.state != State::NONE {
-            return self.look_further(config, statistics, cycle);
+            return self.look_further(config, statistics, cycle, see);
         }
         if self.exposure >= config.l2() {
             statistics.expired += 1;
@@ -194,6 +186,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         let Some(detection) = config.detect(&self.histogram) else {
             return Look::NoPeak;
         };
+        see(Decided::plainly(&self.histogram));
         self.report(config, statistics, cycle, &detection)
     }
 
@@ -205,6 +198,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         config: &PixelConfig<BINS, R>,
         statistics: &mut Statistics,
         cycle: LaserCycle,
+        see: impl FnOnce(Decided<'_, BINS, W>),
     ) -> Look {
         let mut longest = config.l2();
         if self.state.contains(State::PEELED) {
@@ -226,6 +220,11 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         let Some(detection) = config.detect_further(&self.histogram, expected, &self.peeled) else {
             return Look::NoPeak;
         };
+        see(Decided {
+            histogram: &self.histogram,
+            expected,
+            peeled: self.peeled,
+        });
         self.report(config, statistics, cycle, &detection)
     }
 
@@ -377,15 +376,6 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         let histogram = &self.histogram;
         let counted = u64::from(histogram.total()) + u64::from(histogram.saturated());
         counted + u64::from(self.gated_out) + u64::from(self.held)
-    }
-
-    /// Counts photons that the gate left out.
-    #[inline(always)]
-    fn leave_out(&mut self, photons: u32) {
-        // Most often none.
-        if photons > 0 {
-            self.gated_out = self.gated_out.wrapping_add(photons);
-        }
     }
 
     /// Begins a new exposure.

@@ -17,14 +17,23 @@ use crate::{dtof, python, root, succeed, wanted};
 const MOST_BYTES: u64 = 300_000;
 
 /// The reports of a static scene, of a moving one with more events than a report shows,
-/// and of an array whose maps leave room for fewer.
-const REPORTS: [(&str, &str); 3] = [
+/// of an array whose maps leave room for fewer, and of few pixels and one before a target that
+/// moves.
+const REPORTS: [(&str, &str); 5] = [
     ("static", "demo --quiet --out"),
     (
         "moving",
         "simulate --quiet --scene scenes/fan.toml --cycles 100000 --alpha 8 --dynamic-depth --out",
     ),
     ("large", "demo --quiet --array 256x256 --cycles 2000 --out"),
+    (
+        "few",
+        "simulate --quiet --scene host-tests/report/approach.toml --alpha 8 --out",
+    ),
+    (
+        "single",
+        "simulate --quiet --scene host-tests/report/approach.toml --array 1x1 --alpha 8 --out",
+    ),
 ];
 
 #[test]

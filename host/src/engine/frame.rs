@@ -5,13 +5,17 @@
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    Count, Count16, DepthEstimator, DepthEvent, Histogram, LaserCycle, PaperRule, PixelAddress,
-    RangeGate, Statistics, detect,
+    Count, Count16, Decided, DepthEstimator, DepthEvent, Histogram, LaserCycle, PaperRule,
+    PeeledBins, PixelAddress, RangeGate, Statistics, detect,
 };
 
+use super::decisions::{Decision, LastDecision};
 use crate::engine::Engine;
 use crate::engine::settings::Settings;
 use crate::input::source::Slice;
+
+/// Whatever stands above the background.
+pub const ANY: PaperRule = PaperRule::new(U8F8::ZERO, Count::saturating(1));
 
 /// One pixel, with 16-bit counters, as frames may be long.
 #[derive(Clone, Debug)]
@@ -25,6 +29,8 @@ pub struct FramePixel<const BINS: usize> {
     /// Photons of the frame that the gate left out.
     gated_out: u32,
     statistics: Statistics,
+    /// If it is to be kept.
+    last: Option<Box<LastDecision<BINS>>>,
 }
 
 impl<const BINS: usize> FramePixel<BINS> {
@@ -38,6 +44,7 @@ impl<const BINS: usize> FramePixel<BINS> {
             histogram: Histogram::new(),
             gated_out: 0,
             statistics: Statistics::default(),
+            last: None,
         }
     }
 
@@ -65,16 +72,24 @@ impl<const BINS: usize> FramePixel<BINS> {
             return None;
         }
         self.first = cycle + 1;
-        let any = PaperRule::new(U8F8::ZERO, Count::saturating(1));
-        let found = detect(&self.histogram, gate, &any, estimator);
+        let found = detect(&self.histogram, gate, &ANY, estimator);
+        let event = found.map(|found| found.event(self.address, LaserCycle(cycle), self.length));
+        if let (Some(last), Some(event)) = (&mut self.last, event) {
+            last.see(&Decided {
+                histogram: &self.histogram,
+                expected: None,
+                peeled: PeeledBins::NONE,
+            });
+            last.report(event);
+        }
         self.statistics = self.statistics();
         self.histogram.clear();
         self.gated_out = 0;
-        match found {
+        match event {
             Some(_) => self.statistics.events += 1,
             None => self.statistics.expired += 1,
         }
-        Some(found?.event(self.address, LaserCycle(cycle), self.length))
+        event
     }
 
     /// Its counts so far, the frame that has not ended included.
@@ -136,5 +151,16 @@ impl<const BINS: usize> Engine for FrameEngine<BINS> {
             sum += pixel.statistics();
         }
         [sum, Statistics::default()]
+    }
+
+    fn keep_decisions(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+        for pixel in &mut self.pixels {
+            pixel.last = LastDecision::room(is_wanted(pixel.address));
+        }
+    }
+
+    fn decisions(&self) -> Vec<Decision> {
+        let all = self.pixels.iter().filter_map(|pixel| pixel.last.as_ref());
+        all.filter_map(|last| last.decision()).collect()
     }
 }

@@ -4,11 +4,13 @@
 
 use anyhow::{Context, Result};
 use dtof_core::{
-    AnyRule, Array, AsyncPixel, Binning, Block, BlockLevel, BlockPlace, DepthEvent, Feed,
-    LaserCycle, PixelAddress, PixelConfig, Statistics, count_in_blocks, end_laser_cycles_of_blocks,
+    AnyRule, Array, AsyncPixel, Binning, Block, BlockLevel, BlockPlace, Count16, Decided,
+    DepthEvent, Feed, LaserCycle, PixelAddress, PixelConfig, Statistics, count_in_blocks,
+    end_laser_cycles_of_blocks_seen,
 };
 use dtof_link::AdaptiveBinning;
 
+use super::decisions::{Decision, LastDecision};
 use crate::input::source::{Geometry, PixelPhotons};
 
 /// The configurations of pixels and blocks.
@@ -29,6 +31,8 @@ struct Member<const BINS: usize> {
     number: usize,
     pixel: AsyncPixel<BINS>,
     feed: Option<Feed>,
+    /// If it is to be kept.
+    last: Option<Box<LastDecision<BINS>>>,
 }
 
 impl<const BINS: usize> Member<BINS> {
@@ -71,11 +75,36 @@ impl<const BINS: usize> Member<BINS> {
                 photons = later;
             }
             let last = LaserCycle(first + u64::from(cycle) - 1);
-            self.pixel
-                .end_laser_cycles(config, &mut done.pixels, last, cycles);
+            self.end_laser_cycles(config, done, last, cycles);
             *since_look = after(*since_look, cycles, x);
-            done.events.extend(self.pixel.acknowledge());
         }
+    }
+
+    /// Ends laser cycles, the last of which is `last`. The link takes an event at once; whether
+    /// there was one.
+    fn end_laser_cycles(
+        &mut self,
+        config: &PixelConfig<BINS, AnyRule>,
+        done: &mut Done,
+        last: LaserCycle,
+        cycles: u16,
+    ) -> bool {
+        let kept = &mut self.last;
+        let see = |decided: Decided<'_, BINS, _>| {
+            if let Some(kept) = kept {
+                kept.see(&decided);
+            }
+        };
+        self.pixel
+            .end_laser_cycles_seen(config, &mut done.pixels, last, cycles, see);
+        let Some(event) = self.pixel.acknowledge() else {
+            return false;
+        };
+        if let Some(kept) = &mut self.last {
+            kept.report(event);
+        }
+        done.events.push(event);
+        true
     }
 }
 
@@ -90,6 +119,8 @@ fn after(since_look: u16, cycles: u16, x: u16) -> u16 {
 pub struct Group<const BINS: usize> {
     members: Vec<Member<BINS>>,
     blocks: Vec<Block<BINS>>,
+    /// One for each block.
+    of_blocks: Vec<Option<Box<LastDecision<BINS>>>>,
     /// Laser cycles since the last look, and of blocks since the last tick.
     since_look: u16,
     since_tick: u16,
@@ -114,10 +145,12 @@ impl<const BINS: usize> Group<BINS> {
             number,
             pixel: AsyncPixel::new(address),
             feed: None,
+            last: None,
         };
         Self {
             members: vec![member],
             blocks: Vec::new(),
+            of_blocks: Vec::new(),
             since_look: 0,
             since_tick: 0,
         }
@@ -165,6 +198,7 @@ impl<const BINS: usize> Group<BINS> {
                 number,
                 pixel: AsyncPixel::new(address),
                 feed: Some(binning.feed_of(local)),
+                last: None,
             })
         });
         let blocks = binning.blocks().map(|place| {
@@ -173,9 +207,11 @@ impl<const BINS: usize> Group<BINS> {
                 ..place
             })
         });
+        let blocks: Vec<_> = blocks.collect();
         Ok(Self {
             members: members.collect(),
-            blocks: blocks.collect(),
+            of_blocks: vec![None; blocks.len()],
+            blocks,
             since_look: 0,
             since_tick: 0,
         })
@@ -207,13 +243,9 @@ impl<const BINS: usize> Group<BINS> {
                     }
                 }
                 if cycle < received.cycles {
-                    let pixel = &mut member.pixel;
-                    pixel.end_laser_cycle(&configs.pixels, &mut done.pixels, now);
-                    if let Some(event) = pixel.acknowledge() {
-                        done.events.push(event);
-                        if let Some(feed) = &mut member.feed {
-                            feed.reported();
-                        }
+                    let has_reported = member.end_laser_cycles(&configs.pixels, &mut done, now, 1);
+                    if let Some(feed) = member.feed.as_mut().filter(|_| has_reported) {
+                        feed.reported();
                     }
                 }
             }
@@ -231,9 +263,22 @@ impl<const BINS: usize> Group<BINS> {
         done: &mut Done,
     ) {
         let (blocks, statistics) = (&mut self.blocks, &mut done.blocks);
-        if end_laser_cycles_of_blocks(blocks, &configs.blocks, statistics, now, 1) {
-            done.events
-                .extend(blocks.iter_mut().filter_map(Block::acknowledge));
+        let of_blocks = &mut self.of_blocks;
+        let see = |number: usize, decided: Decided<'_, BINS, Count16>| {
+            if let Some(Some(last)) = of_blocks.get_mut(number) {
+                last.see(&decided);
+            }
+        };
+        if end_laser_cycles_of_blocks_seen(blocks, &configs.blocks, statistics, now, 1, see) {
+            for (block, last) in blocks.iter_mut().zip(of_blocks) {
+                let Some(event) = block.acknowledge() else {
+                    continue;
+                };
+                if let Some(last) = last {
+                    last.report(event);
+                }
+                done.events.push(event);
+            }
         }
         self.since_look += 1;
         if self.since_look < configs.pixels.x() {
@@ -250,6 +295,24 @@ impl<const BINS: usize> Group<BINS> {
             }
             self.blocks.iter_mut().for_each(Block::tick);
         }
+    }
+
+    /// Keeps what the last event was decided from, of pixels that `is_wanted` names and of
+    /// blocks that begin with one.
+    pub fn keep_decisions(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+        for member in &mut self.members {
+            member.last = LastDecision::room(is_wanted(member.pixel.address()));
+        }
+        for (block, last) in self.blocks.iter().zip(&mut self.of_blocks) {
+            *last = LastDecision::room(is_wanted(block.pixel().address()));
+        }
+    }
+
+    /// What was kept.
+    pub fn decisions(&self) -> impl Iterator<Item = Decision> {
+        let of_members = self.members.iter().map(|member| &member.last);
+        let all = of_members.chain(&self.of_blocks).flatten();
+        all.filter_map(|last| last.decision())
     }
 
     /// Adds the photons of exposures that have not ended.

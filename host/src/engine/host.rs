@@ -5,6 +5,7 @@ use dtof_core::{DepthEvent, PixelAddress, Statistics};
 use rayon::prelude::*;
 
 use super::Engine;
+use super::decisions::Decision;
 use super::frame::FrameEngine;
 use super::group::{Configs, Done, Group};
 use crate::engine::settings::Settings;
@@ -104,5 +105,17 @@ impl<const BINS: usize> Engine for HostEngine<BINS> {
             group.add_photons_to(&mut pixels, &mut blocks);
         }
         [pixels, blocks]
+    }
+
+    fn keep_decisions(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+        for group in &mut self.groups {
+            group.keep_decisions(is_wanted);
+        }
+    }
+
+    fn decisions(&self) -> Vec<Decision> {
+        let mut all: Vec<Decision> = self.groups.iter().flat_map(Group::decisions).collect();
+        all.sort_unstable_by_key(|decision| (decision.event.level, decision.event.pixel));
+        all
     }
 }

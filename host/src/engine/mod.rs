@@ -1,14 +1,17 @@
 //! The engine: photons in, depth events out.
 
+pub mod decisions;
 pub mod frame;
 pub mod group;
 pub mod host;
+pub mod look;
 pub mod run;
 pub mod settings;
 
 use anyhow::Result;
-use dtof_core::{DepthEvent, Statistics};
+use dtof_core::{DepthEvent, PixelAddress, Statistics};
 
+use self::decisions::Decision;
 use crate::input::source::Slice;
 
 /// Turns photons into events. Whatever runs behind it, the same photons give
@@ -23,4 +26,13 @@ pub trait Engine: Send {
 
     /// The counts of all pixels so far, and of all blocks.
     fn statistics(&self) -> [Statistics; 2];
+
+    /// From now on keeps what the last event was decided from, of pixels that `is_wanted` names
+    /// and of blocks that begin with one. An engine that does not see it keeps nothing.
+    fn keep_decisions(&mut self, _is_wanted: &dyn Fn(PixelAddress) -> bool) {}
+
+    /// What was kept, in order of level and pixel.
+    fn decisions(&self) -> Vec<Decision> {
+        Vec::new()
+    }
 }

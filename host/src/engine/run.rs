@@ -4,6 +4,7 @@ use anyhow::{Context, Result};
 use dtof_core::DepthEvent;
 
 use crate::engine::Engine;
+use crate::engine::decisions::Kept;
 use crate::engine::settings::Settings;
 use crate::events::output::Output;
 use crate::events::summary::Summary;
@@ -34,6 +35,8 @@ pub fn run(
 ) -> Result<Summary> {
     let progress = Progress::new(source.cycles(), "laser cycles", quiet);
     let pixels = source.addresses();
+    let kept = Kept::of(source.geometry(), settings.bins);
+    engine.keep_decisions(&|pixel| kept.holds(pixel));
     each_slice(
         source,
         |slice| engine.run(slice),
@@ -47,6 +50,7 @@ pub fn run(
     )?;
     progress.finish();
     output.end_events();
+    output.keep(kept, engine.decisions());
     let reporting = output.maps().reporting();
     Ok(Summary::new(
         engine.statistics(),

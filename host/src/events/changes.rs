@@ -158,7 +158,7 @@ mod tests {
         assert_eq!((seen, changes.count()), ([3, 3], 6));
         let cycles = |side: usize| changes.sides[side].events().map(|event| event.cycle);
         assert!(cycles(0).eq([1000, 1050, 1100]) && cycles(1).eq([2000, 2050, 2100]));
-        let ranges: Vec<f32> = changes.sides[0]
+        let ranges: Vec<f64> = changes.sides[0]
             .events()
             .map(|event| event.range_mm)
             .collect();

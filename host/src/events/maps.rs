@@ -8,6 +8,7 @@ use dtof_core::{BlockLevel, DepthEvent, PixelAddress, RangeScale, Reflectivity};
 use crate::events::events_csv::range_mm;
 use crate::events::reports::LastReports;
 use crate::input::source::{Geometry, Slice};
+use crate::rows::{Row, grouped};
 
 /// How many events the mean map averages, as in the paper's figure.
 pub const MEAN_OF: usize = 10;
@@ -122,6 +123,29 @@ impl Maps {
         self.pixels.iter().filter(|pixel| pixel.events > 0).count()
     }
 
+    /// What is known of each pixel, as a row of a table.
+    #[must_use]
+    pub fn rows(&self, [column, row]: [&str; 2], [one, several]: [&str; 2]) -> Vec<Row> {
+        let columns = self.geometry.columns.max(1) as usize;
+        let rows = self.pixels.iter().enumerate().map(|(at, pixel)| {
+            let name = format!("{column} {}, {row} {}", at % columns, at / columns);
+            let photons = format!("{} photons", grouped(pixel.photons));
+            let (Some(last), Some(mean)) = (pixel.last_mm(), pixel.mean_mm()) else {
+                return (name, format!("no {one}; {photons}"));
+            };
+            let [events, called] = match pixel.events {
+                1 => ["1".to_owned(), one.to_owned()],
+                events => [grouped(events), several.to_owned()],
+            };
+            let text = format!(
+                "{events} {called}; range of the last {last:.1} mm, mean of up to {MEAN_OF} \
+                 {mean:.1} mm; {photons}"
+            );
+            (name, text)
+        });
+        rows.collect()
+    }
+
     /// Of the pixels with an event, those with the most, the median number and the
     /// fewest, and the two halfway between; fewer if there are fewer. The lower address
     /// comes first where two have as many.
@@ -196,6 +220,28 @@ mod tests {
         }
         let photons = maps.pixels.iter().map(|pixel| pixel.photons);
         assert!(photons.eq([4, 0, 14]));
+    }
+
+    #[test]
+    fn a_row_says_what_is_known_of_a_pixel() {
+        let mut maps = Maps::new(Geometry::new(2, 2));
+        let at = |pixel, cycle, bin| fixtures::event(pixel, cycle, bin);
+        for event in [at(3, 50, 10), at(3, 99, 12), at(0, 120, 10)] {
+            maps.add(&event, &fixtures::scale());
+        }
+        maps.pixels[3].photons = 12_345;
+        let rows = maps.rows(["zone", "capture"], ["event", "events"]);
+        let texts = rows.iter().map(|(name, text)| format!("{name}: {text}"));
+        let bins = |bins: f64| bins * 37.474;
+        let [last, mean] = [bins(12.5), bins(11.5)];
+        let expected = format!(
+            "zone 1, capture 1: 2 events; range of the last {last:.1} mm, mean of up to 10 \
+             {mean:.1} mm; 12,345 photons"
+        );
+        let texts: Vec<String> = texts.collect();
+        assert_eq!(texts[1], "zone 1, capture 0: no event; 0 photons");
+        assert_eq!(texts[3], expected);
+        assert!(texts[0].starts_with("zone 0, capture 0: 1 event; range"));
     }
 
     #[test]

@@ -15,6 +15,7 @@ use dtof_core::{DepthEvent, EchoNumber, PixelAddress, RangeScale};
 use tempfile::NamedTempFile;
 
 use super::aer_file;
+use crate::engine::decisions::{Decision, Kept};
 use crate::engine::settings::Settings;
 use crate::events::changes::Changes;
 use crate::events::echoes::{Echo, Selection};
@@ -26,7 +27,7 @@ use crate::files::{ASIDE, are_same, aside, flushed, may_replace};
 use crate::input::source::{PhotonSource, Slice};
 use crate::rows::Row;
 use crate::settings::{self, SettingsFile};
-use crate::view::report::{self, Cloud, Figure, Section};
+use crate::view::report::{self, Cloud, Decisions, Figure, Section};
 use dtof_draw::svg;
 use dtof_link::DynamicDepth;
 use pictures::{Picture, pictures};
@@ -54,6 +55,8 @@ pub struct Output {
     maps: Maps,
     sides: [&'static str; 2],
     sample: Sample,
+    /// What the last events of pixels were decided from.
+    decisions: Option<(Kept, Vec<Decision>)>,
     /// The echo asked for, and the choice of it where pixels report several: for the maps, and
     /// for the events of the report unless it shows all.
     echo: Option<Echo>,
@@ -112,6 +115,7 @@ impl Output {
             maps: Maps::new(geometry),
             sides: source.sides(),
             sample: Sample::new(Sample::LIMIT),
+            decisions: None,
             echo: None,
             selection: selection(None, settings),
             changes: None,
@@ -191,6 +195,11 @@ impl Output {
         self.show_decided();
     }
 
+    /// The report shows what the last events of pixels were decided from: all that are kept.
+    pub fn keep(&mut self, kept: Kept, decisions: Vec<Decision>) {
+        self.decisions = Some((kept, decisions));
+    }
+
     fn show_decided(&mut self) {
         while let Some(event) = self.selection.as_mut().and_then(Selection::next) {
             self.show(&event);
@@ -265,28 +274,42 @@ impl Output {
             Some((svg, caption.as_ref()?))
         });
         let of_changes = changes.iter().map(|(svg, caption)| (svg, caption));
-        let figures = of_maps.chain(of_changes);
+        // Few pixels are no picture: a table says the same.
+        let few = self.maps.geometry.addresses() <= report::FEW;
+        let figures = of_maps.filter(|_| !few).chain(of_changes);
         let figures: Vec<Figure> = figures
             .map(|(svg, caption)| Figure { svg, caption })
             .collect();
-        let bytes = figures.iter().map(|figure| figure.svg.len()).sum();
-        self.sample.limit(report::room_for_events(bytes));
         let totals = summary.rows();
         let mut settings = summary.settings.rows();
         settings.extend(self.echo_row(&summary.settings));
         let section = |heading, rows| Section { heading, rows };
         let mut all = vec![section("Totals", &totals[..])];
         all.extend(sections);
+        let pixels = self.maps.rows(self.sides, called);
+        if few {
+            all.insert(0, section("Pixels", &pixels));
+        }
         all.push(section("Settings", &settings));
+        let decisions = self.decisions.as_ref();
+        let decisions = decisions.filter(|(_, all)| !all.is_empty());
         let cloud = Cloud {
             geometry: self.maps.geometry,
             sides: self.sides,
             cycles: summary.cycles,
-            sample: &self.sample,
+            laser_hz: summary.laser_hz,
+            sample: &mut self.sample,
+            is_chosen: self.echo.is_some_and(|echo| echo != Echo::All),
             pixels: &self.maps.spread(),
             called,
+            decisions: decisions.map(|(kept, all)| Decisions {
+                settings: &summary.settings,
+                kept: *kept,
+                all,
+                array: self.maps.geometry,
+            }),
         };
-        let report = report::html(title, lead, &all, &figures, &cloud);
+        let report = report::html(title, lead, &all, &figures, cloud);
 
         let name = |file: &str| self.folder.join(file).display().to_string();
         let written = |text: &str, file: &'static str| -> Result<_> {

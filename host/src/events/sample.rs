@@ -8,7 +8,7 @@
 //! in a row one is kept, or two, or none), but not in step with the columns of an array,
 //! which a plain k-th would show as stripes.
 
-use dtof_core::{BlockLevel, DepthEvent, EchoNumber, PixelAddress};
+use dtof_core::{BlockLevel, DepthEvent, EchoNumber, Flags, PixelAddress};
 
 /// The part of an event that is kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +22,13 @@ pub struct SampledEvent {
     /// Which echo of its exposure.
     pub echo: EchoNumber,
     /// Its range in millimetres.
-    pub range_mm: f32,
+    pub range_mm: f64,
+    /// Laser cycles that it was decided from.
+    pub exposure: u16,
+    /// Photons of its peak.
+    pub peak_count: u32,
+    /// What is to be said against it.
+    pub flags: Flags,
 }
 
 /// Evenly one of 1, 2, 4 … events.
@@ -36,7 +42,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Most events of a report: 3.8 MB of it, and 8 MB of memory.
+    /// Most events of a report, and 13 MB of memory.
     pub const LIMIT: usize = 1 << 18;
 
     /// Keeps at most `limit` events.
@@ -51,7 +57,6 @@ impl Sample {
     }
 
     /// Takes the next event in, or leaves it out.
-    #[allow(clippy::cast_possible_truncation, reason = "24 bits for a picture")]
     pub fn add(&mut self, event: &DepthEvent, range_mm: f64) {
         // 2⁶⁴ divided by the golden ratio, made odd.
         let place = self.seen.wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -70,7 +75,10 @@ impl Sample {
             pixel: event.pixel,
             level: event.level,
             echo: event.echo,
-            range_mm: range_mm as f32,
+            range_mm,
+            exposure: event.exposure,
+            peak_count: event.peak_count.raw(),
+            flags: event.flags,
         };
         self.kept.push((place, event));
     }

@@ -1,6 +1,9 @@
 //! The report on a run: one HTML page with everything in it.
 
 mod cloud;
+mod events;
+mod histograms;
+mod packed;
 #[cfg(test)]
 mod tests;
 
@@ -9,8 +12,8 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use sha2::{Digest, Sha256};
 
 pub use cloud::Cloud;
+pub use histograms::Decisions;
 
-use crate::events::sample::Sample;
 use dtof_draw::svg::{escape, one_line};
 
 /// A picture of the report.
@@ -39,23 +42,18 @@ pub(crate) const MARK: &str = "<meta name=\"generator\" content=\"dtof\">";
 const PAGE: usize = 5_000_000;
 /// Bytes of a page for all but events and figures, at most.
 const ALL_ELSE: usize = 200_000;
-/// There are events even where figures leave no room for any.
-const LEAST_EVENTS: usize = 4096;
-
-/// How many events there is room for beside figures of so many bytes.
-#[must_use]
-pub fn room_for_events(figures: usize) -> usize {
-    let bytes = PAGE.saturating_sub(ALL_ELSE + figures);
-    // Four characters for three bytes.
-    let events = bytes / 4 * 3 / cloud::RECORD;
-    events.clamp(LEAST_EVENTS, Sample::LIMIT)
-}
+/// So many pixels, at most, are shown as plots, not as maps.
+pub const FEW: usize = 16;
 
 /// Colours follow the reader's scheme, the columns the width of the window.
-const STYLE: &str = include_str!("report/page.css");
+const STYLE: &str = concat!(
+    include_str!("shared/page.css"),
+    include_str!("report/report.css")
+);
 
 /// A page with `title` and the paragraph `lead`, the events to turn and look at, then
-/// all `figures`, then all `sections`.
+/// all `figures`, then all `sections`. Events and histograms are thinned until the page has
+/// less than 5 MB.
 ///
 /// The page is whole: it loads nothing, and runs no script but its own, which the
 /// policy at its head names by its hash. All texts are escaped. Figures are taken as
@@ -66,11 +64,13 @@ pub fn html(
     lead: &str,
     sections: &[Section],
     figures: &[Figure],
-    events: &Cloud,
+    events: Cloud,
 ) -> String {
     let hash = BASE64.encode(Sha256::digest(cloud::SCRIPT));
     let script = format!("script-src 'sha256-{hash}'; ");
-    page(title, lead, (&script, &events.html()), sections, figures)
+    let taken: usize = figures.iter().map(|figure| figure.svg.len()).sum();
+    let interactive = events.html(PAGE.saturating_sub(ALL_ELSE + taken));
+    page(title, lead, (&script, &interactive), sections, figures)
 }
 
 /// The same page without events, and so without a script.

@@ -14,13 +14,13 @@ use std::time::Instant;
 use serde::Serialize;
 
 use crate::device::{HistogramAnswer, Setup};
+use crate::engine::look::look;
 use crate::engine::settings::Settings;
 use crate::events::aer_file::{Event, Header};
 use crate::settings::SettingsFile;
 use dtof_core::RangeScale;
 use dtof_core::fixed::types::{I24F8, U16F16};
 
-use super::look::look;
 use super::outputs::Recorded;
 pub use frame::MOST_PIXELS;
 use pages::Pages;

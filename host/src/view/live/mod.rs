@@ -12,7 +12,6 @@
 mod feed;
 mod foxglove;
 mod hub;
-mod look;
 mod outputs;
 mod server;
 

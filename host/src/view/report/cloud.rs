@@ -1,18 +1,22 @@
 //! The events of a run, to turn and to look at in time: what the script of the page
 //! is given, and the script.
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD as BASE64;
-use serde_json::json;
+use serde_json::{Value, json};
 
+use super::histograms::Decisions;
+use super::{FEW, events};
 use crate::events::sample::Sample;
+use crate::export::LaserClock;
 use crate::input::source::Geometry;
 use crate::rows::grouped;
 use dtof_core::PixelAddress;
 use dtof_draw::{palette, picture};
 
+/// There are events even where figures leave no room for any.
+const LEAST_EVENTS: usize = 4096;
+
 /// The events of a run.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub struct Cloud<'a> {
     /// The array.
     pub geometry: Geometry,
@@ -20,28 +24,43 @@ pub struct Cloud<'a> {
     pub sides: [&'a str; 2],
     /// Laser cycles of the run.
     pub cycles: u64,
-    /// The events, or evenly some of them.
-    pub sample: &'a Sample,
+    /// Laser cycles a second, if that is known.
+    pub laser_hz: Option<u64>,
+    /// The events, or evenly some of them. Fewer if there is no room for all.
+    pub sample: &'a mut Sample,
+    /// Whether one echo of each exposure was chosen: then all of them are the range of a pixel,
+    /// else the first.
+    pub is_chosen: bool,
     /// Pixels whose spikes are shown first.
     pub pixels: &'a [PixelAddress],
     /// Their name: one of them, and several.
     pub called: [&'static str; 2],
+    /// What the last events were decided from, if that was seen.
+    pub decisions: Option<Decisions<'a>>,
 }
 
 /// The only script of the page, between its tags. A module: it has names of its own.
 pub(super) const SCRIPT: &str = concat!(
     "\n",
-    include_str!("helpers.js"),
+    include_str!("../shared/helpers.js"),
     "\n",
     include_str!("events.js"),
     "\n",
-    include_str!("projection.js"),
+    include_str!("../shared/projection.js"),
     "\n",
-    include_str!("cloud.js"),
+    include_str!("../shared/cloud.js"),
+    "\n",
+    include_str!("../shared/turn.js"),
+    "\n",
+    include_str!("../shared/maps.js"),
+    "\n",
+    include_str!("../shared/histogram.js"),
+    "\n",
+    include_str!("../shared/ranges.js"),
     "\n",
     include_str!("spikes.js"),
     "\n",
-    include_str!("turn.js"),
+    include_str!("pixel.js"),
     "\n",
     include_str!("controls.js"),
 );
@@ -50,24 +69,59 @@ pub(super) const SCRIPT: &str = concat!(
 const CARDS: &str = include_str!("cloud.html");
 
 impl Cloud<'_> {
-    /// The cards with the events and the spikes, nothing if there are no events.
-    pub(super) fn html(&self) -> String {
+    /// The cards with the events and the spikes, nothing if there are no events. Events and
+    /// histograms take at most so many bytes of `room`, unless the fewest events take more.
+    pub(super) fn html(self, room: usize) -> String {
         if self.sample.events().len() == 0 {
             return String::new();
         }
-        let data = self.data();
+        // A third of the room, at most.
+        let histograms = self.decisions.map(|decisions| decisions.data(room / 3));
+        let (histograms, taken) = histograms.unzip();
+        let room = room.saturating_sub(taken.unwrap_or(0));
+        let mut packed = events::packed(self.sample);
+        let mut count = self.sample.events().len();
+        while packed.len() > room && count > LEAST_EVENTS {
+            self.sample.limit(count - 1);
+            count = self.sample.events().len();
+            packed = events::packed(self.sample);
+        }
+        let data = self.data(&packed.base64(), histograms);
         let note = self.note();
         let [_, events] = self.called;
+        let instead = match self.is_few() {
+            true => "the table below has each pixel",
+            false => "the maps below show them pixel by pixel",
+        };
         format!(
             "<p class=\"notice\" id=\"unscripted\">Without scripting the {events} cannot be \
-             turned; the maps below show them pixel by pixel.</p>\n\
+             turned; {instead}.</p>\n\
              {}<script type=\"application/json\" id=\"data\">{data}</script>\n\
              <script type=\"module\">{SCRIPT}</script>\n",
             CARDS
                 .replace("{{how many}}", &note)
+                .replace("{{laser}}", &self.laser())
+                .replace("{{event}}", self.called[0])
                 .replace("{{events}}", events)
                 .replace("{{Events}}", &capital(events))
         )
+    }
+
+    /// Whether plots show more than a map.
+    fn is_few(&self) -> bool {
+        self.geometry.addresses() <= FEW
+    }
+
+    /// Where times come from.
+    fn laser(&self) -> String {
+        match self.laser_hz {
+            Some(hz) => format!("Times are those of a laser of {} Hz.", grouped(hz)),
+            None => format!(
+                "<strong>The laser rate is not known</strong>: times are for {} Hz, unless \
+                 --laser-hz says another.",
+                grouped(LaserClock::PAPER_HZ)
+            ),
+        }
     }
 
     /// How many events there are, and how many of them are shown.
@@ -84,21 +138,8 @@ impl Cloud<'_> {
         }
     }
 
-    /// One JSON object, safe between tags: it holds numbers and base64 alone.
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "a unit is chosen that fits"
-    )]
-    fn data(&self) -> serde_json::Value {
-        // Laser cycles of a run beyond 2³² are told in a larger unit.
-        let unit = (self.cycles >> 32) + 1;
-        let mut records = Vec::with_capacity(self.sample.events().len() * RECORD);
-        for event in self.sample.events() {
-            records.extend(((event.cycle / unit) as u32).to_le_bytes());
-            records.extend(event.range_mm.to_le_bytes());
-            records.extend(event.pixel.0.to_le_bytes());
-            records.push(event.level.raw() << 4 | event.echo.raw());
-        }
+    /// One JSON object, safe between tags: it holds numbers, base64 and names of this program.
+    fn data(&self, packed: &str, histograms: Option<Value>) -> Value {
         let colours: String = (0..=u8::MAX)
             .map(|level| {
                 let [red, green, blue] = palette::level(level);
@@ -108,7 +149,7 @@ impl Cloud<'_> {
         let ranges: Vec<_> = self
             .sample
             .events()
-            .map(|event| Some(event.range_mm.into()))
+            .map(|event| Some(event.range_mm))
             .collect();
         let (low, high) = picture::span(&ranges).unwrap_or_default();
         let spikes: Vec<u16> = self.pixels.iter().map(|pixel| pixel.0).collect();
@@ -117,14 +158,19 @@ impl Cloud<'_> {
             "rows": self.geometry.rows,
             "sides": self.sides,
             "cycles": self.cycles,
-            "unit": unit,
+            "laserHz": self.laser_hz.unwrap_or(LaserClock::PAPER_HZ),
             "oneOf": self.sample.one_of(),
+            "isChosen": self.is_chosen,
+            "isFew": self.is_few(),
             "low": low,
             "high": high,
             "colours": colours,
             "spikes": spikes,
+            "event": self.called[0],
             "events": self.called[1],
-            "records": BASE64.encode(records),
+            "count": self.sample.events().len(),
+            "packed": packed,
+            "histograms": histograms,
         })
     }
 }
@@ -135,7 +181,3 @@ fn capital(word: &str) -> String {
     let first = letters.next().map(|first| first.to_ascii_uppercase());
     first.into_iter().chain(letters).collect()
 }
-
-/// Bytes of an event: laser cycle, range in millimetres, pixel, all little-endian, then four
-/// bits each for level and echo.
-pub(super) const RECORD: usize = 4 + 4 + 2 + 1;

@@ -16,8 +16,12 @@ const redraw = (() => {
     asked = true;
     requestAnimationFrame(() => {
       asked = false;
-      drawCloud();
-      drawLanes();
+      if (!data.isFew) {
+        drawCloud();
+        drawRangeMap();
+        drawLanes();
+      }
+      drawPixel();
     });
   };
 })();
@@ -26,7 +30,7 @@ function chooseWindow() {
   const cycles = Number(width.value);
   const from = Math.round((Number(start.value) / STEPS) * (data.cycles - cycles));
   start.disabled = cycles === data.cycles;
-  start.setAttribute("aria-valuetext", `laser cycle ${number(from)}`);
+  start.setAttribute("aria-valuetext", timeOf(from));
   showWindow(from, from + cycles);
   tell();
   redraw();
@@ -34,29 +38,30 @@ function chooseWindow() {
 
 /** What is shown, what was clicked, and what else there is to say. */
 function tell(news = "") {
-  const [first, last] = [number(shown.start), number(shown.end)];
+  const span = isPart() ? `${timeOf(shown.start)} to ${timeOf(shown.end)}` : `0 to ${timeOf(data.cycles)}`;
   let count = 0;
   for (let event = shown.first; event < shown.last; event++) {
     if (events.range[event] <= shown.far) count++;
   }
-  status.value = `${number(count)} ${data.events} from laser cycle ${first} to ${last}. ${pickedText()} ${news}`.trim();
+  status.value = `${number(count)} ${data.events} from ${span}. ${pickedText()} ${news}`.trim();
 }
 
-/** Adds a pixel's spikes, and says so. */
+/** Chooses a pixel, adds its spikes, and says so. */
 function showSpikes(pixel) {
+  choose(pixel);
   return `Spikes of ${addLane(pixel, true)} are shown first.`;
 }
 
 function pickedText() {
   if (picked < 0) return "";
-  const [range, cycle] = [number(events.range[picked], 1), number(events.cycle[picked])];
-  return `Chosen: ${kindName(picked)}, ${range} mm at laser cycle ${cycle}.`;
+  const event = eventOf(picked);
+  return `Chosen: ${kindName(event)}, ${number(event.range, 1)} mm at ${timeOf(event.cycle)}.`;
 }
 
 // The window of time.
 const parts = [1, 2, 5, 10, 20, 50, 100].map((part) => Math.max(1, Math.round(data.cycles / part)));
 for (const cycles of new Set(parts)) {
-  const text = cycles === data.cycles ? "whole run" : `${number(cycles)} laser cycles`;
+  const text = cycles === data.cycles ? "whole run" : timeOf(cycles);
   width.add(new Option(text, cycles));
 }
 start.max = STEPS;
@@ -106,12 +111,24 @@ function chooseFar() {
 far.addEventListener("input", chooseFar);
 function chooseThird() {
   view.third = element("third").value;
-  const third = view.third === "range" ? "range" : "laser cycle";
+  const third = view.third === "range" ? "range" : "time";
   const by = `${data.sides.join(", ")} and ${third}`;
   cloud.setAttribute("aria-label", `${capital(data.events)} by ${by}, coloured by range`);
   redraw();
 }
 element("third").addEventListener("input", chooseThird);
+
+// The chosen pixel.
+element("map").addEventListener("click", (event) => choose(pixelAt(event)));
+for (const id of ["map", "few", "ranges"]) {
+  element(id).addEventListener("keydown", (event) => {
+    const move = STEPS_OF[event.key];
+    if (!move || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    step(...move);
+    if (id === "few") element("few").children[chosen.pixel].focus();
+  });
+}
 
 // Pixels by their place.
 for (const [at, id] of ["across", "down"].entries()) {
@@ -133,10 +150,16 @@ element("low").textContent = `≤ ${number(data.low)}`;
 element("high").textContent = `≥ ${number(data.high)}`;
 element("unscripted").hidden = true;
 element("interactive").hidden = false;
+for (const part of document.querySelectorAll(".of-many")) part.hidden = data.isFew;
+for (const part of document.querySelectorAll(".of-few")) part.hidden = !data.isFew || data.columns * data.rows === 1;
+document.querySelector(".panels").classList.toggle("is-few", data.isFew);
+element("time-unit").textContent = `time, ${clock.unit}`;
 addScale();
-data.spikes.forEach((pixel) => addLane(pixel));
+if (data.isFew) addFew();
+else data.spikes.forEach((pixel) => addLane(pixel));
+choose(data.spikes[0]);
 chooseWindow();
 chooseFar();
 chooseThird();
-new ResizeObserver(redraw).observe(cloud);
+new ResizeObserver(redraw).observe(element("interactive"));
 dark.addEventListener("change", redraw);

@@ -48,7 +48,7 @@ function addScale() {
   scale.className = "scale";
   const canvas = document.createElement("canvas");
   const label = document.createElement("span");
-  label.textContent = "laser cycle";
+  label.textContent = `time, ${clock.unit}`;
   canvas.setAttribute("aria-hidden", "true");
   // As wide as a line's button.
   const room = document.createElement("button");
@@ -79,10 +79,11 @@ function drawLane(canvas, spikes) {
 function drawScale(canvas) {
   const { context: lines, width, soft } = context(canvas);
   lines.fillStyle = soft;
-  for (const cycle of ticks(shown.start, shown.end, width / 90, true)) {
-    const at = width * share(cycle, shown.start, shown.end);
+  const { per } = clock;
+  for (const time of ticks(shown.start / per, shown.end / per, width / 90)) {
+    const at = width * share(time * per, shown.start, shown.end);
     lines.fillRect(Math.min(width - 1, at), 0, 1, 5);
     lines.textAlign = at < 20 ? "left" : at > width - 30 ? "right" : "center";
-    lines.fillText(number(cycle), at, 19);
+    lines.fillText(number(time, 4), at, 19);
   }
 }

@@ -12,8 +12,8 @@ use super::pages::{Page, Waiting};
 use super::pixels::Pixel;
 use super::{Kind, State};
 use crate::device::PixelHistogram;
+use crate::engine::look::Look;
 use crate::events::aer_file::Event;
-use crate::view::live::look::Look;
 
 /// Pixels in a frame, at most; the others are in the next.
 pub const MOST_PIXELS: usize = 4096;

@@ -117,8 +117,3 @@ function span(values) {
   const at = (share) => sorted[Math.round(share * (sorted.length - 1))];
   return [at(0.02), at(0.98)];
 }
-
-/** The place of a value in the colours. */
-function level(value, low, high) {
-  return high > low ? 255 * Math.min(1, Math.max(0, share(value, low, high))) + 0.5 : 127;
-}

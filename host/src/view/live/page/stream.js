@@ -21,9 +21,7 @@ function redraw() {
     takeCloud();
     drawMaps();
     drawCloud();
-    drawHistogram();
-    drawRanges();
-    drawEvents();
+    drawChosen();
   });
 }
 

@@ -1,4 +1,4 @@
-//! The files of the page. It shares its cloud, axes and colours with the report.
+//! The files of the page. It shares maps, cloud and plots with the report.
 
 use std::sync::LazyLock;
 
@@ -7,7 +7,7 @@ use dtof_draw::palette;
 const HTML: &str = include_str!("../page/index.html");
 
 const STYLE: &str = concat!(
-    include_str!("../../report/page.css"),
+    include_str!("../../shared/page.css"),
     include_str!("../page/live.css")
 );
 
@@ -20,14 +20,15 @@ static SCRIPT: LazyLock<String> = LazyLock::new(|| {
         })
         .collect();
     let parts = [
-        include_str!("../../report/helpers.js"),
+        include_str!("../../shared/helpers.js"),
         include_str!("../page/state.js"),
-        include_str!("../../report/projection.js"),
-        include_str!("../../report/cloud.js"),
-        include_str!("../../report/turn.js"),
-        include_str!("../page/maps.js"),
-        include_str!("../page/pixel.js"),
-        include_str!("../page/histogram.js"),
+        include_str!("../../shared/projection.js"),
+        include_str!("../../shared/cloud.js"),
+        include_str!("../../shared/turn.js"),
+        include_str!("../../shared/maps.js"),
+        include_str!("../../shared/histogram.js"),
+        include_str!("../../shared/ranges.js"),
+        include_str!("../page/chosen.js"),
         include_str!("../page/figures.js"),
         include_str!("../page/settings.js"),
         include_str!("../page/stream.js"),

@@ -23,7 +23,7 @@ function axes() {
   const side = (count) => Math.max(0.3, count / longest);
   const third = view.third === "range"
     ? { name: "range, mm", ...spanOfRange(), length: 1 }
-    : { name: "laser cycle", low: shown.start, high: shown.end, length: 1.3 };
+    : { name: `time, ${clock.unit}`, low: shown.start, high: shown.end, per: clock.per, length: 1.3 };
   return [
     { name: data.sides[0], low: -0.5, high: data.columns - 0.5, length: side(data.columns), whole: true },
     { name: data.sides[1], low: -0.5, high: data.rows - 0.5, length: side(data.rows), whole: true },

@@ -1,21 +1,13 @@
-// The histogram of the chosen pixel: its bins, the gate, and what the rule makes of it.
+// A histogram: its bins, the gate, and what the rule makes of it.
 
-function takeHistogram(news) {
-  if (news.pixel !== chosen.pixel) return;
-  if (news.counts) {
-    const bytes = bytesOf(news.counts);
-    news.counts = Array.from({ length: bytes.byteLength / 4 }, (_, bin) => bytes.getUint32(4 * bin, true));
-  }
-  chosen.histogram = news;
-}
-
-function drawHistogram() {
-  element("histogram").hidden = about?.kind === "recording";
-  const { context: lines, width, height, ink, soft, line } = context(element("histogram"));
-  const shot = chosen.histogram;
-  element("histogram-note").textContent = histogramNote(shot);
+/**
+ * Draws a histogram: counts by bin, the look of the rule at them, and the ranges of bins that are
+ * left out. The gate is its first and its last bin.
+ */
+function drawHistogram(canvas, shot, gate) {
+  const { context: lines, width, height, ink, soft, line } = context(canvas);
   if (!shot?.counts) return;
-  const box = { left: 46, right: width - 12, top: 18, bottom: height - 36 };
+  const box = { left: 46, right: width - 12, top: 24, bottom: height - 36 };
   const bins = shot.counts.length;
   const { peak = [0, 0], needed = null, background = null, quadrants = [] } = shot.look ?? {};
   // A threshold that no photons would reach is not to flatten the rest.
@@ -23,13 +15,14 @@ function drawHistogram() {
   const top = Math.max(4, most, needed !== null && needed < 8 * most + 16 ? needed : 0) * 1.1;
   const x = (bin) => box.left + ((box.right - box.left) * bin) / bins;
   const y = (count) => box.bottom - ((box.bottom - box.top) * count) / top;
-  const gate = about?.settings?.gate ?? [0, bins - 1];
+  const [first, last] = gate ?? [0, bins - 1];
 
-  // Outside of the gate.
+  // Outside of the gate, and around earlier echoes.
   lines.fillStyle = line;
   lines.globalAlpha = 0.5;
-  lines.fillRect(x(0), box.top, x(gate[0]) - x(0), box.bottom - box.top);
-  lines.fillRect(x(gate[1] + 1), box.top, x(bins) - x(gate[1] + 1), box.bottom - box.top);
+  for (const [from, to] of [[0, first - 1], [last + 1, bins - 1], ...(shot.leftOut ?? [])]) {
+    lines.fillRect(x(from), box.top, x(to + 1) - x(from), box.bottom - box.top);
+  }
   lines.globalAlpha = 1;
   axisOf(lines, box, top, soft, line);
   lines.textAlign = "center";
@@ -37,13 +30,15 @@ function drawHistogram() {
     lines.fillText(number(bin), x(bin), box.bottom + 15);
   }
   lines.fillText("bin", (box.left + box.right) / 2, height - 5);
+  lines.textAlign = "left";
+  lines.fillText("photons", 4, 14);
 
   // The window or the quadrants of the rule.
   if (shot.look?.window) {
-    const [first, last] = shot.look.window;
+    const [from, to] = shot.look.window;
     lines.fillStyle = colours[200];
     lines.globalAlpha = 0.35;
-    lines.fillRect(x(first), box.top, x(last + 1) - x(first), box.bottom - box.top);
+    lines.fillRect(x(from), box.top, x(to + 1) - x(from), box.bottom - box.top);
     lines.globalAlpha = 1;
   } else {
     lines.strokeStyle = soft;
@@ -61,12 +56,28 @@ function drawHistogram() {
     const wide = Math.max(1, x(1) - x(0) - 0.6);
     lines.fillRect(x(bin), y(count), wide, box.bottom - y(count));
   });
-  if (needed !== null && needed < top) mark(lines, box, y(needed), ink, `${number(needed)} needed`, []);
-  if (background !== null && background > 0) mark(lines, box, y(background), soft, "", [4, 4]);
+  const at = x(peak[0] + 0.5);
+  const isLeft = at < (box.left + box.right) / 2;
+  if (peak[1] > 0) {
+    lines.fillStyle = ink;
+    const text = `▾ peak: ${number(peak[1])} in bin ${peak[0]}`;
+    const arrow = lines.measureText("▾").width / 2;
+    // Above all bars, its arrow over the bin.
+    lines.textAlign = isLeft ? "left" : "right";
+    const mirrored = `peak: ${number(peak[1])} in bin ${peak[0]} ▾`;
+    lines.fillText(isLeft ? text : mirrored, Math.max(isLeft ? 62 : 0, at + (isLeft ? -arrow : arrow)), box.top - 5);
+  }
+  // Names on the side away from the peak.
+  const side = isLeft ? "right" : "left";
+  if (needed !== null && needed < top) mark(lines, box, y(needed), ink, `${number(needed)} needed`, [], side);
+  if (background > 0) {
+    const isFree = needed === null || y(background) - y(needed) > 16;
+    mark(lines, box, y(background), soft, isFree ? `background ${number(background, 1)}` : "", [4, 4], side);
+  }
 }
 
 /** A level line with its name. */
-function mark(lines, box, at, colour, text, dash) {
+function mark(lines, box, at, colour, text, dash, side) {
   lines.strokeStyle = lines.fillStyle = colour;
   lines.lineWidth = 1.5;
   lines.setLineDash(dash);
@@ -75,8 +86,8 @@ function mark(lines, box, at, colour, text, dash) {
   lines.lineTo(box.right, at);
   lines.stroke();
   lines.setLineDash([]);
-  lines.textAlign = "right";
-  lines.fillText(text, box.right, at - 4);
+  lines.textAlign = side;
+  writeOver(lines, text, side === "right" ? box.right - 2 : box.left + 4, at - 4);
 }
 
 /** The numbers of an upright axis from 0 to top. */
@@ -93,17 +104,4 @@ function axisOf(lines, box, top, soft, line) {
     lines.lineTo(box.right, at);
     lines.stroke();
   }
-}
-
-function histogramNote(shot) {
-  if (about?.kind === "recording") return "A recording has no histograms.";
-  if (!shot) return "No histogram yet; a device sends events first.";
-  if (shot.none) return `No histogram: ${shot.none}.`;
-  const { peak, needed, depends } = shot.look ?? {};
-  const kind = shot.whole ? "A whole histogram of the sensor" : `An exposure of ${number(shot.exposure)} laser cycles so far`;
-  let needs = `the rule needs ${number(needed)}`;
-  if (depends) needs = "what the rule needs depends on the events before";
-  else if (needed === null) needs = "no number is enough for the rule";
-  const rest = peak ? ` Peak: ${number(peak[1])} photons in bin ${peak[0]}; ${needs}.` : "";
-  return `${kind}.${rest}`;
 }

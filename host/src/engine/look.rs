@@ -1,12 +1,15 @@
 //! What the rule makes of a histogram, with the integers of the core.
 
+use dtof_core::fixed::types::U24F8;
 use dtof_core::{
-    AnyRule, BinIndex, Count, Count10, Count16, Count24, CounterWidth, DetectionRule, EchoNumber,
-    Histogram, Peak, RangeGate,
+    AnyRule, BinIndex, BlockLevel, Count, Count10, Count16, Count24, CounterWidth, DetectionRule,
+    EchoNumber, Histogram, Peak, PeeledBins, PixelConfig, RangeGate,
 };
 use serde::Serialize;
 
-use crate::engine::settings::Settings;
+use super::decisions::Decision;
+use super::frame;
+use super::settings::Settings;
 
 /// A look at a histogram.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -19,7 +22,8 @@ pub struct Look {
     /// What is needed depends on the events before, as the pixel tracks or reports more than one
     /// echo: it is not told then.
     pub depends: bool,
-    /// The background a bin at that number of photons, as the rule has it.
+    /// The background a bin as the rule has it, at the photons of the peak or, if these are too
+    /// few, at the number needed.
     pub background: Option<f64>,
     /// Where the quadrants begin, and where the last ends.
     pub quadrants: [u16; 5],
@@ -52,47 +56,165 @@ pub fn look(settings: &Settings, counts: &[u32], is_whole: bool) -> Option<Look>
 fn of<const BINS: usize, W: CounterWidth>(settings: &Settings, counts: &[u32]) -> Option<Look> {
     let counts: &[u32; BINS] = counts.try_into().ok()?;
     let config = settings.config::<BINS>().ok()?;
-    let gate = config.gate();
-    let histogram = |counts: &[u32; BINS]| {
-        let mut histogram = Histogram::<BINS, W>::new();
-        histogram.add_frame(counts, gate);
-        histogram
-    };
-    let peak = histogram(counts).peak();
+    let peak = histogram::<BINS, W>(counts, config.gate()).peak();
     let bin = peak.bin.raw();
-    // The rule's answer if the peak bin held so many.
-    let answer = |photons: u32| {
-        let mut counts = *counts;
-        counts[usize::from(bin)] = photons;
-        let histogram = histogram(&counts);
-        let peak = Peak {
-            bin: BinIndex::saturating(bin),
-            count: Count::saturating(photons),
-        };
-        config.rule().detect(&histogram, gate, peak)
-    };
-    // More photons in the peak never make it less clear.
-    let (mut low, mut high) = (0, W::MAX);
-    let depends = settings.tracking || settings.echoes != EchoNumber::FIRST;
-    let mut background = if depends { None } else { answer(high) };
-    while let (Some(_), true) = (background, low < high) {
-        let middle = low + (high - low) / 2;
-        match answer(middle) {
-            None => low = middle + 1,
-            found => (high, background) = (middle, found),
-        }
-    }
-    Some(Look {
+    let shown = Shown {
+        rule: *config.rule(),
+        gate: *config.gate(),
+        counts: *counts,
+        peeled: PeeledBins::NONE,
         peak: (bin, peak.count.raw()),
-        needed: background.map(|_| high),
-        depends,
-        background: background.map(|background| background.to_num()),
-        quadrants: gate.quadrant_starts(),
-        window: match settings.rule {
-            AnyRule::Window(rule) => window(counts, bin, u16::from(rule.width()), gate),
-            AnyRule::Paper(_) | AnyRule::Average(_) => None,
+        at: bin,
+    };
+    let depends = settings.tracking || settings.echoes != EchoNumber::FIRST;
+    let look = shown.look::<W>();
+    Some(match depends {
+        false => look,
+        true => Look {
+            depends,
+            needed: None,
+            background: None,
+            ..look
         },
     })
+}
+
+/// Looks once more at what events were decided from, one after the other, as their pixels and
+/// blocks did: `needed` is at most the photons of the peak.
+#[must_use]
+pub fn look_back(settings: &Settings, decisions: &[Decision]) -> Vec<Look> {
+    let looks = match settings.bins {
+        8 => all::<8>(settings, decisions),
+        16 => all::<16>(settings, decisions),
+        32 => all::<32>(settings, decisions),
+        64 => all::<64>(settings, decisions),
+        128 => all::<128>(settings, decisions),
+        256 => all::<256>(settings, decisions),
+        512 => all::<512>(settings, decisions),
+        1024 => all::<1024>(settings, decisions),
+        _ => None,
+    };
+    looks.unwrap_or_default()
+}
+
+fn all<const BINS: usize>(settings: &Settings, decisions: &[Decision]) -> Option<Vec<Look>> {
+    let (pixels, blocks) = (settings.config().ok()?, settings.block_config().ok()?);
+    let looks = decisions.iter().map(|decision| {
+        let of_pixel = decision.event.level == BlockLevel::PIXEL;
+        let config: &PixelConfig<BINS, AnyRule> = if of_pixel { &pixels } else { &blocks };
+        let shown = Shown::of(config, decision, settings.frame.is_some())?;
+        Some(match of_pixel && settings.frame.is_none() {
+            true => shown.look::<Count10>(),
+            false => shown.look::<Count16>(),
+        })
+    });
+    looks.collect()
+}
+
+fn histogram<const BINS: usize, W: CounterWidth>(
+    counts: &[u32; BINS],
+    gate: &RangeGate<BINS>,
+) -> Histogram<BINS, W> {
+    let mut histogram = Histogram::new();
+    histogram.add_frame(counts, gate);
+    histogram
+}
+
+/// A histogram, and how it is decided upon.
+struct Shown<const BINS: usize> {
+    rule: AnyRule,
+    gate: RangeGate<BINS>,
+    counts: [u32; BINS],
+    /// The bins around earlier echoes.
+    peeled: PeeledBins,
+    /// The bin of the peak, and its photons.
+    peak: (u16, u32),
+    /// The bin that the rule is asked about: where a pixel that tracks expects its event, else
+    /// the peak.
+    at: u16,
+}
+
+impl<const BINS: usize> Shown<BINS> {
+    /// What `decision` was decided from, by `config` or as a frame.
+    fn of(
+        config: &PixelConfig<BINS, AnyRule>,
+        decision: &Decision,
+        is_frame: bool,
+    ) -> Option<Self> {
+        let mut counts = [0; BINS];
+        for (count, &kept) in counts.iter_mut().zip(&decision.counts) {
+            *count = kept.into();
+        }
+        let peak = decision.event.peak_bin.raw();
+        let mut shown = Self {
+            rule: *config.rule(),
+            gate: *config.gate(),
+            peeled: decision.peeled,
+            peak: (peak, *counts.get(usize::from(peak))?),
+            at: peak,
+            counts,
+        };
+        if is_frame {
+            shown.rule = frame::ANY.into();
+        }
+        if let (Some(tracking), Some(expected)) = (config.tracking(), decision.expected) {
+            shown.rule = *tracking.near();
+            shown.at = expected.raw();
+            let is_near = shown.gate.contains(shown.at);
+            if !is_near || shown.answer::<Count16>(shown.peak.1).is_none() {
+                shown.rule = *tracking.far();
+                shown.at = peak;
+            }
+        }
+        Some(shown)
+    }
+
+    /// The rule's answer if the peak bin held so many.
+    fn answer<W: CounterWidth>(&self, photons: u32) -> Option<U24F8> {
+        let mut counts = self.counts;
+        *counts.get_mut(usize::from(self.peak.0))? = photons;
+        let histogram = histogram::<BINS, W>(&counts, &self.gate);
+        let peak = Peak {
+            bin: BinIndex::saturating(self.at),
+            count: Count::saturating(*counts.get(usize::from(self.at))?),
+        };
+        match self.peeled.echoes() {
+            0 => self.rule.detect(&histogram, &self.gate, peak),
+            _ => {
+                let Self { rule, gate, .. } = self;
+                rule.detect_without(&histogram, gate, peak, &self.peeled)
+            }
+        }
+    }
+
+    fn look<W: CounterWidth>(&self) -> Look {
+        // More photons in the peak never make it less clear.
+        let (mut low, mut high) = (0, W::MAX);
+        let mut needed = self.answer::<W>(high).map(|_| high);
+        while needed.is_some() && low < high {
+            let middle = low + (high - low) / 2;
+            match self.answer::<W>(middle) {
+                None => low = middle + 1,
+                Some(_) => high = middle,
+            }
+            needed = Some(high);
+        }
+        let background = needed.and_then(|needed| self.answer::<W>(needed.max(self.peak.1)));
+        Look {
+            peak: self.peak,
+            needed,
+            depends: false,
+            background: background.map(U24F8::to_num),
+            quadrants: self.gate.quadrant_starts(),
+            window: match self.rule {
+                AnyRule::Window(rule) => {
+                    let width = u16::from(rule.width());
+                    window(&self.counts, self.at, width, &self.gate)
+                }
+                AnyRule::Paper(_) | AnyRule::Average(_) => None,
+            },
+        }
+    }
 }
 
 /// The window of so many bins with the peak in `bin` that has the most photons.

@@ -9,6 +9,19 @@ function share(value, low, high) {
   return (value - low) / (high - low);
 }
 
+/** The place of a value in the colours: 0 at low and below, 255 at high and above. */
+function level(value, low, high) {
+  return high > low ? 255 * Math.min(1, Math.max(0, share(value, low, high))) + 0.5 : 127;
+}
+
+/** The unit that suits so many laser cycles, and how many it has; laser cycles if the rate is unknown. */
+function timeUnit(cycles, laserHz) {
+  if (!laserHz) return { unit: "laser cycle", per: 1, isWhole: true };
+  const units = [["s", 1], ["ms", 1e-3], ["µs", 1e-6]];
+  const [unit, seconds] = units.find(([, seconds]) => cycles / laserHz >= seconds) ?? units.at(-1);
+  return { unit, per: seconds * laserHz, isWhole: false };
+}
+
 /** Round values from low to high, at most `most` of them. */
 function ticks(low, high, most, whole) {
   const least = (high - low) / Math.max(1, most);
@@ -31,6 +44,17 @@ function capital(word) {
 function pixelName(pixel) {
   const [column, row] = data.sides;
   return `${column} ${pixel % data.columns}, ${row} ${Math.floor(pixel / data.columns)}`;
+}
+
+/** Writes a text that can be read on whatever is below it. */
+function writeOver(lines, text, x, y) {
+  lines.save();
+  lines.strokeStyle = getComputedStyle(lines.canvas).getPropertyValue("--card");
+  lines.lineWidth = 4;
+  lines.lineJoin = "round";
+  lines.strokeText(text, x, y);
+  lines.restore();
+  lines.fillText(text, x, y);
 }
 
 /** The context of a canvas that has as many pixels as the screen shows of it. */

@@ -55,17 +55,21 @@ function drawScaleOf(id, ends, unit, digits) {
   high.textContent = ends ? `${number(ends[1], digits)} ${unit}` : "";
 }
 
-function drawMaps() {
-  drawMap(element("range"), pixels.range, data.low, data.high, "mm", 0);
-  const fastest = pixels.rate.reduce((most, rate) => Math.max(most, rate), 0);
-  drawMap(element("rate"), pixels.rate, 0, fastest || 1, "/s", 1);
-  const isPeak = element("light-of").value === "peak";
-  const light = isPeak ? pixels.peak : pixels.reflectivity;
-  const [, brightest] = span(light.filter((value) => !Number.isNaN(value)));
-  drawMap(element("light"), light, 0, brightest, isPeak ? "photons" : "photons × m²", isPeak ? 0 : 3);
-  const range = pixels.range[chosen.pixel];
-  const text = Number.isNaN(range) || range === undefined ? "no event yet" : `${number(range, 0)} mm`;
-  element("range").setAttribute("aria-label", `Range by pixel. Chosen: ${pixelName(chosen.pixel)}, ${text}`);
-  element("rate").setAttribute("aria-label", `Events a second by pixel, up to ${number(fastest, 1)}`);
-  element("light").setAttribute("aria-label", `${isPeak ? "Photons of the peak" : "Relative reflectivity"} by pixel`);
+/** The pixel at the place of a pointer, -1 if there is none. */
+function pixelAt(event) {
+  const canvas = event.currentTarget;
+  const at = (offset, size, count) => Math.min(count - 1, Math.max(0, Math.floor((offset / size) * count)));
+  const column = at(event.offsetX, canvas.clientWidth, data.columns);
+  const row = at(event.offsetY, canvas.clientHeight, data.rows);
+  return data.columns * data.rows > 0 ? row * data.columns + column : -1;
 }
+
+/** Moves the chosen pixel by columns and rows. */
+function step(columns, rows) {
+  const column = (chosen.pixel % data.columns) + columns;
+  const row = Math.floor(chosen.pixel / data.columns) + rows;
+  const isThere = column >= 0 && column < data.columns && row >= 0 && row < data.rows;
+  if (isThere) choose(row * data.columns + column);
+}
+
+const STEPS_OF = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };

@@ -151,14 +151,15 @@ function drawAxes(lines, sides, eye, { ink, soft }) {
     let widest = 0;
     // Numbers beside an upright edge need less of it than those below a level one.
     const most = length / (24 + 36 * Math.abs(outY));
-    for (const value of ticks(side.low, side.high, most, side.whole)) {
-      const at = share(value, side.low, side.high);
+    const per = side.per ?? 1;
+    for (const value of ticks(side.low / per, side.high / per, most, side.whole)) {
+      const at = share(value * per, side.low, side.high);
       const tick = [from.x + at * x, from.y + at * y];
       lines.beginPath();
       lines.moveTo(...tick);
       lines.lineTo(tick[0] + 5 * outX, tick[1] + 5 * outY);
       lines.stroke();
-      widest = Math.max(widest, write(number(value, 3), tick, 8));
+      widest = Math.max(widest, write(number(value, 4), tick, 8));
     }
     lines.fillStyle = ink;
     write(side.name, [(from.x + to.x) / 2, (from.y + to.y) / 2], widest + 5);

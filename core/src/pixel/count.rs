@@ -1,0 +1,43 @@
+//! Photons into the histogram of a pixel.
+
+use super::AsyncPixel;
+use crate::config::PixelConfig;
+use crate::detect::DetectionRule;
+use crate::histogram::counter::{CounterWidth, PhotonCount};
+
+impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
+    /// Counts one photon with the TDC code `code` in the present laser cycle.
+    #[inline]
+    pub fn count<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, code: u16) {
+        let gated_out = self.histogram.add_gated(code, config.gate());
+        self.leave_out(gated_out);
+    }
+
+    /// Counts one photon for each TDC code, as [`Self::count`] does.
+    #[inline]
+    pub fn count_batch<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, codes: &[u16]) {
+        let gated_out = self.histogram.add_gated_batch(codes, config.gate());
+        self.leave_out(gated_out);
+    }
+
+    /// Counts the photons of a whole mini-frame, a histogram over one or more
+    /// laser cycles. Follow it by [`Self::end_laser_cycles`] with as many.
+    #[inline]
+    pub fn count_frame<R: DetectionRule, C: PhotonCount>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        frame: &[C; BINS],
+    ) {
+        let gated_out = self.histogram.add_frame(frame, config.gate());
+        self.leave_out(gated_out);
+    }
+
+    /// Counts photons that the gate left out.
+    #[inline(always)]
+    fn leave_out(&mut self, photons: u32) {
+        // Most often none.
+        if photons > 0 {
+            self.gated_out = self.gated_out.wrapping_add(photons);
+        }
+    }
+}
