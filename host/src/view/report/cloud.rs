@@ -114,12 +114,12 @@ impl Cloud<'_> {
 
     /// Where times come from.
     fn laser(&self) -> String {
-        match self.laser_hz {
-            Some(hz) => format!("Times are those of a laser of {} Hz.", grouped(hz)),
+        match self.laser_hz.and_then(|hz| LaserClock::new(hz).ok()) {
+            Some(laser) => format!("Times are those of a laser of {laser}."),
             None => format!(
-                "<strong>The laser rate is not known</strong>: times are for {} Hz, unless \
-                 --laser-hz says another.",
-                grouped(LaserClock::PAPER_HZ)
+                "<strong>The laser rate is not known</strong>: times are for {}, unless --laser-hz \
+                 says another.",
+                LaserClock::default()
             ),
         }
     }

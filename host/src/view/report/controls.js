@@ -153,6 +153,7 @@ element("interactive").hidden = false;
 for (const part of document.querySelectorAll(".of-many")) part.hidden = data.isFew;
 for (const part of document.querySelectorAll(".of-few")) part.hidden = !data.isFew || data.columns * data.rows === 1;
 document.querySelector(".panels").classList.toggle("is-few", data.isFew);
+element("events-thinned").value = data.oneOf > 1 ? `(1 of ${number(data.oneOf)})` : "";
 element("time-unit").textContent = `time, ${clock.unit}`;
 addScale();
 if (data.isFew) addFew();

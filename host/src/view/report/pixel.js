@@ -62,6 +62,11 @@ function choose(pixel) {
   // The latest; a smaller block says more than a larger one.
   const decision = all.reduce((best, one) => (!best || one.cycle > best.cycle ? one : best), null);
   Object.assign(chosen, { pixel, events: eventsOf(pixel), decision: isKept(pixel) ? decision : null });
+  // Of thinned events the last one is there all the same.
+  const last = chosen.events.at(-1);
+  if (data.oneOf > 1 && chosen.decision?.cycle > (last?.cycle ?? -1)) {
+    chosen.events.push({ ...chosen.decision, peak: chosen.decision.look.peak[1] });
+  }
   element("pixel-name").value = `${pixel}: ${pixelName(pixel)}`;
   const table = element("events");
   fillEvents(table, chosen.events, (event) => number(event.cycle / clock.per, 4));
@@ -90,7 +95,7 @@ function histogramNote() {
   const { peak: [bin, photons], needed, background } = decision.look;
   const whose = decision.level > 0 || decision.echo > 1 ? ` (${kindName(decision)})` : "";
   return `Histogram of the last ${data.event}${whose}, at ${timeOf(decision.cycle)}, of ${number(decision.exposure)} ` +
-    `laser cycles: ${number(decision.range, 1)} mm. Peak: ${number(photons)} photons in bin ${bin}; the rule ` +
+    `laser cycles: ${fixed(decision.range, 1)} mm. Peak: ${number(photons)} photons in bin ${bin}; the rule ` +
     `needs ${number(needed)}, with ${number(background, 2)} of background a bin.`;
 }
 
@@ -114,7 +119,7 @@ function rangesNote(now) {
   const all = `${number(count)} ${count > 1 ? data.events : data.event}${thinned}`;
   if (now === undefined) return `Range against time: ${all}. Hollow ones have a flag.`;
   const last = chosen.events.findLast((event) => event.cycle < now);
-  const text = last ? `${number(last.range, 1)} mm, of ${timeOf(last.cycle)}` : `no ${data.event} yet`;
+  const text = last ? `${fixed(last.range, 1)} mm, reported at ${timeOf(last.cycle)}` : `no ${data.event} yet`;
   return `Range against time: ${all}. At ${timeOf(now)}: ${text}.`;
 }
 
@@ -130,6 +135,7 @@ function addFew() {
     const plot = document.createElement("button");
     plot.type = "button";
     const [name, canvas] = [document.createElement("span"), document.createElement("canvas")];
+    canvas.setAttribute("aria-hidden", "true");
     Object.assign(plot, { pixel, events: eventsOf(pixel) });
     name.textContent = `${pixelName(pixel)}: ${number(plot.events.length)} ${data.events}`;
     plot.append(name, canvas);

@@ -37,6 +37,11 @@ function number(value, digits = 0) {
   return value.toLocaleString("en", { maximumFractionDigits: digits });
 }
 
+/** With so many digits, so that a column of them is in line. */
+function fixed(value, digits) {
+  return value.toLocaleString("en", { minimumFractionDigits: digits, maximumFractionDigits: digits });
+}
+
 function capital(word) {
   return word[0].toUpperCase() + word.slice(1);
 }

@@ -43,6 +43,7 @@ function drawScaleOf(id, ends, unit, digits) {
   if (!scale.firstChild) {
     const bar = document.createElement("canvas");
     scale.append(document.createElement("span"), bar, document.createElement("span"));
+    bar.setAttribute("aria-hidden", "true");
     [bar.width, bar.height] = [256, 1];
     const lines = bar.getContext("2d");
     colours.forEach((colour, at) => {

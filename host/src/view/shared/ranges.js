@@ -40,12 +40,12 @@ function drawRanges(canvas, events, { laserHz, first, last, from, now, span, isS
     lines.stroke();
   }
   const { unit, per, isWhole } = timeUnit(end, laserHz);
-  for (const time of ticks(first / per, end / per, (box.right - box.left) / 90, isWhole)) {
+  for (const time of ticks(first / per, end / per, Math.max(2, (box.right - box.left) / (isSmall ? 60 : 90)), isWhole)) {
     const text = isSmall ? `${number(time, 4)} ${isWhole ? "" : unit}` : number(time, 4);
     const at = x(time * per);
     const half = lines.measureText(text).width / 2;
     lines.textAlign = "center";
-    lines.fillText(text, Math.min(width - half, at), box.bottom + 15);
+    lines.fillText(text, Math.min(width - half - 3, at), box.bottom + 15);
   }
   if (!isSmall) {
     lines.textAlign = "center";
@@ -91,7 +91,7 @@ function fillEvents(table, events, timeOf) {
   const cell = {
     time: timeOf,
     cycle: (event) => number(event.cycle),
-    range: (event) => number(event.range, 1),
+    range: (event) => fixed(event.range, 1),
     peak: (event) => measured(event.peak),
     background: (event) => measured(event.background),
     exposure: (event) => measured(event.exposure),
