@@ -83,7 +83,7 @@ impl Changes {
         let dots = self.sides.each_ref().map(|side| -> Vec<Point> {
             let events = side.events();
             events
-                .map(|event| Point::exact(thousands(event.cycle), event.range_mm.into()))
+                .map(|event| Point::exact(thousands(event.cycle), event.range_mm))
                 .collect()
         });
         let ranges = || dots.iter().flatten().map(|dot| dot.y);

@@ -86,7 +86,7 @@ impl Cloud<'_> {
             count = self.sample.events().len();
             packed = events::packed(self.sample);
         }
-        let data = self.data(&packed.base64(), histograms);
+        let data = self.data(&packed.base64(), histograms.as_ref());
         let note = self.note();
         let [_, events] = self.called;
         let instead = match self.is_few() {
@@ -139,7 +139,7 @@ impl Cloud<'_> {
     }
 
     /// One JSON object, safe between tags: it holds numbers, base64 and names of this program.
-    fn data(&self, packed: &str, histograms: Option<Value>) -> Value {
+    fn data(&self, packed: &str, histograms: Option<&Value>) -> Value {
         let colours: String = (0..=u8::MAX)
             .map(|level| {
                 let [red, green, blue] = palette::level(level);

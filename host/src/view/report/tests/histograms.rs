@@ -73,7 +73,7 @@ fn the_script_is_given_what_the_last_event_of_each_pixel_was_decided_from() {
                 .map(|(first, last)| (u64::from(first), u64::from(last))),
             Some((first, first + width - 1))
         );
-        let mut left_out = vec![false; 128];
+        let mut left_out = [false; 128];
         for _ in 0..reader.number() {
             let [first, last] = [(); 2].map(|()| usize::try_from(reader.number()).unwrap());
             left_out[first..=last].fill(true);
