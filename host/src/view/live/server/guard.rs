@@ -19,7 +19,12 @@ pub type Refused = (StatusCode, &'static str);
 pub fn check<B>(request: &Request<B>, port: u16) -> Result<(), Refused> {
     let headers = request.headers();
     let forbidden = |why| Err((StatusCode::FORBIDDEN, why));
-    let hosts = [format!("127.0.0.1:{port}"), format!("localhost:{port}")];
+    // A browser leaves out the port that http has by itself.
+    let said = match port {
+        80 => String::new(),
+        port => format!(":{port}"),
+    };
+    let hosts = ["127.0.0.1", "localhost"].map(|name| format!("{name}{said}"));
     let is_host = |name: &str| hosts.iter().any(|host| host == name);
     if request.uri().authority().is_some() || !one(headers, &HOST)?.is_some_and(is_host) {
         return forbidden("this server is 127.0.0.1 and localhost only");
@@ -122,5 +127,17 @@ mod tests {
             Some(400)
         );
         assert_eq!(checked("GET", &[here, own, own]), Some(400));
+    }
+
+    #[test]
+    fn a_browser_does_not_say_the_port_that_http_has_by_itself() {
+        let ask = |host: &str, origin| {
+            let request = Request::builder().uri("/").header("host", host);
+            let request = request.header("origin", origin).body(()).unwrap();
+            check(&request, 80).is_ok()
+        };
+        assert!(ask("localhost", "http://localhost"));
+        assert!(!ask("localhost", "http://localhost:8000"));
+        assert!(!ask("example.com", "http://localhost"));
     }
 }
