@@ -1,6 +1,7 @@
 //! `dtof monitor`: the events of a device with a sensor, as they come.
 
 use std::io::{self, BufWriter, IsTerminal, Write};
+use std::path::Path;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -62,6 +63,7 @@ impl Monitor {
             }
         })?;
         let setup = Setup::of(&mut client, said, self.options.pixels).with_context(name)?;
+        super::warn(Path::new(&self.device), setup.warning.clone(), false);
         let length = self
             .seconds
             .map(|seconds| Duration::from_secs(seconds.into()));

@@ -69,7 +69,9 @@ impl View {
                     file.display()
                 );
                 let speed = self.speed.unwrap_or(1.0);
-                Feed::Playback(Playback::new(file, self.laser_hz, speed)?)
+                let playback = Playback::new(file.clone(), self.laser_hz, speed)?;
+                super::warn(&file, playback.warning.clone(), false);
+                Feed::Playback(playback)
             }
         };
         interrupt::listen(|| ())?;

@@ -1,7 +1,7 @@
 //! What the last event of each pixel was decided from.
 //!
 //! A pixel starts over the moment it reports, so that its histogram is copied right before. That
-//! takes a few nanoseconds an event, and as much memory as the pixels themselves.
+//! takes as much memory as the pixels themselves.
 
 use dtof_core::{BinIndex, CounterWidth, Decided, DepthEvent, PeeledBins, PixelAddress};
 
@@ -70,7 +70,7 @@ impl<const BINS: usize> LastDecision<BINS> {
 }
 
 /// The pixels whose decisions are kept: all of a small array, those of every second column and
-/// row of a larger one, and so on.
+/// row of a larger one, of every fourth, and so on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kept {
     columns: u32,
@@ -91,13 +91,12 @@ impl Kept {
                 array.columns.div_ceil(every) as usize * array.rows.div_ceil(every) as usize;
             pixels * bins
         };
-        let all = 1..=u32::from(u16::MAX);
-        let every = all
-            .into_iter()
-            .find(|&every| taken(every) <= Self::MOST_BINS);
+        // Blocks begin at these, too.
+        let mut powers = (0..32).map(|power| 1 << power);
+        let every = powers.find(|&every| taken(every) <= Self::MOST_BINS);
         Self {
             columns: array.columns.max(1),
-            every: every.unwrap_or(u32::MAX),
+            every: every.unwrap_or(1 << 31),
         }
     }
 

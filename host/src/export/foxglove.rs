@@ -88,7 +88,8 @@ pub struct Statistics {
     duration_s: f64,
     /// Events.
     events: u64,
-    /// The same a second.
+    /// The same a second; null of a slice of no length, whose events are no later than the slice
+    /// before.
     events_per_s: f64,
     /// Pixels with an event.
     pixels: u64,
@@ -112,15 +113,16 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Of a slice that began at `time` and lasted so many nanoseconds, not 0, after which there
-    /// were so many events.
+    /// Of a slice that began at `time` and lasted so many nanoseconds, after which there were so
+    /// many events.
     #[must_use]
     pub fn over(self, time: u64, duration_ns: u64, events_so_far: u64) -> Self {
         let duration_s = duration_ns as f64 / 1e9;
+        let rate = self.events as f64 / duration_s;
         Self {
             timestamp: Time::of(time),
             duration_s,
-            events_per_s: self.events as f64 / duration_s,
+            events_per_s: if duration_ns > 0 { rate } else { f64::NAN },
             events_so_far,
             ..self
         }

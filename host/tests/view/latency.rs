@@ -69,7 +69,7 @@ fn percentile(times: &[f64], of: usize) -> f64 {
 }
 
 #[test]
-fn an_event_is_in_the_next_frame() {
+fn an_event_reaches_a_page() {
     let [known, sent] = run(20);
     // A frame is due each 100 ms. This computer may have more to do.
     assert!(known[0] < 50.0, "{known:?}");

@@ -2,12 +2,18 @@
 
 use std::fs::{self, File};
 use std::io::BufReader;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::common::{Scratch, names, says};
 use crate::http::{Stream, post};
 use crate::{Live, fast};
 use dtof::events::aer_file::Reader;
 use dtof::rows::grouped;
+
+fn now_us() -> i64 {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
+    i64::try_from(now.as_micros()).unwrap()
+}
 
 #[test]
 fn a_recording_holds_all_events_while_drawing_is_thinned() {
@@ -24,10 +30,12 @@ fn a_recording_holds_all_events_while_drawing_is_thinned() {
         &post(live.port, "/record", "{\"on\":true}").body,
         "events-2.aer",
     );
+    let before = now_us();
     assert_eq!(
         post(live.port, "/settings", "[detection]\nl1 = 44").status,
         200
     );
+    let after = now_us();
     let frame = page.until("another file", |frame| {
         frame["recorded"]["file"]
             .as_str()
@@ -54,6 +62,8 @@ fn a_recording_holds_all_events_while_drawing_is_thinned() {
         File::open(out.join("events-3.aer")).unwrap(),
     ))
     .unwrap();
+    // Laser cycle 0 is that of the new settings.
+    assert!((before..=after).contains(&reader.header().start_us));
     let mut events = 0;
     while let Some(event) = reader.next_event().unwrap() {
         events += 1;

@@ -198,7 +198,8 @@ fn all_pixels_of_a_small_array_are_kept_and_a_grid_of_a_large_one() {
     assert_eq!(every(64, 64, 128), 1);
     assert_eq!(every(65, 64, 128), 2);
     assert_eq!(every(256, 256, 128), 4);
-    assert_eq!(every(256, 256, 1024), 12);
+    assert_eq!(every(256, 256, 1024), 16);
+    assert_eq!(every(160, 160, 128), 4);
     assert_eq!(every(65_536, 1, 1024), 128);
     let kept = Kept::of(Geometry::new(65, 64), 128);
     let held: Vec<u16> = (0..200)

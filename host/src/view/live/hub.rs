@@ -305,10 +305,8 @@ impl Hub {
 impl State {
     fn begin(&mut self, header: Header) {
         self.version += 1;
-        if header.geometry != self.header.geometry {
-            self.pixels = Pixels::new(header.geometry);
-        }
-        self.pixels.restart();
+        // Of other settings or another device: nothing of before holds.
+        self.pixels = Pixels::new(header.geometry);
         self.pages.restart();
         if let Some(slice) = &mut self.slice {
             slice.restart(header.geometry);

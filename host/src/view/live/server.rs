@@ -5,7 +5,7 @@
 
 mod answer;
 mod assets;
-mod guard;
+pub(super) mod guard;
 mod routes;
 
 use std::net::TcpListener as Listener;

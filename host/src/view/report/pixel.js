@@ -37,9 +37,15 @@ function mapEvent(event) {
 /** Whether a part of the run is shown. */
 const isPart = () => shown.start > 0 || shown.end < data.cycles;
 
+/** Which events the map is of, if not of all. */
+const mapOf =
+  (data.oneOf > 1 ? ` among the 1 in ${number(data.oneOf)} that this report has` : "") +
+  (manyEchoes && !data.isChosen ? "; of several echoes the first" : "");
+
 function drawRangeMap() {
   mapUntil(shown.end);
   drawMap(element("map"), pixels.range, data.low, data.high, "mm", 0);
+  element("map-of").value = mapOf;
   element("map-time").value = isPart() ? `at ${timeOf(shown.end)}` : "at the end";
   const range = pixels.range[chosen.pixel];
   const text = Number.isNaN(range) ? `no ${data.event} yet` : `${number(range)} mm`;
@@ -64,7 +70,7 @@ function choose(pixel) {
   Object.assign(chosen, { pixel, events: eventsOf(pixel), decision: isKept(pixel) ? decision : null });
   // Of thinned events the last one is there all the same.
   const last = chosen.events.at(-1);
-  if (data.oneOf > 1 && chosen.decision?.cycle > (last?.cycle ?? -1)) {
+  if (data.oneOf > 1 && !data.isChosen && chosen.decision?.cycle > (last?.cycle ?? -1)) {
     chosen.events.push({ ...chosen.decision, peak: chosen.decision.look.peak[1] });
   }
   element("pixel-name").value = `${pixel}: ${pixelName(pixel)}`;
@@ -94,7 +100,10 @@ function histogramNote() {
   if (!decision) return `No histogram: the pixel has no ${data.event}.`;
   const { peak: [bin, photons], needed, background } = decision.look;
   const whose = decision.level > 0 || decision.echo > 1 ? ` (${kindName(decision)})` : "";
-  return `Histogram of the last ${data.event}${whose}, at ${timeOf(decision.cycle)}, of ${number(decision.exposure)} ` +
+  // A report of one echo of an exposure has the histogram of whichever came last.
+  const isShown = !data.isChosen || data.oneOf > 1 || chosen.events.some((event) => event.cycle === decision.cycle && event.echo === decision.echo);
+  const hidden = isShown ? "" : `, echo ${decision.echo}, which is not shown,`;
+  return `Histogram of the last ${data.event}${whose}${hidden} at ${timeOf(decision.cycle)}, of ${number(decision.exposure)} ` +
     `laser cycles: ${fixed(decision.range, 1)} mm. Peak: ${number(photons)} photons in bin ${bin}; the rule ` +
     `needs ${number(needed)}, with ${number(background, 2)} of background a bin.`;
 }

@@ -8,6 +8,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow, ensure};
 
 use super::{Command, Wish, Work, reply};
+use dtof_core::RangeScale;
+
 use crate::events::aer_file::{Event, Header, Reader};
 use crate::export::LaserClock;
 
@@ -20,6 +22,8 @@ const BATCH: usize = 65_536;
 pub struct Playback {
     file: PathBuf,
     clock: LaserClock,
+    /// What is not as the file says.
+    pub warning: Option<String>,
     speed: f64,
 }
 
@@ -35,22 +39,24 @@ struct Position {
 
 impl Playback {
     /// A file, so many times as fast as it was. `laser_hz` is that of the laser, if the file does
-    /// not know.
+    /// not know, or is wrong.
     ///
     /// # Errors
     /// If there is no such file, or nobody knows the rate.
     pub fn new(file: PathBuf, laser_hz: Option<u64>, speed: f64) -> Result<Self> {
         let name = || file.display().to_string();
         let header = open(&file).with_context(name)?.header;
+        RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?;
         let said = laser_hz.map(LaserClock::new).transpose()?;
-        let clock = said.or(LaserClock::of(&header));
         ensure!(
-            clock.is_some(),
+            said.or(LaserClock::of(&header)).is_some(),
             "{}: does not say how fast its laser was; say --laser-hz",
             name()
         );
+        let (clock, warning) = LaserClock::choose(said, &header);
         Ok(Self {
-            clock: clock.unwrap_or_default(),
+            clock,
+            warning,
             file,
             speed,
         })

@@ -8,6 +8,7 @@ use dtof_link::endpoint::LinkCounters;
 use dtof_link::{Configuration, DynamicDepth, Refusal, Report, Source};
 
 use super::{Answer, Command, Wish, Work, reply};
+use crate::cli::complain;
 use crate::device::monitor::losses::{Losses as Lost, since};
 use crate::device::monitor::{check_masked, leave_out_masked};
 use crate::device::{Client, Setup, configuration};
@@ -47,6 +48,9 @@ impl<'a> Session<'a> {
     ) -> Result<Self> {
         let setup = Setup::of(client, said, pixels)?;
         check_masked(&setup.settings)?;
+        if let Some(warning) = &setup.warning {
+            complain(&format!("warning: {warning}"));
+        }
         let here = *client.counters();
         let mut session = Self {
             client,

@@ -27,6 +27,10 @@ const HANDSHAKE: Duration = Duration::from_secs(5);
 /// Bytes of what a client says at once, at most.
 const MESSAGE: usize = 64 * 1024;
 
+/// Bytes that wait for a client, at most: some of the largest messages. One that only asks, and takes
+/// no answer, is given up then.
+const WAITING: usize = 8 * 1024 * 1024;
+
 /// What ends a connection.
 type Gone = tokio_tungstenite::tungstenite::Error;
 
@@ -48,6 +52,7 @@ impl<'a, S: AsyncRead + AsyncWrite + Unpin> Client<'a, S> {
     pub async fn accept(app: &'a App, stream: S) -> Option<Self> {
         let config = WebSocketConfig::default()
             .read_buffer_size(4096)
+            .max_write_buffer_size(WAITING)
             .max_message_size(Some(MESSAGE))
             .max_frame_size(Some(MESSAGE));
         #[allow(clippy::result_large_err, reason = "the crate's")]

@@ -77,6 +77,9 @@ impl Frames {
         if self.version != Some(seen.version) {
             self.begin(&seen);
         }
+        if !(wanted(Topic::Events) || wanted(Topic::Statistics)) {
+            self.slice = None;
+        }
         self.left_out += seen.left_out;
         self.timing.advance(&seen);
         let mut messages = Vec::new();
@@ -135,7 +138,7 @@ impl Frames {
             return Ok(());
         };
         let begin = self.slice.unwrap_or(*first);
-        let end = self.timing.end(*last).max(begin + 1);
+        let end = self.timing.end(*last).max(begin);
         self.slice = Some(end);
         if wanted(Topic::Events) {
             self.clouds(begin, &timed, messages)?;

@@ -5,7 +5,10 @@
 
 use std::str::FromStr;
 
+use hyper::Uri;
 use hyper::header::{HOST, HeaderMap, HeaderValue, ORIGIN};
+
+use crate::view::live::server::guard::one;
 
 /// Foxglove in a browser, and as a program of its own whose pages are files.
 const KNOWN: [&str; 2] = ["https://app.foxglove.dev", "file://"];
@@ -19,15 +22,23 @@ impl FromStr for Origin {
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let wrong = "must be http://HOST, https://HOST, or the same with :PORT";
-        let host = text.strip_prefix("http://");
-        let host = host
-            .or_else(|| text.strip_prefix("https://"))
-            .ok_or(wrong)?;
-        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-._:[]".contains(c);
-        if host.is_empty() || !host.chars().all(is_plain) {
+        let uri: Uri = text.parse().map_err(|_| wrong)?;
+        let usual = match uri.scheme_str() {
+            Some("http") => 80,
+            Some("https") => 443,
+            _ => return Err(wrong),
+        };
+        let host = uri.host().filter(|host| !host.is_empty()).ok_or(wrong)?;
+        // As browsers say it: without the port that its kind has by itself.
+        let port = uri.port_u16().filter(|&port| port != usual);
+        let port = port.map_or(String::new(), |port| format!(":{port}"));
+        let origin = format!("{}://{host}{port}", uri.scheme_str().unwrap_or_default());
+        let is_origin = text.len() >= origin.len() && uri.path() == "/" && !text.ends_with('/');
+        let is_plain = uri.query().is_none() && !text.contains(['@', '#']);
+        if !(is_origin && is_plain) {
             return Err(wrong);
         }
-        Ok(Self(text.to_ascii_lowercase()))
+        Ok(Self(origin.to_ascii_lowercase()))
     }
 }
 
@@ -51,12 +62,14 @@ impl Origins {
     /// # Errors
     /// Why it is refused, in a line.
     pub fn check(&self, headers: &HeaderMap<HeaderValue>) -> Result<(), String> {
-        let host = only(headers.get_all(HOST).iter())?.unwrap_or_default();
+        let only = |name| one(headers, name).map_err(|(_, why)| why.to_owned());
+        let host = only(&HOST)?.unwrap_or_default();
+        // Any port: that of a tunnel from another computer is another.
         let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
         if !["127.0.0.1", "localhost"].contains(&name) {
             return Err("this server is 127.0.0.1 and localhost only".to_owned());
         }
-        match only(headers.get_all(ORIGIN).iter())? {
+        match only(&ORIGIN)? {
             // No browser.
             None => Ok(()),
             Some(origin) if self.0.iter().any(|known| known == origin) => Ok(()),
@@ -68,16 +81,6 @@ impl Origins {
                 Err(format!("a page of {origin} may not read{hint}"))
             }
         }
-    }
-}
-
-/// The only value of a header.
-fn only<'a>(mut values: impl Iterator<Item = &'a HeaderValue>) -> Result<Option<&'a str>, String> {
-    let value = values.next();
-    let text = value.map(HeaderValue::to_str).transpose();
-    match (text, values.next()) {
-        (Ok(text), None) => Ok(text),
-        _ => Err("a header makes no sense".to_owned()),
     }
 }
 

@@ -60,13 +60,6 @@ impl Pixels {
         self.changes
     }
 
-    /// Laser cycles begin at 0 again.
-    pub fn restart(&mut self) {
-        for pixel in &mut self.all {
-            pixel.reports = LastReports::default();
-        }
-    }
-
     /// Takes an event in. Of several echoes the first is kept; all are counted.
     pub fn add(&mut self, event: &Event, range_mm: f32) {
         self.changes += 1;

@@ -19,13 +19,7 @@ pub type Refused = (StatusCode, &'static str);
 pub fn check<B>(request: &Request<B>, port: u16) -> Result<(), Refused> {
     let headers = request.headers();
     let forbidden = |why| Err((StatusCode::FORBIDDEN, why));
-    // A browser leaves out the port that http has by itself.
-    let said = match port {
-        80 => String::new(),
-        port => format!(":{port}"),
-    };
-    let hosts = ["127.0.0.1", "localhost"].map(|name| format!("{name}{said}"));
-    let is_host = |name: &str| hosts.iter().any(|host| host == name);
+    let is_host = |name: &str| is_here(name, port);
     if request.uri().authority().is_some() || !one(headers, &HOST)?.is_some_and(is_host) {
         return forbidden("this server is 127.0.0.1 and localhost only");
     }
@@ -47,6 +41,17 @@ pub fn check<B>(request: &Request<B>, port: u16) -> Result<(), Refused> {
     Ok(())
 }
 
+/// Whether a host is the server at `port`.
+fn is_here(host: &str, port: u16) -> bool {
+    // A browser leaves out the port that http has by itself.
+    let said = match port {
+        80 => String::new(),
+        port => format!(":{port}"),
+    };
+    let name = host.strip_suffix(&said);
+    name.is_some_and(|name| ["127.0.0.1", "localhost"].contains(&name))
+}
+
 /// Checks that a body is of a kind that forms of other sites cannot send.
 ///
 /// # Errors
@@ -60,7 +65,10 @@ pub fn check_kind(headers: &HeaderMap<HeaderValue>, kind: &str) -> Result<(), Re
 }
 
 /// The only value of a header.
-fn one<'a>(
+///
+/// # Errors
+/// If there are several, or it is no text.
+pub fn one<'a>(
     headers: &'a HeaderMap<HeaderValue>,
     name: &HeaderName,
 ) -> Result<Option<&'a str>, Refused> {
