@@ -63,6 +63,24 @@ fn all_pixels_come_in_turn_also_while_some_change_all_the_time() {
 }
 
 #[test]
+fn nothing_of_before_holds_once_laser_cycles_begin_again() {
+    let hub = hub();
+    hub.events(&[event(7, 9)], 0);
+    let mut old = hub.join(0).unwrap();
+    assert_eq!(frame(&hub, &mut old).0, [(7, 1)]);
+    let header = hub.state().header;
+    hub.begin_recording(header);
+    let mut new = hub.join(0).unwrap();
+    for page in [&mut old, &mut new] {
+        assert_eq!(frame(&hub, page).0, []);
+    }
+    hub.events(&[event(8, 9)], 0);
+    for page in [&mut old, &mut new] {
+        assert_eq!(frame(&hub, page).0, [(8, 1)]);
+    }
+}
+
+#[test]
 fn the_newest_events_of_a_pixel_wait_and_the_others_are_counted() {
     let hub = hub();
     let mut page = hub.join(7).unwrap();

@@ -69,12 +69,11 @@ function takeEvents(base64) {
   if (chosen.events.length > MOST_KEPT) chosen.events.splice(0, chosen.events.length - MOST_KEPT);
 }
 
-/** The first of a connection has all pixels anew: the program may be another. */
-function takeAbout(news, isFirst) {
-  const isOther = !about || news.columns !== data.columns || news.rows !== data.rows;
+/** All pixels that the program knows come anew. */
+function takeAbout(news) {
   about = news;
   Object.assign(data, { columns: news.columns, rows: news.rows });
-  if (isFirst || isOther) pixels = emptyPixels(news.columns * news.rows);
+  pixels = emptyPixels(news.columns * news.rows);
   // Laser cycles begin at 0 again.
   chosen.events = [];
   chosen.histogram = null;

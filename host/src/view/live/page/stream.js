@@ -31,7 +31,7 @@ function takeFrame(frame) {
   if (frame.about) {
     const isFirst = frame.frame === 1;
     if (isFirst) rated = now;
-    takeAbout(frame.about, isFirst);
+    takeAbout(frame.about);
     page = frame.about.page;
     element("name").textContent = `dtof view: ${about.name}`;
     document.title = `${about.name} · dtof view`;
