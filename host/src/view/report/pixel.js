@@ -101,11 +101,12 @@ function histogramNote() {
   const { peak: [bin, photons], needed, background } = decision.look;
   const whose = decision.level > 0 || decision.echo > 1 ? ` (${kindName(decision)})` : "";
   // A report of one echo of an exposure has the histogram of whichever came last.
-  const isShown = !data.isChosen || data.oneOf > 1 || chosen.events.some((event) => event.cycle === decision.cycle && event.echo === decision.echo);
-  const hidden = isShown ? "" : `, echo ${decision.echo}, which is not shown,`;
+  const isOfIt = (event) => event.cycle === decision.cycle && event.echo === decision.echo;
+  const isShown = !data.isChosen || data.oneOf > 1 || chosen.events.some(isOfIt);
+  const hidden = isShown ? "," : `, echo ${decision.echo}, which is not shown,`;
   return `Histogram of the last ${data.event}${whose}${hidden} at ${timeOf(decision.cycle)}, of ${number(decision.exposure)} ` +
-    `laser cycles: ${fixed(decision.range, 1)} mm. Peak: ${number(photons)} photons in bin ${bin}; the rule ` +
-    `needs ${number(needed)}, with ${number(background, 2)} of background a bin.`;
+    `laser cycles: ${fixed(decision.range, 1)} mm. Peak: ${number(photons)} photons in bin ${bin}; ` +
+    `${needsOf(needed)}, with ${number(background, 2)} of background a bin.`;
 }
 
 function drawPixel() {

@@ -69,9 +69,9 @@ function drawHistogram(canvas, shot, gate) {
   }
   // Names on the side away from the peak.
   const side = isLeft ? "right" : "left";
-  if (needed !== null && needed < top) mark(lines, box, y(needed), ink, `${number(needed)} needed`, [], side);
+  if (needed !== null && needed > 0 && needed < top) mark(lines, box, y(needed), ink, `${number(needed)} needed`, [], side);
   if (background > 0) {
-    const isFree = needed === null || y(background) - y(needed) > 16;
+    const isFree = !needed || y(background) - y(needed) > 16;
     mark(lines, box, y(background), soft, isFree ? `background ${number(background, 1)}` : "", [4, 4], side);
   }
 }
@@ -104,4 +104,9 @@ function axisOf(lines, box, top, soft, line) {
     lines.lineTo(box.right, at);
     lines.stroke();
   }
+}
+
+/** What the rule needs in the bin of the peak, all others as they are. Of a window the others may be enough. */
+function needsOf(needed) {
+  return needed === 0 ? "the bins beside it are enough for the rule" : `the rule needs ${number(needed)}`;
 }

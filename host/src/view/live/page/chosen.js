@@ -40,7 +40,7 @@ function histogramNote(shot) {
   if (shot.none) return `No histogram: ${shot.none}.`;
   const { peak, needed, depends } = shot.look ?? {};
   const kind = shot.whole ? "A whole histogram of the sensor" : `An exposure of ${number(shot.exposure)} laser cycles so far`;
-  let needs = `the rule needs ${number(needed)}`;
+  let needs = needsOf(needed);
   if (depends) needs = "what the rule needs depends on the events before";
   else if (needed === null) needs = "no number is enough for the rule";
   const rest = peak ? ` Peak: ${number(peak[1])} photons in bin ${peak[0]}; ${needs}.` : "";
