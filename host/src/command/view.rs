@@ -23,7 +23,7 @@ pub struct View {
     /// Of a file: so many times as fast as it was [default: 1]
     #[arg(long, value_name = "N", value_parser = positive, conflicts_with = "device")]
     speed: Option<f64>,
-    /// Of a file: laser cycles a second [default: as the file says]
+    /// Of a file: laser cycles a second, if it does not say or is wrong [default: as the file says]
     #[arg(long, value_name = "HZ", value_parser = whole(1..=u64::MAX / 1000), conflicts_with = "device")]
     laser_hz: Option<u64>,
     /// The port of the page on this computer [default: any that is free]

@@ -110,10 +110,14 @@ impl LaserClock {
     }
 }
 
-/// "10 MHz".
+/// "10 MHz", "20 kHz".
 impl fmt::Display for LaserClock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} MHz", self.millihertz as f64 / 1e9)
+        let hz = self.millihertz as f64 / 1e3;
+        if hz < 1e6 {
+            return write!(f, "{} kHz", hz / 1e3);
+        }
+        write!(f, "{} MHz", hz / 1e6)
     }
 }
 

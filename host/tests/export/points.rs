@@ -153,7 +153,7 @@ fn the_result_line_says_what_points_and_times_rest_on() {
         "
             events.aer --format ply --fov 45x24.5 | 12 events (45x24.5 degrees, 10 MHz)
             events.aer --format pcd --calibration rays.toml | 12 events (rays.toml, 10 MHz)
-            events.aer --format evt2 --laser-hz 12500 | 0 events (0.0125 MHz)
+            events.aer --format evt2 --laser-hz 12500 | 0 events (12.5 kHz)
             events.aer --format mcap | 12 events (60x32.2 degrees, 10 MHz, clouds every 1049 µs)
             events.aer --format mcap --slice-us 5 | clouds every 5 µs)
             none.aer --format mcap --events depth | 0 events (60x32.2 degrees, 10 MHz, clouds every 10 µs)

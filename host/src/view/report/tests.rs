@@ -208,7 +208,7 @@ fn the_script_is_given_level_echo_and_flags_of_each_event() {
 fn times_of_a_laser_that_nobody_knows_are_said_to_be_assumed() {
     let known = page(sample(10, 10), 10, &[], &[]);
     assert_eq!(data(&known)["laserHz"], 20_000);
-    assert!(known.contains("Times are those of a laser of 0.02 MHz."));
+    assert!(known.contains("Times are those of a laser of 20 kHz."));
     let mut sample = sample(10, 10);
     let events = Cloud {
         laser_hz: None,

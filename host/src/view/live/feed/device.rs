@@ -8,7 +8,9 @@ use dtof_link::DynamicDepth;
 
 use super::session::Session;
 use super::{Command, Wish, Work, reply};
+use crate::cli::complain;
 use crate::device::{Client, Port};
+use crate::rows::printable;
 use crate::settings::SettingsFile;
 
 /// A device that is gone is looked for so often.
@@ -39,6 +41,7 @@ impl Device {
         work.hub.said(&self.said);
         // Settings that a page wishes for while there is no device.
         let mut wished: Option<Command> = None;
+        let mut told = String::new();
         while !work.is_stopped() {
             let ended = self.session(work, &mut wished);
             let kept = work.recorder.end_file(&mut work.recorded);
@@ -56,6 +59,10 @@ impl Device {
                 reply(command.answer, Err(anyhow!("{reason}")));
             }
             work.hub.connection("gone", &reason);
+            if told != reason {
+                complain(&printable(&format!("{}: {reason}", self.name)));
+                told.clone_from(&reason);
+            }
             wished = self.wait(work, &reason);
         }
         Ok(())
