@@ -125,8 +125,8 @@ impl About {
 pub enum Polled {
     /// Nothing to do before the next interrupt or millisecond.
     Idle,
-    /// A step was taken, but nothing is complete yet.
+    /// A step was taken, but nothing is complete yet; at most a frame has begun.
     Working,
-    /// The sink was given something.
+    /// The sink was given photons, or the end of laser cycles, or a histogram.
     Data,
 }
