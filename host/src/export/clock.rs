@@ -113,11 +113,11 @@ impl LaserClock {
 /// "10 MHz", "20 kHz".
 impl fmt::Display for LaserClock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let hz = self.millihertz as f64 / 1e3;
-        if hz < 1e6 {
-            return write!(f, "{} kHz", hz / 1e3);
+        let millihertz = self.millihertz as f64;
+        if millihertz < 1e9 {
+            return write!(f, "{} kHz", millihertz / 1e6);
         }
-        write!(f, "{} MHz", hz / 1e6)
+        write!(f, "{} MHz", millihertz / 1e9)
     }
 }
 
