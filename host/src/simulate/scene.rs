@@ -101,17 +101,21 @@ impl Scene {
     /// through the nearest of those behind it.
     #[must_use]
     pub fn views(&self, pixel: PixelAddress, cycle: u64) -> [Option<View>; 2] {
-        let sight = self.sight(pixel);
+        self.views_along(&self.sight(pixel), cycle)
+    }
+
+    /// The same for a pixel whose sight is at hand.
+    fn views_along(&self, sight: &Sight, cycle: u64) -> [Option<View>; 2] {
         let seconds = self.seconds(cycle);
         let [mut nearest, mut second]: [Option<View>; 2] = [None; 2];
         for (index, surface) in self.surfaces.iter().enumerate() {
-            let Some(range_mm) = surface.range_mm(&sight, seconds, self.layout) else {
+            let Some(range_mm) = surface.range_mm(sight, seconds, self.layout) else {
                 continue;
             };
             let view = Some(View {
                 surface: index,
                 range_mm,
-                light: surface.light(&sight),
+                light: surface.light(sight),
             });
             if nearest.is_none_or(|other| range_mm < other.range_mm) {
                 (nearest, second) = (view, nearest);
@@ -157,8 +161,9 @@ impl Scene {
             .surfaces
             .iter()
             .any(|surface| surface.transmittance > 0.0);
-        let pixels = self.addresses()?.map(|address| {
-            let [rates, behind] = self.views(address, 0).map(|view| self.rates_of(view));
+        let sights: Vec<Sight> = self.addresses()?.map(|pixel| self.sight(pixel)).collect();
+        let pixels = self.addresses()?.zip(&sights).map(|(address, sight)| {
+            let [rates, behind] = self.views_along(sight, 0).map(|view| self.rates_of(view));
             let pixel = SimulatedPixel::new(&rates, self.bins, pixel_rng(seed, address))?;
             let pixel = match has_behind {
                 true => pixel.with_behind(&behind, seed, address)?,
@@ -169,8 +174,10 @@ impl Scene {
         let pixels = pixels.collect::<Result<_>>()?;
         let rates_at = self.surfaces.iter().any(Surface::moves).then(|| {
             let scene = self.clone();
-            Box::new(move |pixel, cycle| scene.views(pixel, cycle).map(|view| scene.rates_of(view)))
-                as RatesAt
+            Box::new(move |pixel: PixelAddress, cycle| {
+                let [seen, behind] = scene.views_along(&sights[usize::from(pixel.0)], cycle);
+                [scene.rates_of(seen), scene.rates_of(behind)]
+            }) as RatesAt
         });
         let photons = SimulatedArray::new(self.geometry, pixels, cycles, rates_at)
             .with_laser_hz(self.laser_hz());
