@@ -98,7 +98,8 @@ fn highest<const BINS: usize>(asked: &Asked) -> Result<Vec<U4F12>> {
         let estimator = DepthEstimator::Centroid3;
         rule(z).is_ok_and(|rule| detect(histogram, &gate, &rule, &estimator).is_some())
     };
-    let trial = |trial: u16| {
+    // One type for all numbers of bins: what runs it on threads is compiled once.
+    let trial: &(dyn Fn(u16) -> Vec<U4F12> + Sync) = &|trial| {
         let mut rng = trial_rng(asked.seed, trial);
         let mut found = Vec::with_capacity(each);
         for _ in 0..each {
@@ -116,7 +117,8 @@ fn highest<const BINS: usize>(asked: &Asked) -> Result<Vec<U4F12>> {
         found
     };
     let mut all: Vec<U4F12> = (0..TRIALS).into_par_iter().flat_map(trial).collect();
-    all.sort_unstable_by(|one, other| other.cmp(one));
+    all.sort_unstable();
+    all.reverse();
     Ok(all)
 }
 

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use anyhow::{Result, bail, ensure};
 use clap::Args;
 use dtof::cli::arguments::{MOST_WHOLE, path, whole};
-use dtof::cli::complain;
 use dtof::events::aer_file::EventKind;
 use dtof::events::echoes::Echo;
 use dtof::export::{Format, LaserClock, Optics, Options, export};
@@ -14,7 +13,7 @@ use dtof::geometry::FieldOfView;
 use dtof::rows::grouped;
 use dtof::settings::SettingsFile;
 
-use super::dynamic_depth;
+use super::{dynamic_depth, warn};
 
 #[derive(Args)]
 pub struct Export {
@@ -98,10 +97,8 @@ impl Export {
                 self.file.display()
             );
         }
+        warn(&self.file, exported.warning, self.quiet);
         if !self.quiet {
-            if let Some(warning) = exported.warning {
-                complain(&format!("warning: {}: {warning}", self.file.display()));
-            }
             writeln!(
                 io::stdout(),
                 "{out}: {written} events ({})",

@@ -1,8 +1,7 @@
 //! `dtof monitor`: the events of a device with a sensor, as they come.
 
 use std::io::{self, BufWriter, IsTerminal, Write};
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};

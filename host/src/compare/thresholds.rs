@@ -118,7 +118,8 @@ fn highest<const BINS: usize>(
         .transpose()?;
     #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
     let bin = Uniform::new(0, BINS as u16)?;
-    let one = |exposure: u32| {
+    // One type for all rules and numbers of bins: what runs it on threads is compiled once.
+    let one: &(dyn Fn(u32) -> Vec<usize> + Sync) = &|exposure| {
         let place = dtof_core::PixelAddress((exposure & 0xffff) as u16);
         let mut rng = pixel_rng(seed.wrapping_add(u64::from(exposure >> 16) << 32), place);
         let mut histogram = Histogram::<BINS, Count10>::new();

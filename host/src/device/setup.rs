@@ -11,6 +11,7 @@ use super::Client;
 use super::monitor::array;
 use crate::engine::settings::Settings;
 use crate::events::aer_file::Header;
+use crate::export::LaserClock;
 use crate::input::masked;
 use crate::input::source::Geometry;
 use crate::settings::{Sensor, SettingsFile};
@@ -66,15 +67,17 @@ impl Setup {
             client.bins()
         );
         let columns = said.sensor.columns;
-        let told = said.sensor.laser_hz.map_or(0, |hz| hz.saturating_mul(1000));
-        let (laser_millihertz, warning) = laser(told, sensor.laser_millihertz);
+        // A sensor may be slower than its settings promise.
+        let own = LaserClock::from_millihertz(sensor.laser_millihertz);
+        let told = said.sensor.laser_hz.map(LaserClock::new).transpose()?;
+        let (clock, warning) = LaserClock::known(told, own, "the device");
         let setup = Self {
             settings: said.settings(client.bins().into())?,
             asked,
             said,
             pixels,
             geometry: array(pixels, columns),
-            laser_millihertz,
+            laser_millihertz: clock.map_or(0, |clock| clock.millihertz()),
             warning,
             began: SystemTime::now(),
         };
@@ -98,40 +101,5 @@ impl Setup {
             laser_millihertz: self.laser_millihertz,
             start_us: i64::try_from(start.as_micros()).unwrap_or(0),
         }
-    }
-}
-
-/// Laser cycles in a thousand seconds, and a warning: what was `said` comes before what the device
-/// says, as a sensor may be slower than its settings promise. It has whole hertz: to these, what the
-/// device says is exact.
-fn laser(said: u64, device: u64) -> (u64, Option<String>) {
-    if said == 0 || device / 1000 * 1000 == said {
-        return (device, None);
-    }
-    let hz = |millihertz: u64| millihertz as f64 / 1000.0;
-    let differ = || {
-        let (device, said) = (hz(device), hz(said));
-        format!("the device has a laser of {device} Hz; times are for {said} Hz, as was said")
-    };
-    (said, (device > 0).then(differ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_was_said_of_the_laser_holds_and_a_difference_is_told() {
-        assert_eq!(laser(0, 0), (0, None));
-        assert_eq!(laser(0, 4_165_818), (4_165_818, None));
-        assert_eq!(laser(4_165_000, 4_165_818), (4_165_818, None));
-        assert_eq!(laser(10_000_000, 0), (10_000_000, None));
-        let (rate, warning) = laser(3_000_000, 4_165_818);
-        assert_eq!(rate, 3_000_000);
-        let warning = warning.unwrap();
-        assert!(
-            warning.contains("4165.818 Hz") && warning.contains("3000 Hz"),
-            "{warning}"
-        );
     }
 }

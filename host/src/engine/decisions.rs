@@ -20,6 +20,11 @@ pub struct Decision {
     pub peeled: PeeledBins,
 }
 
+/// By level and pixel.
+pub(super) fn sort(decisions: &mut [Decision]) {
+    decisions.sort_unstable_by_key(|decision| (decision.event.level, decision.event.pixel));
+}
+
 /// Room for the last decision of a pixel or a block.
 #[derive(Clone, Debug)]
 pub struct LastDecision<const BINS: usize> {

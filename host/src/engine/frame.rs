@@ -141,7 +141,7 @@ impl<const BINS: usize> Engine for FrameEngine<BINS> {
                 events.extend(pixel.end_laser_cycle(&self.gate, &self.estimator, now));
             }
         }
-        events.sort_unstable_by_key(|event| (event.cycle, event.pixel));
+        sort(&mut events);
         Ok(events)
     }
 
@@ -163,4 +163,9 @@ impl<const BINS: usize> Engine for FrameEngine<BINS> {
         let all = self.pixels.iter().filter_map(|pixel| pixel.last.as_ref());
         all.filter_map(|last| last.decision()).collect()
     }
+}
+
+/// By laser cycle and pixel.
+fn sort(events: &mut [DepthEvent]) {
+    events.sort_unstable_by_key(|event| (event.cycle, event.pixel));
 }

@@ -5,7 +5,7 @@ use dtof_core::{DepthEvent, PixelAddress, Statistics};
 use rayon::prelude::*;
 
 use super::Engine;
-use super::decisions::Decision;
+use super::decisions::{self, Decision};
 use super::frame::FrameEngine;
 use super::group::{Configs, Done, Group};
 use crate::engine::settings::Settings;
@@ -91,11 +91,7 @@ impl<const BINS: usize> Engine for HostEngine<BINS> {
             self.pixels += done.pixels;
             self.blocks += done.blocks;
         }
-        // By laser cycle, level and pixel, as one number: three compare more slowly.
-        events.sort_unstable_by_key(|event| {
-            let cycle = event.cycle.0 - slice.first_cycle;
-            cycle << 24 | u64::from(event.level.raw()) << 16 | u64::from(event.pixel.0)
-        });
+        sort(&mut events, slice.first_cycle);
         Ok(events)
     }
 
@@ -115,7 +111,16 @@ impl<const BINS: usize> Engine for HostEngine<BINS> {
 
     fn decisions(&self) -> Vec<Decision> {
         let mut all: Vec<Decision> = self.groups.iter().flat_map(Group::decisions).collect();
-        all.sort_unstable_by_key(|decision| (decision.event.level, decision.event.pixel));
+        decisions::sort(&mut all);
         all
     }
+}
+
+/// By laser cycle, level and pixel. The same for every number of bins, so it is compiled once.
+fn sort(events: &mut [DepthEvent], first_cycle: u64) {
+    // As one number: three compare more slowly.
+    events.sort_unstable_by_key(|event| {
+        let cycle = event.cycle.0 - first_cycle;
+        cycle << 24 | u64::from(event.level.raw()) << 16 | u64::from(event.pixel.0)
+    });
 }

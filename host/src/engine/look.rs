@@ -35,29 +35,36 @@ pub struct Look {
 /// the settings are for other histograms.
 #[must_use]
 pub fn look(settings: &Settings, counts: &[u32], is_whole: bool) -> Option<Look> {
-    match (counts.len(), is_whole) {
-        (8, false) => of::<8, Count10>(settings, counts, is_whole),
-        (16, false) => of::<16, Count10>(settings, counts, is_whole),
-        (32, false) => of::<32, Count10>(settings, counts, is_whole),
-        (64, false) => of::<64, Count10>(settings, counts, is_whole),
-        (128, false) => of::<128, Count10>(settings, counts, is_whole),
-        (256, false) => of::<256, Count10>(settings, counts, is_whole),
-        (512, false) => of::<512, Count10>(settings, counts, is_whole),
-        (1024, false) => of::<1024, Count10>(settings, counts, is_whole),
-        (64, true) => of::<64, Count24>(settings, counts, is_whole),
-        (128, true) => of::<128, Count24>(settings, counts, is_whole),
-        (256, true) => of::<256, Count24>(settings, counts, is_whole),
-        (512, true) => of::<512, Count16>(settings, counts, is_whole),
-        (1024, true) => of::<1024, Count16>(settings, counts, is_whole),
+    let look = match (counts.len(), is_whole) {
+        (8, false) => of::<8, Count10>(settings, counts),
+        (16, false) => of::<16, Count10>(settings, counts),
+        (32, false) => of::<32, Count10>(settings, counts),
+        (64, false) => of::<64, Count10>(settings, counts),
+        (128, false) => of::<128, Count10>(settings, counts),
+        (256, false) => of::<256, Count10>(settings, counts),
+        (512, false) => of::<512, Count10>(settings, counts),
+        (1024, false) => of::<1024, Count10>(settings, counts),
+        (64, true) => of::<64, Count24>(settings, counts),
+        (128, true) => of::<128, Count24>(settings, counts),
+        (256, true) => of::<256, Count24>(settings, counts),
+        (512, true) => of::<512, Count16>(settings, counts),
+        (1024, true) => of::<1024, Count16>(settings, counts),
         _ => None,
-    }
+    }?;
+    // Whole histograms are not tracked, and their first echo is decided from themselves.
+    let depends = !is_whole && (settings.tracking || settings.echoes != EchoNumber::FIRST);
+    Some(match depends {
+        false => look,
+        true => Look {
+            depends,
+            needed: None,
+            background: None,
+            ..look
+        },
+    })
 }
 
-fn of<const BINS: usize, W: CounterWidth>(
-    settings: &Settings,
-    counts: &[u32],
-    is_whole: bool,
-) -> Option<Look> {
+fn of<const BINS: usize, W: CounterWidth>(settings: &Settings, counts: &[u32]) -> Option<Look> {
     let counts: &[u32; BINS] = counts.try_into().ok()?;
     let config = settings.config::<BINS>().ok()?;
     let peak = histogram::<BINS, W>(counts, config.gate()).peak();
@@ -70,18 +77,7 @@ fn of<const BINS: usize, W: CounterWidth>(
         peak: (bin, peak.count.raw()),
         at: bin,
     };
-    // Whole histograms are not tracked, and their first echo is decided from themselves.
-    let depends = !is_whole && (settings.tracking || settings.echoes != EchoNumber::FIRST);
-    let look = shown.look::<W>();
-    Some(match depends {
-        false => look,
-        true => Look {
-            depends,
-            needed: None,
-            background: None,
-            ..look
-        },
-    })
+    Some(shown.look::<W>())
 }
 
 /// Looks once more at what events were decided from, one after the other, as their pixels and

@@ -286,9 +286,9 @@ impl Output {
         let section = |heading, rows| Section { heading, rows };
         let mut all = vec![section("Totals", &totals[..])];
         all.extend(sections);
-        let pixels = self.maps.rows(self.sides, called);
-        if few {
-            all.insert(0, section("Pixels", &pixels));
+        let pixels = few.then(|| self.maps.rows(self.sides, called));
+        if let Some(pixels) = &pixels {
+            all.insert(0, section("Pixels", pixels));
         }
         all.push(section("Settings", &settings));
         let decisions = self.decisions.as_ref();

@@ -40,24 +40,22 @@ impl LaserClock {
     /// That of a file which says so.
     #[must_use]
     pub fn of(header: &Header) -> Option<Self> {
-        let millihertz = u128::from(header.laser_millihertz);
+        Self::from_millihertz(header.laser_millihertz)
+    }
+
+    /// So many laser cycles in a thousand seconds; none if that is 0, which stands for unknown.
+    #[must_use]
+    pub fn from_millihertz(millihertz: u64) -> Option<Self> {
+        let millihertz = u128::from(millihertz);
         (millihertz > 0).then_some(Self { millihertz })
     }
 
     /// The one that holds for a file, and a warning if that is not the file's: `wanted` comes
     /// before the file, and the paper's is for want of any. To the whole hertz they are the same.
     pub(crate) fn choose(wanted: Option<Self>, header: &Header) -> (Self, Option<String>) {
-        let own = Self::of(header);
-        match (wanted, own) {
-            (Some(wanted), Some(own)) if own.millihertz / 1000 * 1000 == wanted.millihertz => {
-                (own, None)
-            }
-            (Some(wanted), Some(own)) => {
-                let differ = format!("the file has a laser of {own}; times are for {wanted}");
-                (wanted, Some(differ))
-            }
-            (Some(clock), None) | (None, Some(clock)) => (clock, None),
-            (None, None) => {
+        match Self::known(wanted, Self::of(header), "the file") {
+            (Some(clock), warning) => (clock, warning),
+            (None, _) => {
                 let assumed = Self::default();
                 let warning = format!(
                     "the laser rate is not known; times are for {assumed}, unless --laser-hz says \
@@ -65,6 +63,21 @@ impl LaserClock {
                 );
                 (assumed, Some(warning))
             }
+        }
+    }
+
+    /// The same if there is one; `own` is what `whose`, a file or a device, says.
+    pub(crate) fn known(
+        wanted: Option<Self>,
+        own: Option<Self>,
+        whose: &str,
+    ) -> (Option<Self>, Option<String>) {
+        match (wanted, own) {
+            (Some(wanted), Some(own)) if own.millihertz / 1000 * 1000 != wanted.millihertz => {
+                let differ = format!("{whose} has a laser of {own}; times are for {wanted}");
+                (Some(wanted), Some(differ))
+            }
+            _ => (own.or(wanted), None),
         }
     }
 
@@ -201,6 +214,25 @@ mod tests {
         assert_eq!((clock.end_ns(0), one.end_ns(u64::MAX)), (100, u64::MAX));
         assert_eq!(LaserClock::new(u64::MAX).unwrap().end_ns(0), 1);
         assert_eq!(clock.to_string(), "10 MHz");
+    }
+
+    #[test]
+    fn what_was_said_of_the_laser_holds_and_a_difference_is_told() {
+        let known = |said: Option<u64>, own| {
+            let said = said.map(|hz| LaserClock::new(hz).unwrap());
+            let (clock, warning) =
+                LaserClock::known(said, LaserClock::from_millihertz(own), "the device");
+            (clock.map(|clock| clock.millihertz()), warning)
+        };
+        assert_eq!(known(None, 0), (None, None));
+        assert_eq!(known(None, 4_165_818), (Some(4_165_818), None));
+        assert_eq!(known(Some(10_000), 0), (Some(10_000_000), None));
+        // A setting has whole hertz: to these, what the device says is exact.
+        assert_eq!(known(Some(4165), 4_165_818), (Some(4_165_818), None));
+        let (rate, warning) = known(Some(3000), 4_165_818);
+        assert_eq!(rate, Some(3_000_000));
+        let told = "the device has a laser of 4.165818 kHz; times are for 3 kHz";
+        assert_eq!(warning.as_deref(), Some(told));
     }
 
     #[test]

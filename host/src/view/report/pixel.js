@@ -37,15 +37,14 @@ function mapEvent(event) {
 /** Whether a part of the run is shown. */
 const isPart = () => shown.start > 0 || shown.end < data.cycles;
 
-/** Which events the map is of, if not of all. */
-const mapOf =
+// Which events the map is of, if not of all.
+element("map-of").value =
   (data.oneOf > 1 ? ` among the 1 in ${number(data.oneOf)} that this report has` : "") +
   (manyEchoes && !data.isChosen ? "; of several echoes the first" : "");
 
 function drawRangeMap() {
   mapUntil(shown.end);
   drawMap(element("map"), pixels.range, data.low, data.high, "mm", 0);
-  element("map-of").value = mapOf;
   element("map-time").value = isPart() ? `at ${timeOf(shown.end)}` : "at the end";
   const range = pixels.range[chosen.pixel];
   const text = Number.isNaN(range) ? `no ${data.event} yet` : `${number(range)} mm`;

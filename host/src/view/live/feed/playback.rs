@@ -5,11 +5,10 @@ use std::io::BufReader;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, anyhow, ensure};
-
-use super::{Command, Wish, Work, reply};
+use anyhow::{Context, Result, anyhow};
 use dtof_core::RangeScale;
 
+use super::{Command, Wish, Work, reply};
 use crate::events::aer_file::{Event, Header, Reader};
 use crate::export::LaserClock;
 
@@ -48,14 +47,13 @@ impl Playback {
         let header = open(&file).with_context(name)?.header;
         RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?;
         let said = laser_hz.map(LaserClock::new).transpose()?;
-        ensure!(
-            said.or(LaserClock::of(&header)).is_some(),
-            "{}: does not say how fast its laser was; say --laser-hz",
-            name()
-        );
-        let (clock, warning) = LaserClock::choose(said, &header);
+        let (clock, warning) = LaserClock::known(said, LaserClock::of(&header), "the file");
+        let unknown = || {
+            let name = name();
+            format!("{name}: does not say how fast its laser was; say --laser-hz")
+        };
         Ok(Self {
-            clock,
+            clock: clock.with_context(unknown)?,
             warning,
             file,
             speed,

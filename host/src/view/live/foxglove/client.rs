@@ -27,8 +27,8 @@ const HANDSHAKE: Duration = Duration::from_secs(5);
 /// Bytes of what a client says at once, at most.
 const MESSAGE: usize = 64 * 1024;
 
-/// Bytes that wait for a client, at most: some of the largest messages. One that only asks, and takes
-/// no answer, is given up then.
+/// Bytes that wait for a client, at most: some of the largest messages. Answers to pings beyond
+/// them are left out.
 const WAITING: usize = 8 * 1024 * 1024;
 
 /// What ends a connection.

@@ -70,14 +70,15 @@ impl Frames {
     /// The next, of what is `wanted`; also of what has not changed if somebody is new.
     pub fn next(&mut self, hub: &Hub, wanted: &dyn Fn(Topic) -> bool, is_new: bool) -> Frame {
         let images = Topic::IMAGES.map(wanted);
+        let events = wanted(Topic::Events) || wanted(Topic::Statistics);
         let seen = hub.seen(Wanted {
-            events: wanted(Topic::Events) || wanted(Topic::Statistics),
+            events,
             pixels: images.contains(&true).then_some(self.images.change()),
         });
         if self.version != Some(seen.version) {
             self.begin(&seen);
         }
-        if !(wanted(Topic::Events) || wanted(Topic::Statistics)) {
+        if !events {
             self.slice = None;
         }
         self.left_out += seen.left_out;

@@ -8,7 +8,7 @@ use std::str::FromStr;
 use hyper::Uri;
 use hyper::header::{HOST, HeaderMap, HeaderValue, ORIGIN};
 
-use crate::view::live::server::guard::one;
+use crate::view::live::server::guard::{HERE, NOT_HERE, one};
 
 /// Foxglove in a browser, and as a program of its own whose pages are files.
 const KNOWN: [&str; 2] = ["https://app.foxglove.dev", "file://"];
@@ -66,8 +66,8 @@ impl Origins {
         let host = only(&HOST)?.unwrap_or_default();
         // Any port: that of a tunnel from another computer is another.
         let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
-        if !["127.0.0.1", "localhost"].contains(&name) {
-            return Err("this server is 127.0.0.1 and localhost only".to_owned());
+        if !HERE.contains(&name) {
+            return Err(NOT_HERE.to_owned());
         }
         match only(&ORIGIN)? {
             // No browser.

@@ -9,6 +9,11 @@ use hyper::{Method, Request, StatusCode};
 
 const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
+/// Names of this computer.
+pub const HERE: [&str; 2] = ["127.0.0.1", "localhost"];
+/// Why another name is refused.
+pub const NOT_HERE: &str = "this server is 127.0.0.1 and localhost only";
+
 /// Why not, in a line.
 pub type Refused = (StatusCode, &'static str);
 
@@ -21,7 +26,7 @@ pub fn check<B>(request: &Request<B>, port: u16) -> Result<(), Refused> {
     let forbidden = |why| Err((StatusCode::FORBIDDEN, why));
     let is_host = |name: &str| is_here(name, port);
     if request.uri().authority().is_some() || !one(headers, &HOST)?.is_some_and(is_host) {
-        return forbidden("this server is 127.0.0.1 and localhost only");
+        return forbidden(NOT_HERE);
     }
     let origin = one(headers, &ORIGIN)?;
     if origin.is_some_and(|origin| !origin.strip_prefix("http://").is_some_and(is_host)) {
@@ -49,7 +54,7 @@ fn is_here(host: &str, port: u16) -> bool {
         port => format!(":{port}"),
     };
     let name = host.strip_suffix(&said);
-    name.is_some_and(|name| ["127.0.0.1", "localhost"].contains(&name))
+    name.is_some_and(|name| HERE.contains(&name))
 }
 
 /// Checks that a body is of a kind that forms of other sites cannot send.
