@@ -18,9 +18,11 @@
 
 mod fault;
 pub mod i2c;
+pub mod protocol;
 pub mod simulated;
 pub mod tdc7200;
 mod timer;
+pub mod tmf8829;
 pub mod tmf882x;
 
 use dtof_core::PixelAddress;
@@ -39,6 +41,27 @@ pub trait PhotonSink {
     fn begin_frame(&mut self, cycles: u32);
     /// A whole histogram of `pixel`, of the frame that was begun last.
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]);
+    /// What the sensor itself takes for a target of `pixel`, to compare with. Only some sensors
+    /// say it.
+    fn target(&mut self, _pixel: PixelAddress, _target: &Target) {}
+}
+
+/// A target as a sensor's own program sees it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Target {
+    /// Of the targets of its pixel, from 0 on.
+    pub number: u8,
+    /// Millimetres along the ray.
+    pub distance: I24F8,
+    /// How sure the sensor is, as it says it.
+    pub confidence: u8,
+    /// Photons of the target, if that is said.
+    pub signal: Option<u32>,
+    /// Photons of a bin without one.
+    pub noise: Option<u32>,
+    /// Photons of the crosstalk.
+    pub crosstalk: Option<u32>,
 }
 
 /// A sensor that is asked when its interrupt pin (or a timer) says so; never
@@ -88,6 +111,8 @@ pub struct About {
     /// How wide its bins are, in picoseconds; `None` if as wide as the
     /// configuration says.
     pub bin_width: Option<U16F16>,
+    /// Bins that can hold photons. Those behind them are not measured.
+    pub bins: u16,
     /// The range of the start of bin 0 in millimetres, as far as it is known.
     pub offset: I24F8,
     /// It gives whole histograms, not photons.
@@ -104,6 +129,7 @@ impl About {
         Self {
             pixels,
             bin_width: None,
+            bins: 128,
             offset: I24F8::ZERO,
             is_whole: false,
             laser_millihertz: 0,

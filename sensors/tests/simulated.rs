@@ -58,7 +58,7 @@ fn photons(given: &[Given]) -> Vec<(u32, u16, u16)> {
         match given {
             Given::Photon(pixel, code) => photons.push((cycle, *pixel, *code)),
             Given::End(cycles) => cycle += u32::from(*cycles),
-            Given::Frame(_) | Given::Histogram(..) => panic!("a histogram"),
+            Given::Frame(_) | Given::Histogram(..) | Given::Target(..) => panic!("a histogram"),
         }
     }
     photons

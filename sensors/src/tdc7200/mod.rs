@@ -345,6 +345,7 @@ where
         About {
             pixels: settings.pixel.0.saturating_add(1),
             bin_width: None,
+            bins: 128,
             offset: self.config.offset(),
             is_whole: false,
             laser_millihertz: settings.laser_millihertz,

@@ -335,6 +335,7 @@ where
         About {
             pixels: self.config.settings().first_pixel.0.saturating_add(ZONES),
             bin_width: Some(BIN_WIDTH),
+            bins: 128,
             offset: OFFSET,
             is_whole: true,
             laser_millihertz: self.config.laser_millihertz(),

@@ -11,13 +11,14 @@ pub mod chips {
 }
 pub mod plug;
 pub mod tdc7200;
+pub mod tmf8829;
 pub mod tmf882x;
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use dtof_core::PixelAddress;
-use dtof_sensors::PhotonSink;
+use dtof_sensors::{PhotonSink, Target};
 use embedded_hal::digital::{Error, ErrorKind, ErrorType, InputPin, OutputPin};
 
 /// One call of the sink.
@@ -27,6 +28,7 @@ pub enum Given {
     End(u16),
     Frame(u32),
     Histogram(u16, Vec<u32>),
+    Target(u16, Target),
 }
 
 /// Notes every call.
@@ -52,6 +54,9 @@ impl PhotonSink for Notes {
     }
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]) {
         self.0.push(Given::Histogram(pixel.0, counts.to_vec()));
+    }
+    fn target(&mut self, pixel: PixelAddress, target: &Target) {
+        self.0.push(Given::Target(pixel.0, *target));
     }
 }
 

@@ -1,0 +1,85 @@
+//! A protocol over embedded-hal-async.
+
+use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
+use embedded_hal_async::i2c::I2c;
+
+use super::{Driver, Failure, Protocol, Request};
+use crate::{PhotonSink, Polled};
+
+impl<P, I2C, INT, EN> Driver<P, I2C, INT, EN>
+where
+    P: Protocol,
+    I2C: I2c,
+    INT: InputPin,
+    EN: OutputPin + PinErrorType<Error = INT::Error>,
+{
+    /// [`Sensor::poll`](crate::Sensor::poll) that awaits its transfers: the same ones, in the same
+    /// order. It awaits nothing else. Between polls that are [`Polled::Idle`] await an edge of
+    /// INT or a millisecond, whichever comes first.
+    ///
+    /// Drop the future between transfers only; a poll that is dropped within one is as a
+    /// failed one that nobody was told of: call `start` before the next.
+    ///
+    /// # Errors
+    /// The error of this step. The next polls bring the sensor up again.
+    pub async fn poll_async(
+        &mut self,
+        now_ms: u32,
+        sink: &mut impl PhotonSink,
+    ) -> Result<Polled, P::Error<I2C::Error, INT::Error>> {
+        let polled = self.step_async(now_ms, sink).await;
+        polled.inspect_err(|error| self.protocol.failed(error))
+    }
+
+    /// A configuration comes into force: whatever is under way is given up.
+    pub fn start_async(&mut self) {
+        self.protocol.restart();
+    }
+
+    /// Tells the sensor to stop; if that fails, the next start sees to it.
+    pub async fn stop_async(&mut self) {
+        if let Request::Write { address, bytes } = self.protocol.stop() {
+            let _ = self.i2c.write(address, bytes).await;
+        }
+    }
+
+    async fn transfer_async(
+        &mut self,
+        now_ms: u32,
+    ) -> Result<Option<bool>, Failure<I2C::Error, INT::Error>> {
+        match self.protocol.request(now_ms) {
+            Request::Nothing => return Ok(None),
+            Request::Interrupt => return self.interrupt.is_high().map(Some).map_err(Failure::Pin),
+            Request::Enable(high) => {
+                let set = self.enable.set_state(high.into());
+                set.map_err(Failure::Pin)?;
+            }
+            Request::Write { address, bytes } => {
+                let written = self.i2c.write(address, bytes).await;
+                written.map_err(Failure::of_bus)?;
+            }
+            Request::Read {
+                address,
+                register,
+                bytes,
+            } => {
+                let read = self.i2c.write_read(address, &[register], bytes).await;
+                read.map_err(Failure::of_bus)?;
+            }
+        }
+        Ok(Some(false))
+    }
+
+    async fn step_async(
+        &mut self,
+        now_ms: u32,
+        sink: &mut impl PhotonSink,
+    ) -> Result<Polled, P::Error<I2C::Error, INT::Error>> {
+        while let Some(is_high) = self.transfer_async(now_ms).await? {
+            if let Some(polled) = self.protocol.answered(is_high, now_ms, sink)? {
+                return Ok(polled);
+            }
+        }
+        Ok(Polled::Idle)
+    }
+}

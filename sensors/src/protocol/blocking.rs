@@ -1,0 +1,85 @@
+//! A protocol over embedded-hal.
+
+use dtof_core::fixed::types::U16F16;
+use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
+use embedded_hal::i2c::I2c;
+
+use super::{Driver, Failure, Protocol, Request};
+use crate::{About, PhotonSink, Polled, Sensor, SensorFault};
+
+impl<P, I2C, INT, EN> Driver<P, I2C, INT, EN>
+where
+    P: Protocol,
+    I2C: I2c,
+    INT: InputPin,
+    EN: OutputPin + PinErrorType<Error = INT::Error>,
+{
+    /// One request, and the level of INT if that was it. `None` if there is nothing to do.
+    fn transfer(&mut self, now_ms: u32) -> Result<Option<bool>, Failure<I2C::Error, INT::Error>> {
+        match self.protocol.request(now_ms) {
+            Request::Nothing => return Ok(None),
+            Request::Interrupt => return self.interrupt.is_high().map(Some).map_err(Failure::Pin),
+            Request::Enable(high) => {
+                let set = self.enable.set_state(high.into());
+                set.map_err(Failure::Pin)?;
+            }
+            Request::Write { address, bytes } => {
+                let written = self.i2c.write(address, bytes);
+                written.map_err(Failure::of_bus)?;
+            }
+            Request::Read {
+                address,
+                register,
+                bytes,
+            } => {
+                let read = self.i2c.write_read(address, &[register], bytes);
+                read.map_err(Failure::of_bus)?;
+            }
+        }
+        Ok(Some(false))
+    }
+
+    fn step(
+        &mut self,
+        now_ms: u32,
+        sink: &mut impl PhotonSink,
+    ) -> Result<Polled, P::Error<I2C::Error, INT::Error>> {
+        while let Some(is_high) = self.transfer(now_ms)? {
+            if let Some(polled) = self.protocol.answered(is_high, now_ms, sink)? {
+                return Ok(polled);
+            }
+        }
+        Ok(Polled::Idle)
+    }
+}
+
+impl<P, I2C, INT, EN> Sensor for Driver<P, I2C, INT, EN>
+where
+    P: Protocol,
+    P::Error<I2C::Error, INT::Error>: Into<SensorFault>,
+    I2C: I2c,
+    INT: InputPin,
+    EN: OutputPin + PinErrorType<Error = INT::Error>,
+{
+    type Error = P::Error<I2C::Error, INT::Error>;
+
+    fn about(&self) -> About {
+        self.protocol.about()
+    }
+
+    fn start(&mut self, _: U16F16) {
+        self.protocol.restart();
+    }
+
+    /// Tells the sensor to stop; if that fails, the next start sees to it.
+    fn stop(&mut self) {
+        if let Request::Write { address, bytes } = self.protocol.stop() {
+            let _ = self.i2c.write(address, bytes);
+        }
+    }
+
+    fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Self::Error> {
+        self.step(now_ms, sink)
+            .inspect_err(|error| self.protocol.failed(error))
+    }
+}

@@ -1,0 +1,206 @@
+//! How a TMF8829 measures.
+
+use core::fmt;
+
+use dtof_core::PixelAddress;
+
+use super::registers::DEFAULT_ADDRESS;
+use super::zones::{Preset, REFERENCES, Zones};
+
+/// What the sensor says of each zone beside its histogram.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Results {
+    /// Targets a zone, 1 to 4, nearest first. A cover glass may be the first.
+    pub peaks: u8,
+    /// How strong each target is.
+    pub signal: bool,
+    /// The mean bin outside the peaks.
+    pub noise: bool,
+    /// The strength of the crosstalk.
+    pub crosstalk: bool,
+}
+
+impl Results {
+    /// The register `result_format`.
+    pub(super) const fn format(self) -> u8 {
+        self.peaks
+            | (self.signal as u8) << 3
+            | (self.noise as u8) << 4
+            | (self.crosstalk as u8) << 5
+    }
+
+    /// Bytes a zone.
+    pub(super) const fn bytes(self) -> u16 {
+        let of_peak = 3 + 2 * self.signal as u16;
+        2 * (self.noise as u16 + self.crosstalk as u16) + self.peaks as u16 * of_peak
+    }
+}
+
+/// The choices there are. [`Config::new`] checks them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Settings {
+    /// The pixel of the zone in the first row and column; the others follow it row by row.
+    pub first_pixel: PixelAddress,
+    /// The pixel of the first of four reference histograms, if they are wanted; the other
+    /// three follow it.
+    pub reference: Option<PixelAddress>,
+    /// How many zones.
+    pub zones: Zones,
+    /// The vendor's preset.
+    pub preset: Preset,
+    /// What else is said of each zone.
+    pub results: Results,
+    /// The I²C address to change to, 7 bits; 0x41 is the one after power-up.
+    pub address: u8,
+    /// Milliseconds from one measurement to the next.
+    pub period_ms: u16,
+    /// Laser pulses a measurement, in 1,024: those of all its time slots.
+    pub kilo_iterations: u16,
+    /// Milliseconds a command may take.
+    pub command_timeout_ms: u32,
+    /// Milliseconds without data after which the measurement is given up.
+    pub data_timeout_ms: u32,
+    /// Polls in a row that may find INT low and `INT_STATUS` without a reason.
+    pub stuck_limit: u8,
+}
+
+impl Settings {
+    /// The standard preset with 586 × 1,024 pulses, as the vendor has it. The period is what a bus
+    /// of 400 kHz takes for the histograms, some 600 ms for each time slot: 1.3 s with 8×8 and
+    /// 16×16 zones, 5 s with 32×32, 7.5 s with 48×32.
+    #[must_use]
+    pub const fn new(first_pixel: PixelAddress, zones: Zones) -> Self {
+        let period_ms = match zones {
+            Zones::Z8x8 | Zones::Z16x16 => 1300,
+            Zones::Z32x32Pairs | Zones::Z32x32 => 5000,
+            Zones::Z48x32 => 7500,
+        };
+        Self {
+            first_pixel,
+            reference: None,
+            zones,
+            preset: Preset::Standard,
+            results: Results {
+                peaks: 2,
+                signal: false,
+                noise: false,
+                crosstalk: false,
+            },
+            address: DEFAULT_ADDRESS,
+            period_ms,
+            kilo_iterations: 586,
+            command_timeout_ms: 50,
+            data_timeout_ms: period_ms as u32 + 1000,
+            stuck_limit: 3,
+        }
+    }
+}
+
+/// Checked [`Settings`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Config(Settings);
+
+/// Settings that cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ConfigError {
+    /// The I²C address is reserved: below 0x08 or above 0x77.
+    Address,
+    /// A measurement without pulses.
+    ZeroIterations,
+    /// The last zone, or the last reference, would have a pixel past the last.
+    Pixels,
+    /// The time limit of data is not longer than the period.
+    Timeout,
+    /// The preset is one of 8×8 zones alone.
+    LongRange,
+    /// No target a zone, or more than four.
+    Peaks,
+    /// A frame of results would have more than 8,192 bytes, which the sensor refuses.
+    ResultSize,
+}
+
+impl ConfigError {
+    /// The reason, in one line.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Address => "the I2C address must be within 0x08 and 0x77",
+            Self::ZeroIterations => "a measurement needs at least 1,024 pulses",
+            Self::Pixels => "the pixels of all zones do not fit behind the first",
+            Self::Timeout => "data would time out within one period",
+            Self::LongRange => "only 8x8 zones have a preset for long ranges",
+            Self::Peaks => "a zone has 1 to 4 targets",
+            Self::ResultSize => "the results of all zones are more than the sensor's 8,192 bytes",
+        }
+    }
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.text())
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+impl Config {
+    /// Checks `settings`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] says what cannot be.
+    pub const fn new(settings: Settings) -> Result<Self, ConfigError> {
+        if settings.address < 0x08 || settings.address > 0x77 {
+            return Err(ConfigError::Address);
+        }
+        if settings.kilo_iterations == 0 {
+            return Err(ConfigError::ZeroIterations);
+        }
+        let zones = settings.zones;
+        let PixelAddress(first) = settings.first_pixel;
+        if first.checked_add(zones.number() - 1).is_none() {
+            return Err(ConfigError::Pixels);
+        }
+        if let Some(PixelAddress(first)) = settings.reference
+            && first.checked_add(REFERENCES - 1).is_none()
+        {
+            return Err(ConfigError::Pixels);
+        }
+        if settings.data_timeout_ms <= settings.period_ms as u32 {
+            return Err(ConfigError::Timeout);
+        }
+        if matches!(settings.preset, Preset::LongRange) && !matches!(zones, Zones::Z8x8) {
+            return Err(ConfigError::LongRange);
+        }
+        if settings.results.peaks == 0 || settings.results.peaks > 4 {
+            return Err(ConfigError::Peaks);
+        }
+        if zones.result_zones() as u32 * settings.results.bytes() as u32 + 33 > 8192 {
+            return Err(ConfigError::ResultSize);
+        }
+        Ok(Self(settings))
+    }
+
+    /// The checked settings.
+    #[must_use]
+    pub const fn settings(&self) -> &Settings {
+        &self.0
+    }
+
+    /// Laser pulses that a frame of histograms has integrated: those of its time slot.
+    pub(super) const fn pulses(&self) -> u32 {
+        self.0.kilo_iterations as u32 * 1024 / self.0.zones.frames() as u32
+    }
+
+    /// Laser pulses that are counted in a thousand seconds, on average, rounded down.
+    pub(super) const fn laser_millihertz(&self) -> u64 {
+        let pulses = self.pulses() as u64 * self.0.zones.frames() as u64;
+        match (pulses * 1_000_000).checked_div(self.0.period_ms as u64) {
+            Some(rate) => rate,
+            None => 0,
+        }
+    }
+}

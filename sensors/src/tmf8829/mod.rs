@@ -1,0 +1,358 @@
+//! ams OSRAM TMF8829: 8×8 to 48×32 zones of raw histograms over I²C, at most 1 MHz.
+//!
+//! The sensor's program is the vendor's and not part of this crate. Pass the bytes of its image to
+//! the driver. It is loaded when the bootloader runs; a sensor that already runs the application
+//! is configured anew and not loaded again.
+//!
+//! # Histograms
+//!
+//! A measurement has 2 to 12 time slots ([`Zones::frames`]). The sensor sends a frame of histograms
+//! for each, and waits until it is read. A histogram is given as soon as its last byte is here, so
+//! the driver has room for one. Bins behind those of the preset are 0: [`About`] says how many
+//! bins are measured and how wide they are.
+//!
+//! | preset | bins | width |
+//! |---|---|---|
+//! | standard | 54 | 814.6 ps |
+//! | long range, 8×8 zones | 104 | 814.6 ps |
+//! | high accuracy | 64 | 203.65 ps |
+//! | high accuracy, 8×8 zones | 109 | 407.3 ps |
+//!
+//! The last one has 218 bins of 203.65 ps, more than a histogram holds: the driver adds two and two.
+//! A count in a bin that a histogram does not hold is in [`Counts::beyond`].
+//!
+//! Pixels follow the sensor's own zones row by row, the first row on top. Lenses mirror the scene
+//! from left to right, as seen from the sensor; the driver does not turn it.
+//!
+//! After its histograms the sensor says which targets it sees itself
+//! ([`PhotonSink::target`]). [`snr`] says what their confidence stands for. Their distances are not
+//! corrected for the sensor's clock.
+//!
+//! # Time zero
+//!
+//! The offset in [`About`] brings pulses of the standard preset to the sensor's own distances, from
+//! 0.26 to 2.85 m in a public log of one sensor. The four reference histograms of each frame, of a
+//! detector beside the laser, show time zero as it is now: [`Settings::reference`] asks for them.
+//!
+//! # Laser cycles
+//!
+//! Every laser pulse is a laser cycle. The pulses of a measurement, `kilo_iterations` × 1,024, are
+//! shared out among its time slots, and a frame of histograms ends those of its slot. No
+//! source says so; stamps of recorded frames agree. The laser rate is the mean over a period, if the
+//! bus is fast enough for it: a frame of histograms takes 0.6 s at 400 kHz, and the sensor waits.
+//!
+//! # Where the numbers come from
+//!
+//! The data sheet DS001140, the application note AN001096, and for what they leave out or print
+//! wrong the vendor's published drivers: the upload (0x45, least significant byte first), the
+//! identifications of frames, and that no command has a checksum.
+//!
+//! # Not supported
+//!
+//! SPI and I3C; two measurements in turn (dual mode); detection of motion; standby.
+//!
+//! # Several sensors on a bus
+//!
+//! As with the TMF8820: give each an address of its own and its own ENABLE, low at first, and
+//! poll them up one after the other, each until [`Tmf8829::is_measuring`].
+//!
+//! # After an error
+//!
+//! Frames that were left out and frames that are marked as not valid are errors that cost nothing
+//! else. Any other error while measuring stops and configures the sensor anew; an error while that
+//! is going on switches it off and on and loads the image again. Of a frame that breaks off its
+//! first histograms have been given.
+//!
+//! # Cost
+//!
+//! The driver has 1.1 KiB of RAM. A poll has one chunk of the FIFO on the bus, or at most eight
+//! short transfers.
+
+mod answers;
+mod config;
+mod error;
+mod frame;
+mod registers;
+mod requests;
+mod snr;
+mod stream;
+mod zones;
+
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::I24F8;
+
+use self::registers::DEFAULT_ADDRESS;
+use self::stream::Stream;
+use crate::protocol::{Driver, Protocol, Request};
+use crate::timer::Since;
+use crate::{About, PhotonSink, Polled};
+
+pub use self::config::{Config, ConfigError, Results, Settings};
+pub use self::error::{Error, Waiting};
+pub use self::registers::{BootCommand, Command};
+pub use self::snr::snr;
+pub use self::zones::{Preset, Zones};
+
+/// ENABLE stays low this long when the sensor is switched off and on.
+const RESET_MS: u32 = 3;
+/// From ENABLE high to the first access.
+const START_MS: u32 = 3;
+/// From the start of the image to the first access.
+const BOOT_MS: u32 = 10;
+/// The bootloader counts at most so many words of an image.
+const MOST_IMAGE: usize = 4 * 0x1000;
+/// Room for a transfer: the register, and as many bytes as a chunk may have.
+const BUFFER: usize = 256;
+
+/// A TMF8829 on an I²C bus, with INT and ENABLE.
+///
+/// `CHUNK` is how many bytes of a frame or of the image go over the bus in one transaction, 4 to
+/// 252 in fours (checked when compiled): what another device on the bus may have to wait for.
+pub type Tmf8829<'a, I2C, INT, EN, const CHUNK: usize = 128> =
+    Driver<Tmf8829Protocol<'a, CHUNK>, I2C, INT, EN>;
+
+/// The protocol of a TMF8829, with its image.
+#[derive(Debug)]
+pub struct Tmf8829Protocol<'a, const CHUNK: usize = 128> {
+    image: &'a [u8],
+    config: Config,
+    /// The address it answers at now.
+    address: u8,
+    state: State,
+    /// When the present wait began.
+    since: Since,
+    /// Polls in a row with INT low for no reason.
+    stuck: u8,
+    /// The frame that should come next, once one has come.
+    next: Option<u32>,
+    buffer: [u8; BUFFER],
+    stream: Stream,
+    counts: Counts,
+}
+
+/// Counts of the data so far. They stop at their largest value.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Counts {
+    /// Histograms that were given, references included.
+    pub histograms: u32,
+    /// Frames that began, of histograms and of results.
+    pub frames: u32,
+    /// Of these, frames that broke off.
+    pub broken: u32,
+    /// Of these, frames that the sensor aborted or marks as not valid.
+    pub aborted: u32,
+    /// Of these, frames with SPADs overloaded or the laser at its limit.
+    pub limited: u32,
+    /// Frames that were left out, by their numbers.
+    pub missed: u32,
+    /// Photons in bins that a histogram does not hold.
+    pub beyond: u64,
+    /// All errors.
+    pub errors: u32,
+}
+
+/// What is to be done next. Each is one transfer, or a wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    /// ENABLE is to be driven high, or before that low.
+    Off { reset: bool },
+    /// ENABLE is low.
+    Resetting,
+    /// ENABLE is high.
+    Starting,
+    /// Whether the processor is ready.
+    Waking,
+    /// It is not, nor switched on.
+    SwitchingOn { enable: u8 },
+    /// Which chip is it?
+    Identifying,
+    /// Which program runs?
+    Looking,
+    /// The bootloader is to be told.
+    Telling(BootCommand),
+    /// Whether it has done so.
+    Told(BootCommand),
+    /// The rest of the image from here on is to be sent.
+    Uploading { sent: u16 },
+    /// Whether all of it is there.
+    Uploaded,
+    /// Whether the application runs.
+    Booting,
+    /// A reset is to start the application again.
+    Keeping,
+    /// The application is to be told.
+    Commanding(Command),
+    /// Whether it has done so.
+    Commanded(Command),
+    /// Whether the preset is there.
+    Paging,
+    /// This block of the configuration is to be written.
+    Configuring(u8),
+    /// Whether INT is low.
+    Measuring,
+    /// Why it is.
+    Asking,
+    /// These reasons are to be cleared.
+    Clearing { reasons: u8 },
+    /// A frame begins.
+    Beginning,
+    /// The rest of it comes.
+    Reading,
+}
+
+impl<'a, I2C, INT, EN, const CHUNK: usize> Tmf8829<'a, I2C, INT, EN, CHUNK> {
+    /// A driver that has not touched its device yet. `image` may be empty for a sensor that
+    /// already runs the application.
+    pub const fn new(
+        i2c: I2C,
+        interrupt: INT,
+        enable: EN,
+        image: &'a [u8],
+        config: Config,
+    ) -> Self {
+        Self::of(Tmf8829Protocol::new(image, config), i2c, interrupt, enable)
+    }
+
+    /// Counts of the data so far.
+    pub const fn counts(&self) -> Counts {
+        self.protocol().counts
+    }
+
+    /// The I²C address the sensor answers at now.
+    pub const fn address(&self) -> u8 {
+        self.protocol().address
+    }
+
+    /// Whether the sensor is up.
+    pub const fn is_measuring(&self) -> bool {
+        self.protocol().is_measuring()
+    }
+}
+
+impl<'a, const CHUNK: usize> Tmf8829Protocol<'a, CHUNK> {
+    /// Of a device that was not touched yet.
+    #[must_use]
+    pub const fn new(image: &'a [u8], config: Config) -> Self {
+        const {
+            assert!(
+                CHUNK >= 4 && CHUNK < BUFFER && CHUNK.is_multiple_of(4),
+                "CHUNK must be from 4 to 252, in fours"
+            );
+        };
+        Self {
+            image,
+            config,
+            address: DEFAULT_ADDRESS,
+            // With an address of its own it may answer at that or at 0x41, so
+            // that only a reset makes sure.
+            state: State::Off {
+                reset: config.settings().address != DEFAULT_ADDRESS,
+            },
+            since: Since::new(0),
+            stuck: 0,
+            next: None,
+            buffer: [0; BUFFER],
+            stream: Stream::new(),
+            counts: Counts {
+                histograms: 0,
+                frames: 0,
+                broken: 0,
+                aborted: 0,
+                limited: 0,
+                missed: 0,
+                beyond: 0,
+                errors: 0,
+            },
+        }
+    }
+
+    /// Counts of the data so far.
+    #[must_use]
+    pub const fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// Whether the sensor is up.
+    #[must_use]
+    pub const fn is_measuring(&self) -> bool {
+        matches!(
+            self.state,
+            State::Measuring
+                | State::Asking
+                | State::Clearing { .. }
+                | State::Beginning
+                | State::Reading
+        )
+    }
+
+    /// Where to begin again: only a sensor that measures is known to be well.
+    fn give_up(&mut self) {
+        if self.state == State::Reading {
+            count(&mut self.counts.broken);
+        }
+        self.state = match self.state {
+            State::Off { reset } => State::Off { reset },
+            _ => State::Off {
+                reset: !self.is_measuring(),
+            },
+        };
+    }
+}
+
+impl<const CHUNK: usize> Protocol for Tmf8829Protocol<'_, CHUNK> {
+    type Error<B, P> = Error<B, P>;
+
+    fn about(&self) -> About {
+        /// From a fit of the pulses to the sensor's own distances.
+        const OFFSET: I24F8 = I24F8::lit("-441.1");
+        let settings = self.config.settings();
+        let PixelAddress(first) = settings.first_pixel;
+        About {
+            pixels: first.saturating_add(settings.zones.number()),
+            bin_width: Some(settings.preset.bin_width(settings.zones)),
+            bins: settings.preset.bins(settings.zones),
+            offset: OFFSET,
+            is_whole: true,
+            laser_millihertz: self.config.laser_millihertz(),
+        }
+    }
+
+    fn restart(&mut self) {
+        self.give_up();
+    }
+
+    fn stop(&mut self) -> Request<'_> {
+        let was_measuring = self.is_measuring();
+        self.give_up();
+        if was_measuring {
+            self.stop_request()
+        } else {
+            Request::Nothing
+        }
+    }
+
+    fn request(&mut self, now_ms: u32) -> Request<'_> {
+        self.next_request(now_ms)
+    }
+
+    fn answered<B, P>(
+        &mut self,
+        is_high: bool,
+        now_ms: u32,
+        sink: &mut impl PhotonSink,
+    ) -> Result<Option<Polled>, Error<B, P>> {
+        self.take_answer(is_high, now_ms, sink)
+    }
+
+    fn failed<B, P>(&mut self, error: &Error<B, P>) {
+        count(&mut self.counts.errors);
+        if !matches!(error, Error::Missed { .. } | Error::Aborted { .. }) {
+            self.give_up();
+        }
+    }
+}
+
+fn count(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
+}

@@ -1,0 +1,109 @@
+//! Registers, commands and answers of the TMF8829, named as in its data sheet DS001140 and in
+//! the vendor's application note AN001096.
+
+/// The I²C address after power-up.
+pub(super) const DEFAULT_ADDRESS: u8 = 0x41;
+
+/// What runs.
+pub(super) const APPID: u8 = 0x00;
+/// APPID of the bootloader.
+pub(super) const BOOTLOADER: u8 = 0x80;
+/// APPID of the measurement application in RAM.
+pub(super) const APPLICATION: u8 = 0x01;
+
+/// A command is written here with its parameters, in one transaction; its state is read back.
+pub(super) const CMD_STAT: u8 = 0x08;
+/// `CMD_STAT`: done.
+pub(super) const STAT_OK: u8 = 0x00;
+/// `CMD_STAT`: accepted and going on, the answer to [`Command::Measure`].
+pub(super) const STAT_ACCEPTED: u8 = 0x01;
+/// `CMD_STAT` of the bootloader: words of the image are missing.
+pub(super) const STAT_INCOMPLETE: u8 = 0x04;
+/// `CMD_STAT` from here on is a command that is not answered yet.
+pub(super) const FIRST_COMMAND: u8 = 0x10;
+
+/// Which page the registers behind it hold.
+pub(super) const PAGE: u8 = 0x20;
+/// Period in ms and iterations in 1,024, 16 bits each.
+pub(super) const PERIOD: u8 = 0x22;
+/// `fp_mode`: the zones.
+pub(super) const FP_MODE: u8 = 0x26;
+/// The format of results; behind it, whether histograms are given.
+pub(super) const RESULT_FORMAT: u8 = 0x2A;
+/// Histograms are given, and wait for the host.
+pub(super) const HISTOGRAMS_ON: u8 = 1;
+/// The I²C address in bits 7..1.
+pub(super) const I2C_ADDRESS: u8 = 0x90;
+
+/// Why INT is low. Writing a 1 clears a bit. Behind it, which bits pull INT low.
+pub(super) const INT_STATUS: u8 = 0xE1;
+/// `INT_STATUS`: a frame of results, or of histograms, stands ready.
+pub(super) const FRAME_INT: u8 = 1 << 3 | 1;
+/// The chip's identification.
+pub(super) const ID: u8 = 0xE3;
+/// The value of ID.
+pub(super) const CHIP_ID: u8 = 0x9E;
+
+/// ENABLE.
+pub(super) const ENABLE: u8 = 0xF8;
+/// ENABLE bit 7: the processor is ready.
+pub(super) const CPU_READY: u8 = 1 << 7;
+/// ENABLE bit 3: standby.
+pub(super) const POFF: u8 = 1 << 3;
+/// ENABLE bit 2: powered on.
+pub(super) const PON: u8 = 1 << 2;
+/// ENABLE bits 5..4: it wakes up with the program in RAM. PON besides.
+pub(super) const ON_FROM_RAM: u8 = 2 << 4 | PON;
+
+/// FIFOSTATUS; behind it the systick, and the FIFO.
+pub(super) const FIFO_STATUS: u8 = 0xFA;
+/// FIFOSTATUS bit 5: data were lost.
+pub(super) const OVERRUN: u8 = 1 << 5;
+/// The FIFO, at which addresses stay.
+pub(super) const FIFO: u8 = 0xFF;
+
+/// A command of the measurement application.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Command {
+    /// Measure until told to stop.
+    Measure,
+    /// Take over the configuration page.
+    WritePage,
+    /// Load the preset of this number.
+    LoadPreset(u8),
+    /// Stop measuring.
+    Stop,
+}
+
+impl Command {
+    pub(super) const fn code(self) -> u8 {
+        match self {
+            Self::Measure => 0x10,
+            Self::WritePage => 0x15,
+            Self::LoadPreset(code) => code,
+            Self::Stop => 0xFF,
+        }
+    }
+
+    /// The value of `CMD_STAT` when the command is done.
+    pub(super) const fn done(self) -> u8 {
+        match self {
+            Self::Measure => STAT_ACCEPTED,
+            _ => STAT_OK,
+        }
+    }
+}
+
+/// A command of the bootloader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum BootCommand {
+    /// Start the program in RAM.
+    Start = 0x16,
+    /// Switch SPI off, which this driver does not use: with both on, later traffic fails.
+    SpiOff = 0x20,
+    /// The program comes through the FIFO.
+    Upload = 0x45,
+}

@@ -1,0 +1,103 @@
+//! A driver of a TMF8829 beside its chip.
+
+use std::rc::Rc;
+
+use dtof_core::PixelAddress;
+use dtof_sensors::tmf8829::{Config, Preset, Settings, Tmf8829, Zones};
+use dtof_sensors::{Polled, Sensor};
+
+use super::super::{Given, Notes};
+use super::bus::Bus;
+use super::{Chip, Scene};
+
+pub const IMAGE: [u8; 1234] = [0x5A; 1234];
+pub const PRESETS: [Preset; 3] = [Preset::Standard, Preset::LongRange, Preset::HighAccuracy];
+
+/// Counts that differ in every bin and use all three bytes.
+pub fn some() -> Scene {
+    Rc::new(|measurement, zone, bins| {
+        let (zone, bins) = match zone {
+            Some((x, y)) => (64 * y + x, bins),
+            None => (5000 + bins, 64),
+        };
+        let seed = u32::try_from(zone).unwrap() * 7919 + measurement * 104_729;
+        let count = |bin: u32| (seed + bin).wrapping_mul(2_654_435_761) & 0xff_ffff;
+        (0..u32::try_from(bins).unwrap()).map(count).collect()
+    })
+}
+
+pub fn settings(zones: Zones) -> Settings {
+    Settings::new(PixelAddress(10), zones)
+}
+
+pub struct Bench<const CHUNK: usize> {
+    pub sensor: Tmf8829<'static, Bus, Bus, Bus, CHUNK>,
+    pub bus: Bus,
+    pub sink: Notes,
+    pub now_ms: u32,
+}
+
+impl<const CHUNK: usize> Bench<CHUNK> {
+    pub fn new(settings: Settings) -> Self {
+        let bus = Bus::new(Chip::new(&IMAGE, some()));
+        Self {
+            sensor: sensor(&bus, settings, &IMAGE),
+            bus,
+            sink: Notes::default(),
+            // So that the milliseconds wrap in the middle of it.
+            now_ms: u32::MAX - 5,
+        }
+    }
+
+    /// Another driver of the same chip.
+    pub fn load_with(&mut self, settings: Settings, image: &'static [u8]) {
+        self.sensor = sensor(&self.bus, settings, image);
+    }
+
+    pub fn poll(&mut self) -> Polled {
+        self.now_ms = self.now_ms.wrapping_add(1);
+        self.sensor.poll(self.now_ms, &mut self.sink).unwrap()
+    }
+
+    pub fn bring_up(&mut self) {
+        for _ in 0..2000 {
+            let _ = self.poll();
+            if self.sensor.is_measuring() {
+                return;
+            }
+        }
+        panic!("it does not come up");
+    }
+
+    /// Polls until so many frames have come whole.
+    pub fn frames(&mut self, frames: usize) -> Vec<Given> {
+        let until = self.bus.0.borrow().chip.sent.len() + frames;
+        while self.bus.0.borrow().chip.sent.len() < until {
+            self.poll();
+        }
+        self.sink.take()
+    }
+
+    /// Gives a frame away instead of one of the chip's.
+    pub fn present(&mut self, bytes: &[u8], interrupt: u8) -> Vec<Given> {
+        {
+            let chip = &mut self.bus.0.borrow_mut().chip;
+            chip.is_halted = true;
+            chip.present(bytes, interrupt);
+        }
+        self.sink.take();
+        while !self.bus.0.borrow().chip.fifo.is_empty() {
+            self.poll();
+        }
+        self.sink.take()
+    }
+}
+
+fn sensor<const CHUNK: usize>(
+    bus: &Bus,
+    settings: Settings,
+    image: &'static [u8],
+) -> Tmf8829<'static, Bus, Bus, Bus, CHUNK> {
+    let config = Config::new(settings).unwrap();
+    Tmf8829::new(bus.clone(), bus.clone(), bus.clone(), image, config)
+}

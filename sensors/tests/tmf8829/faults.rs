@@ -1,0 +1,241 @@
+//! Fifty thousand faults of a TMF8829 and its bus. A poll is as short as ever, nothing is given
+//! that was not seen on the bus, every frame that is lost is counted, and all is right again
+//! afterwards.
+
+use crate::common::Given;
+use crate::common::tmf8829::bench::{Bench, settings};
+use crate::common::tmf8829::bus::Fault;
+use crate::common::tmf8829::{order, shape};
+use dtof_core::fixed::types::U16F16;
+use dtof_sensors::Sensor;
+use dtof_sensors::tmf8829::{Error, Zones};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+const FAULTS: u32 = 50_000;
+/// Short transfers of a poll: what configures the sensor, at the same address.
+const MOST: usize = 7;
+const CHUNK: usize = 252;
+
+/// What was seen on the bus, and what has to be given of it.
+struct Oracle {
+    mode: u8,
+    /// Of the frame that comes: kind, part, bytes of data, number.
+    frame: Option<(u8, u8, usize, u32)>,
+    bytes: Vec<u8>,
+    begun: u32,
+    whole: u32,
+    histograms: u32,
+    /// The last frame that came whole, if nothing has been counted since.
+    last: Option<u32>,
+}
+
+impl Oracle {
+    const fn new(mode: u8) -> Self {
+        Self {
+            mode,
+            frame: None,
+            bytes: Vec::new(),
+            begun: 0,
+            whole: 0,
+            histograms: 0,
+            last: None,
+        }
+    }
+
+    /// The header, if it begins a frame of this measurement.
+    fn header(&self, bytes: &[u8]) -> Option<(u8, u8, usize, u32)> {
+        let (columns, rows, slots) = shape(self.mode);
+        let (id, part) = (bytes[5], bytes[6]);
+        let payload = usize::from(u16::from_le_bytes([bytes[7], bytes[8]]));
+        let number = u32::from_le_bytes(bytes[9..13].try_into().unwrap());
+        let halves = if slots > 2 { 2 } else { 1 };
+        let data = match id {
+            id if id == 0x20 | self.mode && part < slots => 25_344,
+            // Two targets of three bytes each.
+            id if id == 0x10 | self.mode && (part == 2 || (part == 0x42 && halves == 2)) => {
+                columns * rows / halves * 6
+            }
+            _ => return None,
+        };
+        let fits = bytes[0] & 0x20 == 0 && payload == data + 24;
+        fits.then_some((id, part, data, number))
+    }
+
+    fn see(&mut self, written: &[u8], read: Option<&[u8]>) -> Vec<Given> {
+        let mut given = Vec::new();
+        match (written, read) {
+            ([0xFA], Some(bytes)) => {
+                self.frame = self.header(bytes);
+                self.bytes.clear();
+                if let Some((id, ..)) = self.frame {
+                    self.begun += 1;
+                    if id & 0xF0 == 0x20 {
+                        let slots = u32::from(shape(self.mode).2);
+                        given.push(Given::Frame(586 * 1024 / slots));
+                    }
+                }
+            }
+            ([0xFF], Some(bytes)) => {
+                let before = self.bytes.len();
+                self.bytes.extend(bytes);
+                if let Some((id, part, data, _)) = self.frame
+                    && id & 0xF0 == 0x20
+                {
+                    given = self.histograms(part.into(), before, data);
+                }
+            }
+            _ => {}
+        }
+        given
+    }
+
+    /// Those of which the last byte has come.
+    fn histograms(&mut self, slot: usize, before: usize, data: usize) -> Vec<Given> {
+        let bins = if self.mode == 0 { 256 } else { 64 };
+        let columns = shape(self.mode).0;
+        let mut given = Vec::new();
+        for (index, (x, y)) in order(self.mode, slot).into_iter().enumerate() {
+            let start = 4 * 64 * 3 + index * bins * 3;
+            let end = start + bins * 3;
+            if end <= before || end > self.bytes.len().min(data) {
+                continue;
+            }
+            let words = self.bytes[start..end].chunks(3).take(128);
+            let mut counts: Vec<u32> = words
+                .map(|word| {
+                    u32::from(word[0]) + 256 * u32::from(word[1]) + 65536 * u32::from(word[2])
+                })
+                .collect();
+            counts.resize(128, 0);
+            let pixel = u16::try_from(10 + y * columns + x).unwrap();
+            given.push(Given::Histogram(pixel, counts));
+            self.histograms += 1;
+        }
+        given
+    }
+
+    /// A poll is over, with an error or without.
+    fn end(&mut self, is_error: bool, goes_on: bool) {
+        if let Some((_, _, data, number)) = self.frame
+            && self.bytes.len() == data + 12
+        {
+            if self.bytes.ends_with(&[0xF7, 0xE0]) {
+                self.whole += 1;
+                if let Some(last) = self.last.filter(|_| !is_error) {
+                    assert_eq!(number, last.wrapping_add(1), "lost and not counted");
+                }
+                self.last = Some(number);
+            }
+            self.frame = None;
+        }
+        if is_error {
+            self.last = None;
+            if !goes_on {
+                self.frame = None;
+            }
+        }
+    }
+}
+
+/// Does one fault, of the bus or of the chip.
+fn fault(bench: &Bench<CHUNK>, rng: &mut Pcg32) {
+    let mut wires = bench.bus.0.borrow_mut();
+    let random = rng.next_u32();
+    let byte = random.to_le_bytes()[3];
+    match random % 13 {
+        0 => wires.fault = Some(Fault::Nack),
+        1 => wires.fault = Some(Fault::Late),
+        2 => wires.fault = Some(Fault::All(0)),
+        3 => wires.fault = Some(Fault::All(0xFF)),
+        4 => wires.fault = Some(Fault::All(byte)),
+        5 => wires.fault = Some(Fault::Bit(usize::from(byte), byte)),
+        6 => wires.stuck = Some(byte & 1 == 0),
+        7 => wires.is_unplugged = true,
+        8 => wires.chip.reset(),
+        9 => {
+            // Cut off in the middle.
+            let half = wires.chip.fifo.len() / 2;
+            wires.chip.fifo.truncate(half);
+        }
+        10 => {
+            let half = wires.chip.fifo.len() / 2;
+            wires.chip.fifo.drain(..half);
+            wires.chip.set(0xFA, 0x20);
+        }
+        11 => wires.chip.number = wires.chip.number.wrapping_add(1 + u32::from(byte)),
+        _ => wires.chip.flags = byte,
+    }
+}
+
+/// Polls with faults, then without. How many faults, errors and frames there were.
+fn survive(zones: Zones, seed: u64) -> (u32, u32, u32) {
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let one_in = 1 << (3 + rng.next_u32() % 7);
+    let mut bench = Bench::<CHUNK>::new(settings(zones));
+    let mut oracle = Oracle::new([0, 2, 3, 4, 5][zones as usize]);
+    let mut faults = 0;
+    for polls in 0..40_000u32 {
+        let goes_wrong = polls < 30_000 && rng.next_u32().is_multiple_of(one_in);
+        if goes_wrong {
+            fault(&bench, &mut rng);
+            faults += 1;
+        } else if rng.next_u32().is_multiple_of(32) || polls >= 30_000 {
+            let mut wires = bench.bus.0.borrow_mut();
+            (wires.stuck, wires.is_unplugged) = (None, false);
+            wires.chip.flags = 1;
+        }
+        if rng.next_u32().is_multiple_of(4) {
+            bench.now_ms = bench.now_ms.wrapping_add(1);
+        }
+        bench.bus.0.borrow_mut().log.clear();
+        let polled = bench.sensor.poll(bench.now_ms, &mut bench.sink);
+        let log = std::mem::take(&mut bench.bus.0.borrow_mut().log);
+        assert!(log.len() <= MOST, "{} transfers", log.len());
+        let chunks = log.iter().filter(|(written, _)| written[0] == 0xFF);
+        assert!(chunks.count() <= 1);
+        let mut expected = Vec::new();
+        for (written, read) in &log {
+            expected.extend(oracle.see(written, read.as_deref()));
+        }
+        let given = bench.sink.take();
+        let given: Vec<_> = given
+            .into_iter()
+            .filter(|given| !matches!(given, Given::Target(..)))
+            .collect();
+        assert!(given == expected, "{polled:?}");
+        let goes_on = matches!(polled, Err(Error::Missed { .. } | Error::Aborted { .. }));
+        oracle.end(polled.is_err(), goes_on);
+        let errors = bench.sensor.counts().errors;
+        if polls == 30_000 {
+            bench.sensor.start(U16F16::ZERO);
+            oracle.last = None;
+            oracle.frame = None;
+        }
+        if polls > 35_000 {
+            assert!(polled.is_ok(), "{polled:?} of {errors}");
+        }
+    }
+    assert!(bench.sensor.is_measuring());
+    let counts = bench.sensor.counts();
+    assert_eq!(counts.frames, oracle.begun);
+    let present = u32::from(oracle.frame.is_some());
+    assert_eq!(counts.broken, oracle.begun - oracle.whole - present);
+    assert_eq!(counts.histograms, oracle.histograms);
+    assert!(counts.frames > 20, "{counts:?}");
+    (faults, counts.errors, counts.frames)
+}
+
+#[test]
+fn fifty_thousand_faults() {
+    let (mut faults, mut errors, mut frames, mut seed) = (0, 0, 0, 0);
+    while faults < FAULTS {
+        let zones = Zones::ALL[usize::try_from(seed).unwrap() % 5];
+        let (more, with, of) = survive(zones, seed);
+        (faults, errors, frames, seed) = (faults + more, errors + with, frames + of, seed + 1);
+    }
+    println!(
+        "faults: TMF8829, {faults} faults: {errors} errors counted, {frames} frames, 0 panics, \
+         nothing given that was not on the bus, no frame lost and not counted, right again each time"
+    );
+}

@@ -1,0 +1,149 @@
+//! Settings of the TMF8829: what reaches the chip, what is described, what is refused.
+
+use crate::common::tmf8829::Chip;
+use crate::common::tmf8829::bench::{Bench, IMAGE, PRESETS, settings, some};
+use crate::common::tmf8829::bus::Bus;
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::U16F16;
+use dtof_sensors::Sensor;
+use dtof_sensors::tmf8829::{Config, ConfigError, Preset, Results, Settings, Tmf8829, Zones};
+
+#[test]
+fn the_image_and_every_setting_reach_their_places() {
+    let mut bench = Bench::<128>::new(Settings {
+        zones: Zones::Z32x32,
+        preset: Preset::HighAccuracy,
+        period_ms: 0x0123,
+        kilo_iterations: 0x0456,
+        address: 0x42,
+        results: Results {
+            peaks: 2,
+            signal: true,
+            noise: false,
+            crosstalk: true,
+        },
+        ..settings(Zones::Z8x8)
+    });
+    assert_eq!(bench.sensor.address(), 0x41);
+    bench.bring_up();
+    assert_eq!(bench.sensor.address(), 0x42);
+    let wires = bench.bus.0.borrow();
+    let page = |registers: &[u8]| {
+        let values = registers.iter().map(|&register| wires.chip.page(register));
+        values.collect::<Vec<_>>()
+    };
+    assert_eq!(
+        page(&[0x20, 0x22, 0x23, 0x24, 0x25]),
+        [0x46, 0x23, 0x01, 0x56, 0x04]
+    );
+    assert_eq!(page(&[0x26, 0x2A, 0x2B, 0x90]), [4, 0b10_1010, 1, 0x84]);
+    assert_eq!(page(&[0xE2, 0xF8]), [0x09, 0x24]);
+    let written = wires.log.iter().map(|(written, _)| &**written);
+    let written: Vec<&[u8]> = written.collect();
+    // Both buses would be on; 309 words at 0x0001_0000.
+    let position = |bytes: &[u8]| {
+        written
+            .iter()
+            .position(|written| *written == bytes)
+            .unwrap()
+    };
+    let off = position(&[0x08, 0x20]);
+    let upload = position(&[0x08, 0x45, 6, 0, 0, 1, 0, 0x35, 0x01]);
+    assert!(off < upload && upload < position(&[0x08, 0x16]));
+    assert_eq!(wires.chip.ram.len(), 309 * 4);
+}
+
+#[test]
+fn presets_are_those_of_the_data_sheet() {
+    let presets = [
+        (Zones::Z8x8, [0x40, 0x41, 0x42]),
+        (Zones::Z16x16, [0x43, 0, 0x44]),
+        (Zones::Z32x32Pairs, [0x45, 0, 0x46]),
+        (Zones::Z32x32, [0x45, 0, 0x46]),
+        (Zones::Z48x32, [0x47, 0, 0x48]),
+    ];
+    for (zones, commands) in presets {
+        for (preset, command) in PRESETS.into_iter().zip(commands) {
+            if command == 0 {
+                continue;
+            }
+            let mut bench = Bench::<128>::new(Settings {
+                preset,
+                ..settings(zones)
+            });
+            bench.bring_up();
+            assert_eq!(bench.bus.0.borrow().chip.page(0x20), command);
+            assert_eq!(bench.sensor.counts().errors, 0);
+        }
+    }
+}
+
+#[test]
+fn bins_and_laser_are_described_as_they_are() {
+    let about = |zones, preset| {
+        let config = Config::new(Settings {
+            preset,
+            ..settings(zones)
+        });
+        let bus = Bus::new(Chip::new(&IMAGE, some()));
+        Tmf8829::<_, _, _>::new(bus.clone(), bus.clone(), bus, &IMAGE, config.unwrap()).about()
+    };
+    let width = |text| Some(U16F16::lit(text));
+    let fine = about(Zones::Z16x16, Preset::HighAccuracy);
+    assert_eq!((fine.bins, fine.bin_width), (64, width("203.65")));
+    let merged = about(Zones::Z8x8, Preset::HighAccuracy);
+    assert_eq!(merged.bins, 109);
+    assert_eq!(merged.bin_width, width("203.65").map(|bin| bin * 2));
+    let long = about(Zones::Z8x8, Preset::LongRange);
+    assert_eq!(long.bins, 104);
+    for zones in Zones::ALL {
+        let about = about(zones, Preset::Standard);
+        assert_eq!(about.bins, 54);
+        assert_eq!(about.bin_width, width("203.65").map(|bin| bin * 4));
+        assert_eq!(about.pixels, 10 + zones.number());
+        assert!(about.is_whole);
+        // 600,064 pulses, but what twelve slots cannot share, in the period.
+        let (period_ms, pulses) = match zones {
+            Zones::Z8x8 | Zones::Z16x16 => (1300, 600_064),
+            Zones::Z32x32Pairs | Zones::Z32x32 => (5000, 600_064),
+            Zones::Z48x32 => (7500, 600_060),
+        };
+        assert_eq!(about.laser_millihertz, pulses * 1_000_000 / period_ms);
+    }
+}
+
+#[test]
+fn settings_that_cannot_be_are_refused() {
+    let refused = |change: fn(&mut Settings)| {
+        let mut settings = settings(Zones::Z48x32);
+        change(&mut settings);
+        Config::new(settings).map(|_| ()).unwrap_err()
+    };
+    assert!(Config::new(settings(Zones::Z48x32)).is_ok());
+    assert_eq!(refused(|bad| bad.address = 0x07), ConfigError::Address);
+    assert_eq!(refused(|bad| bad.address = 0x78), ConfigError::Address);
+    let zero = refused(|bad| bad.kilo_iterations = 0);
+    assert_eq!(zero, ConfigError::ZeroIterations);
+    let pixels = refused(|bad| bad.first_pixel = PixelAddress(u16::MAX - 1534));
+    assert_eq!(pixels, ConfigError::Pixels);
+    let reference = refused(|bad| bad.reference = Some(PixelAddress(u16::MAX - 2)));
+    assert_eq!(reference, ConfigError::Pixels);
+    assert_eq!(refused(|bad| bad.period_ms = 8500), ConfigError::Timeout);
+    let long = refused(|bad| bad.preset = Preset::LongRange);
+    assert_eq!(long, ConfigError::LongRange);
+    assert_eq!(refused(|bad| bad.results.peaks = 0), ConfigError::Peaks);
+    assert_eq!(refused(|bad| bad.results.peaks = 5), ConfigError::Peaks);
+    // 768 zones of 12 bytes.
+    assert_eq!(
+        refused(|bad| bad.results.peaks = 4),
+        ConfigError::ResultSize
+    );
+    for (error, part) in [
+        (ConfigError::LongRange, "long ranges"),
+        (ConfigError::ResultSize, "8,192 bytes"),
+        (ConfigError::Peaks, "1 to 4"),
+    ] {
+        assert!(error.text().contains(part));
+        assert_eq!(error.to_string(), error.text());
+    }
+}
