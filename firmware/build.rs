@@ -20,7 +20,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=memory");
     println!("cargo::rerun-if-changed=../memory.x");
 
-    tmf882x_image()?;
+    sensor_image("TMF8829")?;
+    sensor_image("TMF882X")?;
 
     // The one target of real boards; elsewhere the linker's own layout does.
     if env::var("TARGET")? != "thumbv7em-none-eabihf" {
@@ -54,17 +55,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Where the vendor's image of the TMF8820/21/28 is: raw bytes, from RAM address
-/// 0x0000 on. Without it the driver says that there is none.
-const IMAGE: &str = "TMF882X_IMAGE";
-
-/// Puts the vendor's image where the sidecar includes it from.
-fn tmf882x_image() -> Result<(), Box<dyn Error>> {
-    println!("cargo::rerun-if-env-changed={IMAGE}");
-    if env::var_os("CARGO_FEATURE_SENSOR_TMF882X").is_none() {
+/// Puts the vendor's image of a sensor where the sidecar includes it from. `TMF882X_IMAGE` and the
+/// like name it: raw bytes, from the beginning of the RAM on. Without it the driver says that there
+/// is none.
+fn sensor_image(sensor: &str) -> Result<(), Box<dyn Error>> {
+    let variable = format!("{sensor}_IMAGE");
+    println!("cargo::rerun-if-env-changed={variable}");
+    if env::var_os(format!("CARGO_FEATURE_SENSOR_{sensor}")).is_none() {
         return Ok(());
     }
-    let image = match env::var_os(IMAGE) {
+    let image = match env::var_os(variable) {
         None => Vec::new(),
         Some(path) => {
             let path = Path::new(&path);
@@ -73,6 +73,7 @@ fn tmf882x_image() -> Result<(), Box<dyn Error>> {
         }
     };
     let out = env::var_os("OUT_DIR").ok_or("cargo sets OUT_DIR")?;
-    fs::write(Path::new(&out).join("tmf882x.bin"), image)?;
+    let name = sensor.to_lowercase();
+    fs::write(Path::new(&out).join(name).with_extension("bin"), image)?;
     Ok(())
 }

@@ -37,14 +37,14 @@ impl Board {
         found.with_context(|| format!("no board `{name}`: mps2-an386 or stm32f405"))
     }
 
-    /// Builds an image as it goes onto the board; that of a TMF8820/21/28 has the
-    /// sensor's own program in it, which `TMF882X_IMAGE` names.
+    /// Builds an image as it goes onto the board; that of a TMF8820/21/28 or TMF8829 has the
+    /// sensor's own program in it, which `TMF882X_IMAGE` or `TMF8829_IMAGE` names.
     pub fn build(self, root: &Path, what: Build) -> Result<PathBuf> {
         let program = match what {
-            Build::With(Sensor::Tmf882x) => Some(sensor_program()?),
+            Build::With(sensor) => sensor.program()?,
             _ => None,
         };
-        self.link(root, what, None, program.as_deref())
+        self.link(root, what, None, program.as_ref())
     }
 
     /// The same without the sensor's own program.
@@ -69,7 +69,7 @@ impl Board {
         root: &Path,
         what: Build,
         more: Option<&str>,
-        program: Option<&Path>,
+        program: Option<&Program>,
     ) -> Result<PathBuf> {
         let sidecar = format!("sidecar-{}", self.name());
         let is_real = self == Self::Stm32F405;
@@ -102,8 +102,9 @@ impl Build {
             None => Self::Sidecar,
             Some("self-test") => Self::SelfTest,
             Some("tdc7200") => Self::With(Sensor::Tdc7200),
+            Some("tmf8829") => Self::With(Sensor::Tmf8829),
             Some("tmf882x" | "tmf8820" | "tmf8821" | "tmf8828") => Self::With(Sensor::Tmf882x),
-            Some(name) => bail!("what is `{name}`? tdc7200, tmf882x or self-test"),
+            Some(name) => bail!("what is `{name}`? tdc7200, tmf8829, tmf882x or self-test"),
         })
     }
 }
@@ -112,15 +113,17 @@ impl Build {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sensor {
     Tdc7200,
+    Tmf8829,
     Tmf882x,
 }
 
 impl Sensor {
-    pub const ALL: [Self; 2] = [Self::Tdc7200, Self::Tmf882x];
+    pub const ALL: [Self; 3] = [Self::Tdc7200, Self::Tmf8829, Self::Tmf882x];
 
     fn feature(self) -> &'static str {
         match self {
             Self::Tdc7200 => "sensor-tdc7200",
+            Self::Tmf8829 => "sensor-tmf8829",
             Self::Tmf882x => "sensor-tmf882x",
         }
     }
@@ -128,29 +131,45 @@ impl Sensor {
     pub fn name(self) -> &'static str {
         self.feature().trim_start_matches("sensor-")
     }
+
+    /// The variable that names its own program to `firmware/build.rs`, and the most bytes of that:
+    /// the bootloader of a TMF8820/21/28 counts them in 16 bits, that of a TMF8829 4,096 words.
+    fn image(self) -> Option<(&'static str, usize)> {
+        match self {
+            Self::Tdc7200 => None,
+            Self::Tmf8829 => Some(("TMF8829_IMAGE", 1 << 14)),
+            Self::Tmf882x => Some(("TMF882X_IMAGE", 1 << 16)),
+        }
+    }
+
+    /// The variable and what it says, if the sensor has a program of its own.
+    fn program(self) -> Result<Option<Program>> {
+        let Some((variable, most)) = self.image() else {
+            return Ok(None);
+        };
+        let path = env::var_os(variable).map(PathBuf::from);
+        let path = path.with_context(|| {
+            format!("{variable} has to name the sensor's program, raw bytes from its vendor")
+        })?;
+        let name = || format!("{variable}={}", path.display());
+        check_program(&fs::read(&path).with_context(name)?, most).with_context(name)?;
+        // The build script runs in another folder.
+        let path = path.canonicalize().with_context(name)?;
+        Ok(Some(Program { variable, path }))
+    }
 }
 
-/// The variable that names the program of the TMF8820/21/28 to `firmware/build.rs`.
-const IMAGE: &str = "TMF882X_IMAGE";
-
-/// Where the program of the TMF8820/21/28 is.
-fn sensor_program() -> Result<PathBuf> {
-    let path = env::var_os(IMAGE).map(PathBuf::from);
-    let path = path.with_context(|| {
-        format!("{IMAGE} has to name the sensor's program, raw bytes from its vendor")
-    })?;
-    let name = || format!("{IMAGE}={}", path.display());
-    check_program(&fs::read(&path).with_context(name)?).with_context(name)?;
-    // The build script runs in another folder.
-    path.canonicalize().with_context(name)
+/// The program of a sensor, and the variable that names it.
+struct Program {
+    variable: &'static str,
+    path: PathBuf,
 }
 
-/// Whether this may be a program of the TMF8820/21/28, whose bootloader counts
-/// addresses in 16 bits.
-fn check_program(bytes: &[u8]) -> Result<()> {
+/// Whether this may be a program of a sensor that takes so many bytes.
+fn check_program(bytes: &[u8], most: usize) -> Result<()> {
     ensure!(!bytes.is_empty(), "an empty file");
     ensure!(
-        bytes.len() <= 1 << 16,
+        bytes.len() <= most,
         "{} bytes: more than the sensor holds",
         bytes.len()
     );
@@ -166,7 +185,7 @@ fn link(
     root: &Path,
     image: &str,
     features: &[&str],
-    program: Option<&Path>,
+    program: Option<&Program>,
     profile: &str,
 ) -> Result<PathBuf> {
     toolchain::ensure_target(TARGET)?;
@@ -181,10 +200,12 @@ fn link(
         eprintln!("building {name} for the first time");
     }
     let mut cargo = cargo();
-    match program {
-        Some(path) => cargo.env(IMAGE, path),
-        None => cargo.env_remove(IMAGE),
-    };
+    for (variable, _) in Sensor::ALL.into_iter().filter_map(Sensor::image) {
+        cargo.env_remove(variable);
+    }
+    if let Some(Program { variable, path }) = program {
+        cargo.env(variable, path);
+    }
     let status = cargo
         .current_dir(root)
         .args(["build", "--locked", "--package", "dtof-firmware"])
@@ -220,11 +241,14 @@ mod tests {
 
     #[test]
     fn a_program_is_raw_bytes_that_fit() {
-        assert!(check_program(&[0, 0x20, 0xff]).is_ok());
-        assert!(check_program(&vec![0xff; 1 << 16]).is_ok());
-        assert!(check_program(&vec![0xff; (1 << 16) + 1]).is_err());
-        assert!(check_program(b"").is_err());
-        assert!(check_program(b":10000000").is_err());
-        assert!(check_program(b"const unsigned char image[] = {").is_err());
+        let images = Sensor::ALL.into_iter().filter_map(Sensor::image);
+        for most in images.map(|(_, most)| most) {
+            assert!(check_program(&[0, 0x20, 0xff], most).is_ok());
+            assert!(check_program(&vec![0xff; most], most).is_ok());
+            assert!(check_program(&vec![0xff; most + 1], most).is_err());
+            assert!(check_program(b"", most).is_err());
+            assert!(check_program(b":10000000", most).is_err());
+            assert!(check_program(b"const unsigned char image[] = {", most).is_err());
+        }
     }
 }

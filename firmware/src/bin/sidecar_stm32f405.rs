@@ -12,7 +12,11 @@ use cortex_m_rt::{ExceptionFrame, entry, exception};
 use dtof_firmware::board::{stm32f405::Stm32F405, turn};
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_sensors::Sensor;
-#[cfg(not(any(feature = "sensor-tdc7200", feature = "sensor-tmf882x")))]
+#[cfg(not(any(
+    feature = "sensor-tdc7200",
+    feature = "sensor-tmf8829",
+    feature = "sensor-tmf882x"
+)))]
 use dtof_sensors::simulated;
 use heapless::Vec;
 use static_cell::ConstStaticCell;
@@ -29,9 +33,15 @@ fn main() -> ! {
     defmt::info!("stm32f405 started");
     #[cfg(feature = "sensor-tdc7200")]
     let mut sensor = port.tdc7200();
+    #[cfg(feature = "sensor-tmf8829")]
+    let mut sensor = port.tmf8829(include_bytes!(concat!(env!("OUT_DIR"), "/tmf8829.bin")));
     #[cfg(feature = "sensor-tmf882x")]
     let mut sensor = port.tmf882x(include_bytes!(concat!(env!("OUT_DIR"), "/tmf882x.bin")));
-    #[cfg(not(any(feature = "sensor-tdc7200", feature = "sensor-tmf882x")))]
+    #[cfg(not(any(
+        feature = "sensor-tdc7200",
+        feature = "sensor-tmf8829",
+        feature = "sensor-tmf882x"
+    )))]
     let mut sensor = simulated::scene();
     let mut sidecar = Sidecar::new(PIXELS.take(), BLOCKS.take(), Some(sensor.about()));
     loop {

@@ -20,8 +20,12 @@ mod transmit;
 #[cfg(all(feature = "mps2-an386", feature = "stm32f405"))]
 compile_error!("an image is for one board: choose one of mps2-an386 and stm32f405");
 
-#[cfg(all(feature = "sensor-tdc7200", feature = "sensor-tmf882x"))]
-compile_error!("an image is for one sensor: choose one of sensor-tdc7200 and sensor-tmf882x");
+#[cfg(any(
+    all(feature = "sensor-tdc7200", feature = "sensor-tmf8829"),
+    all(feature = "sensor-tdc7200", feature = "sensor-tmf882x"),
+    all(feature = "sensor-tmf8829", feature = "sensor-tmf882x")
+))]
+compile_error!("an image is for one sensor: choose one of the features sensor-*");
 
 pub use self::transmit::{Transmitter, transmit};
 

@@ -10,16 +10,18 @@ impl Sidecar<'_> {
     /// The one before stays if the device cannot do what is wanted.
     pub(super) fn configure(&mut self, body: &[u8]) -> Result<(), Refusal> {
         let wanted = Configuration::from_le_bytes(body)?;
+        let (first, mut last) = wanted.gate;
         if wanted.source == Source::Sensor {
             let sensor = self.sensor.ok_or(Refusal::NoSensor)?;
             if !sensor.has_bins_of(wanted.bin_width_ps) {
                 return Err(Refusal::BinWidth);
             }
+            // Bins that are not measured would be taken for ones without background.
+            last = last.min(sensor.bins.saturating_sub(1));
         }
         if wanted.pixels == 0 || usize::from(wanted.pixels) > self.pixels.capacity() {
             return Err(Refusal::Pixels);
         }
-        let (first, last) = wanted.gate;
         let gate = RangeGate::new(first, last)?;
         let config_of = |rule: AnyRule| {
             let tracking = rule.tracking(&gate).filter(|_| wanted.tracking);

@@ -103,6 +103,7 @@ fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     // pull it up, and both are "no answer".
     for (sensor, fault) in [
         ("tdc7200", FaultRecord::NoAnswer),
+        ("tmf8829", FaultRecord::Bus),
         ("tmf882x", FaultRecord::Bus),
     ] {
         let image = board.image(&[sensor])?;

@@ -1,6 +1,6 @@
 //! Where a sensor is connected.
 //!
-//! | pin | TDC7200 | TMF8820/21/28 |
+//! | pin | TDC7200 | TMF8820/21/28, TMF8829 |
 //! |---|---|---|
 //! | PC6 | ENABLE | EN |
 //! | PC8 | INTB | INT |
@@ -31,6 +31,7 @@ use crate::board::systick::SystickDelay;
 use dtof_sensors::Sensor;
 use dtof_sensors::i2c::SoftwareI2c;
 use dtof_sensors::tdc7200::{self, Tdc7200};
+use dtof_sensors::tmf8829::{self, Tmf8829};
 use dtof_sensors::tmf882x::{self, Tmf882x};
 
 /// The pins of a sensor. One sensor takes them all.
@@ -92,5 +93,18 @@ impl SensorPort {
         let delay = SystickDelay::new(SYST::get_current, self.rcc.clocks.hclk().raw());
         let bus = SoftwareI2c::new(self.scl, self.sda, delay);
         Tmf882x::<_, _, _>::new(bus, self.interrupt, self.enable, image, CONFIG)
+    }
+
+    /// A TMF8829 on the same bus: 16×16 zones, which are pixels 0 to 255, each with a histogram
+    /// in some 1.3 s. `image` is the vendor's.
+    #[must_use]
+    pub fn tmf8829(self, image: &'static [u8]) -> impl Sensor {
+        const CONFIG: tmf8829::Config = checked!(tmf8829::Config::new(tmf8829::Settings::new(
+            PixelAddress(0),
+            tmf8829::Zones::Z16x16
+        )));
+        let delay = SystickDelay::new(SYST::get_current, self.rcc.clocks.hclk().raw());
+        let bus = SoftwareI2c::new(self.scl, self.sda, delay);
+        Tmf8829::<_, _, _>::new(bus, self.interrupt, self.enable, image, CONFIG)
     }
 }
