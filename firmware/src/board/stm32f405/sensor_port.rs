@@ -31,8 +31,8 @@ use crate::board::systick::SystickDelay;
 use dtof_sensors::Sensor;
 use dtof_sensors::i2c::SoftwareI2c;
 use dtof_sensors::tdc7200::{self, Tdc7200};
-use dtof_sensors::tmf8829::{self, Tmf8829};
 use dtof_sensors::tmf882x::{self, Tmf882x};
+use dtof_sensors::tmf8829::{self, Tmf8829};
 
 /// The pins of a sensor. One sensor takes them all.
 pub struct SensorPort {
