@@ -36,7 +36,7 @@ fn every_error_of_settings_names_what_is_wrong() {
         (
             Tmf::Pixels.text(),
             Tmf::Pixels.to_string(),
-            "nine pixels do not fit",
+            "pixels of all zones do not fit",
         ),
         (
             Tmf::Timeout.text(),

@@ -11,7 +11,7 @@ use common::tmf882x::{
 };
 use common::{Line, Notes};
 use dtof_core::PixelAddress;
-use dtof_sensors::tmf882x::{Config, ConfigError, Error, Settings, SpadMap, Tmf882x};
+use dtof_sensors::tmf882x::{Config, ConfigError, Error, Settings, SpadMap, Tmf882x, Zones};
 use dtof_sensors::{Polled, Sensor};
 use embedded_hal_mock::eh1::i2c::{Mock, Transaction as Access};
 use proptest::prelude::*;
@@ -69,7 +69,7 @@ fn every_setting_reaches_its_register() {
         Settings {
             period_ms: 0x0123,
             kilo_iterations: 0x0456,
-            spad_map: SpadMap::Map12,
+            zones: Zones::Nine(SpadMap::Map12),
             ..settings()
         },
         IMAGE,

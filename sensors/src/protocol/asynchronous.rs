@@ -3,7 +3,7 @@
 use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
 use embedded_hal_async::i2c::I2c;
 
-use super::{Driver, Failure, Protocol, Request};
+use super::{Done, Driver, Failure, Protocol, Request};
 use crate::{PhotonSink, Polled};
 
 impl<P, I2C, INT, EN> Driver<P, I2C, INT, EN>
@@ -46,10 +46,13 @@ where
     async fn transfer_async(
         &mut self,
         now_ms: u32,
-    ) -> Result<Option<bool>, Failure<I2C::Error, INT::Error>> {
+    ) -> Result<Done, Failure<I2C::Error, INT::Error>> {
         match self.protocol.request(now_ms) {
-            Request::Nothing => return Ok(None),
-            Request::Interrupt => return self.interrupt.is_high().map(Some).map_err(Failure::Pin),
+            Request::Nothing(polled) => return Ok(Done::Over(polled)),
+            Request::Interrupt => {
+                let level = self.interrupt.is_high();
+                return level.map(Done::Level).map_err(Failure::Pin);
+            }
             Request::Enable(high) => {
                 let set = self.enable.set_state(high.into());
                 set.map_err(Failure::Pin)?;
@@ -67,7 +70,7 @@ where
                 read.map_err(Failure::of_bus)?;
             }
         }
-        Ok(Some(false))
+        Ok(Done::Level(false))
     }
 
     async fn step_async(
@@ -75,11 +78,15 @@ where
         now_ms: u32,
         sink: &mut impl PhotonSink,
     ) -> Result<Polled, P::Error<I2C::Error, INT::Error>> {
-        while let Some(is_high) = self.transfer_async(now_ms).await? {
-            if let Some(polled) = self.protocol.answered(is_high, now_ms, sink)? {
-                return Ok(polled);
+        loop {
+            match self.transfer_async(now_ms).await? {
+                Done::Over(polled) => return Ok(polled),
+                Done::Level(is_high) => {
+                    if let Some(polled) = self.protocol.answered(is_high, now_ms, sink)? {
+                        return Ok(polled);
+                    }
+                }
             }
         }
-        Ok(Polled::Idle)
     }
 }

@@ -4,7 +4,7 @@ use dtof_core::fixed::types::U16F16;
 use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
 use embedded_hal::i2c::I2c;
 
-use super::{Driver, Failure, Protocol, Request};
+use super::{Done, Driver, Failure, Protocol, Request};
 use crate::{About, PhotonSink, Polled, Sensor, SensorFault};
 
 impl<P, I2C, INT, EN> Driver<P, I2C, INT, EN>
@@ -14,11 +14,14 @@ where
     INT: InputPin,
     EN: OutputPin + PinErrorType<Error = INT::Error>,
 {
-    /// One request, and the level of INT if that was it. `None` if there is nothing to do.
-    fn transfer(&mut self, now_ms: u32) -> Result<Option<bool>, Failure<I2C::Error, INT::Error>> {
+    /// One request.
+    fn transfer(&mut self, now_ms: u32) -> Result<Done, Failure<I2C::Error, INT::Error>> {
         match self.protocol.request(now_ms) {
-            Request::Nothing => return Ok(None),
-            Request::Interrupt => return self.interrupt.is_high().map(Some).map_err(Failure::Pin),
+            Request::Nothing(polled) => return Ok(Done::Over(polled)),
+            Request::Interrupt => {
+                let level = self.interrupt.is_high();
+                return level.map(Done::Level).map_err(Failure::Pin);
+            }
             Request::Enable(high) => {
                 let set = self.enable.set_state(high.into());
                 set.map_err(Failure::Pin)?;
@@ -36,7 +39,7 @@ where
                 read.map_err(Failure::of_bus)?;
             }
         }
-        Ok(Some(false))
+        Ok(Done::Level(false))
     }
 
     fn step(
@@ -44,12 +47,16 @@ where
         now_ms: u32,
         sink: &mut impl PhotonSink,
     ) -> Result<Polled, P::Error<I2C::Error, INT::Error>> {
-        while let Some(is_high) = self.transfer(now_ms)? {
-            if let Some(polled) = self.protocol.answered(is_high, now_ms, sink)? {
-                return Ok(polled);
+        loop {
+            match self.transfer(now_ms)? {
+                Done::Over(polled) => return Ok(polled),
+                Done::Level(is_high) => {
+                    if let Some(polled) = self.protocol.answered(is_high, now_ms, sink)? {
+                        return Ok(polled);
+                    }
+                }
             }
         }
-        Ok(Polled::Idle)
     }
 }
 

@@ -16,8 +16,8 @@ use crate::{About, PhotonSink, Polled};
 /// What a protocol wants of its bus and its pins.
 #[derive(Debug)]
 pub enum Request<'a> {
-    /// Nothing before the next interrupt or millisecond.
-    Nothing,
+    /// Nothing: the poll is over, and this came of it.
+    Nothing(Polled),
     /// Drive ENABLE high, or else low.
     Enable(bool),
     /// Look at INT.
@@ -60,6 +60,14 @@ impl<B: embedded_hal::i2c::Error, P> Failure<B, P> {
             _ => Self::Bus(error),
         }
     }
+}
+
+/// A request that was done.
+enum Done {
+    /// There was none, and the poll is over.
+    Over(Polled),
+    /// There was; the level of INT if that was asked.
+    Level(bool),
 }
 
 /// A sensor's protocol. Whoever drives it repeats: [`Self::request`], the transfer, and then

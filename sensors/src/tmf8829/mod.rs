@@ -291,11 +291,8 @@ impl<'a, const CHUNK: usize> Tmf8829Protocol<'a, CHUNK> {
         if self.state == State::Reading {
             count(&mut self.counts.broken);
         }
-        self.state = match self.state {
-            State::Off { reset } => State::Off { reset },
-            _ => State::Off {
-                reset: !self.is_measuring(),
-            },
+        self.state = State::Off {
+            reset: !self.is_measuring(),
         };
     }
 }
@@ -319,16 +316,18 @@ impl<const CHUNK: usize> Protocol for Tmf8829Protocol<'_, CHUNK> {
     }
 
     fn restart(&mut self) {
-        self.give_up();
+        if !matches!(self.state, State::Off { .. }) {
+            self.give_up();
+        }
     }
 
     fn stop(&mut self) -> Request<'_> {
         let was_measuring = self.is_measuring();
-        self.give_up();
+        self.restart();
         if was_measuring {
             self.stop_request()
         } else {
-            Request::Nothing
+            Request::Nothing(Polled::Idle)
         }
     }
 

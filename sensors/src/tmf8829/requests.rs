@@ -7,6 +7,7 @@ use super::registers::{
     RESULT_FORMAT,
 };
 use super::{BOOT_MS, BUFFER, RESET_MS, START_MS, State, Tmf8829Protocol};
+use crate::Polled;
 use crate::protocol::Request;
 
 /// Where an image goes.
@@ -18,16 +19,24 @@ pub(super) const ADDRESS_BLOCK: u8 = 3;
 pub(super) const LAST_BLOCK: u8 = 5;
 
 impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
+    // Not in the middle of a main loop: its table of jumps would go backwards there.
+    #[inline(never)]
     pub(super) fn next_request(&mut self, now_ms: u32) -> Request<'_> {
         match self.state {
             State::Off { reset } => Request::Enable(!reset),
-            State::Resetting if !self.since.is_over(RESET_MS, now_ms) => Request::Nothing,
+            State::Resetting if !self.since.is_over(RESET_MS, now_ms) => {
+                Request::Nothing(Polled::Idle)
+            }
             State::Resetting => Request::Enable(true),
-            State::Starting if !self.since.is_over(START_MS, now_ms) => Request::Nothing,
+            State::Starting if !self.since.is_over(START_MS, now_ms) => {
+                Request::Nothing(Polled::Idle)
+            }
             State::Starting | State::Waking => self.read(ENABLE, 1),
             State::SwitchingOn { enable } => self.write(&[ENABLE, enable & !POFF | PON]),
             State::Identifying => self.read(ID, 1),
-            State::Booting if !self.since.is_over(BOOT_MS, now_ms) => Request::Nothing,
+            State::Booting if !self.since.is_over(BOOT_MS, now_ms) => {
+                Request::Nothing(Polled::Idle)
+            }
             State::Looking | State::Booting => self.read(APPID, 1),
             State::Telling(BootCommand::Upload) => {
                 let words = self.image.len().div_ceil(4);

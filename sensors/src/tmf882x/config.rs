@@ -31,22 +31,44 @@ pub enum SpadMap {
     Map12 = 12,
 }
 
+/// How many zones a measurement has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Zones {
+    /// Nine, of this map.
+    Nine(SpadMap),
+    /// 8×8 of a TMF8828, row by row, in four captures.
+    SixtyFour,
+}
+
+impl Zones {
+    /// How many they are.
+    #[must_use]
+    pub const fn number(self) -> u16 {
+        match self {
+            Self::Nine(_) => CHANNELS as u16 - 1,
+            Self::SixtyFour => 64,
+        }
+    }
+}
+
 /// The choices there are. [`Config::new`] checks them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
-    /// The pixel of zone 1; the other eight follow it.
+    /// The pixel of the first zone; the others follow it.
     pub first_pixel: PixelAddress,
     /// The pixel that the reference histogram goes to, if to any.
     pub reference: Option<PixelAddress>,
     /// The I²C address to change to, 7 bits; 0x41 is the one after power-up.
     pub address: u8,
-    /// `PERIOD_MS`: milliseconds from one measurement to the next.
+    /// `PERIOD_MS`: milliseconds from one measurement to the next. With 8×8 zones that seems to
+    /// be all four captures.
     pub period_ms: u16,
-    /// `KILO_ITERATIONS`: laser pulses a measurement, in 1,024.
+    /// `KILO_ITERATIONS`: laser pulses a measurement, or half a capture, in 1,024.
     pub kilo_iterations: u16,
-    /// `SPAD_MAP_ID`: which SPADs make up the zones.
-    pub spad_map: SpadMap,
+    /// How many zones, and which SPADs make them up (`SPAD_MAP_ID`).
+    pub zones: Zones,
     /// Milliseconds a command may take.
     pub command_timeout_ms: u32,
     /// Milliseconds without a packet after which the measurement is given up.
@@ -66,10 +88,22 @@ impl Settings {
             address: DEFAULT_ADDRESS,
             period_ms: 132,
             kilo_iterations: 537,
-            spad_map: SpadMap::Map1,
+            zones: Zones::Nine(SpadMap::Map1),
             command_timeout_ms: 50,
             data_timeout_ms: 1000,
             stuck_limit: 3,
+        }
+    }
+
+    /// The 8×8 zones of a TMF8828, with the same pulses. At 400 kHz its 244 packets and results
+    /// take 0.8 s, so the period is one second.
+    #[must_use]
+    pub const fn of_8x8(first_pixel: PixelAddress) -> Self {
+        Self {
+            zones: Zones::SixtyFour,
+            period_ms: 1000,
+            data_timeout_ms: 2000,
+            ..Self::new(first_pixel)
         }
     }
 }
@@ -87,7 +121,7 @@ pub enum ConfigError {
     Address,
     /// A measurement without pulses.
     ZeroIterations,
-    /// The ninth zone would have a pixel past the last.
+    /// The last zone would have a pixel past the last.
     Pixels,
     /// The time limit of data is not longer than the period.
     Timeout,
@@ -100,7 +134,7 @@ impl ConfigError {
         match self {
             Self::Address => "the I2C address must be within 0x08 and 0x77",
             Self::ZeroIterations => "a measurement needs at least 1,024 pulses",
-            Self::Pixels => "nine pixels do not fit behind the first",
+            Self::Pixels => "the pixels of all zones do not fit behind the first",
             Self::Timeout => "data would time out within one period",
         }
     }
@@ -127,7 +161,7 @@ impl Config {
             return Err(ConfigError::ZeroIterations);
         }
         let PixelAddress(first) = settings.first_pixel;
-        if first.checked_add(CHANNELS as u16 - 2).is_none() {
+        if first.checked_add(settings.zones.number() - 1).is_none() {
             return Err(ConfigError::Pixels);
         }
         if settings.data_timeout_ms <= settings.period_ms as u32 {
@@ -142,26 +176,27 @@ impl Config {
         &self.0
     }
 
-    /// Laser pulses a measurement.
+    /// Laser pulses a measurement, or half a capture.
     pub(super) const fn pulses(&self) -> u32 {
         self.0.kilo_iterations as u32 * 1024
     }
 
-    /// Laser pulses that are counted in a thousand seconds, on average, rounded down.
+    /// Laser pulses that are counted in a thousand seconds, on average, rounded down. With 8×8
+    /// zones nobody says.
     pub(super) const fn laser_millihertz(&self) -> u64 {
+        if matches!(self.0.zones, Zones::SixtyFour) {
+            return 0;
+        }
         match (self.pulses() as u64 * 1_000_000).checked_div(self.0.period_ms as u64) {
             Some(rate) => rate,
             None => 0,
         }
     }
 
-    /// Where the histogram of a channel goes.
-    pub(super) const fn pixel(&self, channel: u8) -> Option<PixelAddress> {
+    /// Where the histogram of a zone goes.
+    pub(super) const fn pixel(&self, zone: u8) -> Option<PixelAddress> {
         let PixelAddress(first) = self.0.first_pixel;
-        match channel.checked_sub(1) {
-            // At most the ninth zone, which fits.
-            Some(zone) => Some(PixelAddress(first.saturating_add(zone as u16))),
-            None => self.0.reference,
-        }
+        // At most the last zone, which fits.
+        Some(PixelAddress(first.saturating_add(zone as u16)))
     }
 }

@@ -4,6 +4,7 @@ use core::fmt;
 
 use super::registers::{BootCommand, Command};
 use crate::SensorFault;
+use crate::protocol::Failure;
 
 /// The step that took too long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +67,11 @@ pub enum Error<B, P> {
         /// The value of `CONFIG_RESULT`.
         page: u8,
     },
+    /// The sensor does not have 8×8 zones, though it has taken the command.
+    WrongMode {
+        /// The value of MODE.
+        mode: u8,
+    },
     /// INT stays low while `INT_STATUS` names no reason, or none but results.
     StuckInterrupt {
         /// The value of `INT_STATUS`.
@@ -89,6 +95,24 @@ pub enum Error<B, P> {
         /// The number of the packet that came.
         found: u8,
     },
+    /// With 8×8 zones, a result of another capture than the one that was due: the histograms
+    /// before it were given as those of other zones.
+    WrongCapture {
+        /// The capture that should have come, 0 to 3.
+        expected: u8,
+        /// The capture that came.
+        found: u8,
+    },
+}
+
+impl<B, P> From<Failure<B, P>> for Error<B, P> {
+    fn from(failure: Failure<B, P>) -> Self {
+        match failure {
+            Failure::Nack(error) => Self::Nack(error),
+            Failure::Bus(error) => Self::Bus(error),
+            Failure::Pin(error) => Self::Pin(error),
+        }
+    }
 }
 
 impl<B: fmt::Debug, P: fmt::Debug> fmt::Display for Error<B, P> {
@@ -109,6 +133,7 @@ impl<B: fmt::Debug, P: fmt::Debug> fmt::Display for Error<B, P> {
                 write!(f, "refused {command:?} with status {status:#04x}")
             }
             Self::WrongPage { page } => write!(f, "shows page {page:#04x}"),
+            Self::WrongMode { mode } => write!(f, "is in mode {mode:#04x}, not 8"),
             Self::StuckInterrupt { status } => {
                 write!(f, "INT stays low, INT_STATUS {status:#04x}")
             }
@@ -118,6 +143,9 @@ impl<B: fmt::Debug, P: fmt::Debug> fmt::Display for Error<B, P> {
             Self::WrongSize { size } => write!(f, "packet of {size} bytes, not 128"),
             Self::OutOfOrder { expected, found } => {
                 write!(f, "packet {found} came, not {expected}")
+            }
+            Self::WrongCapture { expected, found } => {
+                write!(f, "the result of capture {found} came, not {expected}")
             }
         }
     }
@@ -136,12 +164,14 @@ impl<B, P> From<Error<B, P>> for SensorFault {
             Error::Timeout(_)
             | Error::Bootloader { .. }
             | Error::Refused { .. }
+            | Error::WrongMode { .. }
             | Error::WrongPage { .. } => Self::NotTaken,
             Error::StuckInterrupt { .. } => Self::StuckInterrupt,
             Error::NoImage => Self::NoImage,
-            Error::ForeignResult { .. } | Error::WrongSize { .. } | Error::OutOfOrder { .. } => {
-                Self::Data
-            }
+            Error::ForeignResult { .. }
+            | Error::WrongSize { .. }
+            | Error::OutOfOrder { .. }
+            | Error::WrongCapture { .. } => Self::Data,
         }
     }
 }

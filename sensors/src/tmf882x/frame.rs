@@ -24,11 +24,13 @@ pub(super) const PACKET: usize = HEADER + BINS;
 pub(super) const BINS: usize = 128;
 /// Channels, the reference included.
 pub(super) const CHANNELS: u8 = 10;
-/// Packets of a set.
-const PACKETS: u8 = 3 * CHANNELS;
+/// Packets of ten histograms.
+pub(super) const PACKETS: u8 = 3 * CHANNELS;
 const HEADER: usize = 7;
 /// Byte 0 of a packet of raw histograms.
 const RAW_HISTOGRAM: u8 = 0x81;
+/// Byte 0 of a result.
+pub(super) const RESULT: u8 = 0x10;
 
 /// A packet of raw histograms.
 #[derive(Clone, Copy, Debug)]
@@ -38,10 +40,15 @@ pub(super) struct Packet<'a> {
 }
 
 impl<'a> Packet<'a> {
+    /// If it is `captured`, packets of the second half have numbers from 30 on.
+    ///
     /// # Errors
     /// If the bytes are not a packet of raw histograms.
-    pub(super) fn of<B, P>(bytes: &'a [u8; PACKET]) -> Result<Self, Error<B, P>> {
-        let (&[result, _, _, _, number, size, _], data) = bytes
+    pub(super) fn of<B, P>(
+        bytes: &'a [u8; PACKET],
+        is_captured: bool,
+    ) -> Result<Self, Error<B, P>> {
+        let (&[result, _, _, _, mut number, size, half], data) = bytes
             .split_first_chunk::<HEADER>()
             .ok_or(Error::WrongSize { size: 0 })?;
         if result != RAW_HISTOGRAM {
@@ -49,6 +56,13 @@ impl<'a> Packet<'a> {
         }
         if usize::from(size) != BINS {
             return Err(Error::WrongSize { size });
+        }
+        if is_captured {
+            number = match half {
+                0 if number < PACKETS => number,
+                1 if number < PACKETS => PACKETS + number,
+                _ => u8::MAX,
+            };
         }
         Ok(Self { number, data })
     }
@@ -65,7 +79,7 @@ pub(super) struct Assembly {
 enum Next {
     /// Packet 0; all others are left out.
     Set,
-    /// This packet, 1 to 29.
+    /// This packet, not the first.
     Packet(u8),
 }
 
@@ -82,18 +96,18 @@ impl Assembly {
         self.next = Next::Set;
     }
 
-    /// Takes a packet. Its histogram, with the number of its channel, once its
+    /// Takes a packet, of so many a set. Its histogram, with the number of its channel, once its
     /// most significant bytes are there.
     ///
     /// # Errors
     /// [`Error::OutOfOrder`]: the set is given up. A packet 0 begins the next one.
-    pub(super) fn take<B, P>(&mut self, packet: Packet) -> Result<Taken, Error<B, P>> {
+    pub(super) fn take<B, P>(&mut self, packet: Packet, all: u8) -> Result<Taken, Error<B, P>> {
         let found = packet.number;
         let result = match self.next {
             Next::Packet(expected) if found != expected => {
                 Err(Error::OutOfOrder { expected, found })
             }
-            Next::Set if found >= PACKETS => Err(Error::OutOfOrder { expected: 0, found }),
+            Next::Set if found >= all => Err(Error::OutOfOrder { expected: 0, found }),
             Next::Set if found != 0 => Ok(Taken::LeftOut),
             Next::Set | Next::Packet(_) => Ok(Taken::Part),
         };
@@ -102,10 +116,10 @@ impl Assembly {
             return result;
         }
         self.next = match found + 1 {
-            PACKETS => Next::Set,
+            next if next == all => Next::Set,
             next => Next::Packet(next),
         };
-        let (plane, channel) = (found / CHANNELS, found % CHANNELS);
+        let (plane, channel) = (found % PACKETS / CHANNELS, found % CHANNELS);
         let Some(low) = self.low.get_mut(usize::from(channel)) else {
             return result;
         };

@@ -62,25 +62,27 @@
 //! every chunk after the first: 3.3 ms at 400 kHz. A set has 30 of them.
 //! The driver has 2.6 KiB of RAM for the counts of a set.
 
+mod answers;
 mod bootloader;
-mod bring_up;
+mod captures;
 mod config;
 mod error;
 mod frame;
 mod packets;
 mod registers;
+mod requests;
 
 use dtof_core::fixed::types::{I24F8, U16F16};
-use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
-use embedded_hal::i2c::{ErrorKind, ErrorType, I2c, NoAcknowledgeSource};
 
-use self::bootloader::Answer;
+use self::captures::Captures;
 use self::frame::{Assembly, PACKET};
-use self::registers::{APPID, APPLICATION, CMD_STAT, DEFAULT_ADDRESS, FIRST_COMMAND};
+use self::registers::{CMD_STAT, DEFAULT_ADDRESS};
+use self::requests::Block;
+use crate::protocol::{Driver, Protocol, Request};
 use crate::timer::Since;
-use crate::{About, PhotonSink, Polled, Sensor};
+use crate::{About, PhotonSink, Polled};
 
-pub use self::config::{Config, ConfigError, Settings, SpadMap};
+pub use self::config::{Config, ConfigError, Settings, SpadMap, Zones};
 pub use self::error::{Error, Waiting};
 pub use self::registers::{BootCommand, Command};
 
@@ -91,23 +93,30 @@ const START_MS: u32 = 10;
 /// From the start of the image to the first access.
 const BOOT_MS: u32 = 10;
 
-/// A TMF8820/21/28 on an I²C bus, with INT and ENABLE, and its image.
+/// A TMF8820/21/28 on an I²C bus, with INT and ENABLE.
 ///
 /// `CHUNK` is how many bytes of a packet or of the image go over the bus in one
 /// transaction, 1 to 135 (checked when compiled; the
 /// bootloader takes 128 at most): what another device on the bus
 /// may have to wait for.
+pub type Tmf882x<'a, I2C, INT, EN, const CHUNK: usize = PACKET> =
+    Driver<Tmf882xProtocol<'a, CHUNK>, I2C, INT, EN>;
+
+/// The protocol of a TMF8820/21/28, with its image.
 #[derive(Debug)]
-pub struct Tmf882x<'a, I2C, INT, EN, const CHUNK: usize = PACKET> {
-    i2c: I2C,
-    interrupt: INT,
-    enable: EN,
+pub struct Tmf882xProtocol<'a, const CHUNK: usize = PACKET> {
     image: &'a [u8],
     config: Config,
     /// The address it answers at now.
     address: u8,
     state: State,
+    /// When the present wait began.
+    since: Since,
+    /// Polls in a row with INT low for no reason.
+    stuck: u8,
+    buffer: [u8; PACKET],
     assembly: Assembly,
+    captures: Captures,
     counts: Counts,
 }
 
@@ -119,46 +128,59 @@ pub struct Counts {
     pub histograms: u32,
     /// Packets of raw histograms.
     pub packets: u32,
-    /// Packets left out while waiting for packet 0 of a set.
+    /// Packets left out while waiting for packet 0 of a set. With 8×8 zones also histograms while it
+    /// is not known of which zones they are.
     pub left_out: u32,
     /// Errors.
     pub errors: u32,
 }
 
-/// The state of the driver: each waits for something else.
-#[derive(Clone, Copy, Debug)]
+/// What is to be done next. Each is one transfer, or a wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// Nothing: to be switched on, or off and on again.
+    /// ENABLE is to be driven high, or before that low.
     Off { reset: bool },
     /// ENABLE is low.
-    Resetting { since: Since },
+    Resetting,
     /// ENABLE is high, nothing is asked yet.
-    Starting { since: Since },
-    /// The processor is to be ready.
-    Waking { since: Since },
-    /// The bootloader is at work; this much of the image has been sent.
-    Loading {
-        since: Since,
-        command: BootCommand,
-        sent: usize,
-    },
-    /// The image was started.
-    Booting { since: Since },
-    /// The application is at work.
-    Commanded { since: Since, command: Command },
-    /// Packets come. `stuck` polls found INT low for no reason.
-    Measuring { since: Since, stuck: u8 },
+    Starting,
+    /// Whether the processor is ready.
+    Waking,
+    /// It is not, nor switched on.
+    SwitchingOn { enable: u8 },
+    /// Which chip is it?
+    Identifying,
+    /// Which program runs?
+    Looking,
+    /// The bootloader is to be told; this much of the image has been sent.
+    Loading { command: BootCommand, sent: usize },
+    /// Whether it has done so.
+    Loaded { command: BootCommand, sent: usize },
+    /// Whether the application runs.
+    Booting,
+    /// The application is to be told.
+    Commanding(Command),
+    /// Whether it has done so.
+    Commanded(Command),
+    /// Whether it has 8×8 zones.
+    Switched,
+    /// Which page is shown?
+    Paging,
+    /// This part of it is to be written.
+    Configuring(Block),
+    /// Interrupts are to be cleared, and then enabled.
+    Unmasking { cleared: bool },
+    /// Whether INT is low.
+    Measuring,
+    /// Why it is.
+    Asking,
+    /// These reasons are to be cleared.
+    Clearing { reasons: u8 },
+    /// A packet comes, from this byte on.
+    Reading { at: u8 },
 }
 
-type Result<T, I2C, INT> =
-    core::result::Result<T, Error<<I2C as ErrorType>::Error, <INT as PinErrorType>::Error>>;
-
-impl<'a, I2C, INT, EN, const CHUNK: usize> Tmf882x<'a, I2C, INT, EN, CHUNK>
-where
-    I2C: I2c,
-    INT: InputPin,
-    EN: OutputPin + PinErrorType<Error = INT::Error>,
-{
+impl<'a, I2C, INT, EN, const CHUNK: usize> Tmf882x<'a, I2C, INT, EN, CHUNK> {
     /// A driver that has not touched its device yet. `image` may be empty for a
     /// sensor that already runs the application.
     pub const fn new(
@@ -168,13 +190,34 @@ where
         image: &'a [u8],
         config: Config,
     ) -> Self {
+        let protocol = Tmf882xProtocol::new(image, config);
+        Self::of(protocol, i2c, interrupt, enable)
+    }
+
+    /// Counts of the data so far.
+    pub const fn counts(&self) -> Counts {
+        self.protocol().counts
+    }
+
+    /// The I²C address the sensor answers at now.
+    pub const fn address(&self) -> u8 {
+        self.protocol().address
+    }
+
+    /// Whether the sensor is up.
+    pub const fn is_measuring(&self) -> bool {
+        self.protocol().is_measuring()
+    }
+}
+
+impl<'a, const CHUNK: usize> Tmf882xProtocol<'a, CHUNK> {
+    /// Of a device that was not touched yet.
+    #[must_use]
+    pub const fn new(image: &'a [u8], config: Config) -> Self {
         const {
             assert!(CHUNK >= 1 && CHUNK <= PACKET, "CHUNK must be from 1 to 135");
         };
         Self {
-            i2c,
-            interrupt,
-            enable,
             image,
             config,
             address: DEFAULT_ADDRESS,
@@ -183,7 +226,11 @@ where
             state: State::Off {
                 reset: config.settings().address != DEFAULT_ADDRESS,
             },
+            since: Since::new(0),
+            stuck: 0,
+            buffer: [0; PACKET],
             assembly: Assembly::new(),
+            captures: Captures::new(),
             counts: Counts {
                 histograms: 0,
                 packets: 0,
@@ -194,114 +241,25 @@ where
     }
 
     /// Counts of the data so far.
+    #[must_use]
     pub const fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// The I²C address the sensor answers at now.
-    pub const fn address(&self) -> u8 {
-        self.address
-    }
-
     /// Whether the sensor is up.
+    #[must_use]
     pub const fn is_measuring(&self) -> bool {
-        matches!(self.state, State::Measuring { .. })
-    }
-
-    /// Gives the bus and the pins (INT, ENABLE) back.
-    pub fn release(self) -> (I2C, INT, EN) {
-        (self.i2c, self.interrupt, self.enable)
+        matches!(
+            self.state,
+            State::Measuring | State::Asking | State::Clearing { .. } | State::Reading { .. }
+        )
     }
 
     /// Where to begin again: only a sensor that measures is known to be well.
-    const fn off(&self) -> State {
-        match self.state {
-            State::Off { reset } => State::Off { reset },
-            State::Measuring { .. } => State::Off { reset: false },
-            _ => State::Off { reset: true },
-        }
-    }
-
-    fn step(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, I2C, INT> {
-        let now = Since::new(now_ms);
-        let limit = self.config.settings().command_timeout_ms;
-        match self.state {
-            State::Off { reset: false } => {
-                self.enable.set_high().map_err(Error::Pin)?;
-                self.state = State::Starting { since: now };
-            }
-            State::Off { reset: true } => {
-                self.enable.set_low().map_err(Error::Pin)?;
-                self.address = DEFAULT_ADDRESS;
-                self.state = State::Resetting { since: now };
-            }
-            State::Resetting { since } => {
-                if !since.is_over(RESET_MS, now_ms) {
-                    return Ok(Polled::Idle);
-                }
-                self.enable.set_high().map_err(Error::Pin)?;
-                self.state = State::Starting { since: now };
-            }
-            State::Starting { since } => {
-                if !since.is_over(START_MS, now_ms) {
-                    return Ok(Polled::Idle);
-                }
-                self.state = State::Waking { since: now };
-            }
-            State::Waking { since } => return self.wake(since, now_ms),
-            State::Loading {
-                since,
-                command,
-                sent,
-            } => {
-                let answer = self.read_register(CMD_STAT)?;
-                match Answer::of(answer, command) {
-                    Answer::Done => self.load_more(command, sent, now)?,
-                    Answer::Busy if !since.is_over(limit, now_ms) => return Ok(Polled::Idle),
-                    Answer::Busy => return Err(Error::Timeout(Waiting::Bootloader(command))),
-                    Answer::Wrong => return Err(Error::Bootloader { command, answer }),
-                }
-            }
-            State::Booting { since } => {
-                if !since.is_over(BOOT_MS, now_ms) {
-                    return Ok(Polled::Idle);
-                }
-                let [id] = self.read_register(APPID)?;
-                if id == APPLICATION {
-                    self.command(Command::LoadConfigPageCommon, now)?;
-                } else if since.is_over(BOOT_MS.saturating_add(limit), now_ms) {
-                    return Err(Error::Timeout(Waiting::Application));
-                } else {
-                    return Ok(Polled::Idle);
-                }
-            }
-            State::Commanded { since, command } => {
-                let [status] = self.read_register(CMD_STAT)?;
-                if status == command.done() {
-                    self.go_on_after(command, now)?;
-                } else if status < FIRST_COMMAND {
-                    return Err(Error::Refused { command, status });
-                } else if since.is_over(limit, now_ms) {
-                    return Err(Error::Timeout(Waiting::Command(command)));
-                } else {
-                    return Ok(Polled::Idle);
-                }
-            }
-            State::Measuring { since, stuck } => return self.serve(since, stuck, now_ms, sink),
-        }
-        Ok(Polled::Working)
-    }
-
-    fn read_register<const N: usize>(&mut self, register: u8) -> Result<[u8; N], I2C, INT> {
-        let mut bytes = [0; N];
-        self.i2c
-            .write_read(self.address, &[register], &mut bytes)
-            .map_err(bus_error)?;
-        Ok(bytes)
-    }
-
-    fn write(&mut self, bytes: &[u8]) -> Result<(), I2C, INT> {
-        self.i2c.write(self.address, bytes).map_err(bus_error)
+    const fn give_up(&mut self) {
+        self.state = State::Off {
+            reset: !self.is_measuring(),
+        };
     }
 }
 
@@ -309,65 +267,69 @@ fn count(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }
 
-/// A device that does not acknowledge a byte has acknowledged its address, so it is there.
-fn bus_error<B: embedded_hal::i2c::Error, P>(error: B) -> Error<B, P> {
-    use NoAcknowledgeSource::{Address, Unknown};
-    match error.kind() {
-        ErrorKind::NoAcknowledge(Address | Unknown) => Error::Nack(error),
-        _ => Error::Bus(error),
-    }
-}
+impl<const CHUNK: usize> Protocol for Tmf882xProtocol<'_, CHUNK> {
+    type Error<B, P> = Error<B, P>;
 
-impl<I2C, INT, EN, const CHUNK: usize> Sensor for Tmf882x<'_, I2C, INT, EN, CHUNK>
-where
-    I2C: I2c,
-    INT: InputPin,
-    EN: OutputPin + PinErrorType<Error = INT::Error>,
-{
-    type Error = Error<I2C::Error, INT::Error>;
-
-    /// Bin width and offset are those fitted to the public log of one TMF8820. The laser rate is
-    /// the mean over a period.
+    /// Bin width and offset are those fitted to the public log of one TMF8820, and with 8×8 zones
+    /// to a short one of a TMF8828, which says nothing of the offset. The laser rate is the mean
+    /// over a period.
     fn about(&self) -> About {
-        const ZONES: u16 = 9;
         const BIN_WIDTH: U16F16 = U16F16::lit("92.1");
+        const BIN_WIDTH_8X8: U16F16 = U16F16::lit("380.3");
         const OFFSET: I24F8 = I24F8::lit("-179.5");
+        let settings = self.config.settings();
+        let (bin_width, offset) = match settings.zones {
+            Zones::Nine(_) => (BIN_WIDTH, OFFSET),
+            Zones::SixtyFour => (BIN_WIDTH_8X8, I24F8::ZERO),
+        };
+        let pixels = settings.first_pixel.0;
         About {
-            pixels: self.config.settings().first_pixel.0.saturating_add(ZONES),
-            bin_width: Some(BIN_WIDTH),
+            pixels: pixels.saturating_add(settings.zones.number()),
+            bin_width: Some(bin_width),
             bins: 128,
-            offset: OFFSET,
+            offset,
             is_whole: true,
             laser_millihertz: self.config.laser_millihertz(),
         }
     }
 
-    fn start(&mut self, _: U16F16) {
-        self.state = self.off();
-    }
-
-    /// Tells the sensor to stop; if that fails, the next start sees to it.
-    fn stop(&mut self) {
-        if self.is_measuring() {
-            let _ = self.write(&[CMD_STAT, Command::Stop as u8]);
+    fn restart(&mut self) {
+        if !matches!(self.state, State::Off { .. }) {
+            self.give_up();
         }
-        self.state = self.off();
     }
 
-    fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, I2C, INT> {
+    fn stop(&mut self) -> Request<'_> {
         let was_measuring = self.is_measuring();
-        let polled = self.step(now_ms, sink);
-        if let Err(error) = &polled {
-            count(&mut self.counts.errors);
-            self.state = match error {
-                Error::ForeignResult { .. }
-                | Error::WrongSize { .. }
-                | Error::OutOfOrder { .. } => self.state,
-                _ => State::Off {
-                    reset: !was_measuring,
-                },
-            };
+        self.restart();
+        if was_measuring {
+            self.write(&[CMD_STAT, Command::Stop as u8])
+        } else {
+            Request::Nothing(Polled::Idle)
         }
-        polled
+    }
+
+    fn request(&mut self, now_ms: u32) -> Request<'_> {
+        self.next_request(now_ms)
+    }
+
+    fn answered<B, P>(
+        &mut self,
+        is_high: bool,
+        now_ms: u32,
+        sink: &mut impl PhotonSink,
+    ) -> Result<Option<Polled>, Error<B, P>> {
+        self.take_answer(is_high, now_ms, sink)
+    }
+
+    fn failed<B, P>(&mut self, error: &Error<B, P>) {
+        count(&mut self.counts.errors);
+        match error {
+            Error::ForeignResult { .. }
+            | Error::WrongSize { .. }
+            | Error::OutOfOrder { .. }
+            | Error::WrongCapture { .. } => {}
+            _ => self.give_up(),
+        }
     }
 }

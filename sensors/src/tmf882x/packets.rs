@@ -1,89 +1,120 @@
 //! Packets of histograms while the sensor measures.
 
-use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
-use embedded_hal::i2c::I2c;
-
-use super::frame::{PACKET, Packet, Taken};
-use super::registers::{CONFIG_RESULT, HISTOGRAM_INT, INT_STATUS, RESULT_INT};
-use super::{Error, Result, State, Tmf882x, Waiting, bus_error, count};
+use super::answers::Next;
+use super::config::Zones;
+use super::frame::{PACKET, PACKETS, Packet, RESULT, Taken};
+use super::registers::{HISTOGRAM_INT, RESULT_INT};
+use super::{Error, State, Tmf882xProtocol, Waiting, count};
 use crate::timer::Since;
 use crate::{PhotonSink, Polled};
 
-impl<I2C, INT, EN, const CHUNK: usize> Tmf882x<'_, I2C, INT, EN, CHUNK>
-where
-    I2C: I2c,
-    INT: InputPin,
-    EN: OutputPin + PinErrorType<Error = INT::Error>,
-{
+impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
     /// Sees whether a packet came, and takes it.
-    pub(super) fn serve(
+    pub(super) fn serve<B, P>(
         &mut self,
-        since: Since,
-        stuck: u8,
+        is_high: bool,
         now_ms: u32,
         sink: &mut impl PhotonSink,
-    ) -> Result<Polled, I2C, INT> {
-        let settings = self.config.settings();
-        let silent = since.is_over(settings.data_timeout_ms, now_ms);
-        if self.interrupt.is_high().map_err(Error::Pin)? {
-            if silent {
-                return Err(Error::Timeout(Waiting::Histogram));
+    ) -> Next<B, P> {
+        let limit = self.config.settings().data_timeout_ms;
+        let is_silent = self.since.is_over(limit, now_ms);
+        let timeout = Err(Error::Timeout(Waiting::Histogram));
+        match self.state {
+            State::Asking => self.ask(is_silent),
+            State::Clearing { reasons } if reasons & self.readable() == 0 => {
+                self.state = State::Measuring;
+                Ok(Some(Polled::Working))
             }
-            self.state = State::Measuring { since, stuck: 0 };
-            return Ok(Polled::Idle);
+            State::Clearing { .. } => self.go_on_in(State::Reading { at: 0 }),
+            State::Reading { at } => {
+                let end = usize::from(at) + CHUNK;
+                if end < PACKET {
+                    let at = u8::try_from(end).unwrap_or(u8::MAX);
+                    return self.go_on_in(State::Reading { at });
+                }
+                self.state = State::Measuring;
+                let taken = self.take(sink)?;
+                self.stuck = 0;
+                if taken != Polled::Idle {
+                    self.since = Since::new(now_ms);
+                } else if is_silent {
+                    return timeout;
+                }
+                Ok(Some(taken))
+            }
+            _ if !is_high => self.go_on_in(State::Asking),
+            _ if is_silent => timeout,
+            _ => {
+                self.stuck = 0;
+                Ok(Some(Polled::Idle))
+            }
         }
-        let limit = settings.stuck_limit;
-        let [status] = self.read_register(INT_STATUS)?;
-        let reasons = status & (RESULT_INT | HISTOGRAM_INT);
-        if reasons & HISTOGRAM_INT == 0 {
-            // A result now and then is no reason to worry; more in a row are.
-            let stuck = stuck.saturating_add(1);
-            if stuck >= limit {
-                return Err(Error::StuckInterrupt { status });
-            }
-            if silent {
-                return Err(Error::Timeout(Waiting::Histogram));
-            }
-            self.state = State::Measuring { since, stuck };
-            if reasons == 0 {
-                return Ok(Polled::Idle);
-            }
-            self.write(&[INT_STATUS, reasons])?;
-            return Ok(Polled::Working);
-        }
-        self.write(&[INT_STATUS, reasons])?;
-        let taken = self.take_packet(sink)?;
-        if taken != Polled::Idle || !silent {
-            let since = if taken == Polled::Idle {
-                since
-            } else {
-                Since::new(now_ms)
-            };
-            self.state = State::Measuring { since, stuck: 0 };
-            return Ok(taken);
-        }
-        Err(Error::Timeout(Waiting::Histogram))
     }
 
-    /// Reads a packet. [`Polled::Idle`] if it is left out.
-    fn take_packet(&mut self, sink: &mut impl PhotonSink) -> Result<Polled, I2C, INT> {
-        let mut bytes = [0; PACKET];
-        let mut register = CONFIG_RESULT;
-        for chunk in bytes.chunks_mut(CHUNK) {
-            self.i2c
-                .write_read(self.address, &[register], chunk)
-                .map_err(bus_error)?;
-            // 0x20 + 135 bytes end at 0xA7.
-            register += u8::try_from(chunk.len()).unwrap_or(0);
+    /// Which reasons of an interrupt have something that is read.
+    const fn readable(&self) -> u8 {
+        match self.config.settings().zones {
+            Zones::Nine(_) => HISTOGRAM_INT,
+            Zones::SixtyFour => HISTOGRAM_INT | RESULT_INT,
         }
-        let packet = Packet::of(&bytes).inspect_err(|_| self.assembly.restart())?;
+    }
+
+    fn ask<B, P>(&mut self, is_silent: bool) -> Next<B, P> {
+        let [status, ..] = self.buffer;
+        let reasons = status & (RESULT_INT | HISTOGRAM_INT);
+        if reasons & self.readable() == 0 {
+            // A result now and then is no reason to worry; more in a row are.
+            self.stuck = self.stuck.saturating_add(1);
+            if self.stuck >= self.config.settings().stuck_limit {
+                return Err(Error::StuckInterrupt { status });
+            }
+            if is_silent {
+                return Err(Error::Timeout(Waiting::Histogram));
+            }
+            if reasons == 0 {
+                self.state = State::Measuring;
+                return Ok(Some(Polled::Idle));
+            }
+        }
+        self.go_on_in(State::Clearing { reasons })
+    }
+
+    /// A packet, or with 64 zones a result. [`Polled::Idle`] if it is left out.
+    fn take<B, P>(&mut self, sink: &mut impl PhotonSink) -> Result<Polled, Error<B, P>> {
+        let is_captured = self.config.settings().zones == Zones::SixtyFour;
+        if is_captured && self.buffer.first() == Some(&RESULT) {
+            self.assembly.restart();
+            let first = self.config.settings().first_pixel;
+            self.captures.end(&self.buffer, first, sink)?;
+            return Ok(Polled::Working);
+        }
+        let packet = Packet::of(&self.buffer, is_captured);
+        let packet = packet.inspect_err(|_| self.assembly.restart())?;
         count(&mut self.counts.packets);
         if packet.number == 0 {
+            self.captures.begin();
+        }
+        if packet.number == 0 || (is_captured && packet.number == PACKETS) {
             sink.begin_frame(self.config.pulses());
         }
-        match self.assembly.take(packet)? {
+        let all = if is_captured { 2 * PACKETS } else { PACKETS };
+        let half = packet.number / PACKETS;
+        match self.assembly.take(packet, all)? {
             Taken::Histogram { channel, counts } => {
-                let Some(pixel) = self.config.pixel(channel) else {
+                let pixel = match channel.checked_sub(1) {
+                    Some(zone) if is_captured => match self.captures.zone(half, zone) {
+                        Some(zone) => self.config.pixel(zone),
+                        // Of which zones is not known yet; or the last one, which is empty.
+                        None => {
+                            self.counts.left_out =
+                                self.counts.left_out.saturating_add(u32::from(zone < 8));
+                            None
+                        }
+                    },
+                    Some(zone) => self.config.pixel(zone),
+                    None => self.config.settings().reference,
+                };
+                let Some(pixel) = pixel else {
                     return Ok(Polled::Working);
                 };
                 sink.histogram(pixel, &counts);

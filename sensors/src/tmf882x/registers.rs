@@ -21,6 +21,11 @@ pub(super) const STAT_ACCEPTED: u8 = 0x01;
 /// [`STAT_ACCEPTED`] and this are errors.
 pub(super) const FIRST_COMMAND: u8 = 0x10;
 
+/// MODE: how many zones a TMF8828 has.
+pub(super) const MODE: u8 = 0x10;
+/// MODE: 8×8 zones.
+pub(super) const MODE_8X8: u8 = 8;
+
 /// `CONFIG_RESULT`: which page or result the registers from here on hold.
 pub(super) const CONFIG_RESULT: u8 = 0x20;
 
@@ -75,6 +80,8 @@ pub enum Command {
     LoadConfigPageCommon = 0x16,
     /// Change the I²C address to that of the common configuration page.
     I2cSlaveAddress = 0x21,
+    /// Have 8×8 zones, which a TMF8828 takes.
+    Switch8x8 = 0x6C,
     /// Stop measuring.
     Stop = 0xFF,
 }
