@@ -3,27 +3,32 @@
 
 mod common;
 
+use std::cell::RefCell;
 use std::pin::pin;
+use std::rc::Rc;
 use std::task::{Context, Poll, Waker};
 
-use common::Notes;
+use common::tmf8828;
 use common::tmf8829::Chip;
 use common::tmf8829::bench::{IMAGE, settings, some};
 use common::tmf8829::bus::{Bus, Fault};
+use common::{Given, Notes};
+use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
+use dtof_sensors::tmf882x::{self, Tmf882x};
 use dtof_sensors::tmf8829::{Config, Tmf8829, Zones};
 use dtof_sensors::{Polled, Sensor};
 use embedded_hal::i2c::{ErrorKind, ErrorType, Operation};
 use embedded_hal_async::i2c::I2c;
 
 /// A bus on which each transfer takes a while.
-struct Slow(Bus);
+struct Slow<B>(B);
 
-impl ErrorType for Slow {
+impl<B: ErrorType<Error = ErrorKind>> ErrorType for Slow<B> {
     type Error = ErrorKind;
 }
 
-impl I2c for Slow {
+impl<B: embedded_hal::i2c::I2c<Error = ErrorKind>> I2c for Slow<B> {
     async fn transaction(
         &mut self,
         address: u8,
@@ -39,7 +44,7 @@ impl I2c for Slow {
             Poll::Pending
         })
         .await;
-        embedded_hal::i2c::I2c::transaction(&mut self.0, address, operations)
+        self.0.transaction(address, operations)
     }
 }
 
@@ -104,4 +109,35 @@ fn an_awaited_tmf8829_makes_the_same_transfers() {
         blocking.0.borrow().log.last(),
         waiting.0.borrow().log.last()
     );
+}
+
+#[test]
+fn an_awaited_tmf8828_gives_the_same() {
+    let config = tmf882x::Config::new(tmf882x::Settings::of_8x8(PixelAddress(10))).unwrap();
+    let chips = [(); 2].map(|()| Rc::new(RefCell::new(tmf8828::Chip::new(0))));
+    let [one, other] = [0, 1].map(|at: usize| tmf8828::Bus(Rc::clone(&chips[at])));
+    let (interrupt, enable) = (one.clone(), one.clone());
+    let mut sensor = Tmf882x::<_, _, _>::new(one, interrupt, enable, &[], config);
+    let (interrupt, enable) = (other.clone(), other.clone());
+    let mut awaited = Tmf882x::<_, _, _>::new(Slow(other), interrupt, enable, &[], config);
+    let mut sinks = [(); 2].map(|()| Notes::default());
+    let mut histograms = 0;
+    for now_ms in 0..1000 {
+        for chip in &chips {
+            chip.borrow_mut().nack = now_ms % 300 == 299;
+        }
+        let [first, second] = &mut sinks;
+        let polled = sensor.poll(now_ms, first);
+        let before = chips[1].borrow().transfers;
+        let (later, pending) = run(awaited.poll_async(now_ms, second));
+        assert_eq!(polled, later);
+        assert_eq!(pending, 3 * (chips[1].borrow().transfers - before));
+        let given = first.take();
+        assert_eq!(given, second.take());
+        let is_histogram = |given: &&Given| matches!(given, Given::Histogram(..));
+        histograms += given.iter().filter(is_histogram).count();
+    }
+    assert!(histograms > 100, "{histograms}");
+    assert_eq!(sensor.counts(), awaited.counts());
+    assert_eq!(sensor.counts().errors, 3);
 }

@@ -102,9 +102,12 @@ impl Build {
             None => Self::Sidecar,
             Some("self-test") => Self::SelfTest,
             Some("tdc7200") => Self::With(Sensor::Tdc7200),
+            Some("tmf8828-8x8") => Self::With(Sensor::Tmf8828),
             Some("tmf8829") => Self::With(Sensor::Tmf8829),
             Some("tmf882x" | "tmf8820" | "tmf8821" | "tmf8828") => Self::With(Sensor::Tmf882x),
-            Some(name) => bail!("what is `{name}`? tdc7200, tmf8829, tmf882x or self-test"),
+            Some(name) => {
+                bail!("what is `{name}`? tdc7200, tmf8829, tmf882x, tmf8828-8x8 or self-test")
+            }
         })
     }
 }
@@ -115,16 +118,19 @@ pub enum Sensor {
     Tdc7200,
     Tmf8829,
     Tmf882x,
+    /// The same with 8×8 zones.
+    Tmf8828,
 }
 
 impl Sensor {
-    pub const ALL: [Self; 3] = [Self::Tdc7200, Self::Tmf8829, Self::Tmf882x];
+    pub const ALL: [Self; 4] = [Self::Tdc7200, Self::Tmf8829, Self::Tmf882x, Self::Tmf8828];
 
     fn feature(self) -> &'static str {
         match self {
             Self::Tdc7200 => "sensor-tdc7200",
             Self::Tmf8829 => "sensor-tmf8829",
             Self::Tmf882x => "sensor-tmf882x",
+            Self::Tmf8828 => "sensor-tmf8828-8x8",
         }
     }
 
@@ -138,7 +144,7 @@ impl Sensor {
         match self {
             Self::Tdc7200 => None,
             Self::Tmf8829 => Some(("TMF8829_IMAGE", 1 << 14)),
-            Self::Tmf882x => Some(("TMF882X_IMAGE", 1 << 16)),
+            Self::Tmf882x | Self::Tmf8828 => Some(("TMF882X_IMAGE", 1 << 16)),
         }
     }
 

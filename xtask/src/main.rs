@@ -30,9 +30,9 @@ cargo xtask <command>
                 Verilator and the other tools if that needs no question
   image BOARD [SENSOR | self-test] [--emulator]
                 build an image and print its path: the sidecar or the self-test.
-                BOARD is mps2-an386 or stm32f405. SENSOR is tdc7200, tmf8829 or
-                tmf882x, on stm32f405 only. --emulator builds for QEMU, with its slower clock
-                and without the sensor's own program
+                BOARD is mps2-an386 or stm32f405. SENSOR is tdc7200, tmf8829,
+                tmf882x or tmf8828-8x8, on stm32f405 only. --emulator builds for QEMU,
+                with its slower clock and without the sensor's own program
   flash [--chip CHIP] [SENSOR | self-test]
                 write an image onto an STM32F405 or STM32F407 and show its log.
                 CHIP is the name in probe-rs, by default that of the Discovery

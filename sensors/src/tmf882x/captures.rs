@@ -45,12 +45,15 @@ impl Captures {
         *self = Self::new();
     }
 
-    /// The first packet of a capture. If another one has not ended, its result is lost.
-    pub(super) const fn begin(&mut self) {
-        if self.has_begun {
+    /// The first packet of a capture. Whether the result of the one before is lost: nobody
+    /// confirms its zones then.
+    pub(super) const fn begin(&mut self) -> bool {
+        let is_lost = self.has_begun;
+        if is_lost {
             self.present = None;
         }
         self.has_begun = true;
+        is_lost
     }
 
     /// The zone of a channel, 0 to 7, if the capture is known.

@@ -91,9 +91,11 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
         let packet = Packet::of(&self.buffer, is_captured);
         let packet = packet.inspect_err(|_| self.assembly.restart())?;
         count(&mut self.counts.packets);
-        if packet.number == 0 {
-            self.captures.begin();
-        }
+        let lost = Error::OutOfOrder {
+            expected: 2 * PACKETS,
+            found: 0,
+        };
+        let is_lost = is_captured && packet.number == 0 && self.captures.begin();
         if packet.number == 0 || (is_captured && packet.number == PACKETS) {
             sink.begin_frame(self.config.pulses());
         }
@@ -121,6 +123,7 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
                 count(&mut self.counts.histograms);
                 Ok(Polled::Data)
             }
+            Taken::Part if is_lost => Err(lost),
             Taken::Part => Ok(Polled::Working),
             Taken::LeftOut => {
                 count(&mut self.counts.left_out);

@@ -40,7 +40,7 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
             State::SwitchingOn { enable } => self.write(&[ENABLE, enable | PON]),
             State::Identifying => self.read(ID, 1),
             State::Looking => self.read(APPID, 1),
-            State::Loading { command, sent } => self.load(command, usize::from(sent)),
+            State::Loading { command, sent } => self.load(command, sent),
             State::Loaded { .. } => self.read(CMD_STAT, 3),
             State::Booting if self.since.is_over(BOOT_MS, now_ms) => self.read(APPID, 1),
             State::Booting => Request::Nothing(Polled::Idle),

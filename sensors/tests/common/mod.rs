@@ -11,6 +11,7 @@ pub mod chips {
 }
 pub mod plug;
 pub mod tdc7200;
+pub mod tmf8828;
 pub mod tmf8829;
 pub mod tmf882x;
 

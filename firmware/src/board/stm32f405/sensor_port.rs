@@ -83,12 +83,16 @@ impl SensorPort {
     }
 
     /// A TMF8820, TMF8821 or TMF8828 on an I²C bus of 400 kHz, map 1. Its nine
-    /// zones are pixels 0 to 8. `image` is the vendor's.
+    /// zones are pixels 0 to 8, or with the feature `sensor-tmf8828-8x8` its 64 zones
+    /// pixels 0 to 63. `image` is the vendor's.
     #[must_use]
     pub fn tmf882x(self, image: &'static [u8]) -> impl Sensor {
-        const CONFIG: tmf882x::Config = checked!(tmf882x::Config::new(tmf882x::Settings::new(
-            PixelAddress(0)
-        )));
+        const SETTINGS: tmf882x::Settings = if cfg!(feature = "sensor-tmf8828-8x8") {
+            tmf882x::Settings::of_8x8(PixelAddress(0))
+        } else {
+            tmf882x::Settings::new(PixelAddress(0))
+        };
+        const CONFIG: tmf882x::Config = checked!(tmf882x::Config::new(SETTINGS));
         // The timer runs since the board has started.
         let delay = SystickDelay::new(SYST::get_current, self.rcc.clocks.hclk().raw());
         let bus = SoftwareI2c::new(self.scl, self.sda, delay);

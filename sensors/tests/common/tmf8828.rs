@@ -1,0 +1,196 @@
+//! A TMF8828 with 8×8 zones, written from its vendor's drivers and not from the driver. It runs
+//! its application; whoever tests it can make it lose packets.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
+use embedded_hal::i2c::{self, ErrorKind, I2c, NoAcknowledgeSource, Operation};
+
+use super::Broken;
+
+/// Capture, half and channel of each zone, row by row: the map of the vendor's example for 8×8
+/// zones, written out.
+pub const MAP: [[&str; 8]; 8] = [
+    ["206", "216", "306", "316", "207", "217", "307", "317"],
+    ["006", "016", "106", "116", "007", "017", "107", "117"],
+    ["204", "214", "304", "314", "205", "215", "305", "315"],
+    ["004", "014", "104", "114", "005", "015", "105", "115"],
+    ["202", "212", "302", "312", "203", "213", "303", "313"],
+    ["002", "012", "102", "112", "003", "013", "103", "113"],
+    ["200", "210", "300", "310", "201", "211", "301", "311"],
+    ["000", "010", "100", "110", "001", "011", "101", "111"],
+];
+
+pub struct Chip {
+    /// The mode it is in, and whether it may change.
+    pub mode: u8,
+    pub is_fixed: bool,
+    status: u8,
+    pub page: [u8; 256],
+    /// Of the present capture: packets sent, 60 and a result.
+    pub at: u8,
+    /// Of the present capture.
+    pub number: u8,
+    pub is_measuring: bool,
+    interrupt: u8,
+    /// The next transfer is not acknowledged.
+    pub nack: bool,
+    /// Each transfer.
+    pub transfers: u32,
+}
+
+impl Chip {
+    pub fn new(number: u8) -> Self {
+        Self {
+            mode: 0,
+            is_fixed: false,
+            status: 0,
+            page: [0; 256],
+            at: 0,
+            number,
+            is_measuring: false,
+            interrupt: 0,
+            nack: false,
+            transfers: 0,
+        }
+    }
+
+    fn command(&mut self, command: u8) {
+        self.status = 0;
+        match command {
+            0x6C if self.is_fixed => {}
+            0x6C => self.mode = 8,
+            0x16 => self.page[0x20] = 0x16,
+            0x15 => {}
+            0x10 => {
+                (self.is_measuring, self.status, self.at) = (true, 1, 0);
+                self.interrupt = 0x08;
+            }
+            0xFF => (self.is_measuring, self.interrupt) = (false, 0),
+            _ => self.status = 8,
+        }
+    }
+
+    /// The packet that stands ready, or after 60 the result.
+    pub fn packet(&self) -> Vec<u8> {
+        let capture = self.number % 4;
+        let mut bytes = vec![0; 135];
+        if self.at == 60 {
+            bytes[..8].copy_from_slice(&[0x10, 9, 128, 0, self.number, 30, 9, 0]);
+            for entry in 0..18 {
+                let (half, channel) = (entry / 9, entry % 9);
+                let mm = match zone(capture, half, channel) {
+                    Some(zone) => 1000 + zone,
+                    None => 9999,
+                };
+                let [low, high] = mm.to_le_bytes();
+                let at = 24 + 3 * usize::from(entry);
+                bytes[at..at + 3].copy_from_slice(&[100 + half, low, high]);
+            }
+            return bytes;
+        }
+        let (half, n) = (self.at / 30, self.at % 30);
+        bytes[..7].copy_from_slice(&[0x81, self.at, 0, 0, n, 128, half]);
+        let (plane, channel) = (usize::from(n / 10), n % 10);
+        let zone = channel.checked_sub(1).and_then(|k| zone(capture, half, k));
+        for (bin, byte) in (0..).zip(&mut bytes[7..]) {
+            *byte = count(zone, bin).to_le_bytes()[plane];
+        }
+        bytes
+    }
+
+    /// What stands ready was taken, or is lost.
+    pub fn next(&mut self) {
+        if self.at == 60 {
+            (self.at, self.number) = (0, self.number.wrapping_add(1));
+        } else {
+            self.at += 1;
+        }
+        self.interrupt = if self.at == 60 { 0x02 } else { 0x08 };
+    }
+
+    fn read(&mut self, register: u8, bytes: &mut [u8]) {
+        match (register, &mut *bytes) {
+            (0x00, [id]) => *id = 0x03,
+            (0x08, [status]) => *status = self.status,
+            (0x10, [mode]) => *mode = self.mode,
+            (0xE0, [enable]) => *enable = 0x41,
+            (0xE1, [interrupt]) => *interrupt = self.interrupt,
+            (0xE3, [id]) => *id = 0x08,
+            (0x20, [page]) if !self.is_measuring => *page = self.page[0x20],
+            (at, bytes) => {
+                let from = usize::from(at - 0x20);
+                bytes.copy_from_slice(&self.packet()[from..from + bytes.len()]);
+                if from + bytes.len() == 135 {
+                    self.next();
+                }
+            }
+        }
+    }
+}
+
+/// The zone of a channel.
+pub fn zone(capture: u8, half: u8, channel: u8) -> Option<u16> {
+    let name = format!("{capture}{half}{channel}");
+    let at = MAP.concat().iter().position(|other| *other == name)?;
+    u16::try_from(at).ok()
+}
+
+/// The counts of a zone tell which it is, those of no zone that it is none.
+pub fn count(zone: Option<u16>, bin: u32) -> u32 {
+    let zone = zone.map_or(255, u32::from);
+    zone << 16 | (bin * 7 + zone) & 0xFFFF
+}
+
+/// The bus of a chip, and its pins; clones are the same.
+#[derive(Clone)]
+pub struct Bus(pub Rc<RefCell<Chip>>);
+
+impl i2c::ErrorType for Bus {
+    type Error = ErrorKind;
+}
+
+impl I2c for Bus {
+    fn transaction(&mut self, _: u8, operations: &mut [Operation<'_>]) -> Result<(), ErrorKind> {
+        let mut chip = self.0.borrow_mut();
+        chip.transfers += 1;
+        if std::mem::take(&mut chip.nack) {
+            return Err(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address));
+        }
+        match operations {
+            [Operation::Write([0x08, command])] => chip.command(*command),
+            [Operation::Write([register, data @ ..])] => {
+                let at = usize::from(*register);
+                chip.page[at..at + data.len()].copy_from_slice(data);
+            }
+            [Operation::Write([register]), Operation::Read(bytes)] => chip.read(*register, bytes),
+            other => panic!("{other:?}"),
+        }
+        Ok(())
+    }
+}
+
+impl PinErrorType for Bus {
+    type Error = Broken;
+}
+
+impl InputPin for Bus {
+    fn is_high(&mut self) -> Result<bool, Broken> {
+        Ok(!self.0.borrow().is_measuring)
+    }
+    fn is_low(&mut self) -> Result<bool, Broken> {
+        self.is_high().map(|is_high| !is_high)
+    }
+}
+
+impl OutputPin for Bus {
+    fn set_low(&mut self) -> Result<(), Broken> {
+        let mut chip = self.0.borrow_mut();
+        (chip.mode, chip.is_measuring) = (0, false);
+        Ok(())
+    }
+    fn set_high(&mut self) -> Result<(), Broken> {
+        Ok(())
+    }
+}

@@ -1,0 +1,309 @@
+//! The 8×8 zones of a TMF8828.
+
+mod common;
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use common::tmf8828::{Bus, Chip, MAP, count, zone};
+use common::{Broken, Given, Notes};
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_sensors::tmf882x::{Config, Error, Settings, Tmf882x};
+use dtof_sensors::{Polled, Sensor};
+use embedded_hal::i2c::ErrorKind;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+type Of = Error<ErrorKind, Broken>;
+
+struct Bench {
+    sensor: Tmf882x<'static, Bus, Bus, Bus, 128>,
+    chip: Rc<RefCell<Chip>>,
+    sink: Notes,
+    now_ms: u32,
+}
+
+fn bench(number: u8) -> Bench {
+    let chip = Rc::new(RefCell::new(Chip::new(number)));
+    let bus = Bus(Rc::clone(&chip));
+    let config = Config::new(Settings::of_8x8(PixelAddress(10))).unwrap();
+    Bench {
+        sensor: Tmf882x::new(bus.clone(), bus.clone(), bus, &[], config),
+        chip,
+        sink: Notes::default(),
+        now_ms: 0,
+    }
+}
+
+impl Bench {
+    fn poll(&mut self) -> Result<Polled, Of> {
+        self.now_ms += 1;
+        self.sensor.poll(self.now_ms, &mut self.sink)
+    }
+
+    fn bring_up(&mut self) {
+        for _ in 0..100 {
+            self.poll().unwrap();
+            if self.sensor.is_measuring() {
+                return;
+            }
+        }
+        panic!("it does not come up");
+    }
+
+    /// Takes so many packets or results.
+    fn take(&mut self, packets: u32) {
+        for _ in 0..packets {
+            let _ = self.poll().unwrap();
+        }
+    }
+
+    /// The packet or result that stands ready is lost.
+    fn lose(&self) {
+        self.chip.borrow_mut().next();
+    }
+
+    fn error(&mut self) -> Of {
+        for _ in 0..300 {
+            if let Err(error) = self.poll() {
+                return error;
+            }
+        }
+        panic!("no error");
+    }
+}
+
+/// The histograms of a capture, by pixel, as the chip has them.
+fn histogram(zone: u16) -> Given {
+    let counts = (0..128).map(|bin| count(Some(zone), bin));
+    Given::Histogram(10 + zone, counts.collect())
+}
+
+/// The formula of the vendor's filter, beside the map of its viewer.
+#[test]
+fn the_map_is_that_of_the_formula() {
+    for capture in 0..4u8 {
+        for half in 0..2u8 {
+            for (channel, first) in (0..).zip([56u16, 60, 40, 44, 24, 28, 8, 12]) {
+                let right = u16::from(half) + 2 * u16::from(capture % 2);
+                let up = 8 * u16::from(capture / 2);
+                assert_eq!(zone(capture, half, channel), Some(first + right - up));
+            }
+        }
+    }
+    assert_eq!(zone(2, 1, 0), Some(49));
+    let mut all = MAP.concat();
+    all.sort_unstable();
+    all.dedup();
+    assert_eq!(all.len(), 64);
+}
+
+#[test]
+fn each_of_64_zones_comes_once_in_four_captures() {
+    for number in [0, 2, 255] {
+        let mut bench = bench(number);
+        bench.bring_up();
+        assert_eq!(bench.chip.borrow().page[0x34..0x36], [15, 0x84]);
+        assert_eq!(bench.chip.borrow().page[0x39], 1);
+        // Which capture is the first one is not known before its result.
+        bench.take(61);
+        let given = bench.sink.take();
+        assert_eq!(
+            given[..2],
+            [Given::Frame(537 * 1024), Given::Frame(537 * 1024)]
+        );
+        assert!(
+            given[2..]
+                .iter()
+                .all(|given| matches!(given, Given::Target(..)))
+        );
+        assert_eq!(bench.sensor.counts().left_out, 16);
+        bench.take(4 * 61);
+        let given = bench.sink.take();
+        let mut histograms: Vec<(u16, &Given)> = Vec::new();
+        let mut targets = Vec::new();
+        let mut frames = 0;
+        for given in &given {
+            match given {
+                Given::Histogram(pixel, _) => histograms.push((pixel - 10, given)),
+                Given::Target(pixel, target) => targets.push((pixel - 10, target.distance)),
+                _ => frames += 1,
+            }
+        }
+        histograms.sort_unstable_by_key(|(zone, _)| *zone);
+        targets.sort_unstable();
+        assert_eq!(histograms.len(), 64);
+        for (zone, (at, given)) in (0..64).zip(&histograms) {
+            assert_eq!((*at, *given), (zone, &histogram(zone)));
+        }
+        let wanted = (0..64).map(|zone| (zone, I24F8::from_num(1000 + zone)));
+        assert_eq!(targets, wanted.collect::<Vec<_>>());
+        assert_eq!(frames, 8);
+        assert_eq!(bench.sensor.counts().errors, 0);
+    }
+}
+
+#[test]
+fn it_is_described_as_64_pixels() {
+    let bench = bench(0);
+    let about = bench.sensor.about();
+    assert_eq!(
+        (about.pixels, about.bins, about.laser_millihertz),
+        (74, 128, 0)
+    );
+    // 57 mm a bin.
+    let mm = about.bin_width.unwrap().to_num::<f64>() * 0.149_896_229;
+    assert!((mm - 57.0).abs() < 0.1, "{mm}");
+    let mut settings = Settings::of_8x8(PixelAddress(u16::MAX - 62));
+    assert!(Config::new(settings).is_err());
+    settings.first_pixel = PixelAddress(u16::MAX - 63);
+    assert!(Config::new(settings).is_ok());
+}
+
+#[test]
+fn a_sensor_without_8x8_zones_is_an_error() {
+    let mut bench = bench(0);
+    bench.chip.borrow_mut().is_fixed = true;
+    assert_eq!(bench.error(), Error::WrongMode { mode: 0 });
+    bench.chip.borrow_mut().is_fixed = false;
+    bench.bring_up();
+}
+
+#[test]
+fn a_lost_packet_costs_its_capture() {
+    let mut bench = bench(3);
+    bench.bring_up();
+    bench.take(61);
+    bench.sink.take();
+    bench.take(29);
+    bench.lose();
+    assert_eq!(
+        bench.error(),
+        Error::OutOfOrder {
+            expected: 29,
+            found: 30
+        }
+    );
+    let before = bench.sink.take();
+    bench.take(60 - 31 + 1);
+    let rest = bench.sink.take();
+    assert!(rest.iter().all(|given| matches!(given, Given::Target(..))));
+    // Eight zones of the first half had come, the ninth channel is empty.
+    assert_eq!(before.len(), 2 + 8);
+    bench.take(61);
+    assert!(
+        bench
+            .sink
+            .take()
+            .contains(&histogram(zone(1, 1, 7).unwrap()))
+    );
+    assert_eq!(bench.sensor.counts().errors, 1);
+}
+
+/// Nothing is given to zones that are not known.
+#[test]
+fn a_lost_result_costs_the_next_capture() {
+    let mut bench = bench(0);
+    bench.bring_up();
+    bench.take(61 + 60);
+    bench.lose();
+    bench.sink.take();
+    let left_out = bench.sensor.counts().left_out;
+    let lost = Error::OutOfOrder {
+        expected: 60,
+        found: 0,
+    };
+    assert_eq!(bench.poll(), Err(lost));
+    bench.take(60);
+    let is_histogram = |given: &Given| matches!(given, Given::Histogram(..));
+    assert!(!bench.sink.take().iter().any(is_histogram));
+    assert_eq!(bench.sensor.counts().left_out, left_out + 16);
+    bench.take(61);
+    let given = bench.sink.take();
+    assert!(given.contains(&histogram(zone(3, 0, 0).unwrap())));
+}
+
+#[test]
+fn a_lost_capture_is_told_by_the_next_result() {
+    let mut bench = bench(0);
+    bench.bring_up();
+    bench.take(61);
+    bench.chip.borrow_mut().number = 2;
+    let expected = Error::WrongCapture {
+        expected: 1,
+        found: 2,
+    };
+    assert_eq!(bench.error(), expected);
+    assert!(bench.sensor.is_measuring());
+    bench.sink.take();
+    bench.take(61);
+    assert!(
+        bench
+            .sink
+            .take()
+            .contains(&histogram(zone(3, 0, 0).unwrap()))
+    );
+}
+
+/// Lost packets, results and captures, errors of the bus, and the sensor starting anew: a
+/// histogram that is given is that of its zone, unless the next result says that it is not.
+#[test]
+fn faults_put_no_histogram_into_another_zone_unsaid() {
+    let (mut faults, mut errors, mut histograms) = (0, 0, 0);
+    for seed in 0..50 {
+        let mut rng = Pcg32::seed_from_u64(seed);
+        let mut bench = bench(rng.next_u32().to_le_bytes()[0]);
+        let one_in = 4 << (seed % 8);
+        let mut wrong = 0;
+        for polls in 0..20_000u32 {
+            if polls < 18_000 && rng.next_u32().is_multiple_of(one_in) {
+                faults += 1;
+                let mut chip = bench.chip.borrow_mut();
+                match rng.next_u32() % 4 {
+                    0 => chip.next(),
+                    1 => chip.nack = true,
+                    2 => chip.number = chip.number.wrapping_add(1),
+                    _ => (chip.at, chip.mode) = (0, 0),
+                }
+            }
+            let before = bench.chip.borrow().transfers;
+            let polled = bench.poll();
+            assert!(bench.chip.borrow().transfers - before <= 7);
+            for given in bench.sink.take() {
+                let Given::Histogram(pixel, _) = given else {
+                    continue;
+                };
+                histograms += 1;
+                wrong += u32::from(given != histogram(pixel - 10));
+            }
+            match polled {
+                // Both say that the zones of the capture before are not sure.
+                Err(Error::WrongCapture { .. } | Error::OutOfOrder { found: 0, .. }) => {
+                    (wrong, errors) = (0, errors + 1);
+                }
+                Err(error) => {
+                    errors += 1;
+                    // The measurement begins anew, and the next result is not of this one.
+                    if !bench.sensor.is_measuring() {
+                        wrong = 0;
+                    }
+                    assert!(!error.to_string().contains('\n'));
+                }
+                Ok(_) => {}
+            }
+        }
+        assert_eq!(wrong, 0, "seed {seed}");
+        assert!(bench.sensor.is_measuring());
+        bench.sensor.start(U16F16::ZERO);
+        bench.bring_up();
+    }
+    assert!(
+        histograms > 10_000 && errors > 1000,
+        "{histograms} {errors}"
+    );
+    println!(
+        "faults: TMF8828 with 8x8 zones, {faults} faults: {errors} errors counted, {histograms} \
+         histograms, 0 of another zone unsaid"
+    );
+}
