@@ -8,7 +8,7 @@ use common::script;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, LaserCycle, PaperRule, PixelAddress};
 use dtof_firmware::sidecar::Sidecar;
-use dtof_link::{Configuration, HistogramHead, NoHistogram, Source, message};
+use dtof_link::{Configuration, HistogramHead, NoHistogram, Refusal, Source, message};
 use dtof_sensors::About;
 
 /// A sensor of three pixels that gives whole histograms.
@@ -137,4 +137,39 @@ fn photons_of_the_link_have_histograms_beside_any_sensor() {
         panic!("{:?}", host.answers);
     };
     assert!(!head.is_whole && head.exposure == 0 && counts[5] == 1);
+}
+
+/// Bins that a sensor does not measure are no part of a decision: they would be taken for bins without
+/// background. Whatever is in them is counted as lost.
+#[test]
+fn the_gate_ends_where_the_bins_of_the_sensor_do() {
+    let narrow = About { bins: 54, ..WHOLE };
+    let mut device = device::<8>(Some(narrow));
+    let mut host = Host::new(1, 0);
+    let wanted = Configuration {
+        gate: (0, 127),
+        ..CONFIGURATION
+    };
+    host.configure(&mut device, 0, &wanted);
+    let counts = std::array::from_fn(|bin| match bin {
+        20 => 1000,
+        70 => 5000,
+        ..54 => 10,
+        _ => 0,
+    });
+    let mut sensor = scripted([Some(vec![Call::Histogram(1, Box::new(counts))])].into_iter());
+    host.run(&mut device, &mut sensor, 0..1, usize::MAX);
+    let report = host.report(&mut device, 1);
+    assert_eq!(report.statistics.gated_out, 5000);
+    assert_eq!(host.events.len(), 1);
+    assert_eq!(host.events[0].peak_bin.raw(), 20);
+    assert_eq!(host.events[0].background.raw(), 10);
+
+    // A gate behind all of them leaves nothing.
+    let behind = Configuration {
+        gate: (60, 127),
+        ..CONFIGURATION
+    };
+    let answer = host.answer(&mut device, 2, message::CONFIGURE, &behind.to_le_bytes());
+    assert_eq!(answer, [Refusal::GateTooNarrow as u8]);
 }

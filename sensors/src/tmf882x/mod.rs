@@ -1,5 +1,5 @@
 //! ams OSRAM TMF8820, TMF8821 and TMF8828: nine zones of raw 128-bin histograms
-//! over I²C, at most 1 MHz.
+//! over I²C, at most 1 MHz; with a TMF8828 also 8×8 zones.
 //!
 //! The sensor's program is the vendor's and not part of this crate. Pass the bytes of
 //! its RAM image to the driver, from RAM address 0x0000 on.
@@ -17,6 +17,19 @@
 //! [`Settings::new`]. Laser cycle ÷ rate is then a time, if a measurement is over within its
 //! period, and the sensor's clock is right. A period of 0 ms has no rate that is known.
 //!
+//! # 8×8 zones
+//!
+//! With [`Zones::SixtyFour`] a TMF8828 measures its zones in four captures of two halves. Only the
+//! result behind a capture says which of the four it was. So the histograms of the first capture are
+//! left out, those of the next ones are given as what is due, and each result confirms them. If it does
+//! not, [`Error::WrongCapture`] or [`Error::OutOfOrder`] says so, and the driver knows again from there.
+//! Zones are numbered row by row as in the vendor's examples; how they lie in space is not published.
+//! Targets of the sensor come with each result ([`PhotonSink::target`]).
+//!
+//! Each half is one frame of `kilo_iterations` × 1,024 laser cycles. That is assumed, and
+//! the laser rate is not known. The crosstalk calibration is neither made nor restored. With
+//! nine zones the driver does not leave the 8×8 mode: a TMF8828 that is in it has to be switched off.
+//!
 //! # Where the numbers come from
 //!
 //! Register addresses, fields, commands and status values are those of the
@@ -27,7 +40,7 @@
 //!
 //! - the bootloader's messages, and the seed 0x29 of `DOWNLOAD_INIT`, which the
 //!   newer drivers leave out;
-//! - that a raw histogram comes as packets, and which is which;
+//! - that a raw histogram comes as packets, and which is which, also of 8×8 zones;
 //! - that an interrupt is cleared before its packet is read, and that the result
 //!   interrupt is enabled along with the histogram interrupt;
 //! - that the address changes by `I2C_SLAVE_ADDRESS`, `I2C_ADDR_CHANGE` = 0 and
@@ -37,7 +50,7 @@
 //!
 //! # Not supported
 //!
-//! - Time-multiplexed maps (4×4, 3×6, 8×8): their packets come in several
+//! - Time-multiplexed maps of 4×4 and 3×6 zones: their packets come in several
 //!   measurements that this driver does not tell apart.
 //! - The total size in a packet's header is not checked; how it counts down is
 //!   not documented precisely enough.
