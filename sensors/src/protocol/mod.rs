@@ -15,6 +15,7 @@ use crate::{About, PhotonSink, Polled};
 
 /// What a protocol wants of its bus and its pins.
 #[derive(Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Request<'a> {
     /// Nothing: the poll is over, and this came of it.
     Nothing(Polled),
@@ -42,6 +43,7 @@ pub enum Request<'a> {
 
 /// A transfer that failed. `B` is the error of the bus, `P` that of a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Failure<B, P> {
     /// Nobody acknowledged the address, or the bus does not tell what was not acknowledged.
     Nack(B),
