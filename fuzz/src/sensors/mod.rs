@@ -3,6 +3,7 @@
 
 mod bus;
 mod tdc7200;
+mod tmf8829;
 mod tmf882x;
 
 use dtof_core::PixelAddress;
@@ -63,11 +64,14 @@ trait Model<C> {
 pub fn sensors(data: &[u8]) {
     let mut input = Input::new(data);
     let (kind, settings) = (input.byte(), input.byte());
-    match kind % 4 {
-        0 => tdc7200::run::<13>(settings, input),
-        1 => tdc7200::run::<2>(settings, input),
-        2 => tmf882x::run::<135>(settings, input),
-        _ => tmf882x::run::<32>(settings, input),
+    // Kinds below 224 are older than the TMF8829: the corpus has them.
+    match (kind >= 224, kind % 4) {
+        (false, 0) => tdc7200::run::<13>(settings, input),
+        (false, 1) => tdc7200::run::<2>(settings, input),
+        (false, 2) => tmf882x::run::<135>(settings, input),
+        (false, _) => tmf882x::run::<32>(settings, input),
+        (true, 0 | 1) => tmf8829::run::<128>(settings, input),
+        (true, _) => tmf8829::run::<252>(settings, input),
     }
 }
 
