@@ -65,7 +65,7 @@
 //!
 //! # Cost
 //!
-//! The driver has 1.1 KiB of RAM. A poll has one chunk of the FIFO on the bus, or at most eight
+//! The driver has less than 1 KiB of RAM. A poll has one chunk of the FIFO on the bus, or at most eight
 //! short transfers.
 
 mod answers;

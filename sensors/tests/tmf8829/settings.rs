@@ -6,7 +6,9 @@ use crate::common::tmf8829::bus::Bus;
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
 use dtof_sensors::Sensor;
-use dtof_sensors::tmf8829::{Config, ConfigError, Preset, Results, Settings, Tmf8829, Zones};
+use dtof_sensors::tmf8829::{
+    Config, ConfigError, Preset, Results, Settings, Tmf8829, Tmf8829Protocol, Zones,
+};
 
 #[test]
 fn the_image_and_every_setting_reach_their_places() {
@@ -146,4 +148,41 @@ fn settings_that_cannot_be_are_refused() {
         assert!(error.text().contains(part));
         assert_eq!(error.to_string(), error.text());
     }
+}
+
+/// What the documentation says of bus and memory.
+#[test]
+fn a_measurement_takes_the_bus_as_long_as_is_said() {
+    for (zones, seconds) in [
+        (Zones::Z8x8, 1.2),
+        (Zones::Z16x16, 1.2),
+        (Zones::Z32x32, 4.8),
+        (Zones::Z48x32, 7.2),
+    ] {
+        let mut bench = Bench::<128>::new(settings(zones));
+        bench.bring_up();
+        let frames = usize::from(zones.frames());
+        let results = if frames > 2 { 2 } else { 1 };
+        bench.bus.0.borrow_mut().log.clear();
+        bench.frames(frames + results);
+        // Nine bits a byte, an address before each direction, at 400 kHz.
+        let wires = bench.bus.0.borrow();
+        let bytes = wires.log.iter().map(|(written, read)| {
+            let read = read.as_ref().map_or(0, Vec::len);
+            1 + written.len() + if read > 0 { 1 + read } else { 0 }
+        });
+        let bytes: usize = bytes.sum();
+        let taken = 9.0 * bytes as f64 / 400e3;
+        assert!((taken - seconds).abs() < 0.06, "{zones:?}: {taken} s");
+        // The period leaves room for that.
+        let period = f64::from(settings(zones).period_ms) / 1000.0;
+        assert!(
+            taken < period && period < 1.2 * taken,
+            "{zones:?}: {taken} s"
+        );
+        println!("TMF8829, {zones:?}: {taken:.2} s a measurement at 400 kHz");
+    }
+    let driver = size_of::<Tmf8829Protocol<'static>>();
+    println!("TMF8829: {driver} bytes of RAM");
+    assert!(driver < 1024, "{driver} bytes");
 }
