@@ -111,6 +111,48 @@ fn an_awaited_tmf8829_makes_the_same_transfers() {
     );
 }
 
+/// Who drops a poll within a transfer loses the rest of that frame, and no count is wrong.
+#[test]
+fn a_poll_that_is_dropped_costs_its_frame() {
+    let config = Config::new(settings(Zones::Z8x8)).unwrap();
+    let bus = Bus::new(Chip::new(&IMAGE, some()));
+    let slow = Slow(bus.clone());
+    let mut sensor = Tmf8829::<_, _, _>::new(slow, bus.clone(), bus.clone(), &IMAGE, config);
+    let mut sink = Notes::default();
+    let mut dropped = 0;
+    for now_ms in 0..3000 {
+        if now_ms % 400 == 399 {
+            let mut poll = pin!(sensor.poll_async(now_ms, &mut sink));
+            let mut context = Context::from_waker(Waker::noop());
+            dropped += u32::from(poll.as_mut().poll(&mut context).is_pending());
+            // The chip was read, and nobody has the bytes.
+            let mut lost = [0; 100];
+            bus.0.borrow_mut().chip.read(0xFF, &mut lost);
+            continue;
+        }
+        assert!(run(sensor.poll_async(now_ms, &mut sink)).0.is_ok());
+    }
+    assert_eq!(dropped, 7);
+    let counts = sensor.counts();
+    assert_eq!((counts.broken, counts.errors), (7, 0));
+    let measurements = bus.0.borrow().chip.sent.len() / 3 + 1;
+    let mut histograms = 0;
+    for given in sink.take() {
+        let Given::Histogram(pixel, counts) = given else {
+            continue;
+        };
+        let zone = usize::from(pixel - 10);
+        let is_right = |measurement| {
+            let scene = some()(measurement, Some((zone % 8, zone / 8)), 256);
+            scene[..128] == counts
+        };
+        let measurements = u32::try_from(measurements).unwrap();
+        assert!((0..measurements).any(is_right), "pixel {pixel}");
+        histograms += 1;
+    }
+    assert!(histograms > 200, "{histograms}");
+}
+
 #[test]
 fn an_awaited_tmf8828_gives_the_same() {
     let config = tmf882x::Config::new(tmf882x::Settings::of_8x8(PixelAddress(10))).unwrap();

@@ -17,8 +17,8 @@ where
     /// order. It awaits nothing else. Between polls that are [`Polled::Idle`] await an edge of
     /// INT or a millisecond, whichever comes first.
     ///
-    /// Drop the future between transfers only; a poll that is dropped within one is as a
-    /// failed one that nobody was told of: call `start` before the next.
+    /// The future may be dropped. If that is within a transfer, nobody knows how far it came, and
+    /// the next poll begins to bring the sensor up again.
     ///
     /// # Errors
     /// The error of this step. The next polls bring the sensor up again.
@@ -27,7 +27,11 @@ where
         now_ms: u32,
         sink: &mut impl PhotonSink,
     ) -> Result<Polled, P::Error<I2C::Error, INT::Error>> {
+        if core::mem::replace(&mut self.is_under_way, true) {
+            self.protocol.restart();
+        }
         let polled = self.step_async(now_ms, sink).await;
+        self.is_under_way = false;
         polled.inspect_err(|error| self.protocol.failed(error))
     }
 

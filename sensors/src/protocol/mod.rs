@@ -113,6 +113,9 @@ pub struct Driver<P, I2C, INT, EN> {
     i2c: I2C,
     interrupt: INT,
     enable: EN,
+    /// A transfer was begun and has not ended: who awaited it gave it up.
+    #[cfg(feature = "async")]
+    is_under_way: bool,
 }
 
 impl<P, I2C, INT, EN> Driver<P, I2C, INT, EN> {
@@ -122,6 +125,8 @@ impl<P, I2C, INT, EN> Driver<P, I2C, INT, EN> {
             i2c,
             interrupt,
             enable,
+            #[cfg(feature = "async")]
+            is_under_way: false,
         }
     }
 
