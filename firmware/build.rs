@@ -7,12 +7,15 @@ use std::fs;
 use std::path::Path;
 
 /// The images a board runs, each with the features of the boards it is for.
-const IMAGES: [(&str, &[&str]); 4] = [
-    ("bench", &["MPS2_AN386", "STM32F405"]),
+const IMAGES: [(&str, &[&str]); 5] = [
+    ("bench", &["MPS2_AN386", "PICO", "STM32F405"]),
     ("sidecar-mps2-an386", &["MPS2_AN386"]),
+    ("sidecar-pico", &["PICO"]),
     ("sidecar-stm32f405", &["STM32F405"]),
-    ("self-test", &["MPS2_AN386", "STM32F405"]),
+    ("self-test", &["MPS2_AN386", "PICO", "STM32F405"]),
 ];
+/// The targets of boards; elsewhere the linker's own layout does.
+const TARGETS: [&str; 2] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf"];
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
@@ -23,8 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     sensor_image("TMF8829")?;
     sensor_image("TMF882X")?;
 
-    // The one target of real boards; elsewhere the linker's own layout does.
-    if env::var("TARGET")? != "thumbv7em-none-eabihf" {
+    if !TARGETS.contains(&&*env::var("TARGET")?) {
         return Ok(());
     }
     let here = env::var("CARGO_MANIFEST_DIR")?;
@@ -42,6 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             // `link.x` includes in the folder it is started in before all others,
             // and cargo starts it where the other board's is.
             Some(&"MPS2_AN386") => link(image, &format!("-T{here}/memory/mps2-an386.x")),
+            Some(&"PICO") => link(image, &format!("-T{here}/memory/pico.x")),
             Some(_) => {
                 link(image, &format!("-L{here}/.."));
                 link(image, "-Tlink.x");

@@ -9,8 +9,8 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 
+use crate::emulator;
 use crate::firmware::Board;
-use crate::qemu;
 
 const FILE: &str = "docs/results/bench/instructions.csv";
 const HEADER: &str = "operation,variant,opt,instructions";
@@ -66,7 +66,7 @@ fn count(root: &Path) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for (level, small) in [("3", false), ("s", true)] {
         let image = board.bench(root, small)?;
-        let (status, output) = qemu::run(board, &image, &COUNT_INSTRUCTIONS)?;
+        let (status, output) = emulator::run(board, &image, &COUNT_INSTRUCTIONS)?;
         ensure!(status.success(), "QEMU: {status}: {}", output.trim());
         for line in output.lines() {
             rows.push(measured(line, level).with_context(|| format!("what is `{line}`?"))?);

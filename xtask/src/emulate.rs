@@ -1,36 +1,37 @@
-//! `cargo xtask emulate`: the sidecar in QEMU.
+//! `cargo xtask emulate`: the sidecar in an emulator.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
+use crate::emulator;
 use crate::firmware::{Board, Build};
-use crate::qemu;
-use crate::tools::{DEFMT_PRINT, QEMU};
+use crate::tools::DEFMT_PRINT;
 
 /// Where the serial port is unless said otherwise.
 const PORT: u16 = 5386;
 
-/// Runs the sidecar in QEMU until it ends or is interrupted. `end` is how it is to
-/// end by itself.
-pub fn emulate(root: &Path, port: Option<u16>, end: Option<&str>) -> Result<()> {
+/// Runs the sidecar in the emulator of `board` until it ends or is interrupted. `end` is
+/// how it is to end by itself, in QEMU.
+pub fn emulate(root: &Path, board: Board, port: Option<u16>, end: Option<&str>) -> Result<()> {
     let port = port.unwrap_or(PORT);
-    QEMU.require()?;
-    let board = Board::Mps2An386;
+    if let Some(reason) = emulator::cannot_run(board)? {
+        bail!("{reason}");
+    }
     let image = board.build_for_emulator(root, Build::Sidecar)?;
-    let mut command = qemu::command(board, &image, Some(port), end);
+    let mut command = emulator::command(board, &image, Some(port), end);
     println!("the serial port is tcp:127.0.0.1:{port}; Ctrl-C ends");
     println!("what the board sends while nobody is connected is lost");
-    let decoded = DEFMT_PRINT.is_there();
+    // rp2040js has no probe that reads a log.
+    let logs = board != Board::Pico;
+    let decoded = logs && DEFMT_PRINT.is_there();
     if decoded {
         command.stdout(Stdio::piped());
-    } else {
+    } else if logs {
         println!("the log comes as it is: {}", DEFMT_PRINT.missing());
     }
-    let mut emulator = command
-        .spawn()
-        .with_context(|| format!("{} does not start", QEMU.program))?;
+    let mut emulator = command.spawn().context("the emulator does not start")?;
     if let Some(log) = emulator.stdout.take() {
         let mut decoder = Command::new(DEFMT_PRINT.program);
         let status = decoder.arg("-e").arg(&image).stdin(log).status();
@@ -42,6 +43,6 @@ pub fn emulate(root: &Path, port: Option<u16>, end: Option<&str>) -> Result<()> 
         ensure!(status.success(), "{}: {status}", DEFMT_PRINT.program);
     }
     let status = emulator.wait()?;
-    ensure!(status.success(), "QEMU: {status}");
+    ensure!(status.success(), "the emulator: {status}");
     Ok(())
 }

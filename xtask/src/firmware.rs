@@ -8,9 +8,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::{cargo, target_folder, toolchain};
+use crate::{cargo, target_folder, toolchain, uf2};
 
-const TARGET: &str = "thumbv7em-none-eabihf";
 const PROFILE: &str = "firmware";
 const SMALL_PROFILE: &str = "firmware-small";
 
@@ -18,23 +17,33 @@ const SMALL_PROFILE: &str = "firmware-small";
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Board {
     Mps2An386,
+    Pico,
     Stm32F405,
 }
 
 impl Board {
-    pub const ALL: [Self; 2] = [Self::Mps2An386, Self::Stm32F405];
+    pub const ALL: [Self; 3] = [Self::Mps2An386, Self::Pico, Self::Stm32F405];
 
     /// Its name and that of its feature.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mps2An386 => "mps2-an386",
+            Self::Pico => "pico",
             Self::Stm32F405 => "stm32f405",
+        }
+    }
+
+    /// What its processor is to the compiler.
+    fn target(self) -> &'static str {
+        match self {
+            Self::Mps2An386 | Self::Stm32F405 => "thumbv7em-none-eabihf",
+            Self::Pico => "thumbv6m-none-eabi",
         }
     }
 
     fn named(name: &str) -> Result<Self> {
         let found = Self::ALL.into_iter().find(|board| board.name() == name);
-        found.with_context(|| format!("no board `{name}`: mps2-an386 or stm32f405"))
+        found.with_context(|| format!("no board `{name}`: mps2-an386, pico or stm32f405"))
     }
 
     /// Builds an image as it goes onto the board; that of a TMF8820/21/28 or TMF8829 has the
@@ -61,7 +70,8 @@ impl Board {
     /// Builds the image that counts instructions, `small` or fast.
     pub fn bench(self, root: &Path, small: bool) -> Result<PathBuf> {
         let profile = if small { SMALL_PROFILE } else { PROFILE };
-        link(root, "bench", &[self.name(), "bench"], None, profile)
+        let features = [self.name(), "bench"];
+        link(root, self.target(), "bench", &features, None, profile)
     }
 
     fn link(
@@ -81,7 +91,11 @@ impl Board {
         };
         let board = [self.name()].into_iter();
         let features: Vec<&str> = board.chain(feature).chain(more).collect();
-        link(root, image, &features, program, PROFILE)
+        let image = link(root, self.target(), image, &features, program, PROFILE)?;
+        if self == Self::Pico {
+            uf2::write(&image)?;
+        }
+        Ok(image)
     }
 }
 
@@ -189,12 +203,13 @@ fn check_program(bytes: &[u8], most: usize) -> Result<()> {
 /// Links one image and gives the path of a copy that no other image replaces.
 fn link(
     root: &Path,
+    target: &str,
     image: &str,
     features: &[&str],
     program: Option<&Program>,
     profile: &str,
 ) -> Result<PathBuf> {
-    toolchain::ensure_target(TARGET)?;
+    toolchain::ensure_target(target)?;
     let folder = target_folder(root);
     let kept = folder.join("images");
     fs::create_dir_all(&kept).with_context(|| kept.display().to_string())?;
@@ -217,13 +232,13 @@ fn link(
         .args(["build", "--locked", "--package", "dtof-firmware"])
         .args((!io::stderr().is_terminal()).then_some("--quiet"))
         .args(["--bin", image, "--features", &features.join(",")])
-        .args(["--target", TARGET, "--profile", profile, "--target-dir"])
+        .args(["--target", target, "--profile", profile, "--target-dir"])
         .arg(&folder)
         .status()
         .context("cargo does not start")?;
     ensure!(status.success(), "{image} does not build, see above");
 
-    let built = folder.join(TARGET).join(profile).join(image);
+    let built = folder.join(target).join(profile).join(image);
     fs::copy(&built, &kept).with_context(|| built.display().to_string())?;
     Ok(kept)
 }

@@ -8,16 +8,26 @@ use anyhow::{Context, Result, ensure};
 use crate::firmware::{Board, Build};
 use crate::tools::PROBE_RS;
 
-/// The controller of the Discovery board, as probe-rs calls it.
-const CHIP: &str = "STM32F407VGTx";
+/// The controller of a board, as probe-rs calls it: that of the Discovery.
+const fn chip(board: Board) -> &'static str {
+    match board {
+        Board::Pico => "RP2040",
+        Board::Mps2An386 | Board::Stm32F405 => "STM32F407VGTx",
+    }
+}
 
 /// Writes an image onto the board and shows what it logs until interrupted.
-pub fn flash(root: &Path, chip: Option<&str>, what: Build) -> Result<()> {
+pub fn flash(root: &Path, board: Board, named: Option<&str>, what: Build) -> Result<()> {
     // Before anything is built.
     PROBE_RS.require()?;
-    let image = Board::Stm32F405.build(root, what)?;
+    let image = board.build(root, what)?;
     let status = Command::new(PROBE_RS.program)
-        .args(["run", "--non-interactive", "--chip", chip.unwrap_or(CHIP)])
+        .args([
+            "run",
+            "--non-interactive",
+            "--chip",
+            named.unwrap_or(chip(board)),
+        ])
         .arg(&image)
         .stdin(Stdio::null())
         .status()

@@ -3,15 +3,16 @@
 mod bench;
 mod c_bindings;
 mod emulate;
+mod emulator;
 mod firmware;
 mod flash;
 mod image;
 mod python;
-mod qemu;
 mod self_test;
 mod sizes;
 mod toolchain;
 mod tools;
+mod uf2;
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -21,7 +22,7 @@ use anyhow::{Context, Result, bail, ensure};
 use lexopt::prelude::{Long, Short, Value};
 use lexopt::{Parser, ValueExt};
 
-use firmware::Build;
+use firmware::{Board, Build};
 
 const HELP: &str = "\
 cargo xtask <command>
@@ -30,21 +31,23 @@ cargo xtask <command>
                 Verilator and the other tools if that needs no question
   image BOARD [SENSOR | self-test] [--emulator]
                 build an image and print its path: the sidecar or the self-test.
-                BOARD is mps2-an386 or stm32f405. SENSOR is tdc7200, tmf8829,
-                tmf882x or tmf8828-8x8, on stm32f405 only. --emulator builds for QEMU,
-                with its slower clock and without the sensor's own program
-  flash [--chip CHIP] [SENSOR | self-test]
-                write an image onto an STM32F405 or STM32F407 and show its log.
-                CHIP is the name in probe-rs, by default that of the Discovery
-  emulate [--port PORT] [exit | panic | fault]
-                run the sidecar in QEMU, its serial port on a TCP port (5386).
-                The last word ends it in that way
+                BOARD is mps2-an386, pico or stm32f405. SENSOR is tdc7200, tmf8829,
+                tmf882x or tmf8828-8x8, on stm32f405 only. For pico a .uf2 lies beside it, to be copied onto
+                the board without a probe. --emulator builds for QEMU, with its slower clock
+                and without the sensor's own program
+  flash [--chip CHIP] [pico] [SENSOR | self-test]
+                write an image onto an STM32F405 or STM32F407, or with `pico` onto a
+                Pico with a debug probe, and show its log. CHIP is the name in
+                probe-rs, by default that of the Discovery
+  emulate [--port PORT] [pico | exit | panic | fault]
+                run the sidecar in QEMU, or `pico` in rp2040js, its serial port on a
+                TCP port (5386). Another word ends it in that way
   sizes         print flash, RAM and stack of each image
   check-image [--all]
                 link dtof-core for every target: no panic, float or allocation.
                 --all: both for speed and for size, not for Cortex-M4F alone
   self-test [--bless]
-                run the self-test in QEMU and compare its lines with
+                run the self-test in emulators and compare its lines with
                 firmware/self-test.out; --bless writes the file
   bench [--check]
                 count the instructions of the core's operations in QEMU and write
@@ -109,16 +112,23 @@ fn run() -> Result<()> {
         ("setup", []) => {
             toolchain::set_up(root)?;
             tools::set_up();
+            emulator::install_rp2040js()?;
         }
         ("image", [board, what @ ..]) if what.len() < 2 => {
             firmware::image(root, board, what.first().copied(), options.emulator)?;
         }
+        ("flash", ["pico", what @ ..]) if what.len() < 2 => {
+            let what = Build::named(what.first().copied())?;
+            flash::flash(root, Board::Pico, options.chip.as_deref(), what)?;
+        }
         ("flash", what @ ([] | [_])) => {
             let what = Build::named(what.first().copied())?;
-            flash::flash(root, options.chip.as_deref(), what)?;
+            flash::flash(root, Board::Stm32F405, options.chip.as_deref(), what)?;
         }
+        ("emulate", ["pico"]) => emulate::emulate(root, Board::Pico, options.port, None)?,
         ("emulate", end @ ([] | ["exit" | "panic" | "fault"])) => {
-            emulate::emulate(root, options.port, end.first().copied())?;
+            let end = end.first().copied();
+            emulate::emulate(root, Board::Mps2An386, options.port, end)?;
         }
         ("sizes", []) => sizes::print(root)?,
         ("check-image", []) => image::check(root, options.all)?,

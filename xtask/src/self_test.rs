@@ -6,16 +6,16 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 
+use crate::emulator;
 use crate::firmware::{Board, Build};
-use crate::qemu;
 
 pub const EXPECTED: &str = "firmware/self-test.out";
 
-/// Runs the image of each board in QEMU and compares.
+/// Runs the image of each board in its emulator and compares.
 pub fn check(root: &Path) -> Result<()> {
     let expected = fs::read_to_string(root.join(EXPECTED)).context(EXPECTED)?;
     for board in Board::ALL {
-        if let Some(reason) = qemu::cannot_run(board)? {
+        if let Some(reason) = emulator::cannot_run(board)? {
             println!("{reason}");
             continue;
         }
@@ -46,9 +46,9 @@ pub fn bless(root: &Path) -> Result<()> {
 /// The lines that a board's image prints.
 fn lines(board: Board, root: &Path) -> Result<String> {
     let image = board.build_bare(root, Build::SelfTest)?;
-    let (status, output) = qemu::run(board, &image, &[])?;
+    let (status, output) = emulator::run(board, &image, &[])?;
     let name = board.name();
-    ensure!(status.success(), "{name}: QEMU: {status}: {output}");
+    ensure!(status.success(), "{name}: emulator: {status}: {output}");
     Ok(output)
 }
 

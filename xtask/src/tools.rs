@@ -36,6 +36,10 @@ pub const QEMU: Tool = tool("qemu-system-arm", Packages("qemu-system-arm"));
 pub const DEFMT_PRINT: Tool = tool("defmt-print", Crate("defmt-print"));
 pub const PROBE_RS: Tool = tool("probe-rs", LargeCrate("probe-rs-tools"));
 
+/// For the emulated Pico, with the packages of `tools/rp2040`.
+pub const NODE: Tool = tool("node", Packages("nodejs"));
+pub const NPM: Tool = tool("npm", Packages("npm"));
+
 /// For `cargo xtask c-bindings`.
 pub const CXX: Tool = tool("g++", Packages("g++"));
 pub const CMAKE: Tool = tool("cmake", Packages("cmake make"));
@@ -52,7 +56,7 @@ pub const PYTHON: Tool = Tool {
 };
 
 /// Every tool that [`set_up`] installs.
-const ALL: [Tool; 11] = [
+const ALL: [Tool; 13] = [
     QEMU,
     CXX,
     CMAKE,
@@ -69,6 +73,8 @@ const ALL: [Tool; 11] = [
     // For the reports, as readers see them.
     tool("chromium", Packages("chromium")),
     PYTHON,
+    NODE,
+    NPM,
     DEFMT_PRINT,
 ];
 

@@ -2,12 +2,13 @@
 //! `firmware/self-test.out`: `cargo xtask self-test`.
 //!
 //! It writes plain text through semihosting, which the emulator prints and a
-//! debugger can show as well, and needs nothing of the board but its memory.
+//! debugger can show as well, and needs nothing of the board but its memory (and what
+//! a Pico boots with).
 
 #![no_std]
 #![no_main]
 
-#[cfg(not(all(target_os = "none", any(feature = "mps2-an386", feature = "stm32f405"))))]
+#[cfg(not(all(target_os = "none", feature = "board")))]
 compile_error!("an image for a board: cargo xtask self-test");
 
 use core::fmt;

@@ -1,4 +1,4 @@
-//! Boards: what the main loop needs of one, and the two there are.
+//! Boards: what the main loop needs of one, and those there are.
 //!
 //! A board is one file beside this one. It starts the clock, a timer of one
 //! millisecond and a serial port, hands the received bytes to
@@ -9,7 +9,9 @@
 
 #[cfg(all(target_os = "none", feature = "mps2-an386"))]
 pub mod mps2_an386;
-#[cfg(all(target_os = "none", any(feature = "mps2-an386", feature = "stm32f405")))]
+#[cfg(all(target_os = "none", feature = "pico"))]
+pub mod pico;
+#[cfg(all(target_os = "none", feature = "board"))]
 mod report;
 #[cfg(all(target_os = "none", feature = "stm32f405"))]
 pub mod stm32f405;
@@ -17,8 +19,12 @@ pub mod systick;
 mod transmit;
 
 // Each board defines the interrupt handlers of the image.
-#[cfg(all(feature = "mps2-an386", feature = "stm32f405"))]
-compile_error!("an image is for one board: choose one of mps2-an386 and stm32f405");
+#[cfg(any(
+    all(feature = "mps2-an386", feature = "pico"),
+    all(feature = "mps2-an386", feature = "stm32f405"),
+    all(feature = "pico", feature = "stm32f405")
+))]
+compile_error!("an image is for one board: choose one of mps2-an386, pico and stm32f405");
 
 #[cfg(any(
     all(feature = "sensor-tdc7200", feature = "sensor-tmf8829"),

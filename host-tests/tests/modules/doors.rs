@@ -93,7 +93,10 @@ fn files(folder: &Path, ends: &[&str], found: &mut Vec<(String, String)>) {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap();
         if path.is_dir() {
-            let is_built = matches!(name, "target" | "out" | "corpus" | "artifacts");
+            let is_built = matches!(
+                name,
+                "target" | "out" | "corpus" | "artifacts" | "node_modules"
+            );
             if !is_built && (!name.starts_with('.') || name == ".ci") {
                 files(&path, ends, found);
             }
@@ -148,7 +151,7 @@ fn what_listens_does_so_for_this_computer_alone() {
     let mut all = Vec::new();
     files(
         &root(),
-        &["rs", "py", "c", "cpp", "sh", "md", "ipynb"],
+        &["rs", "py", "js", "c", "cpp", "sh", "md", "ipynb"],
         &mut all,
     );
     // Firmware has no network; its ports listen for interrupts.

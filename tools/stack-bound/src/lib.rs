@@ -7,6 +7,7 @@
 //! through tables, so the bound ends at the panic handler. A compiled function ends
 //! in a jump or a return; it never runs on into the next.
 
+mod small;
 mod thumb;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -180,14 +181,25 @@ fn functions(file: &object::File) -> Result<BTreeMap<u32, Function>> {
             };
             let mut at = address;
             while at < end {
-                let is_code = code.range(..=at).next_back().is_none_or(|(_, &code)| code);
-                let rest = halfwords.get(usize::try_from((at - start) / 2)?..);
-                let (effect, bytes) = match rest.unwrap_or_default() {
-                    [_, ..] if !is_code => (Effect::None, 2),
+                let is_code = |at| code.range(..=at).next_back().is_none_or(|(_, &code)| code);
+                let index = usize::try_from((at - start) / 2)?;
+                let rest = halfwords.get(index..).unwrap_or_default();
+                let is_table = || code.get(&(at + 2)) == Some(&false);
+                let (effect, bytes) = match rest {
+                    [_, ..] if !is_code(at) => (Effect::None, 2),
                     &[first, second, ..] if thumb::is_wide(first) => {
                         (thumb::wide(at, first, second), 4)
                     }
-                    &[first, ..] => (thumb::narrow(at, first), 2),
+                    &[first, ..] => {
+                        let effect = match thumb::narrow(at, first) {
+                            Effect::SetsStackPointer => small::frame(&halfwords, start, index),
+                            Effect::GoesAnywhere if small::is_jump(first) && is_table() => {
+                                Some(Effect::None)
+                            }
+                            effect => Some(effect),
+                        };
+                        (effect.unwrap_or(Effect::SetsStackPointer), 2)
+                    }
                     [] => bail!("{name} reaches beyond its section"),
                 };
                 function.add(effect, address..end);

@@ -15,7 +15,7 @@ use crate::image::symbols;
 use crate::self_test;
 use crate::sizes::Sizes;
 use crate::tools::{ARM_GCC, CMAKE, CXX, QEMU, Tool};
-use crate::{cargo, qemu, succeed, target_folder, toolchain};
+use crate::{cargo, emulator, succeed, target_folder, toolchain};
 
 use self::figures::Figures;
 
@@ -175,7 +175,7 @@ fn no_panic(path: &Path) -> Result<()> {
 }
 
 fn in_emulator(image: &Path, arguments: &[&str]) -> Result<String> {
-    let (status, output) = qemu::run(Board::Mps2An386, image, arguments)?;
+    let (status, output) = emulator::run(Board::Mps2An386, image, arguments)?;
     ensure!(status.success(), "QEMU: {status}: {}", output.trim());
     Ok(output)
 }

@@ -1,4 +1,4 @@
-//! QEMU, with an image.
+//! The emulators, with an image: QEMU, and for the Pico rp2040js in Node.js.
 
 use std::io::Read;
 use std::path::Path;
@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 
 use crate::firmware::Board;
-use crate::tools::QEMU;
+use crate::tools::{NODE, NPM, QEMU};
+use crate::{root, succeed};
 
 /// Far more than any image takes that ends.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -18,8 +19,29 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// the clocks.
 const KNOWN: &str = "version 7.2.";
 
-/// Why this QEMU does not run the images of `board`, if so.
+/// Where the runner of the Pico's images is, and what it needs.
+const RP2040: &str = "tools/rp2040";
+
+/// Installs what the runner of the Pico's images needs, if it is not there.
+pub fn install_rp2040js() -> Result<()> {
+    let folder = root()?.join(RP2040);
+    // Written by npm last.
+    if folder.join("node_modules/.package-lock.json").exists() {
+        return Ok(());
+    }
+    NODE.require()?;
+    NPM.require()?;
+    let mut npm = Command::new(NPM.program);
+    npm.args(["ci", "--silent", "--no-audit", "--no-fund"]);
+    succeed(npm.current_dir(folder))
+}
+
+/// Why the emulator does not run the images of `board`, if so.
 pub fn cannot_run(board: Board) -> Result<Option<String>> {
+    if board == Board::Pico {
+        install_rp2040js()?;
+        return Ok(None);
+    }
     let version = QEMU.require()?;
     let cannot = board == Board::Stm32F405 && !version.contains(KNOWN);
     Ok(cannot.then(|| {
@@ -28,8 +50,28 @@ pub fn cannot_run(board: Board) -> Result<Option<String>> {
     }))
 }
 
-/// How to start an image. `word` is what it finds on its command line.
+/// How to start an image. `word` is what it finds on its command line, in QEMU.
 pub fn command(board: Board, image: &Path, port: Option<u16>, word: Option<&str>) -> Command {
+    match board {
+        Board::Pico => rp2040js(image, port),
+        Board::Mps2An386 | Board::Stm32F405 => qemu(board, image, port, word),
+    }
+}
+
+fn rp2040js(image: &Path, port: Option<u16>) -> Command {
+    let mut command = Command::new(NODE.program);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("..")
+        .join(RP2040);
+    command.arg(folder.join("run.js")).arg(image);
+    match port {
+        Some(port) => command.args(["--port", &port.to_string()]),
+        None => command.stdin(Stdio::null()),
+    };
+    command
+}
+
+fn qemu(board: Board, image: &Path, port: Option<u16>, word: Option<&str>) -> Command {
     let uart = port.map_or_else(
         || "null".to_owned(),
         |port| format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on"),
@@ -41,27 +83,37 @@ pub fn command(board: Board, image: &Path, port: Option<u16>, word: Option<&str>
     }
     let mut command = Command::new(QEMU.program);
     command.args(["-display", "none", "-monitor", "none"]);
-    match board {
-        Board::Mps2An386 => command.args(["-machine", "mps2-an386"]),
+    if board == Board::Stm32F405 {
         // The first is USART1, ours USART2.
-        Board::Stm32F405 => command.args(["-machine", "netduinoplus2", "-serial", "null"]),
-    };
+        command.args(["-machine", "netduinoplus2", "-serial", "null"]);
+    } else {
+        command.args(["-machine", "mps2-an386"]);
+    }
     command.args(["-serial", &uart, "-semihosting-config", &semihosting]);
     command.arg("-kernel").arg(image);
     command.stdin(Stdio::null());
     command
 }
 
-/// Runs an image that ends, with these arguments more for QEMU; gives how it ended and
+/// Runs an image that ends, with these arguments more for the emulator; gives how it ended and
 /// what it printed.
 pub fn run(board: Board, image: &Path, arguments: &[&str]) -> Result<(ExitStatus, String)> {
-    QEMU.require()?;
-    let mut emulator = command(board, image, None, None)
+    if board == Board::Pico {
+        install_rp2040js()?;
+    } else {
+        QEMU.require()?;
+    }
+    let mut command = command(board, image, None, None);
+    let program = command.get_program().display().to_string();
+    let mut emulator = command
         .args(arguments)
         .stdout(Stdio::piped())
         .spawn()
-        .with_context(|| format!("{} does not start", QEMU.program))?;
-    let mut stdout = emulator.stdout.take().context("no output of QEMU")?;
+        .with_context(|| format!("{program} does not start"))?;
+    let mut stdout = emulator
+        .stdout
+        .take()
+        .context("no output of the emulator")?;
     let output = thread::spawn(move || {
         let mut bytes = Vec::new();
         // The text before an error is kept.

@@ -1,0 +1,220 @@
+//! Raspberry Pi Pico: RP2040 with a flash of 2 MiB, a crystal of 12 MHz.
+//!
+//! | | |
+//! |---|---|
+//! | clock | 125 MHz from the crystal |
+//! | serial port | UART0, 1 Mbaud, 8 data bits, no parity, 1 stop bit |
+//! | GP0 | sends; pin 1, to RX of a USB adapter of 3.3 V |
+//! | GP1 | receives; pin 2, to TX of the adapter |
+//! | watchdog | resets after about a second |
+//! | log | defmt over RTT, which a debug probe reads |
+//!
+//! One of the two cores runs. Of the boot ROM nothing is called once the image has started.
+
+use core::cell::RefCell;
+use core::panic::PanicInfo;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m::peripheral::{NVIC, SCB};
+use cortex_m_rt::{ExceptionFrame, exception};
+use critical_section::Mutex;
+use defmt_rtt as _;
+use embedded_io::WriteReady;
+use rp2040_hal::clocks::init_clocks_and_plls;
+use rp2040_hal::fugit::{ExtU32, RateExtU32};
+use rp2040_hal::gpio::bank0::{Gpio0, Gpio1};
+use rp2040_hal::gpio::{FunctionUart, Pin, Pins, PullDown};
+use rp2040_hal::pac::{self, Interrupt, UART0, interrupt};
+use rp2040_hal::uart::{DataBits, Reader, StopBits, UartConfig, UartPeripheral, Writer};
+use rp2040_hal::watchdog::Watchdog;
+use rp2040_hal::{Clock, Sio};
+use static_cell::ConstStaticCell;
+
+use super::{Board, Transmitter, report, systick, transmit};
+use crate::serial::{BoardBuffers, Buffers, Serial, SerialInterrupt};
+
+const BAUD: u32 = 1_000_000;
+const CRYSTAL_HZ: u32 = 12_000_000;
+
+/// What the chip's ROM loads first: it sets the flash up for reading.
+#[unsafe(link_section = ".boot2")]
+#[used]
+#[allow(unsafe_code, reason = "its place is said by the section's name")]
+static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_W25Q080;
+
+type UartPins = (
+    Pin<Gpio0, FunctionUart, PullDown>,
+    Pin<Gpio1, FunctionUart, PullDown>,
+);
+
+/// The port and its end of the queues.
+struct Port {
+    interrupt: SerialInterrupt<'static>,
+    tx: Writer<UART0, UartPins>,
+    rx: Reader<UART0, UartPins>,
+}
+
+static BUFFERS: ConstStaticCell<BoardBuffers> = ConstStaticCell::new(Buffers::new());
+static PORT: Mutex<RefCell<Option<Port>>> = Mutex::new(RefCell::new(None));
+static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
+
+/// The board, once started.
+pub struct Pico {
+    watchdog: Watchdog,
+}
+
+impl Pico {
+    /// Starts clock, timer, serial port and watchdog. Waits for the crystal: a board
+    /// without one stays here.
+    ///
+    /// # Panics
+    /// If called twice.
+    #[must_use]
+    pub fn start() -> (Self, Serial<'static>) {
+        let (Some(core), Some(device)) = (cortex_m::Peripherals::take(), pac::Peripherals::take())
+        else {
+            panic!("the board is started twice");
+        };
+        let mut resets = device.RESETS;
+        let mut watchdog = Watchdog::new(device.WATCHDOG);
+        let Ok(clocks) = init_clocks_and_plls(
+            CRYSTAL_HZ,
+            device.XOSC,
+            device.CLOCKS,
+            device.PLL_SYS,
+            device.PLL_USB,
+            &mut resets,
+            &mut watchdog,
+        ) else {
+            panic!("125 MHz cannot be had from this crystal");
+        };
+
+        let mut timer = core.SYST;
+        timer.set_clock_source(SystClkSource::Core);
+        timer.set_reload(systick::reload(clocks.system_clock.freq().to_Hz()));
+        timer.clear_current();
+        timer.enable_interrupt();
+        timer.enable_counter();
+
+        let sio = Sio::new(device.SIO);
+        let pins = Pins::new(
+            device.IO_BANK0,
+            device.PADS_BANK0,
+            sio.gpio_bank0,
+            &mut resets,
+        );
+        let uart = (pins.gpio0.into_function(), pins.gpio1.into_function());
+        let config = UartConfig::new(BAUD.Hz(), DataBits::Eight, None, StopBits::One);
+        let uart = UartPeripheral::new(device.UART0, uart, &mut resets);
+        let Ok(uart) = uart.enable(config, clocks.peripheral_clock.freq()) else {
+            panic!("{BAUD} baud cannot be had from this clock");
+        };
+        let (mut rx, tx) = uart.split();
+        rx.enable_rx_interrupt();
+        let (interrupt, serial) = BUFFERS.take().split(Self::start_sending);
+        critical_section::with(|cs| PORT.replace(cs, Some(Port { interrupt, tx, rx })));
+
+        // SAFETY: the handlers share data with the main loop through queues,
+        // atomics and mutexes only, and nothing relies on their being masked.
+        #[allow(unsafe_code, reason = "there is no other way to unmask")]
+        unsafe {
+            NVIC::unmask(Interrupt::UART0_IRQ);
+        }
+
+        // A breakpoint is no reason to reset.
+        watchdog.pause_on_debug(true);
+        watchdog.start(1.secs());
+        (Self { watchdog }, serial)
+    }
+
+    /// Reports a panic and resets.
+    pub fn on_panic(info: &PanicInfo<'_>) -> ! {
+        report::panic(info);
+        SCB::sys_reset()
+    }
+
+    /// Reports a hard fault and resets.
+    pub fn on_hard_fault(frame: &ExceptionFrame) -> ! {
+        report::hard_fault(frame);
+        SCB::sys_reset()
+    }
+}
+
+impl Board for Pico {
+    fn now_ms(&self) -> u32 {
+        MILLISECONDS.load(Ordering::Relaxed)
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.feed();
+    }
+
+    fn start_sending() {
+        NVIC::pend(Interrupt::UART0_IRQ);
+    }
+
+    fn hold_interrupts(&mut self, work: impl FnOnce(&mut Self)) {
+        cortex_m::interrupt::free(|_| work(self));
+    }
+
+    fn sleep(&mut self) {
+        // An interrupt that is held back ends it all the same.
+        cortex_m::asm::wfi();
+    }
+}
+
+#[exception]
+fn SysTick() {
+    // Nobody else writes it, and this processor cannot add to memory in one step.
+    let now = MILLISECONDS.load(Ordering::Relaxed);
+    MILLISECONDS.store(now.wrapping_add(1), Ordering::Relaxed);
+}
+
+#[interrupt]
+fn UART0_IRQ() {
+    critical_section::with(|cs| {
+        if let Some(port) = PORT.borrow_ref_mut(cs).as_mut() {
+            port.serve();
+        }
+    });
+}
+
+impl Port {
+    /// Fetches what has been received and hands over what there is to send. Runs
+    /// when either is possible, and when sending is to start.
+    fn serve(&mut self) {
+        let mut byte = [0];
+        loop {
+            match self.rx.read_raw(&mut byte) {
+                Ok(_) => self.interrupt.on_receive(byte[0]),
+                Err(nb::Error::Other(_)) => self.interrupt.on_loss(),
+                Err(nb::Error::WouldBlock) => break,
+            }
+        }
+        transmit(&mut self.interrupt, &mut self.tx);
+    }
+}
+
+impl Transmitter for Writer<UART0, UartPins> {
+    // It interrupts when its queue runs half empty, which filling it further ends.
+    fn acknowledge(&mut self) {}
+
+    fn has_room(&mut self) -> bool {
+        let Ok(ready) = self.write_ready();
+        ready
+    }
+
+    fn send(&mut self, byte: u8) {
+        // There is room, as was just seen.
+        let _ = self.write_raw(&[byte]);
+    }
+
+    fn wake(&mut self) {
+        self.enable_tx_interrupt();
+    }
+
+    fn rest(&mut self) {
+        self.disable_tx_interrupt();
+    }
+}
