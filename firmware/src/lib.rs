@@ -20,6 +20,7 @@
 extern crate std;
 
 pub mod board;
+pub mod photon_timer;
 pub mod self_test;
 pub mod serial;
 pub mod sidecar;

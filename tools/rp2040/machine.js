@@ -19,6 +19,8 @@ const VECTORS = FLASH + 0x100;
 const UART_GAPS = new Set([0x04, 0x34, 0x48]);
 /** AIRCR, through which an image resets the chip. */
 const AIRCR = 0xd0c;
+/** Clocks until a pin's level is in step with the chip's clock, and seen. */
+const SYNCHRONISER = 2;
 /** Clocks of a byte at 1 Mbaud. */
 const CLOCKS_A_BYTE = 1250;
 const PAINT = 0xcccccccc;
@@ -186,7 +188,8 @@ export class Machine {
       const isHigh = ((this.rp2040.pio[0].pinValues >>> this.origin) & 1) === 1;
       if (isHigh && !this.wasHigh) {
         this.triggers++;
-        this.edgesFrom ??= this.clocks;
+        // What an instruction does to a pin is to be seen outside from the next clock on.
+        this.edgesFrom ??= this.clocks + 1;
       }
       this.wasHigh = isHigh;
     }
@@ -196,7 +199,7 @@ export class Machine {
     while (
       this.edgesFrom !== null &&
       this.nextEdge < this.edges.length &&
-      this.edgesFrom + this.edges[this.nextEdge].clock <= this.clocks
+      this.edgesFrom + this.edges[this.nextEdge].clock + SYNCHRONISER <= this.clocks
     ) {
       const { pin, level } = this.edges[this.nextEdge++];
       this.setPin(pin, level);

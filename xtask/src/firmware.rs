@@ -82,11 +82,14 @@ impl Board {
         program: Option<&Program>,
     ) -> Result<PathBuf> {
         let sidecar = format!("sidecar-{}", self.name());
-        let is_real = self == Self::Stm32F405;
         let (image, feature) = match what {
             Build::Sidecar => (&*sidecar, None),
-            Build::With(sensor) if is_real => (&*sidecar, Some(sensor.feature())),
-            Build::With(_) => bail!("only stm32f405 has a place for a sensor"),
+            Build::With(sensor) if Sensor::of(self).contains(&sensor) => {
+                (&*sidecar, Some(sensor.feature()))
+            }
+            Build::With(sensor) => {
+                bail!("{} has no place for {}", self.name(), sensor.name());
+            }
             Build::SelfTest => ("self-test", Some("self-test")),
         };
         let board = [self.name()].into_iter();
@@ -116,19 +119,21 @@ impl Build {
             None => Self::Sidecar,
             Some("self-test") => Self::SelfTest,
             Some("tdc7200") => Self::With(Sensor::Tdc7200),
+            Some("photon-timer") => Self::With(Sensor::PhotonTimer),
             Some("tmf8828-8x8") => Self::With(Sensor::Tmf8828),
             Some("tmf8829") => Self::With(Sensor::Tmf8829),
             Some("tmf882x" | "tmf8820" | "tmf8821" | "tmf8828") => Self::With(Sensor::Tmf882x),
-            Some(name) => {
-                bail!("what is `{name}`? tdc7200, tmf8829, tmf882x, tmf8828-8x8 or self-test")
-            }
+            Some(name) => bail!(
+                "what is `{name}`? tdc7200, tmf8829, tmf882x, tmf8828-8x8, photon-timer or self-test"
+            ),
         })
     }
 }
 
-/// The sensor on the real board.
+/// The sensor on a real board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sensor {
+    PhotonTimer,
     Tdc7200,
     Tmf8829,
     Tmf882x,
@@ -137,10 +142,18 @@ pub enum Sensor {
 }
 
 impl Sensor {
-    pub const ALL: [Self; 4] = [Self::Tdc7200, Self::Tmf8829, Self::Tmf882x, Self::Tmf8828];
+    /// Those of a board.
+    pub fn of(board: Board) -> &'static [Self] {
+        match board {
+            Board::Mps2An386 => &[],
+            Board::Pico => &[Self::PhotonTimer],
+            Board::Stm32F405 => &[Self::Tdc7200, Self::Tmf8829, Self::Tmf882x, Self::Tmf8828],
+        }
+    }
 
     fn feature(self) -> &'static str {
         match self {
+            Self::PhotonTimer => "sensor-photon-timer",
             Self::Tdc7200 => "sensor-tdc7200",
             Self::Tmf8829 => "sensor-tmf8829",
             Self::Tmf882x => "sensor-tmf882x",
@@ -156,7 +169,7 @@ impl Sensor {
     /// the bootloader of a TMF8820/21/28 counts them in 16 bits, that of a TMF8829 4,096 words.
     fn image(self) -> Option<(&'static str, usize)> {
         match self {
-            Self::Tdc7200 => None,
+            Self::PhotonTimer | Self::Tdc7200 => None,
             Self::Tmf8829 => Some(("TMF8829_IMAGE", 1 << 14)),
             Self::Tmf882x | Self::Tmf8828 => Some(("TMF882X_IMAGE", 1 << 16)),
         }
@@ -221,7 +234,8 @@ fn link(
         eprintln!("building {name} for the first time");
     }
     let mut cargo = cargo();
-    for (variable, _) in Sensor::ALL.into_iter().filter_map(Sensor::image) {
+    let sensors = Board::ALL.into_iter().flat_map(Sensor::of);
+    for (variable, _) in sensors.filter_map(|sensor| sensor.image()) {
         cargo.env_remove(variable);
     }
     if let Some(Program { variable, path }) = program {
@@ -262,7 +276,8 @@ mod tests {
 
     #[test]
     fn a_program_is_raw_bytes_that_fit() {
-        let images = Sensor::ALL.into_iter().filter_map(Sensor::image);
+        let sensors = Board::ALL.into_iter().flat_map(Sensor::of);
+        let images = sensors.filter_map(|sensor| sensor.image());
         for most in images.map(|(_, most)| most) {
             assert!(check_program(&[0, 0x20, 0xff], most).is_ok());
             assert!(check_program(&vec![0xff; most], most).is_ok());

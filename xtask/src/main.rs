@@ -32,7 +32,8 @@ cargo xtask <command>
   image BOARD [SENSOR | self-test] [--emulator]
                 build an image and print its path: the sidecar or the self-test.
                 BOARD is mps2-an386, pico or stm32f405. SENSOR is tdc7200, tmf8829,
-                tmf882x or tmf8828-8x8, on stm32f405 only. For pico a .uf2 lies beside it, to be copied onto
+                tmf882x or tmf8828-8x8 on stm32f405, photon-timer on pico. For pico a
+                .uf2 lies beside it, to be copied onto
                 the board without a probe. --emulator builds for QEMU, with its slower clock
                 and without the sensor's own program
   flash [--chip CHIP] [pico] [SENSOR | self-test]

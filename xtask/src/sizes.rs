@@ -30,8 +30,6 @@ const ARRAYS: [(u64, u64); 7] = [
 const MOST_FLASH: u64 = 64 * 1024;
 const MOST_FLASH_WITH_SENSOR: u64 = 82 * 1024;
 const MOST_RAM: u64 = 128 * 1024 - STACK_RESERVE;
-/// The same of the Pico, which has 2 MiB and 264 KiB; flash is no matter there.
-const MOST_RAM_PICO: u64 = 264 * 1024 - STACK_RESERVE;
 /// Bytes of its RAM that are left to the stack.
 const STACK_RESERVE: u64 = 19 * 1024;
 /// Bytes of them that an image may need; the rest is for the report of a panic.
@@ -47,11 +45,9 @@ pub fn print(root: &Path) -> Result<()> {
             format!("sidecar {}", board.name()),
             board.build_bare(root, Build::Sidecar)?,
         )];
-        if board == Board::Stm32F405 {
-            for sensor in Sensor::ALL {
-                let image = board.build_bare(root, Build::With(sensor))?;
-                sidecars.push((format!("  with {}", sensor.name()), image));
-            }
+        for &sensor in Sensor::of(board) {
+            let image = board.build_bare(root, Build::With(sensor))?;
+            sidecars.push((format!("  with {}", sensor.name()), image));
         }
         for (name, path) in sidecars {
             let Sizes { flash, ram } = Sizes::read(&path)?;
@@ -62,10 +58,8 @@ pub fn print(root: &Path) -> Result<()> {
                 "more than {MOST_STACK} bytes of stack needed"
             );
             if board == Board::Pico {
-                ensure!(
-                    ram <= MOST_RAM_PICO,
-                    "more than {MOST_RAM_PICO} bytes of RAM"
-                );
+                let left = address(&path, "_stack_start")? - address(&path, "_stack_end")?;
+                ensure!(left >= STACK_RESERVE, "{left} bytes are left to the stack");
             }
             if board == Board::Stm32F405 {
                 // The first is the one without a sensor.
@@ -98,6 +92,15 @@ pub fn print(root: &Path) -> Result<()> {
         println!("{pixels:>4} macropixels, {blocks:>2} blocks {ram:>8} bytes of RAM");
     }
     Ok(())
+}
+
+/// Where a symbol of an image is.
+fn address(path: &Path, name: &str) -> Result<u64> {
+    let bytes = fs::read(path).with_context(|| path.display().to_string())?;
+    let file = object::File::parse(&*bytes)?;
+    let symbol = file.symbol_by_name(name);
+    let symbol = symbol.with_context(|| format!("no symbol {name} in the image"))?;
+    Ok(symbol.address())
 }
 
 /// Bytes of the sidecar's memory of such a name.

@@ -9,9 +9,14 @@ compile_error!("an image for a board: cargo xtask image pico");
 use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, entry, exception};
+#[cfg(feature = "sensor-photon-timer")]
+use dtof_core::checked;
 use dtof_firmware::board::{pico::Pico, turn};
+#[cfg(feature = "sensor-photon-timer")]
+use dtof_firmware::photon_timer::{Config, Settings};
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_sensors::Sensor;
+#[cfg(not(feature = "sensor-photon-timer"))]
 use dtof_sensors::simulated;
 use heapless::Vec;
 use static_cell::ConstStaticCell;
@@ -21,10 +26,34 @@ static PIXELS: ConstStaticCell<Vec<Pixel, 512>> = ConstStaticCell::new(Vec::new(
 /// The blocks of 16 x 16 macropixels in three levels.
 static BLOCKS: ConstStaticCell<Vec<Block, 84>> = ConstStaticCell::new(Vec::new());
 
+/// 100 kHz and pulses of 100 ns, unless `LASER_HZ` and `LASER_PULSE_NS` say otherwise when
+/// the image is built.
+#[cfg(feature = "sensor-photon-timer")]
+const LASER: Config = checked!(Config::new(Settings {
+    laser_hz: number(option_env!("LASER_HZ"), 100_000),
+    pulse_ns: number(option_env!("LASER_PULSE_NS"), 100),
+}));
+
+/// The number in a text, or `default` without one.
+#[cfg(feature = "sensor-photon-timer")]
+const fn number(text: Option<&str>, default: u32) -> u32 {
+    let Some(text) = text else {
+        return default;
+    };
+    match u32::from_str_radix(text, 10) {
+        Ok(number) => number,
+        Err(_) => panic!("LASER_HZ and LASER_PULSE_NS are whole numbers"),
+    }
+}
+
 #[entry]
 fn main() -> ! {
-    let (mut board, mut serial) = Pico::start();
+    #[allow(unused_variables, reason = "the simulated sensor is not connected")]
+    let (mut board, mut serial, port) = Pico::start();
     defmt::info!("pico started");
+    #[cfg(feature = "sensor-photon-timer")]
+    let mut sensor = port.photon_timer(LASER);
+    #[cfg(not(feature = "sensor-photon-timer"))]
     let mut sensor = simulated::scene();
     let mut sidecar = Sidecar::new(PIXELS.take(), BLOCKS.take(), Some(sensor.about()));
     loop {

@@ -9,7 +9,14 @@
 //! | watchdog | resets after about a second |
 //! | log | defmt over RTT, which a debug probe reads |
 //!
+//! | GP2, GP3 | with the photon timer: the laser's pulse, the SPAD's pulses; pins 4 and 5 |
+//!
 //! One of the two cores runs. Of the boot ROM nothing is called once the image has started.
+
+#[cfg(feature = "sensor-photon-timer")]
+mod photon_timer;
+#[cfg(feature = "sensor-photon-timer")]
+mod sample_rings;
 
 use core::cell::RefCell;
 use core::panic::PanicInfo;
@@ -59,6 +66,18 @@ static BUFFERS: ConstStaticCell<BoardBuffers> = ConstStaticCell::new(Buffers::ne
 static PORT: Mutex<RefCell<Option<Port>>> = Mutex::new(RefCell::new(None));
 static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
 
+/// The parts of the chip that a sensor takes.
+pub struct SensorPort {
+    #[cfg(feature = "sensor-photon-timer")]
+    pins: photon_timer::Pins,
+    #[cfg(feature = "sensor-photon-timer")]
+    pio: pac::PIO0,
+    #[cfg(feature = "sensor-photon-timer")]
+    dma: pac::DMA,
+    #[cfg(feature = "sensor-photon-timer")]
+    resets: pac::RESETS,
+}
+
 /// The board, once started.
 pub struct Pico {
     watchdog: Watchdog,
@@ -71,7 +90,7 @@ impl Pico {
     /// # Panics
     /// If called twice.
     #[must_use]
-    pub fn start() -> (Self, Serial<'static>) {
+    pub fn start() -> (Self, Serial<'static>, SensorPort) {
         let (Some(core), Some(device)) = (cortex_m::Peripherals::take(), pac::Peripherals::take())
         else {
             panic!("the board is started twice");
@@ -125,7 +144,17 @@ impl Pico {
         // A breakpoint is no reason to reset.
         watchdog.pause_on_debug(true);
         watchdog.start(1.secs());
-        (Self { watchdog }, serial)
+        let sensor = SensorPort {
+            #[cfg(feature = "sensor-photon-timer")]
+            pins: (pins.gpio2.into_function(), pins.gpio3.into_function()),
+            #[cfg(feature = "sensor-photon-timer")]
+            pio: device.PIO0,
+            #[cfg(feature = "sensor-photon-timer")]
+            dma: device.DMA,
+            #[cfg(feature = "sensor-photon-timer")]
+            resets,
+        };
+        (Self { watchdog }, serial, sensor)
     }
 
     /// Reports a panic and resets.
@@ -159,6 +188,11 @@ impl Board for Pico {
     }
 
     fn sleep(&mut self) {
+        // Laser cycles come without interrupts.
+        #[cfg(feature = "sensor-photon-timer")]
+        if photon_timer::RUNS.load(Ordering::Relaxed) {
+            return;
+        }
         // An interrupt that is held back ends it all the same.
         cortex_m::asm::wfi();
     }

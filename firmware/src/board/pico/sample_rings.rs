@@ -1,0 +1,174 @@
+//! The samples of the photon timer on their way into memory, without the processor.
+//!
+//! Each of the two shift registers fills a ring, by two DMA channels that take turns: while
+//! one counts down, the other waits, and is started by its end. Both write through the same
+//! ring. How far they are is read from their counters at any time, so that nothing has to be
+//! done at any time. The ring's size divides what a channel transfers, so that it begins where
+//! the other has ended. See the datasheet of RP2040, sections 2.5 and 3.5.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use rp2040_hal::pac::{DMA, PIO0, RESETS};
+use rp2040_hal::pio::{Rx, SM1, SM2};
+
+use crate::photon_timer::Samples;
+
+/// Words of a ring, a power of two.
+const WORDS: u32 = 2048;
+/// The logarithm of its bytes.
+const RING_BITS: u32 = (4 * WORDS).ilog2();
+/// Words of a laser cycle in each ring: the level before, and 64 samples.
+const WORDS_A_CYCLE: u32 = 3;
+/// Laser cycles that are certainly there: besides, one that comes, and a word on its way.
+pub const KEPT: u32 = (WORDS - 2 * WORDS_A_CYCLE) / WORDS_A_CYCLE;
+
+/// Words that a channel transfers before the other takes over: a multiple of the ring's.
+const TURN: u32 = 1 << 30;
+
+/// Aligned to its size, as the DMA's rings are.
+#[repr(align(8192))]
+struct Ring([AtomicU32; WORDS as usize]);
+
+const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
+
+impl Ring {
+    const fn new() -> Self {
+        Self([const { AtomicU32::new(0) }; WORDS as usize])
+    }
+
+    /// Three words from word `3 cycle` on; after the last comes the first.
+    fn cycle(&self, cycle: u32) -> [u32; 3] {
+        let first = cycle.wrapping_mul(WORDS_A_CYCLE);
+        [0, 1, 2].map(|word| {
+            let place = self.0.get((first.wrapping_add(word) % WORDS) as usize);
+            place.map_or(0, |place| place.load(Ordering::Relaxed))
+        })
+    }
+}
+
+static EVEN: Ring = Ring::new();
+static ODD: Ring = Ring::new();
+
+/// Both rings and what fills them.
+pub struct SampleRings {
+    dma: DMA,
+    /// Words counted so far, and how many laser cycles they were.
+    words: u32,
+    cycles: u32,
+}
+
+/// Channels 0 and 1 fill one ring, 2 and 3 the other.
+const PAIRS: [u32; 2] = [0, 2];
+
+impl SampleRings {
+    pub const fn new(dma: DMA) -> Self {
+        Self {
+            dma,
+            words: 0,
+            cycles: 0,
+        }
+    }
+
+    /// Begins with empty rings.
+    pub fn start(&mut self, resets: &mut RESETS, even: &Rx<(PIO0, SM1)>, odd: &Rx<(PIO0, SM2)>) {
+        // All counters are 0 then, and nothing is under way.
+        resets.reset().modify(|_, w| w.dma().set_bit());
+        resets.reset().modify(|_, w| w.dma().clear_bit());
+        while resets.reset_done().read().dma().bit_is_clear() {}
+        clear_stalls();
+        self.fill(PAIRS[0], even.fifo_address(), even.dreq_value(), &EVEN);
+        self.fill(PAIRS[1], odd.fifo_address(), odd.dreq_value(), &ODD);
+        let first = PAIRS.map(|channel| 1 << channel).iter().sum();
+        // SAFETY: these two channels have just been set up.
+        #[allow(unsafe_code, reason = "every write that starts the DMA is unsafe")]
+        self.dma
+            .multi_chan_trigger()
+            .write(|w| unsafe { w.bits(first) });
+        self.words = 0;
+        self.cycles = 0;
+    }
+
+    /// Sets two channels up that fill a ring from a queue.
+    fn fill(&mut self, first: u32, from: *const u32, request: u8, ring: &'static Ring) {
+        const ENABLE: u32 = 1 << 0;
+        const HIGH_PRIORITY: u32 = 1 << 1;
+        const WORD: u32 = 2 << 2;
+        const INCREMENT_WRITE: u32 = 1 << 5;
+        const RING_OF_WRITES: u32 = 1 << 10 | RING_BITS << 6;
+        const QUIET: u32 = 1 << 21;
+        for (channel, other) in [(first, first + 1), (first + 1, first)] {
+            let registers = self.dma.ch(channel as usize);
+            let control = ENABLE
+                | HIGH_PRIORITY
+                | WORD
+                | INCREMENT_WRITE
+                | RING_OF_WRITES
+                | other << 11
+                | u32::from(request) << 15
+                | QUIET;
+            // SAFETY: the channel reads a queue of the PIO, and writes words within the ring,
+            // which lives as long as the image and is aligned to its size. The ring is read
+            // through atomics only.
+            #[allow(unsafe_code, reason = "the DMA writes to memory")]
+            unsafe {
+                registers.ch_read_addr().write(|w| w.bits(from as u32));
+                let to = ring.0.as_ptr() as u32;
+                registers.ch_write_addr().write(|w| w.bits(to));
+                registers.ch_trans_count().write(|w| w.bits(TURN));
+                registers.ch_al1_ctrl().write(|w| w.bits(control));
+            }
+        }
+    }
+
+    /// Words that have come into both rings, modulo [`TURN`]: one channel of each pair has 0
+    /// left. Between two reads the turn may pass to the other; then it is a few too few.
+    fn written(&self) -> u32 {
+        let [even, odd] = PAIRS.map(|first| {
+            let left = |channel: u32| self.dma.ch(channel as usize).ch_trans_count().read().bits();
+            TURN.wrapping_sub(left(first).wrapping_add(left(first + 1)))
+        });
+        let behind = even.wrapping_sub(odd) & (TURN - 1);
+        // The odd one is the later one, unless it has just been read after the other.
+        let is_behind = behind < TURN / 2;
+        (if is_behind { odd } else { even }) & (TURN - 1)
+    }
+
+    /// How many laser cycles have come whole, since the start.
+    pub fn completed(&mut self) -> u32 {
+        let new = self.written().wrapping_sub(self.words) & (TURN - 1);
+        // It has not gone back: see above.
+        if new < TURN / 2 {
+            let whole = new / WORDS_A_CYCLE;
+            self.words = self.words.wrapping_add(whole * WORDS_A_CYCLE);
+            self.cycles = self.cycles.wrapping_add(whole);
+        }
+        self.cycles
+    }
+
+    pub fn samples(&self, cycle: u32) -> Samples {
+        let [_, first_even, last_even] = EVEN.cycle(cycle);
+        let [before, first_odd, last_odd] = ODD.cycle(cycle);
+        Samples {
+            before,
+            even: [first_even, last_even],
+            odd: [first_odd, last_odd],
+        }
+    }
+
+    /// Whether a queue was full when a shift register had a word for it.
+    #[allow(clippy::unused_self, reason = "of these rings")]
+    pub fn has_stalled(&self) -> bool {
+        // SAFETY: it is only read, and reading it changes nothing.
+        #[allow(unsafe_code, reason = "rp2040-hal keeps the register to itself")]
+        let debug = unsafe { &*PIO0::PTR }.fdebug().read();
+        debug.rxstall().bits() != 0
+    }
+}
+
+fn clear_stalls() {
+    // SAFETY: only flags are cleared, which nobody else reads.
+    #[allow(unsafe_code, reason = "rp2040-hal keeps the register to itself")]
+    unsafe {
+        (*PIO0::PTR).fdebug().write(|w| w.rxstall().bits(0xf));
+    }
+}

@@ -1,0 +1,252 @@
+//! Against a model that has one level a bin, and a ring that is overwritten.
+
+use std::vec;
+use std::vec::Vec;
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// One level a bin, and the one before.
+#[derive(Clone, Debug)]
+struct Levels(Vec<bool>);
+
+impl Levels {
+    /// As shift registers have them.
+    fn samples(&self) -> Samples {
+        let mut samples = Samples {
+            before: u32::from(self.0[0]) << 31,
+            even: [0; 2],
+            odd: [0; 2],
+        };
+        for (bin, &level) in self.0[1..].iter().enumerate() {
+            let words = [&mut samples.even, &mut samples.odd][bin % 2].iter_mut();
+            let word = words.into_iter().nth(bin / 64).unwrap();
+            *word |= u32::from(level) << (bin / 2 % 32);
+        }
+        samples
+    }
+
+    /// By the definition of an edge.
+    fn photons(&self) -> Vec<u16> {
+        let pairs = self.0.windows(2).zip(0..);
+        let rising = pairs.filter(|(pair, _)| !pair[0] && pair[1]);
+        rising.map(|(_, bin)| bin).collect()
+    }
+}
+
+fn photons(samples: &Samples) -> Vec<u16> {
+    let mut found = Vec::new();
+    samples.photons(|bin| found.push(bin));
+    found.sort_unstable();
+    found
+}
+
+/// All levels of 13 clocks, at both ends and around the middle, where one word ends.
+#[test]
+fn every_pattern_of_a_few_clocks_has_its_edges() {
+    for first in [0, 1, 57, 58, 64, 65, 115, 116] {
+        for others in [false, true] {
+            for pattern in 0..1 << 13 {
+                let mut levels = Levels(vec![others; 129]);
+                for bit in 0..13 {
+                    levels.0[first + bit] = pattern >> bit & 1 == 1;
+                }
+                assert_eq!(photons(&levels.samples()), levels.photons());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pulse_from_before_is_no_photon_and_no_pulse_is_dark() {
+    let mut levels = Levels(vec![false; 129]);
+    assert!(levels.samples().is_dark());
+    levels.0[0] = true;
+    levels.0[1] = true;
+    assert!(!levels.samples().is_dark());
+    assert_eq!(photons(&levels.samples()), [0; 0]);
+    levels.0[0] = false;
+    assert_eq!(photons(&levels.samples()), [0]);
+}
+
+/// A ring of laser cycles in which more complete between any two calls.
+struct Ring {
+    cycles: Vec<Levels>,
+    completed: u32,
+    /// How many more at each call; over and over.
+    steps: Vec<u32>,
+    asked: usize,
+    stalls_at: Option<u32>,
+    starts: u32,
+}
+
+impl Sampler for Ring {
+    const KEPT: u32 = 40;
+
+    fn start(&mut self, _: &Config) {
+        self.completed = 0;
+        self.starts += 1;
+        self.stalls_at = self.stalls_at.filter(|_| self.starts < 2);
+    }
+
+    fn stop(&mut self) {}
+
+    fn completed(&mut self) -> u32 {
+        let more = self.steps[self.asked % self.steps.len()];
+        self.asked += 1;
+        self.completed = (self.completed + more).min(u32::try_from(self.cycles.len()).unwrap());
+        self.completed
+    }
+
+    fn samples(&self, cycle: u32) -> Samples {
+        // One more is being written.
+        if self.completed - cycle > Self::KEPT {
+            return Samples {
+                before: 0,
+                even: [0x5555_5555; 2],
+                odd: [0; 2],
+            };
+        }
+        self.cycles[cycle as usize].samples()
+    }
+
+    fn has_stalled(&self) -> bool {
+        self.stalls_at.is_some_and(|at| self.completed >= at)
+    }
+}
+
+/// Photons of each laser cycle that has ended.
+#[derive(Default)]
+struct Seen {
+    open: Vec<u16>,
+    ended: Vec<Vec<u16>>,
+}
+
+impl PhotonSink for Seen {
+    fn photon(&mut self, pixel: PixelAddress, code: u16) {
+        assert_eq!(pixel, PixelAddress(0));
+        self.open.push(code);
+    }
+
+    fn end_laser_cycles(&mut self, cycles: u16) {
+        assert!(cycles > 0);
+        self.open.sort_unstable();
+        self.ended.push(core::mem::take(&mut self.open));
+        self.ended
+            .resize(self.ended.len() + usize::from(cycles) - 1, Vec::new());
+    }
+
+    fn begin_frame(&mut self, _: u32) {
+        unreachable!("photons come one by one");
+    }
+
+    fn histogram(&mut self, _: PixelAddress, _: &[u32; 128]) {
+        unreachable!("photons come one by one");
+    }
+}
+
+const SETTINGS: Settings = Settings {
+    laser_hz: 100_000,
+    pulse_ns: 100,
+};
+
+fn timer(cycles: Vec<Levels>, steps: Vec<u32>) -> PhotonTimer<Ring> {
+    let ring = Ring {
+        cycles,
+        completed: 0,
+        steps,
+        asked: 0,
+        stalls_at: None,
+        starts: 0,
+    };
+    let mut timer = PhotonTimer::new(ring, Config::new(SETTINGS).unwrap());
+    timer.start(U16F16::from_num(BIN_PS));
+    timer
+}
+
+/// Laser cycles, of which many are dark.
+fn laser_cycles(most: usize) -> impl Strategy<Value = Vec<Levels>> {
+    let levels = prop::collection::vec(prop::bool::weighted(0.1), 129);
+    let dark = Just(vec![false; 129]);
+    let cycle = prop_oneof![levels, dark].prop_map(Levels);
+    prop::collection::vec(cycle, 0..most)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn random_levels_have_their_edges(levels in prop::collection::vec(any::<bool>(), 129)) {
+        let levels = Levels(levels);
+        prop_assert_eq!(photons(&levels.samples()), levels.photons());
+    }
+
+    /// Nothing is lost while the ring is read in time, and all is in order.
+    #[test]
+    fn every_laser_cycle_comes_once_and_in_order(
+        cycles in laser_cycles(200),
+        steps in prop::collection::vec(0u32..4, 1..8),
+    ) {
+        let expected: Vec<_> = cycles.iter().map(Levels::photons).collect();
+        let mut timer = timer(cycles, steps.iter().map(|&step| step + 1).collect());
+        let mut seen = Seen::default();
+        for _ in 0..1000 {
+            prop_assert!(timer.poll(0, &mut seen).is_ok());
+        }
+        prop_assert_eq!(timer.lost(), 0);
+        prop_assert_eq!(seen.ended, expected);
+    }
+
+    /// However late it is read: what comes out is whole and in order, and what does not is
+    /// counted.
+    #[test]
+    fn what_is_overwritten_is_counted_and_never_seen(
+        cycles in laser_cycles(400),
+        steps in prop::collection::vec(0u32..60, 1..8),
+    ) {
+        prop_assume!(steps.iter().any(|&step| step > 0));
+        let photons: Vec<_> = cycles.iter().map(Levels::photons).collect();
+        let mut timer = timer(cycles, steps);
+        let (mut lost, mut expected) = (0, Vec::new());
+        let mut seen = Seen::default();
+        for _ in 0..2000 {
+            let from = timer.next;
+            let result = timer.poll(0, &mut seen);
+            let to = timer.next;
+            let mut read = to - from;
+            if let Err(error) = result {
+                let Error::Lost(now) = error else { panic!("{error:?}") };
+                lost += now;
+                read -= now;
+            }
+            expected.extend_from_slice(&photons[from as usize..][..read as usize]);
+        }
+        prop_assert_eq!(timer.lost(), lost);
+        prop_assert_eq!(seen.ended.len() + lost as usize, photons.len());
+        prop_assert_eq!(seen.ended, expected);
+    }
+}
+
+#[test]
+fn samples_that_come_late_are_given_up_and_it_begins_anew() {
+    let mut dark = timer(vec![Levels(vec![false; 129]); 100], vec![10]);
+    dark.sampler.stalls_at = Some(20);
+    let mut seen = Seen::default();
+    let mut results = Vec::new();
+    for _ in 0..20 {
+        results.push(dark.poll(0, &mut seen));
+    }
+    assert!(results.contains(&Err(Error::Stalled)));
+    assert_eq!(results.last(), Some(&Ok(Polled::Idle)));
+    assert_eq!(dark.sampler.starts, 2);
+    assert_eq!(SensorFault::from(Error::Stalled), SensorFault::Data);
+}
+
+#[test]
+fn says_what_it_is() {
+    let about = timer(Vec::new(), vec![0]).about();
+    assert_eq!((about.pixels, about.is_whole), (1, false));
+    assert_eq!(about.bin_width, Some(U16F16::from_num(8000)));
+    assert_eq!(about.laser_millihertz, 100_000_000);
+}
