@@ -1,5 +1,5 @@
 //! `cargo xtask bench`: how many instructions the operations of the core take on
-//! the target, counted by the emulator.
+//! the targets, counted by emulators.
 
 mod laser_rates;
 
@@ -12,12 +12,32 @@ use anyhow::{Context, Result, ensure};
 use crate::emulator;
 use crate::firmware::Board;
 
-const FILE: &str = "docs/results/bench/instructions.csv";
-const HEADER: &str = "operation,variant,opt,instructions";
+/// A processor, by the board that has it in an emulator.
+struct Processor {
+    name: &'static str,
+    board: Board,
+    file: &'static str,
+    /// Lets the emulator count: see `firmware/src/bin/bench/counter.rs`.
+    count: &'static [&'static str],
+}
 
-/// An instruction takes 256 ns of the emulator's clock: see
-/// `firmware/src/bin/bench/counter.rs`.
-const COUNT_INSTRUCTIONS: [&str; 2] = ["-icount", "shift=8"];
+const PROCESSORS: [Processor; 2] = [
+    Processor {
+        name: "Cortex-M4F",
+        board: Board::Mps2An386,
+        file: "docs/results/bench/instructions.csv",
+        // An instruction takes 256 ns of the emulator's clock.
+        count: &["-icount", "shift=8"],
+    },
+    Processor {
+        name: "Cortex-M0+",
+        board: Board::Pico,
+        file: "docs/results/bench/instructions-m0plus.csv",
+        count: &["--count"],
+    },
+];
+
+const HEADER: &str = "operation,variant,opt,instructions";
 
 /// A figure may grow or fall by one fiftieth before [`check`] fails.
 const TOLERANCE: u64 = 50;
@@ -34,45 +54,72 @@ struct Row {
     hundredths: u64,
 }
 
-/// Counts and writes the file.
+/// Counts and writes the files.
 pub fn run(root: &Path) -> Result<()> {
-    let rows = count(root)?;
-    print(&rows)?;
-    fs::write(root.join(FILE), text(&rows)).context(FILE)?;
-    println!("{FILE}: written");
+    for processor in &PROCESSORS {
+        let file = processor.file;
+        let rows = processor.count(root)?;
+        processor.print(&rows)?;
+        fs::write(root.join(file), text(&rows)).context(file)?;
+        println!("{file}: written");
+    }
     Ok(())
 }
 
-/// Counts and compares with the file.
+/// Counts and compares with the files.
 pub fn check(root: &Path) -> Result<()> {
-    let committed = parse(&fs::read_to_string(root.join(FILE)).context(FILE)?).context(FILE)?;
-    let rows = count(root)?;
-    print(&rows)?;
-    let differences = differences(&committed, &rows);
-    for line in &differences {
-        println!("{line}");
+    for processor in &PROCESSORS {
+        let file = processor.file;
+        let committed = parse(&fs::read_to_string(root.join(file)).context(file)?).context(file)?;
+        let rows = processor.count(root)?;
+        processor.print(&rows)?;
+        let differences = differences(&committed, &rows);
+        for line in &differences {
+            println!("{line}");
+        }
+        ensure!(
+            differences.is_empty(),
+            "not what {file} says, see above; `cargo xtask bench` writes it"
+        );
+        println!("{file}: all {} figures hold", committed.len());
     }
-    ensure!(
-        differences.is_empty(),
-        "not what {FILE} says, see above; `cargo xtask bench` writes it"
-    );
-    println!("{FILE}: all {} figures hold", committed.len());
     Ok(())
 }
 
-/// Every figure, at both optimisation levels.
-fn count(root: &Path) -> Result<Vec<Row>> {
-    let board = Board::Mps2An386;
-    let mut rows = Vec::new();
-    for (level, small) in [("3", false), ("s", true)] {
-        let image = board.bench(root, small)?;
-        let (status, output) = emulator::run(board, &image, &COUNT_INSTRUCTIONS)?;
-        ensure!(status.success(), "QEMU: {status}: {}", output.trim());
-        for line in output.lines() {
-            rows.push(measured(line, level).with_context(|| format!("what is `{line}`?"))?);
+impl Processor {
+    /// Every figure, at both optimisation levels.
+    fn count(&self, root: &Path) -> Result<Vec<Row>> {
+        let mut rows = Vec::new();
+        for (level, small) in [("3", false), ("s", true)] {
+            let image = self.board.bench(root, small)?;
+            let (status, output) = emulator::run(self.board, &image, self.count)?;
+            ensure!(status.success(), "emulator: {status}: {}", output.trim());
+            for line in output.lines() {
+                rows.push(measured(line, level).with_context(|| format!("what is `{line}`?"))?);
+            }
         }
+        Ok(rows)
     }
-    Ok(rows)
+
+    /// One line an operation, the levels beside each other; and the table of `README.md`, which
+    /// is of the first processor.
+    fn print(&self, rows: &[Row]) -> Result<()> {
+        let title = format!("instructions, {}", self.name);
+        println!("{title:<WIDTH$} {:>10} {:>10}", "O3", "Os");
+        for row in rows {
+            let Some(name) = row.name.strip_suffix(",3") else {
+                continue;
+            };
+            let small = rows.iter().find(|row| row.name == format!("{name},s"));
+            let small = small.map_or_else(String::new, |row| decimal(row.hundredths));
+            let name = name.replacen(',', ": ", 1);
+            println!("{name:<WIDTH$} {:>10} {small:>10}", decimal(row.hundredths));
+        }
+        if self.board == PROCESSORS[0].board {
+            println!("\n{}", laser_rates::table(rows)?);
+        }
+        Ok(())
+    }
 }
 
 /// A line of the image: operation, variant, instructions of all runs, runs.
@@ -135,22 +182,6 @@ fn parse(text: &str) -> Result<Vec<Row>> {
 
 fn decimal(hundredths: u64) -> String {
     format!("{}.{:02}", hundredths / 100, hundredths % 100)
-}
-
-/// One line an operation, the levels beside each other; and the table of `README.md`.
-fn print(rows: &[Row]) -> Result<()> {
-    println!("{:<WIDTH$} {:>10} {:>10}", "instructions", "O3", "Os");
-    for row in rows {
-        let Some(name) = row.name.strip_suffix(",3") else {
-            continue;
-        };
-        let small = rows.iter().find(|row| row.name == format!("{name},s"));
-        let small = small.map_or_else(String::new, |row| decimal(row.hundredths));
-        let name = name.replacen(',', ": ", 1);
-        println!("{name:<WIDTH$} {:>10} {small:>10}", decimal(row.hundredths));
-    }
-    println!("\n{}", laser_rates::table(rows)?);
-    Ok(())
 }
 
 #[cfg(test)]

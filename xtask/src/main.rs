@@ -51,8 +51,9 @@ cargo xtask <command>
                 run the self-test in emulators and compare its lines with
                 firmware/self-test.out; --bless writes the file
   bench [--check]
-                count the instructions of the core's operations in QEMU and write
-                docs/results/bench/instructions.csv; --check compares with the file instead
+                count the instructions of the core's operations in emulators and write
+                docs/results/bench/instructions*.csv; --check compares with the files
+                instead
   c-bindings [--bless]
                 build bindings/c and its examples, run them here and in QEMU, and compare
                 them with Rust; --bless writes the header and the figures of its README

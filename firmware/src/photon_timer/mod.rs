@@ -59,6 +59,8 @@ pub struct PhotonTimer<S> {
     /// The laser cycle that is read next.
     next: u32,
     lost: u32,
+    /// What has been copied out of the ring.
+    batch: Vec<Samples, { BATCH as usize }>,
 }
 
 /// A poll that went wrong. The next goes on.
@@ -86,6 +88,7 @@ impl<S: Sampler> PhotonTimer<S> {
             config,
             next: 0,
             lost: 0,
+            batch: Vec::new(),
         }
     }
 
@@ -97,13 +100,13 @@ impl<S: Sampler> PhotonTimer<S> {
 
     /// Copies the next laser cycles that are complete. Says how many have been lost before
     /// them, if some have.
-    fn copy(&mut self) -> Result<Vec<Samples, { BATCH as usize }>, u32> {
+    fn copy(&mut self) -> Result<(), u32> {
         let waiting = self.sampler.completed().wrapping_sub(self.next).min(BATCH);
-        let mut batch = Vec::new();
+        self.batch.clear();
         for count in 0..waiting {
             let cycle = self.next.wrapping_add(count);
             // There is room: asked for above.
-            let _ = batch.push(self.sampler.samples(cycle));
+            let _ = self.batch.push(self.sampler.samples(cycle));
         }
         // After they were read: what was overwritten meanwhile is not to be looked at.
         let age = self.sampler.completed().wrapping_sub(self.next);
@@ -115,7 +118,7 @@ impl<S: Sampler> PhotonTimer<S> {
             return Err(lost);
         }
         self.next = self.next.wrapping_add(waiting);
-        Ok(batch)
+        Ok(())
     }
 }
 
@@ -165,10 +168,10 @@ impl<S: Sampler> Sensor for PhotonTimer<S> {
             return Err(Error::Stalled);
         }
         for round in 0..BATCHES {
-            let batch = self.copy().map_err(Error::Lost)?;
-            give(&batch, sink);
-            if !batch.is_full() {
-                let nothing = round == 0 && batch.is_empty();
+            self.copy().map_err(Error::Lost)?;
+            give(&self.batch, sink);
+            if !self.batch.is_full() {
+                let nothing = round == 0 && self.batch.is_empty();
                 return Ok(if nothing { Polled::Idle } else { Polled::Data });
             }
         }

@@ -25,22 +25,22 @@ impl Samples {
     /// before bin 0 is none of them.
     #[inline]
     pub fn photons(&self, mut photon: impl FnMut(u16)) {
-        let mut before = self.before >> 31;
-        for (first, (&even, &odd)) in [0, 64].into_iter().zip(self.even.iter().zip(&self.odd)) {
-            each(even & !(odd << 1 | before), |bit| photon(first + 2 * bit));
-            each(odd & !even, |bit| photon(first + 2 * bit + 1));
-            before = odd >> 31;
+        let ([even, next_even], [odd, next_odd]) = (self.even, self.odd);
+        // A bit is an edge, of the bin that the second number and the bit's place say.
+        let edges = [
+            (even & !(odd << 1 | self.before >> 31), 0),
+            (odd & !even, 1),
+            (next_even & !(next_odd << 1 | odd >> 31), 64),
+            (next_odd & !next_even, 65),
+        ];
+        for (mut word, first) in edges {
+            while word != 0 {
+                // On a Cortex-M0+ a multiplication and a look into a table.
+                let place = word.trailing_zeros();
+                #[allow(clippy::cast_possible_truncation, reason = "less than 128")]
+                photon((first + 2 * place) as u16);
+                word &= word - 1;
+            }
         }
-    }
-}
-
-/// Calls `found` with the place of each bit that is set. On a Cortex-M0+ `trailing_zeros` is a
-/// multiplication and a look into a table.
-#[inline]
-fn each(mut word: u32, mut found: impl FnMut(u16)) {
-    while word != 0 {
-        #[allow(clippy::cast_possible_truncation, reason = "less than 32")]
-        found(word.trailing_zeros() as u16);
-        word &= word - 1;
     }
 }

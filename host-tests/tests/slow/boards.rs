@@ -275,7 +275,7 @@ fn agrees(
 
 /// What the device makes of the demo's photons is what this computer does. Says
 /// how much that was.
-fn decides_alike(
+pub fn decides_alike(
     client: Client,
     settings: &Settings,
     geometry: Geometry,

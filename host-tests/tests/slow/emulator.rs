@@ -15,7 +15,7 @@ use crate::debugger::Debugger;
 use crate::stack::{self, Image};
 
 /// How long anything may take that takes no time.
-const PATIENCE: Duration = Duration::from_secs(20);
+pub const PATIENCE: Duration = Duration::from_secs(20);
 
 /// What an image asks for that ends: `SYS_EXIT` and `SYS_EXIT_EXTENDED` of
 /// Arm's semihosting.
@@ -191,16 +191,16 @@ impl Emulator {
     }
 }
 
-/// Two TCP ports that are free now; should another take one meanwhile, QEMU ends
+/// Two TCP ports that are free now; should another take one meanwhile, the emulator ends
 /// at once.
-fn free_ports() -> Result<[u16; 2]> {
+pub fn free_ports() -> Result<[u16; 2]> {
     let bind = || TcpListener::bind((Ipv4Addr::LOCALHOST, 0));
     let (first, second) = (bind()?, bind()?);
     Ok([first.local_addr()?.port(), second.local_addr()?.port()])
 }
 
-/// Opens what QEMU is about to open.
-fn open<T, E: Into<anyhow::Error>>(
+/// Opens what an emulator is about to open.
+pub fn open<T, E: Into<anyhow::Error>>(
     child: &mut Child,
     open: impl Fn() -> Result<T, E>,
 ) -> Result<T> {
@@ -211,10 +211,10 @@ fn open<T, E: Into<anyhow::Error>>(
             Err(error) => error,
         };
         if let Some(status) = child.try_wait()? {
-            bail!("QEMU ended at once: {status}");
+            bail!("the emulator ended at once: {status}");
         }
         if start.elapsed() > PATIENCE {
-            return Err(error.into()).context("QEMU does not open its ports");
+            return Err(error.into()).context("the emulator does not open its ports");
         }
         thread::sleep(Duration::from_millis(20));
     }

@@ -13,8 +13,10 @@ mod boards;
 mod debugger;
 mod emulator;
 mod histograms;
+mod pico;
 mod readers;
 mod report;
+mod rp2040;
 #[path = "../../../host/tests/common/sensed.rs"]
 mod sensed;
 mod soak;

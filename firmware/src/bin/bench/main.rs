@@ -7,8 +7,12 @@
 #![no_std]
 #![no_main]
 
-#[cfg(not(all(target_os = "none", any(feature = "mps2-an386", feature = "stm32f405"))))]
+#[cfg(not(all(target_os = "none", feature = "board")))]
 compile_error!("an image for a board: cargo xtask bench");
+
+// What the board boots with, and its interrupts.
+#[cfg(feature = "pico")]
+use dtof_firmware as _;
 
 mod counter;
 mod decisions;

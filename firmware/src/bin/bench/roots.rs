@@ -11,12 +11,16 @@ use crate::report;
 /// Every number of 10 bits.
 const VALUES: u32 = 1024;
 
+/// A Cortex-M0+ has no floating point.
+const WAYS: usize = if cfg!(feature = "pico") { 3 } else { 4 };
+
 /// Measures all.
 pub fn run(counter: &Counter, state: &mut State) {
-    let ways: [(&str, Operation); 4] = [
+    let ways: [(&str, Operation); WAYS] = [
         ("isqrt::<5> out of line", trial_square),
         ("core u32::isqrt out of line", of_core),
         ("table of 1 KiB out of line", table),
+        #[cfg(not(feature = "pico"))]
         ("VSQRT.F32 out of line", vsqrt),
     ];
     for (name, way) in ways {
@@ -50,6 +54,7 @@ extern "C" fn table(_: &mut State, value: u32) -> u32 {
     ROOTS.get(value as usize).copied().unwrap_or(31).into()
 }
 
+#[cfg(not(feature = "pico"))]
 #[allow(unsafe_code, reason = "the library has no square root without std")]
 #[allow(improper_ctypes_definitions, reason = "only Rust calls it")]
 #[unsafe(naked)]

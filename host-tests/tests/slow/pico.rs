@@ -1,0 +1,289 @@
+//! The images of the Pico in rp2040js do what they should. Needs Node.js and npm, which installs
+//! rp2040js.
+//!
+//! ```sh
+//! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow pico -- --nocapture
+//! ```
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, ensure};
+use dtof::device::{Client, configuration};
+use dtof::engine::host::host_engine;
+use dtof::engine::settings::Settings;
+use dtof::input::source::{Geometry, Photon, PixelPhotons, Slice};
+use dtof_core::fixed::types::{U8F8, U16F16};
+use dtof_core::{Count, PaperRule, PixelAddress};
+use dtof_link::{FaultRecord, Report, Source};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+use crate::boards::{decides_alike, settings, with_all};
+use crate::rp2040::{NODE, NPM, Rp2040, image, install, run, write_edges};
+use crate::{root, stack, target_folder, wanted};
+
+/// The SPAD's pin.
+const SPAD: u8 = 3;
+const BINS: u32 = 128;
+/// Nanoseconds of a bin.
+const BIN_NS: u64 = 8;
+/// How long the SPAD's pulse is: two samples, whenever it begins.
+const PULSE_NS: u64 = 16;
+
+#[test]
+fn pico_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
+    let Some(_alone) = wanted("the Pico in rp2040js", &[NODE, NPM]) else {
+        return Ok(());
+    };
+    install()?;
+    let of_core = run(&image(&["self-test"], None)?)?;
+    let expected = std::fs::read(root().join("firmware/self-test.out"))?;
+    ensure!(
+        of_core.success && of_core.output == expected,
+        "not the lines of firmware/self-test.out"
+    );
+    ensure!(of_core.stack <= stack::MOST, "{of_core:?}");
+
+    let sidecar = image(&[], None)?;
+    let mut used = Vec::new();
+    for (settings, cycles) in [(settings(), 500), (with_all(), 500)] {
+        let mut board = Rp2040::start(&sidecar, None)?;
+        let client = Client::new(board.connect()?)?;
+        let decided = decides_alike(client, &settings, Geometry::new(8, 8), cycles)?;
+        let done = board.stop()?;
+        println!("{decided}; {done:?}");
+        used.push(done.stack);
+    }
+    stack::check(&sidecar, &used)
+}
+
+/// Photons of laser cycles, by their bins: in order, and so far apart that each is seen.
+type Cycles = Vec<Vec<u16>>;
+
+/// `hits` photons a laser cycle over all bins, of which one in two laser cycles comes from a
+/// target at `target`.
+fn photons(hits: usize, target: u16, cycles: usize, random: &mut Pcg32) -> Cycles {
+    let mut below = |limit: u32| {
+        let scaled = (u64::from(random.next_u32()) * u64::from(limit)) >> 32;
+        u16::try_from(scaled).unwrap_or_default()
+    };
+    let mut cycle = || {
+        let mut bins = BTreeSet::new();
+        if below(2) == 0 {
+            bins.insert(target);
+        }
+        while bins.len() < hits {
+            let bin = below(BINS);
+            let near = bins.range(bin.saturating_sub(3)..=bin + 3).next();
+            if near.is_none() {
+                bins.insert(bin);
+            }
+        }
+        bins.into_iter().collect()
+    };
+    (0..cycles).map(|_| cycle()).collect()
+}
+
+/// The edges of the SPAD's pulses in laser cycles of `period_ns`, each somewhere in its bin. In every
+/// 16th laser cycle is a pulse between the bins of two laser cycles as well, which is none, and
+/// one that has begun before bin 0 where the first bins are free.
+fn edges(cycles: &Cycles, period_ns: u64, random: &mut Pcg32) -> Vec<(u64, u8, bool)> {
+    let mut edges = Vec::new();
+    let mut pulse = |from: u64| edges.extend([(from, SPAD, true), (from + PULSE_NS, SPAD, false)]);
+    for (number, cycle) in (0..).zip(cycles) {
+        let start = number * period_ns;
+        if number % 16 == 7 && cycle.first().is_none_or(|&bin| bin > 5) {
+            pulse(start - BIN_NS);
+        }
+        for &bin in cycle {
+            pulse(start + BIN_NS * u64::from(bin) + u64::from(random.next_u32() % 8));
+        }
+        if number % 16 == 9 && period_ns > 1100 {
+            pulse(start + 1048);
+        }
+    }
+    edges
+}
+
+fn counts(cycles: &Cycles) -> Vec<u32> {
+    let mut counts = vec![0; BINS as usize];
+    for &bin in cycles.iter().flatten() {
+        counts[usize::from(bin)] += 1;
+    }
+    counts
+}
+
+/// An image that senses edges, and its host.
+struct Timer {
+    board: Rp2040,
+    client: Client,
+}
+
+impl Timer {
+    fn start(image: &Path, edges: &[(u64, u8, bool)], settings: &Settings) -> Result<Self> {
+        let path = target_folder().join("pico-edges.txt");
+        write_edges(&path, edges)?;
+        let mut board = Rp2040::start(image, Some(&path))?;
+        let mut client = Client::new(board.connect()?)?;
+        let about = client.sensor()?.context("no sensor")?;
+        ensure!(about.bin_width == Some(U16F16::from_num(BIN_NS * 1000)));
+        let wanted = configuration(settings, 1, 1, Source::Sensor, None)?;
+        client.configure(&wanted)?;
+        Ok(Self { board, client })
+    }
+
+    /// Waits until so many laser cycles have ended.
+    fn wait(&mut self, cycles: u64) -> Result<Report> {
+        let start = Instant::now();
+        loop {
+            let report = self.client.report()?;
+            if report.cycles >= cycles {
+                return Ok(report);
+            }
+            ensure!(
+                start.elapsed() < Duration::from_secs(60),
+                "{cycles} laser cycles take too long: {report:?}"
+            );
+            // Each question takes time that laser cycles need.
+            thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// The histogram of the exposure so far.
+    fn histogram(&mut self) -> Result<Vec<u32>> {
+        self.client.request_histogram(PixelAddress(0))?;
+        loop {
+            if let Some(answer) = self.client.poll_histogram()? {
+                let histogram = answer.ok().context("no histogram")?;
+                return Ok(histogram.counts);
+            }
+        }
+    }
+}
+
+/// Decides nothing within the laser cycles of a test.
+fn gathers() -> Settings {
+    Settings {
+        l1: 60_000,
+        l2: 65_000,
+        ..senses()
+    }
+}
+
+fn senses() -> Settings {
+    Settings {
+        bin_width_ps: U16F16::from_num(BIN_NS * 1000),
+        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
+        ..settings()
+    }
+}
+
+#[test]
+fn pico_times_all_photons_of_a_laser_cycle() -> Result<()> {
+    let Some(_alone) = wanted("the Pico's photon timer in rp2040js", &[NODE, NPM]) else {
+        return Ok(());
+    };
+    install()?;
+    let image = image(&["photon-timer"], None)?;
+    const PERIOD_NS: u64 = 10_000;
+    const TARGET: u16 = 90;
+    for hits in 1..=6 {
+        let mut random = Pcg32::seed_from_u64(hits as u64);
+        let cycles = photons(hits, TARGET, 1000, &mut random);
+        let edges = edges(&cycles, PERIOD_NS, &mut random);
+
+        let mut timer = Timer::start(&image, &edges, &gathers())?;
+        let report = timer.wait(1100)?;
+        let found = timer.histogram()?;
+        let expected = counts(&cycles);
+        ensure!(
+            found == expected,
+            "{hits} a laser cycle: {found:?}, not {expected:?}"
+        );
+        ensure!(report.sensor_errors == 0 && report.statistics.rejected == 0);
+        let done = timer.board.stop()?;
+        ensure!(done.triggers >= report.cycles, "{done:?}");
+
+        // All hits show the target. Of a TDC of one hit, six a laser cycle hide it behind early ones.
+        let highest = |counts: &[u32]| (0..128).max_by_key(|&bin| counts[bin]).unwrap_or_default();
+        ensure!(highest(&found) == usize::from(TARGET));
+        let first: Cycles = cycles.iter().map(|cycle| cycle[..1].to_vec()).collect();
+        let of_first = highest(&counts(&first));
+        println!(
+            "{hits} photons a laser cycle: highest bin {TARGET}, of the first ones {of_first}"
+        );
+        ensure!((of_first == usize::from(TARGET)) == (hits < 4));
+
+        let [found, expected] = events(&image, &cycles, &edges)?;
+        ensure!(!expected.is_empty() && found == expected, "other events");
+        println!("{} events, each as on this computer", found.len());
+    }
+    Ok(())
+}
+
+/// The events of the board and of this computer from the same photons.
+fn events(
+    image: &Path,
+    cycles: &Cycles,
+    edges: &[(u64, u8, bool)],
+) -> Result<[Vec<dtof_core::DepthEvent>; 2]> {
+    let settings = senses();
+    let mut timer = Timer::start(image, edges, &settings)?;
+    // An exposure ends with as many dark laser cycles.
+    let all = u16::try_from(cycles.len())? + settings.l2 + 10;
+    let report = timer.wait(all.into())?;
+    ensure!(report.statistics.deferred == 0 && report.sensor_errors == 0);
+    let found = timer.client.synchronise()?;
+    timer.board.stop()?;
+
+    let array = Geometry::new(1, 1);
+    let mut engine = host_engine(&settings, array, &[PixelAddress(0)])?;
+    let photons = (0..)
+        .zip(cycles)
+        .flat_map(|(cycle, bins)| bins.iter().map(move |&code| Photon { cycle, code }));
+    let expected = engine.run(&Slice {
+        first_cycle: 0,
+        pixels: vec![PixelPhotons {
+            cycles: all,
+            photons: photons.collect(),
+        }],
+    })?;
+    let found = found.into_iter().map(|event| match event {
+        dtof::events::aer_file::Event::Depth(event) => Ok(event),
+        other => anyhow::bail!("{other:?}"),
+    });
+    Ok([found.collect::<Result<_>>()?, expected])
+}
+
+#[test]
+fn pico_keeps_up_with_a_laser_and_counts_what_it_loses() -> Result<()> {
+    let Some(_alone) = wanted("the Pico's highest rates in rp2040js", &[NODE, NPM]) else {
+        return Ok(());
+    };
+    install()?;
+    // Those of docs/boards.md, and one that is too much.
+    for (hits, laser_hz, keeps_up) in [
+        (1, 138_889, true),
+        (3, 100_000, true),
+        (6, 78_125, true),
+        (6, 800_000, false),
+    ] {
+        let image = image(&["photon-timer"], Some(laser_hz))?;
+        let mut random = Pcg32::seed_from_u64(1);
+        let cycles = photons(hits, 90, 5000, &mut random);
+        let period = BIN_NS * u64::from((125_000_000 + laser_hz / 2) / laser_hz);
+        let mut timer = Timer::start(&image, &edges(&cycles, period, &mut random), &senses())?;
+        let report = timer.wait(if keeps_up { 5000 } else { 2000 })?;
+        let done = timer.board.stop()?;
+        println!("{hits} photons, {laser_hz} laser cycles a second: {report:?}; {done:?}");
+        ensure!((report.sensor_errors == 0) == keeps_up, "{report:?}");
+        if !keeps_up {
+            let fault = FaultRecord::from_number(report.last_sensor_error);
+            ensure!(fault == Some(FaultRecord::Data));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,144 @@
+//! The runner of the Pico's images, `tools/rp2040`, with an image.
+
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Instant;
+
+use anyhow::{Context, Result, ensure};
+use dtof::device::{self, Port};
+use serde_json::Value;
+
+use crate::emulator::{PATIENCE, free_ports, open};
+use crate::{root, succeed};
+
+/// What runs it. `cargo xtask setup` installs both.
+pub const NODE: &str = "node";
+pub const NPM: &str = "npm";
+
+/// The path of the image, of the sidecar unless something else is named. `laser_hz` is the rate
+/// of the photon timer.
+pub fn image(what: &[&str], laser_hz: Option<u32>) -> Result<PathBuf> {
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo
+        .args(["--locked", "xtask", "image", "pico"])
+        .args(what);
+    match laser_hz {
+        Some(hz) => cargo.env("LASER_HZ", hz.to_string()),
+        None => cargo.env_remove("LASER_HZ"),
+    };
+    let cargo = cargo.current_dir(root()).stdin(Stdio::null());
+    let output = cargo.stderr(Stdio::inherit()).output()?;
+    ensure!(output.status.success(), "no image of {what:?}, see above");
+    Ok(String::from_utf8(output.stdout)?.trim().into())
+}
+
+/// Installs rp2040js, if it is not there.
+pub fn install() -> Result<()> {
+    let folder = folder();
+    if folder.join("node_modules/.package-lock.json").exists() {
+        return Ok(());
+    }
+    succeed(
+        Command::new(NPM)
+            .args(["ci", "--silent"])
+            .current_dir(folder),
+    )
+}
+
+fn folder() -> PathBuf {
+    root().join("tools/rp2040")
+}
+
+/// The emulator, ended when dropped.
+pub struct Rp2040 {
+    child: Child,
+    port: u16,
+}
+
+/// What a run has done.
+#[derive(Debug)]
+pub struct Done {
+    /// What was printed.
+    pub output: Vec<u8>,
+    pub success: bool,
+    /// Bytes of the stack that were used.
+    pub stack: u64,
+    /// Pulses of the laser.
+    pub triggers: u64,
+}
+
+impl Rp2040 {
+    /// Starts an image with its serial port on a free TCP port. Pins change as the file `edges`
+    /// says, from the laser's first pulse at GP2 on.
+    pub fn start(image: &Path, edges: Option<&Path>) -> Result<Self> {
+        let [port, _] = free_ports()?;
+        let mut node = command(image);
+        node.args(["--port", &port.to_string(), "--from", "2"]);
+        if let Some(edges) = edges {
+            node.arg("--edges").arg(edges);
+        }
+        let child = node.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn();
+        let child = child.context("node does not start")?;
+        Ok(Self { child, port })
+    }
+
+    /// Connects to its serial port.
+    pub fn connect(&mut self) -> Result<Box<dyn Port>> {
+        let port = format!("tcp:127.0.0.1:{}", self.port);
+        open(&mut self.child, || device::open(&port, None))
+    }
+
+    /// Ends it.
+    pub fn stop(mut self) -> Result<Done> {
+        drop(self.child.stdin.take());
+        let mut report = String::new();
+        let mut stderr = self.child.stderr.take().context("no report")?;
+        stderr.read_to_string(&mut report)?;
+        done(&report, Vec::new(), self.child.wait()?.success())
+    }
+}
+
+impl Drop for Rp2040 {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Runs an image that ends.
+pub fn run(image: &Path) -> Result<Done> {
+    let start = Instant::now();
+    let output = command(image).stdin(Stdio::null()).output()?;
+    ensure!(start.elapsed() < PATIENCE, "it takes {:?}", start.elapsed());
+    let report = String::from_utf8(output.stderr)?;
+    done(&report, output.stdout, output.status.success())
+}
+
+fn command(image: &Path) -> Command {
+    let mut node = Command::new(NODE);
+    node.arg(folder().join("run.js")).arg(image).arg("--report");
+    node
+}
+
+/// The last line of a report.
+fn done(report: &str, output: Vec<u8>, success: bool) -> Result<Done> {
+    let line = report.lines().last().unwrap_or_default();
+    let value: Value = serde_json::from_str(line).with_context(|| report.to_owned())?;
+    let number = |name: &str| value[name].as_u64().with_context(|| report.to_owned());
+    Ok(Done {
+        output,
+        success,
+        stack: number("stack")?,
+        triggers: number("triggers")?,
+    })
+}
+
+/// Writes edges, each `(nanoseconds, pin, level)`.
+pub fn write_edges(path: &Path, edges: &[(u64, u8, bool)]) -> Result<()> {
+    let lines = edges.iter();
+    let lines = lines.map(|(ns, pin, level)| format!("{ns} {pin} {}\n", u8::from(*level)));
+    fs::write(path, lines.collect::<String>()).with_context(|| path.display().to_string())
+}
