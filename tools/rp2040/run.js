@@ -1,4 +1,4 @@
-// Runs an image of the Raspberry Pi Pico until it ends, or until standard input does.
+// Runs an image of the Raspberry Pi Pico until it ends or is interrupted.
 
 import { createServer } from 'node:net';
 import { parseArgs } from 'node:util';
@@ -12,6 +12,7 @@ node run.js IMAGE [options]
   --port N        put the serial port on this TCP port of this computer
   --edges FILE    change pins as the file says: lines of \`nanoseconds pin level\`
   --from PIN      count the file's time from the first clock in which this pin is high
+  --attached      end when standard input does
   --count         let every instruction take one clock: the timer then counts them
   --report        print what it has done, and where time went, to standard error at the end
   --warn          print what the emulator lacks`;
@@ -26,6 +27,7 @@ function main() {
       port: { type: 'string' },
       edges: { type: 'string' },
       from: { type: 'string' },
+      attached: { type: 'boolean' },
       count: { type: 'boolean' },
       report: { type: 'boolean' },
       warn: { type: 'boolean' },
@@ -36,9 +38,13 @@ function main() {
     process.stderr.write(`${HELP}\n`);
     process.exit(values.help ? 0 : 2);
   }
+  const numbers = [values.port ?? '0', values.from ?? '0'].map(Number);
+  if (!numbers.every((number) => Number.isInteger(number) && number >= 0)) {
+    throw new Error('--port and --from take a whole number');
+  }
   const machine = new Machine(readElf(positionals[0]), {
     edges: values.edges ? readEdges(values.edges) : [],
-    origin: values.from === undefined ? null : Number(values.from),
+    origin: values.from === undefined ? null : numbers[1],
     oneClock: values.count === true,
     warn: values.warn ? (text) => process.stderr.write(`emulator: ${text}\n`) : undefined,
   });
@@ -48,7 +54,10 @@ function main() {
     }
     return finish(machine, values.report);
   }
-  serve(machine, Number(values.port), () => finish(machine, values.report));
+  if (values.attached) {
+    process.stdin.on('end', () => machine.end(0)).resume();
+  }
+  serve(machine, numbers[0], () => finish(machine, values.report));
 }
 
 /** Runs it with its serial port on a TCP port, never ahead of this computer's time. */
@@ -69,7 +78,6 @@ function serve(machine, port, done) {
     process.stderr.write(`error: ${error.message}\n`);
     process.exit(1);
   });
-  process.stdin.on('end', () => machine.end(0)).resume();
   const start = performance.now();
   const turn = () => {
     machine.run(SLICE);

@@ -75,7 +75,7 @@ impl Rp2040 {
     pub fn start(image: &Path, edges: Option<&Path>) -> Result<Self> {
         let [port, _] = free_ports()?;
         let mut node = command(image);
-        node.args(["--port", &port.to_string(), "--from", "2"]);
+        node.args(["--port", &port.to_string(), "--from", "2", "--attached"]);
         if let Some(edges) = edges {
             node.arg("--edges").arg(edges);
         }
