@@ -5,10 +5,11 @@
 // - State machines of the PIO do not step with the core: here all that are enabled step once a
 //   clock. Delays of their instructions and clock dividers are not there.
 // - A DMA transfer of a word is an alarm of the clock, which ticks once a clock as well.
+// - A handler would run at an odd address, as its vector is, and read tables beside its code wrongly.
 // - An interrupt that comes while the core sleeps would be taken even when all are held back. So
 //   the core never sleeps for long: this file knows that it does.
 
-import { RP2040 } from 'rp2040js';
+import { RP2040, USBCDC } from 'rp2040js';
 import { CLOCK_NS } from './edges.js';
 import { answer } from './semihosting.js';
 
@@ -29,9 +30,9 @@ export class Machine {
   /**
    * `elf` is what `readElf` gives. `edges` are changes of pins, counted in clocks from the first
    * clock in which pin `origin` is high, or from the start without it. With `oneClock` every
-   * instruction takes one clock.
+   * instruction takes one clock. With `usb` the serial port is that of the USB, not the UART.
    */
-  constructor(elf, { edges = [], origin = null, oneClock = false, warn = () => {} } = {}) {
+  constructor(elf, { edges = [], origin = null, oneClock = false, usb = false, warn = () => {} } = {}) {
     const rp2040 = new RP2040();
     this.rp2040 = rp2040;
     this.elf = elf;
@@ -59,10 +60,23 @@ export class Machine {
       const [memory, start] = address < RAM ? [rp2040.flash, FLASH] : [rp2040.sram, RAM];
       memory.set(bytes, address - start);
     }
+    const inFlash = elf.segments.filter(({ address }) => address < RAM);
+    this.codeEnd = Math.max(...inFlash.map(({ address, bytes }) => address + bytes.length - FLASH));
     rp2040.core.VTOR = VECTORS;
     rp2040.core.reset();
     rp2040.onBreak = (code) => this.onBreak(code);
-    rp2040.uart[0].onByte = (byte) => this.onOutput(byte);
+    this.usb = usb ? new USBCDC(rp2040.usbCtrl) : null;
+    /** The endpoint that waits for a packet of the host, and its most bytes. */
+    this.wanted = null;
+    if (usb) {
+      this.usb.onSerialData = (bytes) => bytes.forEach((byte) => this.onOutput(byte));
+      // Its own forgets a packet that is wanted before it knows the device.
+      rp2040.usbCtrl.onEndpointRead = (endpoint, size) => {
+        this.wanted = endpoint > 0 ? { endpoint, size } : this.wanted;
+      };
+    } else {
+      rp2040.uart[0].onByte = (byte) => this.onOutput(byte);
+    }
     this.fillGaps();
   }
 
@@ -73,7 +87,12 @@ export class Machine {
       uart.readUint32 = (offset) => (UART_GAPS.has(offset) ? 0 : readUint32.call(uart, offset));
       uart.writeUint32 = (offset, value) => UART_GAPS.has(offset) || writeUint32.call(uart, offset, value);
     }
-    const { ppb } = rp2040;
+    const { core, ppb } = rp2040;
+    const { exceptionEntry } = core;
+    core.exceptionEntry = (number) => {
+      exceptionEntry.call(core, number);
+      core.PC = (core.PC & ~1) >>> 0;
+    };
     const { writeUint32 } = ppb;
     ppb.writeUint32 = (offset, value) =>
       offset === AIRCR ? this.end(1, 'the image resets the chip') : writeUint32.call(ppb, offset, value);
@@ -121,6 +140,9 @@ export class Machine {
         continue;
       }
       const { PC } = core;
+      if (PC >>> 28 === 1 && PC - FLASH >= this.codeEnd) {
+        return this.end(1, `the image runs on at ${PC.toString(16)}, where no code is`);
+      }
       const cycles = core.executeInstruction();
       const taken = this.oneClock ? 1 : cycles;
       this.instructions++;
@@ -164,9 +186,23 @@ export class Machine {
       this.rp2040.clock.tick(clocks * CLOCK_NS);
       this.changePins();
     }
-    if (this.input.length > 0 && this.clocks >= this.nextInput && !this.rp2040.uart[0].rxFIFO.full) {
-      this.rp2040.uart[0].feedByte(this.input.shift());
-      this.nextInput = this.clocks + CLOCKS_A_BYTE;
+    if (this.input.length > 0 && this.clocks >= this.nextInput) {
+      this.feed();
+    }
+  }
+
+  /** Gives the serial port the next byte, or of the USB the next packet, if it has room. */
+  feed() {
+    const { uart, usbCtrl } = this.rp2040;
+    if (this.usb === null) {
+      if (!uart[0].rxFIFO.full) {
+        uart[0].feedByte(this.input.shift());
+        this.nextInput = this.clocks + CLOCKS_A_BYTE;
+      }
+    } else if (this.usb.initialized && this.wanted !== null) {
+      const { endpoint, size } = this.wanted;
+      this.wanted = null;
+      usbCtrl.endpointReadDone(endpoint, Uint8Array.from(this.input.splice(0, size)));
     }
   }
 

@@ -12,6 +12,7 @@ node run.js IMAGE [options]
   --port N        put the serial port on this TCP port of this computer
   --edges FILE    change pins as the file says: lines of \`nanoseconds pin level\`
   --from PIN      count the file's time from the first clock in which this pin is high
+  --usb           put the serial port of the USB there, not the UART
   --attached      end when standard input does
   --count         let every instruction take one clock: the timer then counts them
   --report        print what it has done, and where time went, to standard error at the end
@@ -29,6 +30,7 @@ function main() {
       from: { type: 'string' },
       attached: { type: 'boolean' },
       count: { type: 'boolean' },
+      usb: { type: 'boolean' },
       report: { type: 'boolean' },
       warn: { type: 'boolean' },
       help: { type: 'boolean', short: 'h' },
@@ -46,6 +48,7 @@ function main() {
     edges: values.edges ? readEdges(values.edges) : [],
     origin: values.from === undefined ? null : numbers[1],
     oneClock: values.count === true,
+    usb: values.usb === true,
     warn: values.warn ? (text) => process.stderr.write(`emulator: ${text}\n`) : undefined,
   });
   if (values.port === undefined) {

@@ -49,8 +49,16 @@ fn pico_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
 
     let sidecar = image(&[], None)?;
     let mut used = Vec::new();
-    for (settings, cycles) in [(settings(), 500), (with_all(), 500)] {
-        let mut board = Rp2040::start(&sidecar, None)?;
+    for (settings, cycles, over_usb) in [
+        (settings(), 500, false),
+        (with_all(), 500, false),
+        (settings(), 200, true),
+    ] {
+        let mut board = if over_usb {
+            Rp2040::start_with_usb(&sidecar)?
+        } else {
+            Rp2040::start(&sidecar, None)?
+        };
         let client = Client::new(board.connect()?)?;
         let decided = decides_alike(client, &settings, Geometry::new(8, 8), cycles)?;
         let done = board.stop()?;

@@ -73,12 +73,23 @@ impl Rp2040 {
     /// Starts an image with its serial port on a free TCP port. Pins change as the file `edges`
     /// says, from the laser's first pulse at GP2 on.
     pub fn start(image: &Path, edges: Option<&Path>) -> Result<Self> {
-        let [port, _] = free_ports()?;
         let mut node = command(image);
-        node.args(["--port", &port.to_string(), "--from", "2", "--attached"]);
         if let Some(edges) = edges {
             node.arg("--edges").arg(edges);
         }
+        Self::spawn(node)
+    }
+
+    /// The same with the serial port of the USB, and no edges.
+    pub fn start_with_usb(image: &Path) -> Result<Self> {
+        let mut node = command(image);
+        node.arg("--usb");
+        Self::spawn(node)
+    }
+
+    fn spawn(mut node: Command) -> Result<Self> {
+        let [port, _] = free_ports()?;
+        node.args(["--port", &port.to_string(), "--from", "2", "--attached"]);
         let child = node.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn();
         let child = child.context("node does not start")?;
         Ok(Self { child, port })

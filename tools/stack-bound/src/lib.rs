@@ -46,6 +46,7 @@ pub fn of_image(path: &Path) -> Result<u64> {
         under_way: Vec::new(),
     };
     needs.resolve_defmt_rtt();
+    needs.resolve_usb_device();
     let mut bound = 0;
     let mut handlers = 0;
     for (index, vector) in vectors.enumerate().skip(1) {
@@ -70,6 +71,11 @@ const DEFMT_RTT: [(&str, u32); 3] = [
     ("_defmt_release", 3),
     ("_defmt_write", 5),
 ];
+
+/// In the names of the functions of usb-device that call its classes through a table; its
+/// `poll` may be a part of the interrupt's handler. And in those of the functions of classes.
+const USB_DEVICE: [&str; 2] = ["usb_device6device", "USBCTRL_IRQ"];
+const USB_CLASS: &str = "UsbClass";
 
 /// A function, as far as the stack is concerned.
 #[derive(Debug, Default)]
@@ -104,6 +110,23 @@ impl Needs {
             if (1..=calls).contains(&function.goes_anywhere) {
                 function.goes_anywhere = 0;
                 function.goes_to.extend(&writers);
+            }
+        }
+    }
+
+    /// Those of [`USB_DEVICE`] call functions of classes, of which an image has one.
+    fn resolve_usb_device(&mut self) {
+        let of_class = |(_, function): &(&u32, &Function)| function.name.contains(USB_CLASS);
+        let found = self.functions.iter().filter(of_class);
+        let class: Vec<u32> = found.map(|(&address, _)| address).collect();
+        if class.is_empty() {
+            return;
+        }
+        for function in self.functions.values_mut() {
+            let is_it = |name: &&str| function.name.contains(*name);
+            if function.goes_anywhere > 0 && USB_DEVICE.iter().any(is_it) {
+                function.goes_anywhere = 0;
+                function.goes_to.extend(&class);
             }
         }
     }
@@ -286,6 +309,31 @@ mod tests {
             };
             needs.resolve_defmt_rtt();
             assert_eq!(needs.of(0).ok(), is_bounded.then_some(14), "{name} {calls}");
+        }
+    }
+
+    #[test]
+    fn usb_device_calls_its_class() {
+        let function = |name: &str, takes, goes_anywhere| Function {
+            name: name.to_owned(),
+            takes,
+            goes_anywhere,
+            ..Function::default()
+        };
+        let poll = || function("_ZN10usb_device6device9UsbDevice4poll", 4, 3);
+        let class = ["UsbClass4poll", "UsbClass10control_in"];
+        for (with_class, need) in [(true, Some(14)), (false, None)] {
+            let mut needs = Needs {
+                functions: [(0, poll())].into(),
+                known: BTreeMap::new(),
+                under_way: Vec::new(),
+            };
+            if with_class {
+                needs.functions.insert(2, function(class[0], 6, 0));
+                needs.functions.insert(4, function(class[1], 10, 0));
+            }
+            needs.resolve_usb_device();
+            assert_eq!(needs.of(0).ok(), need);
         }
     }
 

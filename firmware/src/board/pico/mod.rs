@@ -4,6 +4,7 @@
 //! |---|---|
 //! | clock | 125 MHz from the crystal |
 //! | serial port | UART0, 1 Mbaud, 8 data bits, no parity, 1 stop bit |
+//! | USB | the same link as a serial port (CDC ACM): who has sent last is answered |
 //! | GP0 | sends; pin 1, to RX of a USB adapter of 3.3 V |
 //! | GP1 | receives; pin 2, to TX of the adapter |
 //! | watchdog | resets after about a second |
@@ -17,6 +18,7 @@
 mod photon_timer;
 #[cfg(feature = "sensor-photon-timer")]
 mod sample_rings;
+mod usb;
 
 use core::cell::RefCell;
 use core::panic::PanicInfo;
@@ -38,6 +40,7 @@ use rp2040_hal::watchdog::Watchdog;
 use rp2040_hal::{Clock, Sio};
 use static_cell::ConstStaticCell;
 
+use self::usb::Usb;
 use super::{Board, Transmitter, report, systick, transmit};
 use crate::serial::{BoardBuffers, Buffers, Serial, SerialInterrupt};
 
@@ -60,6 +63,9 @@ struct Port {
     interrupt: SerialInterrupt<'static>,
     tx: Writer<UART0, UartPins>,
     rx: Reader<UART0, UartPins>,
+    usb: Usb,
+    /// The last byte came over USB: so does the host that is answered.
+    over_usb: bool,
 }
 
 static BUFFERS: ConstStaticCell<BoardBuffers> = ConstStaticCell::new(Buffers::new());
@@ -132,13 +138,27 @@ impl Pico {
         let (mut rx, tx) = uart.split();
         rx.enable_rx_interrupt();
         let (interrupt, serial) = BUFFERS.take().split(Self::start_sending);
-        critical_section::with(|cs| PORT.replace(cs, Some(Port { interrupt, tx, rx })));
+        let usb = Usb::start(
+            device.USBCTRL_REGS,
+            device.USBCTRL_DPRAM,
+            clocks.usb_clock,
+            &mut resets,
+        );
+        let port = Port {
+            interrupt,
+            tx,
+            rx,
+            usb,
+            over_usb: false,
+        };
+        critical_section::with(|cs| PORT.replace(cs, Some(port)));
 
         // SAFETY: the handlers share data with the main loop through queues,
         // atomics and mutexes only, and nothing relies on their being masked.
         #[allow(unsafe_code, reason = "there is no other way to unmask")]
         unsafe {
             NVIC::unmask(Interrupt::UART0_IRQ);
+            NVIC::unmask(Interrupt::USBCTRL_IRQ);
         }
 
         // A breakpoint is no reason to reset.
@@ -209,7 +229,16 @@ fn SysTick() {
 fn UART0_IRQ() {
     critical_section::with(|cs| {
         if let Some(port) = PORT.borrow_ref_mut(cs).as_mut() {
-            port.serve();
+            port.serve_uart();
+        }
+    });
+}
+
+#[interrupt]
+fn USBCTRL_IRQ() {
+    critical_section::with(|cs| {
+        if let Some(port) = PORT.borrow_ref_mut(cs).as_mut() {
+            port.serve_usb();
         }
     });
 }
@@ -217,16 +246,36 @@ fn UART0_IRQ() {
 impl Port {
     /// Fetches what has been received and hands over what there is to send. Runs
     /// when either is possible, and when sending is to start.
-    fn serve(&mut self) {
+    fn serve_uart(&mut self) {
         let mut byte = [0];
         loop {
             match self.rx.read_raw(&mut byte) {
-                Ok(_) => self.interrupt.on_receive(byte[0]),
+                Ok(_) => {
+                    self.interrupt.on_receive(byte[0]);
+                    self.over_usb = false;
+                }
                 Err(nb::Error::Other(_)) => self.interrupt.on_loss(),
                 Err(nb::Error::WouldBlock) => break,
             }
         }
-        transmit(&mut self.interrupt, &mut self.tx);
+        self.send();
+    }
+
+    /// The same of the USB. Runs whenever something happens there.
+    fn serve_usb(&mut self) {
+        if self.usb.receive(&mut self.interrupt) {
+            self.over_usb = true;
+        }
+        self.send();
+    }
+
+    fn send(&mut self) {
+        if self.over_usb {
+            self.tx.rest();
+            self.usb.send(&mut self.interrupt);
+        } else {
+            transmit(&mut self.interrupt, &mut self.tx);
+        }
     }
 }
 
