@@ -114,7 +114,10 @@ fn run() -> Result<()> {
         ("setup", []) => {
             toolchain::set_up(root)?;
             tools::set_up();
-            emulator::install_rp2040js()?;
+            // What needs it says so itself.
+            if let Err(error) = emulator::install_rp2040js() {
+                println!("rp2040js: {error:#}");
+            }
         }
         ("image", [board, what @ ..]) if what.len() < 2 => {
             firmware::image(root, board, what.first().copied(), options.emulator)?;
