@@ -47,7 +47,7 @@ const WIDTH: usize = 62;
 
 /// One figure.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Row {
+pub struct Row {
     /// Operation, variant and optimisation level, with commas between.
     name: String,
     /// Instructions, in hundredths.
@@ -94,9 +94,7 @@ impl Processor {
             let image = self.board.bench(root, small)?;
             let (status, output) = emulator::run(self.board, &image, self.count)?;
             ensure!(status.success(), "emulator: {status}: {}", output.trim());
-            for line in output.lines() {
-                rows.push(measured(line, level).with_context(|| format!("what is `{line}`?"))?);
-            }
+            rows.extend(self::rows(&output, level)?);
         }
         Ok(rows)
     }
@@ -120,6 +118,36 @@ impl Processor {
         }
         Ok(())
     }
+}
+
+/// The figures that an image printed.
+pub fn rows(output: &str, level: &str) -> Result<Vec<Row>> {
+    let row = |line| measured(line, level).with_context(|| format!("what is `{line}`?"));
+    output.lines().map(row).collect()
+}
+
+/// A table of figures of a real board and, beside them, those of `board` in the emulator, if it
+/// has some, or else of the board with a processor of the same instructions.
+pub fn beside(root: &Path, board: Board, rows: &[Row]) -> Result<String> {
+    let like = match board {
+        Board::Pico => Board::Pico,
+        Board::Mps2An386 | Board::Stm32F405 => Board::Mps2An386,
+    };
+    let of_like = PROCESSORS.iter().find(|processor| processor.board == like);
+    let file = of_like.context("no figures of this board")?.file;
+    let counted = parse(&fs::read_to_string(root.join(file)).context(file)?).context(file)?;
+    let mut text = String::from("\n| operation | clock cycles | instructions |\n|---|---|---|\n");
+    for Row { name, hundredths } in rows {
+        let instructions = counted.iter().find(|row| row.name == *name);
+        let instructions = instructions.map_or_else(|| "–".into(), |row| decimal(row.hundredths));
+        let name = name.trim_end_matches(",3").replacen(',', ": ", 1);
+        let _ = writeln!(
+            text,
+            "| {name} | {} | {instructions} |",
+            decimal(*hundredths)
+        );
+    }
+    Ok(text)
 }
 
 /// A line of the image: operation, variant, instructions of all runs, runs.

@@ -9,7 +9,7 @@ use crate::firmware::{Board, Build};
 use crate::tools::PROBE_RS;
 
 /// The controller of a board, as probe-rs calls it: that of the Discovery.
-const fn chip(board: Board) -> &'static str {
+pub const fn chip(board: Board) -> &'static str {
     match board {
         Board::Pico => "RP2040",
         Board::Mps2An386 | Board::Stm32F405 => "STM32F407VGTx",

@@ -6,6 +6,7 @@ mod emulate;
 mod emulator;
 mod firmware;
 mod flash;
+mod hil;
 mod image;
 mod python;
 mod self_test;
@@ -40,6 +41,11 @@ cargo xtask <command>
                 write an image onto an STM32F405 or STM32F407, or with `pico` onto a
                 Pico with a debug probe, and show its log. CHIP is the name in
                 probe-rs, by default that of the Discovery
+  hil --device DEVICE [--chip CHIP] [--out DIR] [pico]
+                try an STM32F405 or STM32F407, or with `pico` a Pico, with a debug probe and
+                its serial line at DEVICE: the self-test, the clock cycles of the core's
+                operations, and the demo's photons, decided as on this computer. Writes
+                BOARD.md into DIR, out/hil without it
   emulate [--port PORT] [pico | exit | panic | fault]
                 run the sidecar in QEMU, or `pico` in rp2040js, its serial port on a
                 TCP port (5386). Another word ends it in that way
@@ -77,6 +83,8 @@ struct Options {
     bless: bool,
     check: bool,
     chip: Option<String>,
+    device: Option<String>,
+    out: Option<String>,
     emulator: bool,
     port: Option<u16>,
 }
@@ -96,7 +104,9 @@ fn run() -> Result<()> {
             ("self-test" | "c-bindings", Long("bless")) => options.bless = true,
             ("bench", Long("check")) => options.check = true,
             ("check-image", Long("all")) => options.all = true,
-            ("flash", Long("chip")) => options.chip = Some(parser.value()?.string()?),
+            ("hil", Long("out")) => options.out = Some(parser.value()?.string()?),
+            ("hil", Long("device")) => options.device = Some(parser.value()?.string()?),
+            ("flash" | "hil", Long("chip")) => options.chip = Some(parser.value()?.string()?),
             ("image", Long("emulator")) => options.emulator = true,
             ("emulate", Long("port")) => {
                 let number = parser.value()?.string()?;
@@ -130,6 +140,19 @@ fn run() -> Result<()> {
             let what = Build::named(what.first().copied())?;
             flash::flash(root, Board::Stm32F405, options.chip.as_deref(), what)?;
         }
+        ("hil", board @ ([] | ["pico"])) => hil::run(&hil::Rig {
+            root,
+            board: match board {
+                [] => Board::Stm32F405,
+                _ => Board::Pico,
+            },
+            chip: options.chip,
+            device: options.device.context("hil: --device is missing")?,
+            out: match options.out {
+                Some(out) => std::path::absolute(out)?,
+                None => root.join("out/hil"),
+            },
+        })?,
         ("emulate", ["pico"]) => emulate::emulate(root, Board::Pico, options.port, None)?,
         ("emulate", end @ ([] | ["exit" | "panic" | "fault"])) => {
             let end = end.first().copied();

@@ -12,6 +12,7 @@
 mod boards;
 mod debugger;
 mod emulator;
+mod hil;
 mod histograms;
 mod pico;
 mod readers;

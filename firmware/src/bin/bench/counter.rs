@@ -7,7 +7,7 @@
 //! `SysTick` comes round after 2.6 million. The emulator of the Pico, told by `--count`,
 //! advances it by 1 an instruction.
 //!
-//! The STM32F405 has the counter: there it is clock cycles.
+//! The STM32F405 has the counter: there it is clock cycles, as on a real Pico.
 
 use crate::State;
 
@@ -90,8 +90,9 @@ mod hardware {
         }
     }
 
+    /// On a real Pico an instruction takes a clock or more; `cargo xtask bench` compares.
     pub fn is_right(hundred: u32) -> bool {
-        hundred == 100
+        hundred == 100 || cfg!(feature = "pico") && hundred > 100
     }
 }
 

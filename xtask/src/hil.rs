@@ -1,0 +1,181 @@
+//! `cargo xtask hil`: a real board, tried with all that emulators are tried with, and what it did
+//! as one file.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::bench;
+use crate::firmware::{Board, Build};
+use crate::flash::chip;
+use crate::self_test::{self, EXPECTED};
+use crate::tools::PROBE_RS;
+use crate::{cargo, succeed};
+
+/// The array whose photons are sent to the board, and how long.
+const ARRAY: &str = "8x8";
+const CYCLES: &str = "1000";
+
+/// A board with a debug probe and a serial line.
+pub struct Rig {
+    pub root: &'static Path,
+    pub board: Board,
+    /// Its controller, as probe-rs calls it, if not the usual one.
+    pub chip: Option<String>,
+    /// Its serial line, as `dtof` takes it.
+    pub device: String,
+    /// The folder of its results.
+    pub out: PathBuf,
+}
+
+/// What a part of the trial found: a line, and what is to be seen of it.
+type Found = Result<(String, String)>;
+
+/// A part of the trial.
+type Part = fn(&Rig) -> Found;
+
+/// Tries a board and writes the file, whatever is found.
+///
+/// # Errors
+/// If a part fails; the file says why.
+pub fn run(rig: &Rig) -> Result<()> {
+    let version = PROBE_RS.require()?;
+    fs::create_dir_all(&rig.out).with_context(|| rig.out.display().to_string())?;
+    let name = rig.board.name();
+    let mut text = format!("# {name}, a real board\n\n");
+    let commit = commit(rig.root).unwrap_or_else(|| "unknown".into());
+    let _ = writeln!(
+        text,
+        "- source: {commit}\n- chip: {}\n- {version}",
+        rig.chip()
+    );
+    let mut failed = Vec::new();
+    let parts: [(&str, Part); 3] = [
+        ("Self-test", Rig::self_test),
+        ("Clock cycles", Rig::bench),
+        ("Photons over the serial line", Rig::stream),
+    ];
+    for (part, run) in parts {
+        println!("{part} …");
+        let (line, more) = run(rig).unwrap_or_else(|error| {
+            failed.push(part);
+            (format!("**failed**: {error:#}"), String::new())
+        });
+        println!("{line}");
+        let _ = write!(text, "\n## {part}\n\n{line}\n{more}");
+    }
+    let file = rig.out.join(format!("{name}.md"));
+    fs::write(&file, text).with_context(|| file.display().to_string())?;
+    println!("{}: written; please send it", file.display());
+    ensure!(failed.is_empty(), "failed: {}", failed.join(", "));
+    Ok(())
+}
+
+impl Rig {
+    fn chip(&self) -> &str {
+        self.chip.as_deref().unwrap_or(chip(self.board))
+    }
+
+    /// Writes an image, runs it until it ends, and gives what it printed.
+    fn output(&self, image: &Path) -> Result<String> {
+        let mut probe = self.probe("run");
+        let output = probe.arg(image).stderr(Stdio::inherit()).output();
+        let output = output.context("probe-rs does not start")?;
+        let text = String::from_utf8(output.stdout)?;
+        ensure!(
+            output.status.success(),
+            "probe-rs: {}: {text}",
+            output.status
+        );
+        Ok(text)
+    }
+
+    fn probe(&self, command: &str) -> Command {
+        let mut probe = Command::new(PROBE_RS.program);
+        probe.args([command, "--non-interactive", "--chip", self.chip()]);
+        probe.stdin(Stdio::null());
+        probe
+    }
+
+    fn self_test(&self) -> Found {
+        let image = self.board.build_bare(self.root, Build::SelfTest)?;
+        let found = self.output(&image)?;
+        let expected = fs::read_to_string(self.root.join(EXPECTED)).context(EXPECTED)?;
+        let differences = self_test::differences(&expected, &found);
+        if !differences.is_empty() {
+            bail!(
+                "differs from {EXPECTED}:\n\n    {}",
+                differences.join("\n    ")
+            );
+        }
+        let line = format!("{} lines as in `{EXPECTED}`.", expected.lines().count());
+        Ok((line, String::new()))
+    }
+
+    fn bench(&self) -> Found {
+        let image = self.board.bench(self.root, false)?;
+        let rows = bench::rows(&self.output(&image)?, "3")?;
+        ensure!(!rows.is_empty(), "it counted nothing");
+        let line = format!(
+            "Of {} operations, beside instructions in the emulator.",
+            rows.len()
+        );
+        Ok((line, bench::beside(self.root, self.board, &rows)?))
+    }
+
+    /// The board decides on the photons of the demo as this computer does.
+    fn stream(&self) -> Found {
+        let image = self.board.build_bare(self.root, Build::Sidecar)?;
+        succeed(self.probe("download").arg(&image))?;
+        succeed(&mut self.probe("reset"))?;
+        let here = self.demo("here", &[])?;
+        let start = Instant::now();
+        let there = self.demo(self.board.name(), &["--device", &self.device])?;
+        let seconds = start.elapsed().as_secs_f64();
+        let [here, there] = [here, there].map(|folder| folder.join("events.csv"));
+        let read = |file: &Path| fs::read_to_string(file).context(file.display().to_string());
+        let (expected, found) = (read(&here)?, read(&there)?);
+        let events = expected.lines().count().saturating_sub(1);
+        ensure!(
+            expected == found,
+            "{} of {events} events here and {} there differ: {} and {}",
+            self_test::differences(&expected, &found).len(),
+            found.lines().count().saturating_sub(1),
+            here.display(),
+            there.display()
+        );
+        let line = format!(
+            "{CYCLES} laser cycles of {ARRAY} macropixels in {seconds:.1} s: {events} events, all as on this \
+             computer."
+        );
+        Ok((line, String::new()))
+    }
+
+    /// Runs the demo; gives the folder of its results.
+    fn demo(&self, name: &str, arguments: &[&str]) -> Result<PathBuf> {
+        let out = self.out.join(name);
+        let mut cargo = cargo();
+        cargo
+            .current_dir(self.root)
+            .args(["run", "--locked", "--release", "--quiet"]);
+        cargo.args(["--package", "dtof", "--", "demo", "--quiet"]);
+        cargo
+            .args(["--array", ARRAY, "--cycles", CYCLES, "--out"])
+            .arg(&out);
+        succeed(cargo.args(arguments))?;
+        Ok(out)
+    }
+}
+
+/// The commit of the sources, and whether they have changed since.
+fn commit(root: &Path) -> Option<String> {
+    let mut git = Command::new("git");
+    let git = git.args(["describe", "--always", "--dirty", "--abbrev=40"]);
+    let output = git.current_dir(root).stderr(Stdio::null()).output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    output.status.success().then(|| text.trim().to_owned())
+}
