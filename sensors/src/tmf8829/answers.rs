@@ -79,8 +79,9 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
             }
             State::Configuring(block) => {
                 let next = block + 1;
-                let moves = self.address != self.config.settings().address;
-                let skipped = next == ADDRESS_BLOCK && !moves;
+                // The preset has the default one, whatever it answers at now.
+                let keeps = self.config.settings().address == DEFAULT_ADDRESS;
+                let skipped = next == ADDRESS_BLOCK && keeps;
                 self.go_on_in(State::Configuring(next + u8::from(skipped)))
             }
             State::Measuring => self.look(is_high, now_ms),
@@ -159,7 +160,7 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
             Command::LoadPreset(_) => self.go_on_in(State::Paging),
             Command::WritePage => self.go_on_in(State::Commanding(Command::Measure)),
             Command::Measure => {
-                (self.stuck, self.next) = (0, None);
+                (self.stuck, self.next, self.has_given) = (0, None, false);
                 self.wait_in(State::Measuring, now_ms)
             }
         }
@@ -236,6 +237,7 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
         }
         let flags = Flags::of(&self.stream.end)?;
         self.state = State::Measuring;
+        self.has_given = true;
         if flags.is_limited() {
             count(&mut self.counts.limited);
         }

@@ -59,9 +59,9 @@
 //! # After an error
 //!
 //! Frames that were left out and frames that are marked as not valid are errors that cost nothing
-//! else. Any other error while measuring stops and configures the sensor anew; an error while that
-//! is going on switches it off and on and loads the image again. Of a frame that breaks off its
-//! first histograms have been given.
+//! else. Any other error while measuring stops and configures the sensor anew. An error before it has
+//! given a whole frame switches it off and on and loads the image again. Of a frame that breaks off
+//! its first histograms have been given.
 //!
 //! # Cost
 //!
@@ -123,6 +123,8 @@ pub struct Tmf8829Protocol<'a, const CHUNK: usize = 128> {
     since: Since,
     /// Polls in a row with INT low for no reason.
     stuck: u8,
+    /// A frame has come whole since it began to measure.
+    has_given: bool,
     /// The frame that should come next, once one has come.
     next: Option<u32>,
     buffer: [u8; BUFFER],
@@ -251,6 +253,7 @@ impl<'a, const CHUNK: usize> Tmf8829Protocol<'a, CHUNK> {
             },
             since: Since::new(0),
             stuck: 0,
+            has_given: false,
             next: None,
             buffer: [0; BUFFER],
             stream: Stream::new(),
@@ -286,14 +289,12 @@ impl<'a, const CHUNK: usize> Tmf8829Protocol<'a, CHUNK> {
         )
     }
 
-    /// Where to begin again: only a sensor that measures is known to be well.
-    fn give_up(&mut self) {
+    /// Begins again, with a reset or without.
+    fn give_up(&mut self, reset: bool) {
         if self.state == State::Reading {
             count(&mut self.counts.broken);
         }
-        self.state = State::Off {
-            reset: !self.is_measuring(),
-        };
+        self.state = State::Off { reset };
     }
 }
 
@@ -317,7 +318,7 @@ impl<const CHUNK: usize> Protocol for Tmf8829Protocol<'_, CHUNK> {
 
     fn restart(&mut self) {
         if !matches!(self.state, State::Off { .. }) {
-            self.give_up();
+            self.give_up(!self.is_measuring());
         }
     }
 
@@ -347,7 +348,8 @@ impl<const CHUNK: usize> Protocol for Tmf8829Protocol<'_, CHUNK> {
     fn failed<B, P>(&mut self, error: &Error<B, P>) {
         count(&mut self.counts.errors);
         if !matches!(error, Error::Missed { .. } | Error::Aborted { .. }) {
-            self.give_up();
+            // Only a sensor that has given a frame is known to be well.
+            self.give_up(!self.is_measuring() || !self.has_given);
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::protocol::Request;
 /// Where an image goes.
 const LOAD_ADDRESS: [u8; 4] = 0x0001_0000u32.to_le_bytes();
 
-/// Of the configuration: the block with the address, which is skipped if that stays.
+/// Of the configuration: the block with the address, which is skipped if that is the preset's.
 pub(super) const ADDRESS_BLOCK: u8 = 3;
 /// The command that takes it over.
 pub(super) const LAST_BLOCK: u8 = 5;

@@ -5,7 +5,7 @@ use crate::common::tmf8829::bus::Fault;
 use crate::common::tmf8829::frame;
 use crate::common::{Broken, Given};
 use dtof_core::fixed::types::U16F16;
-use dtof_sensors::tmf8829::{BootCommand, Command, Error, Waiting, Zones};
+use dtof_sensors::tmf8829::{BootCommand, Command, Error, Settings, Waiting, Zones};
 use dtof_sensors::{Polled, Sensor, SensorFault};
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 
@@ -267,6 +267,58 @@ fn what_is_no_frame_ends_the_measurement() {
 
 fn foreign(id: u8, part: u8, payload: u16) -> Of {
     Error::ForeignFrame { id, part, payload }
+}
+
+/// Its FIFO may stay out of step: to stop and to measure again does not help, so it is switched off and
+/// on.
+#[test]
+fn a_sensor_that_gives_no_frame_is_reset() {
+    let astray = |bench: &Bench<128>| {
+        let mut wires = bench.bus.0.borrow_mut();
+        if wires.chip.is_measuring && wires.chip.page(0xE1) == 0 {
+            wires.chip.present(&[0; 21], 8);
+        }
+        wires.chip.is_halted = true;
+    };
+    let mut bench = measuring();
+    bench.frames(3);
+    bench.bus.0.borrow_mut().chip.fifo.clear();
+    let mut errors = Vec::new();
+    for _ in 0..200 {
+        astray(&bench);
+        errors.extend(poll(&mut bench).err());
+        if bench.bus.0.borrow().chip.ram.is_empty() {
+            break;
+        }
+    }
+    // One of the measurement that went well before, one of that which never does.
+    assert_eq!(errors, [foreign(0, 0, 0); 2]);
+    bench.bus.0.borrow_mut().chip.is_halted = false;
+    recovers(&mut bench);
+}
+
+/// A preset has the default address.
+#[test]
+fn a_sensor_that_begins_again_keeps_its_address() {
+    let mut bench = Bench::<128>::new(Settings {
+        address: 0x42,
+        ..settings(Zones::Z8x8)
+    });
+    bench.bring_up();
+    bench.frames(1);
+    bench.bus.0.borrow_mut().fault = Some(Fault::Late);
+    while poll(&mut bench).is_ok() {}
+    bench.bus.0.borrow_mut().log.clear();
+    recovers(&mut bench);
+    assert_eq!(bench.sensor.address(), 0x42);
+    // It was not loaded again.
+    let wires = bench.bus.0.borrow();
+    assert!(
+        wires
+            .log
+            .iter()
+            .all(|(written, _)| *written != [0x08, 0x16])
+    );
 }
 
 /// Its histograms so far have been given; that it broke off is counted.
