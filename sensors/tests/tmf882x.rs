@@ -145,6 +145,10 @@ fn settings_that_cannot_be_are_refused() {
     assert_eq!(zero, ConfigError::ZeroIterations);
     let pixels = refused(|bad| bad.first_pixel = PixelAddress(u16::MAX - 7));
     assert_eq!(pixels, ConfigError::Pixels);
+    let reference = refused(|bad| {
+        bad.reference = Some(PixelAddress(bad.first_pixel.0 + 8));
+    });
+    assert_eq!(reference, ConfigError::Reference);
     assert_eq!(refused(|bad| bad.period_ms = 1000), ConfigError::Timeout);
 }
 
@@ -254,6 +258,8 @@ fn the_laser_rate_is_the_mean_over_a_period() {
         };
         let mut bench = Bench::<128>::new(settings, IMAGE);
         bench.i2c.done();
+        // Zones are pixels 10 to 18, the reference is pixel 99.
+        assert_eq!(bench.sensor.about().pixels, 100);
         bench.sensor.about().laser_millihertz
     };
     // 549,888 pulses in 132 ms: 4,165,818.18 Hz.

@@ -54,7 +54,8 @@ pub struct Settings {
     pub results: Results,
     /// The I²C address to change to, 7 bits; 0x41 is the one after power-up.
     pub address: u8,
-    /// Milliseconds from one measurement to the next.
+    /// Milliseconds from one measurement to the next. The pulses take 50.7 ns each, with long range
+    /// 91.4 ns, and have to fit.
     pub period_ms: u16,
     /// Laser pulses a measurement, in 1,024: those of all its time slots.
     pub kilo_iterations: u16,
@@ -111,8 +112,13 @@ pub enum ConfigError {
     Address,
     /// A measurement without pulses.
     ZeroIterations,
+    /// The pulses of a measurement take longer than its period; so they do with a period of 0,
+    /// which the sensor takes for a single measurement.
+    Period,
     /// The last zone, or the last reference, would have a pixel past the last.
     Pixels,
+    /// A reference would have the pixel of a zone.
+    Reference,
     /// The time limit of data is not longer than the period.
     Timeout,
     /// The preset is one of 8×8 zones alone.
@@ -130,7 +136,9 @@ impl ConfigError {
         match self {
             Self::Address => "the I2C address must be within 0x08 and 0x77",
             Self::ZeroIterations => "a measurement needs at least 1,024 pulses",
+            Self::Period => "the pulses of a measurement take longer than its period",
             Self::Pixels => "the pixels of all zones do not fit behind the first",
+            Self::Reference => "a reference has the pixel of a zone",
             Self::Timeout => "data would time out within one period",
             Self::LongRange => "only 8x8 zones have a preset for long ranges",
             Self::Peaks => "a zone has 1 to 4 targets",
@@ -159,15 +167,23 @@ impl Config {
         if settings.kilo_iterations == 0 {
             return Err(ConfigError::ZeroIterations);
         }
+        // In hundredths of a picosecond.
+        let lasts = settings.kilo_iterations as u64 * 1024 * settings.preset.laser_period();
+        if lasts > settings.period_ms as u64 * 100_000_000_000 {
+            return Err(ConfigError::Period);
+        }
         let zones = settings.zones;
         let PixelAddress(first) = settings.first_pixel;
-        if first.checked_add(zones.number() - 1).is_none() {
+        let Some(last) = first.checked_add(zones.number() - 1) else {
             return Err(ConfigError::Pixels);
-        }
-        if let Some(PixelAddress(first)) = settings.reference
-            && first.checked_add(REFERENCES - 1).is_none()
-        {
-            return Err(ConfigError::Pixels);
+        };
+        if let Some(PixelAddress(reference)) = settings.reference {
+            let Some(last_reference) = reference.checked_add(REFERENCES - 1) else {
+                return Err(ConfigError::Pixels);
+            };
+            if reference <= last && first <= last_reference {
+                return Err(ConfigError::Reference);
+            }
         }
         if settings.data_timeout_ms <= settings.period_ms as u32 {
             return Err(ConfigError::Timeout);
@@ -188,6 +204,14 @@ impl Config {
     #[must_use]
     pub const fn settings(&self) -> &Settings {
         &self.0
+    }
+
+    /// One more than the last pixel of a zone or a reference.
+    pub(super) fn pixels(&self) -> u16 {
+        let PixelAddress(first) = self.0.first_pixel;
+        let zones = first.saturating_add(self.0.zones.number());
+        let references = self.0.reference.map(|PixelAddress(first)| first);
+        references.map_or(zones, |first| zones.max(first.saturating_add(REFERENCES)))
     }
 
     /// Laser pulses that a frame of histograms has integrated: those of its time slot.

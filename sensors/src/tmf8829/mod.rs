@@ -78,7 +78,6 @@ mod snr;
 mod stream;
 mod zones;
 
-use dtof_core::PixelAddress;
 use dtof_core::fixed::types::I24F8;
 
 use self::registers::DEFAULT_ADDRESS;
@@ -305,9 +304,8 @@ impl<const CHUNK: usize> Protocol for Tmf8829Protocol<'_, CHUNK> {
         /// From a fit of the pulses to the sensor's own distances.
         const OFFSET: I24F8 = I24F8::lit("-441.1");
         let settings = self.config.settings();
-        let PixelAddress(first) = settings.first_pixel;
         About {
-            pixels: first.saturating_add(settings.zones.number()),
+            pixels: self.config.pixels(),
             bin_width: Some(settings.preset.bin_width(settings.zones)),
             bins: settings.preset.bins(settings.zones),
             offset: OFFSET,

@@ -167,6 +167,15 @@ impl Preset {
         }
     }
 
+    /// From one laser pulse to the next, in hundredths of a picosecond.
+    pub(super) const fn laser_period(self) -> u64 {
+        let steps = match self {
+            Self::Standard | Self::HighAccuracy => 249,
+            Self::LongRange => 449,
+        };
+        steps * 20_365
+    }
+
     /// The width of the bins that are given.
     pub(super) const fn bin_width(self, zones: Zones) -> U16F16 {
         let shift = if self.is_fine() { self.merge(zones) } else { 2 };

@@ -123,6 +123,8 @@ pub enum ConfigError {
     ZeroIterations,
     /// The last zone would have a pixel past the last.
     Pixels,
+    /// The reference would have the pixel of a zone.
+    Reference,
     /// The time limit of data is not longer than the period.
     Timeout,
 }
@@ -135,6 +137,7 @@ impl ConfigError {
             Self::Address => "the I2C address must be within 0x08 and 0x77",
             Self::ZeroIterations => "a measurement needs at least 1,024 pulses",
             Self::Pixels => "the pixels of all zones do not fit behind the first",
+            Self::Reference => "the reference has the pixel of a zone",
             Self::Timeout => "data would time out within one period",
         }
     }
@@ -161,8 +164,14 @@ impl Config {
             return Err(ConfigError::ZeroIterations);
         }
         let PixelAddress(first) = settings.first_pixel;
-        if first.checked_add(settings.zones.number() - 1).is_none() {
+        let Some(last) = first.checked_add(settings.zones.number() - 1) else {
             return Err(ConfigError::Pixels);
+        };
+        if let Some(PixelAddress(reference)) = settings.reference
+            && first <= reference
+            && reference <= last
+        {
+            return Err(ConfigError::Reference);
         }
         if settings.data_timeout_ms <= settings.period_ms as u32 {
             return Err(ConfigError::Timeout);
@@ -174,6 +183,14 @@ impl Config {
     #[must_use]
     pub const fn settings(&self) -> &Settings {
         &self.0
+    }
+
+    /// One more than the last pixel of a zone or the reference.
+    pub(super) fn pixels(&self) -> u16 {
+        let PixelAddress(first) = self.0.first_pixel;
+        let zones = first.saturating_add(self.0.zones.number());
+        let reference = self.0.reference.map(|PixelAddress(pixel)| pixel);
+        reference.map_or(zones, |pixel| zones.max(pixel.saturating_add(1)))
     }
 
     /// Laser pulses a measurement, or half a capture.

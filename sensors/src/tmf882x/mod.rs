@@ -295,9 +295,8 @@ impl<const CHUNK: usize> Protocol for Tmf882xProtocol<'_, CHUNK> {
             Zones::Nine(_) => (BIN_WIDTH, OFFSET),
             Zones::SixtyFour => (BIN_WIDTH_8X8, I24F8::ZERO),
         };
-        let pixels = settings.first_pixel.0;
         About {
-            pixels: pixels.saturating_add(settings.zones.number()),
+            pixels: self.config.pixels(),
             bin_width: Some(bin_width),
             bins: 128,
             offset,

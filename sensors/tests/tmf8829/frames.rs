@@ -104,6 +104,7 @@ fn references_are_four_pixels_if_they_are_wanted() {
         reference: Some(PixelAddress(1000)),
         ..settings(Zones::Z16x16)
     });
+    assert_eq!(bench.sensor.about().pixels, 1004);
     bench.bring_up();
     let given = bench.frames(1);
     for reference in 0..4 {

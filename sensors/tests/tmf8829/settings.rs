@@ -130,6 +130,28 @@ fn settings_that_cannot_be_are_refused() {
     assert_eq!(pixels, ConfigError::Pixels);
     let reference = refused(|bad| bad.reference = Some(PixelAddress(u16::MAX - 2)));
     assert_eq!(reference, ConfigError::Pixels);
+    // Zones are pixels 10 to 1545.
+    for (first, is_good) in [(6, true), (7, false), (1545, false), (1546, true)] {
+        let with = Config::new(Settings {
+            reference: Some(PixelAddress(first)),
+            ..settings(Zones::Z48x32)
+        });
+        assert_eq!(with.err(), (!is_good).then_some(ConfigError::Reference));
+    }
+    // 600,064 pulses, each 249 or 449 × 203.65 ps after the one before.
+    for (preset, steps) in PRESETS.into_iter().zip([249.0, 449.0, 249.0]) {
+        let lasts_ms = 600_064.0 * steps * 203.65e-9_f64;
+        let with = |period_ms: f64| {
+            Config::new(Settings {
+                preset,
+                period_ms: period_ms as u16,
+                ..settings(Zones::Z8x8)
+            })
+        };
+        assert!(with(lasts_ms.ceil()).is_ok());
+        assert_eq!(with(lasts_ms.floor()), Err(ConfigError::Period));
+        assert_eq!(with(0.0), Err(ConfigError::Period));
+    }
     assert_eq!(refused(|bad| bad.period_ms = 8500), ConfigError::Timeout);
     let long = refused(|bad| bad.preset = Preset::LongRange);
     assert_eq!(long, ConfigError::LongRange);
