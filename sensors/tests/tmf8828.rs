@@ -307,3 +307,18 @@ fn faults_put_no_histogram_into_another_zone_unsaid() {
          histograms, 0 of another zone unsaid"
     );
 }
+
+/// With nine zones its packets would be taken for other zones.
+#[test]
+fn a_sensor_left_in_its_8x8_mode_is_switched_off_for_nine_zones() {
+    let mut bench = bench(0);
+    bench.bring_up();
+    let bus = Bus(Rc::clone(&bench.chip));
+    let config = Config::new(Settings::new(PixelAddress(10))).unwrap();
+    bench.sensor = Tmf882x::new(bus.clone(), bus.clone(), bus, &[], config);
+    assert_eq!(bench.error(), Error::WrongMode { mode: 8 });
+    assert_eq!(bench.sink.take(), []);
+    bench.bring_up();
+    assert_eq!(bench.chip.borrow().mode, 0);
+    assert_eq!(bench.sensor.counts().errors, 1);
+}

@@ -213,13 +213,21 @@ fn an_application_that_refuses_never_ends_or_shows_another_page() {
     assert_eq!(bench.poll(&[read(0x41, 0x08, &[0x06])]), Err(refused));
 
     begin(&mut bench, true);
-    bench.work(&[read(0x41, 0x08, &[0x00]), write(0x41, &[0x08, 0x16])]);
+    bench.work(&[
+        read(0x41, 0x08, &[0x00]),
+        read(0x41, 0x10, &[0x00]),
+        write(0x41, &[0x08, 0x16]),
+    ]);
     let accesses = [read(0x41, 0x08, &[0x00]), read(0x41, 0x20, &[0x19])];
     assert_eq!(bench.poll(&accesses), Err(Error::WrongPage { page: 0x19 }));
 
     // `accepted` is the end of measure alone.
     begin(&mut bench, true);
-    bench.work(&[read(0x41, 0x08, &[0x00]), write(0x41, &[0x08, 0x16])]);
+    bench.work(&[
+        read(0x41, 0x08, &[0x00]),
+        read(0x41, 0x10, &[0x00]),
+        write(0x41, &[0x08, 0x16]),
+    ]);
     bench.work(&page(0x41));
     bench.work(&measure(0x41));
     let refused = Error::Refused {

@@ -43,6 +43,7 @@ impl Chip for Tmf {
             (0x08, [status, length, checksum]) => {
                 [*status, *length, *checksum] = [0x00, 0x00, 0xff];
             }
+            (0x10, [mode]) => *mode = 0x00,
             (0x20, [page]) => *page = 0x16,
             (0xe0, [enable]) => *enable = 0x41,
             (0xe1, [interrupt]) => *interrupt = if self.interrupts() { 0x08 } else { 0x00 },

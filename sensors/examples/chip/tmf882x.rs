@@ -23,6 +23,7 @@ impl Chip {
                 match (*register, &mut **bytes) {
                     (0x00, [application]) => *application = 0x03,
                     (0x08, [status]) => *status = self.status,
+                    (0x10, [mode]) => *mode = 0x00,
                     (0x20, [page]) => *page = 0x16,
                     (0xE0, [enable]) => *enable = 0x41,
                     (0xE1, [interrupt]) => *interrupt = 0x08,

@@ -69,10 +69,13 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
                 self.wait_in(State::Commanded(command), now_ms)
             }
             State::Commanded(command) => self.commanded(command, answer, now_ms),
-            State::Switched if answer == MODE_8X8 => {
+            State::Switched => {
+                let is_8x8 = self.config.settings().zones == Zones::SixtyFour;
+                if is_8x8 != (answer == MODE_8X8) {
+                    return Err(Error::WrongMode { mode: answer });
+                }
                 self.go_on_in(State::Commanding(Command::LoadConfigPageCommon))
             }
-            State::Switched => Err(Error::WrongMode { mode: answer }),
             State::Paging if answer == Command::LoadConfigPageCommon as u8 => {
                 self.go_on_in(State::Configuring(Block::Period))
             }
@@ -167,6 +170,10 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
             return self.patience(0, Waiting::Command(command), now_ms);
         }
         match command {
+            // With nine zones: it may still have 8×8, and nothing in their packets tells.
+            Command::Stop if self.config.settings().zones != Zones::SixtyFour => {
+                self.go_on_in(State::Switched)
+            }
             Command::Stop => self.show_page(),
             Command::Switch8x8 => self.go_on_in(State::Switched),
             Command::LoadConfigPageCommon => self.go_on_in(State::Paging),

@@ -67,7 +67,8 @@ pub enum Error<B, P> {
         /// The value of `CONFIG_RESULT`.
         page: u8,
     },
-    /// The sensor does not have 8×8 zones, though it has taken the command.
+    /// The sensor does not have 8×8 zones, though it has taken the command; or it has them, and nine
+    /// are wanted.
     WrongMode {
         /// The value of MODE.
         mode: u8,
@@ -134,7 +135,7 @@ impl<B: fmt::Debug, P: fmt::Debug> fmt::Display for Error<B, P> {
                 write!(f, "refused {command:?} with status {status:#04x}")
             }
             Self::WrongPage { page } => write!(f, "shows page {page:#04x}"),
-            Self::WrongMode { mode } => write!(f, "is in mode {mode:#04x}, not 8"),
+            Self::WrongMode { mode } => write!(f, "is in the wrong mode, {mode:#04x}"),
             Self::StuckInterrupt { status } => {
                 write!(f, "INT stays low, INT_STATUS {status:#04x}")
             }

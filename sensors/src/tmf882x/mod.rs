@@ -27,8 +27,9 @@
 //! Targets of the sensor come with each result ([`PhotonSink::target`]).
 //!
 //! Each half is one frame of `kilo_iterations` × 1,024 laser cycles. That is assumed, and
-//! the laser rate is not known. The crosstalk calibration is neither made nor restored. With
-//! nine zones the driver does not leave the 8×8 mode: a TMF8828 that is in it has to be switched off.
+//! the laser rate is not known. The crosstalk calibration is neither made nor restored. A TMF8828
+//! that is in the 8×8 mode when nine zones are wanted is switched off and on, after
+//! [`Error::WrongMode`].
 //!
 //! # Where the numbers come from
 //!
@@ -175,7 +176,7 @@ enum State {
     Commanding(Command),
     /// Whether it has done so.
     Commanded(Command),
-    /// Whether it has 8×8 zones.
+    /// Whether it has 8×8 zones, as it should or should not.
     Switched,
     /// Which page is shown?
     Paging,

@@ -192,7 +192,11 @@ impl<const CHUNK: usize> Bench<CHUNK> {
         self.switch_on(false);
         self.identify(0x03, &[0x08, 0xFF]);
         assert_eq!(self.poll(&[read(0x41, 0x08, &[0xFF])]), Ok(Polled::Idle));
-        self.work(&[read(0x41, 0x08, &[0x00]), write(0x41, &[0x08, 0x16])]);
+        self.work(&[
+            read(0x41, 0x08, &[0x00]),
+            read(0x41, 0x10, &[0x00]),
+            write(0x41, &[0x08, 0x16]),
+        ]);
         self.configure();
     }
 
