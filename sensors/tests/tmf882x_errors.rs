@@ -77,6 +77,7 @@ fn only_an_address_not_acknowledged_is_no_answer() {
 #[test]
 fn an_unplugged_sensor_says_so_again_and_again_and_is_found_when_it_is_back() {
     let mut bench = measuring();
+    bench.set(&some_counts());
     times_out(&mut bench, 1000, &[], Waiting::Histogram);
     for reset in [false, true, true] {
         bench.switch_on(reset);
@@ -280,6 +281,12 @@ fn packets_that_make_no_set_time_out() {
     let polled = bench.packet(&good[7]);
     assert_eq!(polled, Err(Error::Timeout(Waiting::Histogram)));
     assert_eq!(bench.sensor.counts().left_out, 3);
+    // It has given none that is good: to stop it does not help.
+    bench.interrupt.set(true);
+    starts_over(&mut bench);
+    bench.wait(1001);
+    let polled = bench.poll(&[]);
+    assert_eq!(polled, Err(Error::Timeout(Waiting::Histogram)));
     stops_measuring(&mut bench, polled);
 }
 

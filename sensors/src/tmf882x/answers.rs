@@ -186,7 +186,7 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
             Command::Measure => {
                 self.assembly.restart();
                 self.captures.restart();
-                self.stuck = 0;
+                (self.stuck, self.has_given) = (0, false);
                 self.wait_in(State::Measuring, now_ms)
             }
         }

@@ -67,8 +67,8 @@
 //! # After an error
 //!
 //! A packet that is wrong costs its set. Any other error while measuring stops
-//! and configures the sensor anew; an error while that is going on switches it
-//! off and on and loads the image again.
+//! and configures the sensor anew; an error while that is going on, or no packet
+//! after it, switches it off and on and loads the image again.
 //!
 //! # Cost
 //!
@@ -128,6 +128,8 @@ pub struct Tmf882xProtocol<'a, const CHUNK: usize = PACKET> {
     since: Since,
     /// Polls in a row with INT low for no reason.
     stuck: u8,
+    /// A packet was taken since it began to measure.
+    has_given: bool,
     buffer: [u8; PACKET],
     assembly: Assembly,
     captures: Captures,
@@ -242,6 +244,7 @@ impl<'a, const CHUNK: usize> Tmf882xProtocol<'a, CHUNK> {
             },
             since: Since::new(0),
             stuck: 0,
+            has_given: false,
             buffer: [0; PACKET],
             assembly: Assembly::new(),
             captures: Captures::new(),
@@ -342,6 +345,10 @@ impl<const CHUNK: usize> Protocol for Tmf882xProtocol<'_, CHUNK> {
             | Error::WrongSize { .. }
             | Error::OutOfOrder { .. }
             | Error::WrongCapture { .. } => {}
+            // To stop it and to begin again would bring no packet either.
+            Error::Timeout(Waiting::Histogram) if !self.has_given => {
+                self.state = State::Off { reset: true };
+            }
             _ => self.give_up(),
         }
     }

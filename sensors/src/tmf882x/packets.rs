@@ -37,6 +37,7 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
                 self.stuck = 0;
                 if taken != Polled::Idle {
                     self.since = Since::new(now_ms);
+                    self.has_given = true;
                 } else if is_silent {
                     return timeout;
                 }
