@@ -98,6 +98,42 @@ fn every_mode_gives_each_zone_as_the_chip_has_it() {
     round::<252>(Zones::Z48x32, Preset::HighAccuracy);
 }
 
+/// Zones written out by hand from the tables of x and y, beside the formula in the simulated chip:
+/// the first three of a frame's first row, and the first of its second.
+#[test]
+fn zones_are_where_the_tables_have_them() {
+    type Place = (u16, u16);
+    let tables: [(Zones, u8, [Place; 4]); 11] = [
+        (Zones::Z8x8, 0, [(0, 0), (1, 0), (2, 0), (0, 1)]),
+        (Zones::Z8x8, 1, [(4, 0), (5, 0), (6, 0), (4, 1)]),
+        (Zones::Z16x16, 1, [(8, 0), (9, 0), (10, 0), (8, 1)]),
+        (Zones::Z32x32, 0, [(0, 0), (2, 0), (4, 0), (0, 2)]),
+        (Zones::Z32x32, 1, [(16, 0), (18, 0), (20, 0), (16, 2)]),
+        (Zones::Z32x32Pairs, 2, [(1, 0), (3, 0), (5, 0), (1, 2)]),
+        (Zones::Z32x32, 7, [(17, 1), (19, 1), (21, 1), (17, 3)]),
+        (Zones::Z48x32, 1, [(24, 0), (27, 0), (30, 0), (24, 2)]),
+        (Zones::Z48x32, 4, [(2, 0), (5, 0), (8, 0), (2, 2)]),
+        (Zones::Z48x32, 6, [(0, 1), (3, 1), (6, 1), (0, 3)]),
+        (Zones::Z48x32, 11, [(26, 1), (29, 1), (32, 1), (26, 3)]),
+    ];
+    for (zones, slot, places) in tables {
+        let mut bench = Bench::<252>::new(settings(zones));
+        bench.bring_up();
+        let mode = [0, 2, 3, 4, 5][zones as usize];
+        bench.sensor.start(U16F16::ZERO);
+        bench.bring_up();
+        let given = bench.present(&frame(0x20 | mode, slot, 1, &[0; 25_344], 1), 8);
+        let second_row = if zones == Zones::Z8x8 { 4 } else { 8 };
+        for (index, (x, y)) in [0, 1, 2, second_row].into_iter().zip(places) {
+            let Given::Histogram(pixel, _) = &given[1 + index] else {
+                panic!("{given:?}");
+            };
+            let columns = zones.size().0;
+            assert_eq!(*pixel, 10 + columns * y + x, "{zones:?}, {slot}, {index}");
+        }
+    }
+}
+
 #[test]
 fn references_are_four_pixels_if_they_are_wanted() {
     let mut bench = Bench::<128>::new(Settings {
