@@ -44,7 +44,8 @@ pub struct Settings {
     /// The pixel of the zone in the first row and column; the others follow it row by row.
     pub first_pixel: PixelAddress,
     /// The pixel of the first of four reference histograms, if they are wanted; the other
-    /// three follow it.
+    /// three follow it. They have 64 bins as the sensor sends them, never added. With the preset for
+    /// high accuracy nobody has published how wide these are.
     pub reference: Option<PixelAddress>,
     /// How many zones.
     pub zones: Zones,

@@ -88,7 +88,8 @@ pub enum Error<B, P> {
         /// The length it says.
         payload: u16,
     },
-    /// A frame does not end where it should. The measurement is given up.
+    /// A frame does not end where it should. The measurement is given up. Its histograms have been
+    /// given: those behind the bytes that were lost are wrong.
     NoEnd {
         /// What came instead of the end marker.
         marker: u16,
