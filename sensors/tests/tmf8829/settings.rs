@@ -139,18 +139,22 @@ fn settings_that_cannot_be_are_refused() {
         assert_eq!(with.err(), (!is_good).then_some(ConfigError::Reference));
     }
     // 600,064 pulses, each 249 or 449 × 203.65 ps after the one before.
-    for (preset, steps) in PRESETS.into_iter().zip([249.0, 449.0, 249.0]) {
+    for (preset, (steps, enough)) in
+        PRESETS
+            .into_iter()
+            .zip([(249.0, 31), (449.0, 55), (249.0, 31)])
+    {
         let lasts_ms = 600_064.0 * steps * 203.65e-9_f64;
-        let with = |period_ms: f64| {
-            Config::new(Settings {
+        assert!(lasts_ms < f64::from(enough) && f64::from(enough - 1) < lasts_ms);
+        for period_ms in [0, 1, enough - 1, enough] {
+            let with = Config::new(Settings {
                 preset,
-                period_ms: period_ms as u16,
+                period_ms,
                 ..settings(Zones::Z8x8)
-            })
-        };
-        assert!(with(lasts_ms.ceil()).is_ok());
-        assert_eq!(with(lasts_ms.floor()), Err(ConfigError::Period));
-        assert_eq!(with(0.0), Err(ConfigError::Period));
+            });
+            let refused = (period_ms < enough).then_some(ConfigError::Period);
+            assert_eq!(with.err(), refused);
+        }
     }
     assert_eq!(refused(|bad| bad.period_ms = 8500), ConfigError::Timeout);
     let long = refused(|bad| bad.preset = Preset::LongRange);
