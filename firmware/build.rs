@@ -45,10 +45,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             // and cargo starts it where the other board's is.
             Some(&"MPS2_AN386") => link(image, &format!("-T{here}/memory/mps2-an386.x")),
             Some(&"PICO") => link(image, &format!("-T{here}/memory/pico.x")),
-            Some(_) => {
+            Some(&"STM32F405") => {
                 link(image, &format!("-L{here}/.."));
                 link(image, "-Tlink.x");
             }
+            Some(board) => return Err(format!("which linker script has {board}?").into()),
             None => continue,
         }
         link(image, "-Tdefmt.x");

@@ -43,7 +43,15 @@ impl Board {
 
     fn named(name: &str) -> Result<Self> {
         let found = Self::ALL.into_iter().find(|board| board.name() == name);
-        found.with_context(|| format!("no board `{name}`: mps2-an386, pico or stm32f405"))
+        let names = Self::ALL.map(Self::name).join(", ");
+        found.with_context(|| format!("no board `{name}`: {names}"))
+    }
+
+    /// The one that the first word names, or `default`; and the other words.
+    pub fn chosen<'a>(words: &'a [&'a str], default: Self) -> (Self, &'a [&'a str]) {
+        let named = words.split_first();
+        let named = named.and_then(|(name, rest)| Some((Self::named(name).ok()?, rest)));
+        named.unwrap_or((default, words))
     }
 
     /// Builds an image as it goes onto the board; that of a TMF8820/21/28 or TMF8829 has the
@@ -84,19 +92,14 @@ impl Board {
         let sidecar = format!("sidecar-{}", self.name());
         let (image, feature) = match what {
             Build::Sidecar => (&*sidecar, None),
-            Build::With(sensor) if Sensor::of(self).contains(&sensor) => {
-                (&*sidecar, Some(sensor.feature()))
-            }
-            Build::With(sensor) => {
-                bail!("{} has no place for {}", self.name(), sensor.name());
-            }
+            Build::With(sensor) => (&*sidecar, Some(sensor.feature())),
             Build::SelfTest => ("self-test", Some("self-test")),
         };
         let board = [self.name()].into_iter();
         let features: Vec<&str> = board.chain(feature).chain(more).collect();
         let image = link(root, self.target(), image, &features, program, PROFILE)?;
         if self == Self::Pico {
-            uf2::write(&image)?;
+            eprintln!("for its drive: {}", uf2::write(&image)?.display());
         }
         Ok(image)
     }
@@ -113,20 +116,46 @@ pub enum Build {
 }
 
 impl Build {
-    /// The sidecar with simulated photons, unless another is named.
-    pub fn named(name: Option<&str>) -> Result<Self> {
-        Ok(match name {
+    /// The sidecar of a board with simulated photons, unless another is named.
+    pub fn named(board: Board, name: Option<&str>) -> Result<Self> {
+        let build = match name {
             None => Self::Sidecar,
             Some("self-test") => Self::SelfTest,
             Some("tdc7200") => Self::With(Sensor::Tdc7200),
             Some("photon-timer") => Self::With(Sensor::PhotonTimer),
             Some("tmf8828-8x8") => Self::With(Sensor::Tmf8828),
             Some("tmf8829") => Self::With(Sensor::Tmf8829),
-            Some("tmf882x" | "tmf8820" | "tmf8821" | "tmf8828") => Self::With(Sensor::Tmf882x),
-            Some(name) => bail!(
-                "what is `{name}`? tdc7200, tmf8829, tmf882x, tmf8828-8x8, photon-timer or self-test"
-            ),
-        })
+            Some("tmf882x" | "tmf8820" | "tmf8821") => Self::With(Sensor::Tmf882x),
+            Some("tmf8828") => bail!("`tmf882x` for its 9 zones, or `tmf8828-8x8` for its 64?"),
+            Some(name) => bail!("what is `{name}`? {}", Self::names(board)),
+        };
+        match build {
+            Self::With(sensor) if !Sensor::of(board).contains(&sensor) => {
+                bail!(
+                    "{} has no {}: {}",
+                    board.name(),
+                    sensor.name(),
+                    Self::names(board)
+                )
+            }
+            Self::With(Sensor::PhotonTimer) => {
+                for variable in ["LASER_HZ", "LASER_PULSE_NS"] {
+                    let said = env::var(variable).unwrap_or_else(|_| "1".into());
+                    let number = said.parse::<u32>();
+                    number.with_context(|| format!("{variable}={said}: is no whole number"))?;
+                }
+                Ok(build)
+            }
+            _ => Ok(build),
+        }
+    }
+
+    /// The images of a board, as they are named.
+    fn names(board: Board) -> String {
+        let sensors = Sensor::of(board).iter();
+        let mut names: Vec<&str> = sensors.map(|sensor| sensor.name()).collect();
+        names.push("self-test");
+        format!("it has {}", names.join(", "))
     }
 }
 
@@ -203,7 +232,7 @@ fn check_program(bytes: &[u8], most: usize) -> Result<()> {
     ensure!(!bytes.is_empty(), "an empty file");
     ensure!(
         bytes.len() <= most,
-        "{} bytes: more than the sensor holds",
+        "{} bytes: more than the {most} that the sensor holds",
         bytes.len()
     );
     ensure!(
@@ -260,7 +289,7 @@ fn link(
 /// Builds an image and prints its path.
 pub fn image(root: &Path, board: &str, what: Option<&str>, emulator: bool) -> Result<()> {
     let board = Board::named(board)?;
-    let what = Build::named(what)?;
+    let what = Build::named(board, what)?;
     let path = if emulator {
         board.build_for_emulator(root, what)?
     } else {

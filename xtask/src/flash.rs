@@ -3,16 +3,17 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 use crate::firmware::{Board, Build};
 use crate::tools::PROBE_RS;
 
 /// The controller of a board, as probe-rs calls it: that of the Discovery.
-pub const fn chip(board: Board) -> &'static str {
+pub fn chip(board: Board) -> Result<&'static str> {
     match board {
-        Board::Pico => "RP2040",
-        Board::Mps2An386 | Board::Stm32F405 => "STM32F407VGTx",
+        Board::Mps2An386 => bail!("{} is emulated only", board.name()),
+        Board::Pico => Ok("RP2040"),
+        Board::Stm32F405 => Ok("STM32F407VGTx"),
     }
 }
 
@@ -20,14 +21,10 @@ pub const fn chip(board: Board) -> &'static str {
 pub fn flash(root: &Path, board: Board, named: Option<&str>, what: Build) -> Result<()> {
     // Before anything is built.
     PROBE_RS.require()?;
+    let chip = named.map_or_else(|| chip(board), Ok)?;
     let image = board.build(root, what)?;
     let status = Command::new(PROBE_RS.program)
-        .args([
-            "run",
-            "--non-interactive",
-            "--chip",
-            named.unwrap_or(chip(board)),
-        ])
+        .args(["run", "--non-interactive", "--chip", chip])
         .arg(&image)
         .stdin(Stdio::null())
         .status()

@@ -22,14 +22,14 @@ const CYCLES: &str = "1000";
 
 /// A board with a debug probe and a serial line.
 pub struct Rig {
-    pub root: &'static Path,
-    pub board: Board,
-    /// Its controller, as probe-rs calls it, if not the usual one.
-    pub chip: Option<String>,
+    root: &'static Path,
+    board: Board,
+    /// Its controller, as probe-rs calls it.
+    chip: String,
     /// Its serial line, as `dtof` takes it.
-    pub device: String,
+    device: String,
     /// The folder of its results.
-    pub out: PathBuf,
+    out: PathBuf,
 }
 
 /// What a part of the trial found: a line, and what is to be seen of it.
@@ -48,11 +48,8 @@ pub fn run(rig: &Rig) -> Result<()> {
     let name = rig.board.name();
     let mut text = format!("# {name}, a real board\n\n");
     let commit = commit(rig.root).unwrap_or_else(|| "unknown".into());
-    let _ = writeln!(
-        text,
-        "- source: {commit}\n- chip: {}\n- {version}",
-        rig.chip()
-    );
+    let chip = &rig.chip;
+    let _ = writeln!(text, "- source: {commit}\n- chip: {chip}\n- {version}");
     let mut failed = Vec::new();
     let parts: [(&str, Part); 3] = [
         ("Self-test", Rig::self_test),
@@ -76,8 +73,28 @@ pub fn run(rig: &Rig) -> Result<()> {
 }
 
 impl Rig {
-    fn chip(&self) -> &str {
-        self.chip.as_deref().unwrap_or(chip(self.board))
+    /// A board with its usual controller, unless another is named, and results in `out/hil`
+    /// likewise.
+    ///
+    /// # Errors
+    /// If it is no real board, or has no serial line.
+    pub fn new(
+        root: &'static Path,
+        board: Board,
+        named: Option<String>,
+        device: Option<String>,
+        out: Option<String>,
+    ) -> Result<Self> {
+        Ok(Self {
+            root,
+            board,
+            chip: named.map_or_else(|| Ok(chip(board)?.into()), anyhow::Ok)?,
+            device: device.context("which serial line? `--device /dev/ttyUSB0`, for one")?,
+            out: match out {
+                Some(out) => std::path::absolute(out)?,
+                None => root.join("out/hil"),
+            },
+        })
     }
 
     /// Writes an image, runs it until it ends, and gives what it printed.
@@ -96,7 +113,7 @@ impl Rig {
 
     fn probe(&self, command: &str) -> Command {
         let mut probe = Command::new(PROBE_RS.program);
-        probe.args([command, "--non-interactive", "--chip", self.chip()]);
+        probe.args([command, "--non-interactive", "--chip", &self.chip]);
         probe.stdin(Stdio::null());
         probe
     }

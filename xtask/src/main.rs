@@ -34,21 +34,20 @@ cargo xtask <command>
                 build an image and print its path: the sidecar or the self-test.
                 BOARD is mps2-an386, pico or stm32f405. SENSOR is tdc7200, tmf8829,
                 tmf882x or tmf8828-8x8 on stm32f405, photon-timer on pico. For pico a
-                .uf2 lies beside it, to be copied onto
-                the board without a probe. --emulator builds for QEMU, with its slower clock
-                and without the sensor's own program
-  flash [--chip CHIP] [pico] [SENSOR | self-test]
-                write an image onto an STM32F405 or STM32F407, or with `pico` onto a
-                Pico with a debug probe, and show its log. CHIP is the name in
-                probe-rs, by default that of the Discovery
-  hil --device DEVICE [--chip CHIP] [--out DIR] [pico]
-                try an STM32F405 or STM32F407, or with `pico` a Pico, with a debug probe and
-                its serial line at DEVICE: the self-test, the clock cycles of the core's
-                operations, and the demo's photons, decided as on this computer. Writes
-                BOARD.md into DIR, out/hil without it
-  emulate [--port PORT] [pico | exit | panic | fault]
-                run the sidecar in QEMU, or `pico` in rp2040js, its serial port on a
-                TCP port (5386). Another word ends it in that way
+                .uf2 lies beside it, to be copied onto the board without a probe.
+                --emulator builds for QEMU, with its slower clock and without the
+                sensor's own program
+  flash [--chip CHIP] [BOARD] [SENSOR | self-test]
+                write an image onto a board (stm32f405) with a debug probe, and show its
+                log. CHIP is the name in probe-rs, by default that of the Discovery
+  hil --device DEVICE [--chip CHIP] [--out DIR] [BOARD]
+                try a board (stm32f405) with a debug probe and its serial line at DEVICE:
+                the self-test, the clock cycles of the core's operations, and the demo's
+                photons, decided as on this computer. Writes BOARD.md into DIR, out/hil
+                without it
+  emulate [--port PORT] [BOARD] [exit | panic | fault]
+                run the sidecar of a board (mps2-an386) in its emulator, its serial port on
+                a TCP port (5386). A last word ends mps2-an386 in that way
   sizes         print flash, RAM and stack of each image
   check-image [--all]
                 link dtof-core for every target: no panic, float or allocation.
@@ -113,6 +112,10 @@ fn run() -> Result<()> {
                 let port = number.parse();
                 options.port = Some(port.with_context(|| format!("no port: `{number}`"))?);
             }
+            (_, Short('h') | Long("help")) => {
+                println!("{HELP}");
+                return Ok(());
+            }
             (_, Value(word)) => words.push(word.string()?),
             (_, other) => return Err(other.unexpected().into()),
         }
@@ -132,31 +135,32 @@ fn run() -> Result<()> {
         ("image", [board, what @ ..]) if what.len() < 2 => {
             firmware::image(root, board, what.first().copied(), options.emulator)?;
         }
-        ("flash", ["pico", what @ ..]) if what.len() < 2 => {
-            let what = Build::named(what.first().copied())?;
-            flash::flash(root, Board::Pico, options.chip.as_deref(), what)?;
+        ("flash", words) => {
+            let (board, what) = Board::chosen(words, Board::Stm32F405);
+            ensure!(what.len() < 2, "flash: one image at a time");
+            let what = Build::named(board, what.first().copied())?;
+            flash::flash(root, board, options.chip.as_deref(), what)?;
         }
-        ("flash", what @ ([] | [_])) => {
-            let what = Build::named(what.first().copied())?;
-            flash::flash(root, Board::Stm32F405, options.chip.as_deref(), what)?;
+        ("hil", words) => {
+            let (board, []) = Board::chosen(words, Board::Stm32F405) else {
+                bail!("what is `{}`? hil takes a board", words.join(" "));
+            };
+            hil::run(&hil::Rig::new(
+                root,
+                board,
+                options.chip,
+                options.device,
+                options.out,
+            )?)?;
         }
-        ("hil", board @ ([] | ["pico"])) => hil::run(&hil::Rig {
-            root,
-            board: match board {
-                [] => Board::Stm32F405,
-                _ => Board::Pico,
-            },
-            chip: options.chip,
-            device: options.device.context("hil: --device is missing")?,
-            out: match options.out {
-                Some(out) => std::path::absolute(out)?,
-                None => root.join("out/hil"),
-            },
-        })?,
-        ("emulate", ["pico"]) => emulate::emulate(root, Board::Pico, options.port, None)?,
-        ("emulate", end @ ([] | ["exit" | "panic" | "fault"])) => {
-            let end = end.first().copied();
-            emulate::emulate(root, Board::Mps2An386, options.port, end)?;
+        ("emulate", words) => {
+            let (board, end) = Board::chosen(words, Board::Mps2An386);
+            let end = match (board, end) {
+                (_, []) => None,
+                (Board::Mps2An386, &[end @ ("exit" | "panic" | "fault")]) => Some(end),
+                _ => bail!("what is `{}`? `cargo xtask help` says", end.join(" ")),
+            };
+            emulate::emulate(root, board, options.port, end)?;
         }
         ("sizes", []) => sizes::print(root)?,
         ("check-image", []) => image::check(root, options.all)?,

@@ -57,10 +57,13 @@ pub fn print(root: &Path) -> Result<()> {
                 stack <= MOST_STACK,
                 "more than {MOST_STACK} bytes of stack needed"
             );
-            if board == Board::Pico {
-                let left = address(&path, "_stack_start")? - address(&path, "_stack_end")?;
-                ensure!(left >= STACK_RESERVE, "{left} bytes are left to the stack");
-            }
+            let left =
+                address(&path, "_stack_start")?.saturating_sub(address(&path, "_stack_end")?);
+            ensure!(
+                left >= STACK_RESERVE,
+                "{left} bytes of its RAM are left to the stack, of {STACK_RESERVE}: fewer PIXELS or BLOCKS in \
+                 its `src/bin` leave more"
+            );
             if board == Board::Stm32F405 {
                 // The first is the one without a sensor.
                 let most = if of_pixels.is_none() {

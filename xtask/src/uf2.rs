@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use object::read::elf::{ElfFile32, ProgramHeader};
@@ -16,8 +16,8 @@ const FAMILY: u32 = 0xe48b_ff56;
 const HAS_FAMILY: u32 = 0x2000;
 const FLASH: std::ops::Range<u32> = 0x1000_0000..0x1100_0000;
 
-/// Writes `IMAGE.uf2` beside an image.
-pub fn write(image: &Path) -> Result<()> {
+/// Writes `IMAGE.uf2` beside an image; gives its path.
+pub fn write(image: &Path) -> Result<PathBuf> {
     let name = || image.display().to_string();
     let bytes = fs::read(image).with_context(name)?;
     let file = ElfFile32::<Endianness>::parse(&*bytes).with_context(name)?;
@@ -30,7 +30,8 @@ pub fn write(image: &Path) -> Result<()> {
         }
     }
     let path = image.with_added_extension("uf2");
-    fs::write(&path, blocks(&pages)?).with_context(|| path.display().to_string())
+    fs::write(&path, blocks(&pages)?).with_context(|| path.display().to_string())?;
+    Ok(path)
 }
 
 /// Puts bytes at an address of the flash into its pages.
