@@ -64,11 +64,18 @@ fn photons(given: &[Given]) -> Vec<(u32, u16, u16)> {
     photons
 }
 
+#[test]
+fn says_how_fast_its_laser_is_and_how_many_pixels_it_has() {
+    let pixels = [pixel(0, 60, 0.1, 0.1), pixel(6, 60, 0.1, 0.1)];
+    let about = Simulated::new(&pixels, PULSE, settings(1)).about();
+    assert_eq!((about.laser_millihertz, about.pixels), (100_000_000, 7));
+}
+
 proptest! {
     /// The bound that the module states, 2⁻²⁶, against the formula in floating
     /// point.
     #[test]
-    fn cumulative_probabilities_are_exact(mean in 0u32..=4 << 24) {
+fn cumulative_probabilities_are_exact(mean in 0u32..=4 << 24) {
         let mean = U8F24::from_bits(mean);
         let lambda: f64 = mean.to_num();
         let (mut probability, mut sum, mut count) = ((-lambda).exp(), 0.0, 0);
