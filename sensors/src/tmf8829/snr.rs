@@ -14,7 +14,8 @@ const RATIOS: [u32; 216] = {
         {
             ratios[code] = (ratio >> 64) as u32;
         }
-        ratio = ratio / 1_000_000 * 1_053_676 + ratio % 1_000_000 * 1_053_676 / 1_000_000;
+        // What the division leaves is less than 2⁻⁴⁴.
+        ratio = ratio / 1_000_000 * 1_053_676;
         code += 1;
     }
     ratios
