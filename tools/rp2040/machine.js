@@ -221,7 +221,8 @@ export class Machine {
     }
     this.pioClocks++;
     if (this.origin !== null) {
-      const isHigh = ((this.rp2040.pio[0].pinValues >>> this.origin) & 1) === 1;
+      const { gpio, pio } = this.rp2040;
+      const isHigh = ((pio[0].pinValues >>> this.origin) & 1) === 1 && gpio[this.origin].outputValue;
       if (isHigh && !this.wasHigh) {
         this.triggers++;
         // What an instruction does to a pin is to be seen outside from the next clock on.

@@ -162,13 +162,14 @@ impl<S: Sampler> Sensor for PhotonTimer<S> {
     }
 
     fn poll(&mut self, _: u32, sink: &mut impl PhotonSink) -> Result<Polled, Error> {
-        if self.sampler.has_stalled() {
-            self.sampler.start(&self.config);
-            self.next = 0;
-            return Err(Error::Stalled);
-        }
         for round in 0..BATCHES {
             self.copy().map_err(Error::Lost)?;
+            // After they were copied: those that came late are not to be looked at.
+            if self.sampler.has_stalled() {
+                self.sampler.start(&self.config);
+                self.next = 0;
+                return Err(Error::Stalled);
+            }
             give(&self.batch, sink);
             if !self.batch.is_full() {
                 let nothing = round == 0 && self.batch.is_empty();

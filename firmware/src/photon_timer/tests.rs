@@ -101,7 +101,8 @@ impl Sampler for Ring {
 
     fn samples(&self, cycle: u32) -> Samples {
         // One more is being written.
-        if self.completed - cycle > Self::KEPT {
+        let is_overwritten = self.completed - cycle > Self::KEPT;
+        if is_overwritten || self.stalls_at.is_some_and(|at| cycle >= at) {
             return Samples {
                 before: 0,
                 even: [0x5555_5555; 2],
@@ -229,17 +230,20 @@ proptest! {
 }
 
 #[test]
-fn samples_that_come_late_are_given_up_and_it_begins_anew() {
-    let mut dark = timer(vec![Levels(vec![false; 129]); 100], vec![10]);
-    dark.sampler.stalls_at = Some(20);
-    let mut seen = Seen::default();
-    let mut results = Vec::new();
-    for _ in 0..20 {
-        results.push(dark.poll(0, &mut seen));
+fn samples_that_come_late_are_never_seen_and_it_begins_anew() {
+    for late_from in 1..40 {
+        let mut dark = timer(vec![Levels(vec![false; 129]); 100], vec![10]);
+        dark.sampler.stalls_at = Some(late_from);
+        let mut seen = Seen::default();
+        let mut results = Vec::new();
+        for _ in 0..20 {
+            results.push(dark.poll(0, &mut seen));
+        }
+        assert!(results.contains(&Err(Error::Stalled)));
+        assert_eq!(results.last(), Some(&Ok(Polled::Idle)));
+        assert_eq!(dark.sampler.starts, 2);
+        assert!(seen.ended.iter().all(Vec::is_empty), "from {late_from}");
     }
-    assert!(results.contains(&Err(Error::Stalled)));
-    assert_eq!(results.last(), Some(&Ok(Polled::Idle)));
-    assert_eq!(dark.sampler.starts, 2);
     assert_eq!(SensorFault::from(Error::Stalled), SensorFault::Data);
 }
 

@@ -24,8 +24,8 @@ use core::cell::RefCell;
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use cortex_m::peripheral::NVIC;
 use cortex_m::peripheral::syst::SystClkSource;
-use cortex_m::peripheral::{NVIC, SCB};
 use cortex_m_rt::{ExceptionFrame, exception};
 use critical_section::Mutex;
 use defmt_rtt as _;
@@ -33,7 +33,7 @@ use embedded_io::WriteReady;
 use rp2040_hal::clocks::init_clocks_and_plls;
 use rp2040_hal::fugit::{ExtU32, RateExtU32};
 use rp2040_hal::gpio::bank0::{Gpio0, Gpio1};
-use rp2040_hal::gpio::{FunctionUart, Pin, Pins, PullDown};
+use rp2040_hal::gpio::{FunctionUart, Pin, Pins, PullDown, PullUp};
 use rp2040_hal::pac::{self, Interrupt, UART0, interrupt};
 use rp2040_hal::uart::{DataBits, Reader, StopBits, UartConfig, UartPeripheral, Writer};
 use rp2040_hal::watchdog::Watchdog;
@@ -55,7 +55,8 @@ static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_W25Q080;
 
 type UartPins = (
     Pin<Gpio0, FunctionUart, PullDown>,
-    Pin<Gpio1, FunctionUart, PullDown>,
+    // Silent while nothing is connected: a low line is a break.
+    Pin<Gpio1, FunctionUart, PullUp>,
 );
 
 /// The port and its end of the queues.
@@ -102,6 +103,9 @@ impl Pico {
             panic!("the board is started twice");
         };
         let mut resets = device.RESETS;
+        // A debugger may have reset the processor alone: what an image had started goes on.
+        let reset = resets.reset();
+        reset.modify(|_, w| w.pio0().set_bit().dma().set_bit());
         let mut watchdog = Watchdog::new(device.WATCHDOG);
         let Ok(clocks) = init_clocks_and_plls(
             CRYSTAL_HZ,
@@ -129,7 +133,7 @@ impl Pico {
             sio.gpio_bank0,
             &mut resets,
         );
-        let uart = (pins.gpio0.into_function(), pins.gpio1.into_function());
+        let uart = (pins.gpio0.into_function(), pins.gpio1.reconfigure());
         let config = UartConfig::new(BAUD.Hz(), DataBits::Eight, None, StopBits::One);
         let uart = UartPeripheral::new(device.UART0, uart, &mut resets);
         let Ok(uart) = uart.enable(config, clocks.peripheral_clock.freq()) else {
@@ -177,16 +181,21 @@ impl Pico {
         (Self { watchdog }, serial, sensor)
     }
 
-    /// Reports a panic and resets.
+    /// Lets the laser rest, reports a panic and resets.
     pub fn on_panic(info: &PanicInfo<'_>) -> ! {
+        #[cfg(feature = "sensor-photon-timer")]
+        photon_timer::laser_off();
         report::panic(info);
-        SCB::sys_reset()
+        // All of the chip: its processor can reset itself alone, and the PIO would go on.
+        rp2040_hal::reset()
     }
 
-    /// Reports a hard fault and resets.
+    /// The same of a hard fault.
     pub fn on_hard_fault(frame: &ExceptionFrame) -> ! {
+        #[cfg(feature = "sensor-photon-timer")]
+        photon_timer::laser_off();
         report::hard_fault(frame);
-        SCB::sys_reset()
+        rp2040_hal::reset()
     }
 }
 

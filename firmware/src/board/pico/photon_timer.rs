@@ -12,8 +12,8 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use pio::{Instruction, InstructionOperands, MovDestination, MovOperation, MovSource, Program};
 use rp2040_hal::gpio::bank0::{Gpio2, Gpio3};
-use rp2040_hal::gpio::{FunctionPio0, Pin, PullDown};
-use rp2040_hal::pac::{PIO0, RESETS};
+use rp2040_hal::gpio::{FunctionPio0, OutputOverride, Pin, PullDown};
+use rp2040_hal::pac::{IO_BANK0, PIO0, RESETS};
 use rp2040_hal::pio::{
     PIO, PIOBuilder, PIOExt, PinDir, Running, Rx, SM0, SM1, SM2, ShiftDirection, StateMachine,
     StateMachineGroup3, StateMachineIndex, Stopped, Tx, UninitStateMachine,
@@ -62,7 +62,7 @@ pub struct Hardware {
     rings: SampleRings,
     resets: RESETS,
     _pio: PIO<PIO0>,
-    _pins: Pins,
+    pins: Pins,
 }
 
 impl SensorPort {
@@ -88,10 +88,18 @@ impl SensorPort {
             rings: SampleRings::new(self.dma),
             resets: self.resets,
             _pio: pio,
-            _pins: self.pins,
+            pins: self.pins,
         };
         PhotonTimer::new(hardware, config)
     }
+}
+
+/// Lets the laser rest from now on: the state machines go on when the processor fails.
+pub fn laser_off() {
+    // SAFETY: the register is that of the laser's pin alone, and the image does nothing more.
+    #[allow(unsafe_code, reason = "nobody can hand over the pin here")]
+    let control = unsafe { &*IO_BANK0::PTR }.gpio(LASER.into()).gpio_ctrl();
+    control.modify(|_, w| w.outover().low());
 }
 
 /// High for `y + 2` clocks, low for `osr + 2`.
@@ -212,6 +220,7 @@ impl Sampler for Hardware {
         let (odd, odd_ends) = sampler(odd, config.sampler_counters());
         self.rings
             .start(&mut self.resets, &even_ends.0, &odd_ends.0);
+        self.pins.0.set_output_override(OutputOverride::DontInvert);
         self.steps = Some(Steps {
             group: laser.with(even).with(odd).start(),
             laser: (rx, tx),
@@ -223,6 +232,8 @@ impl Sampler for Hardware {
 
     fn stop(&mut self) {
         if let Some(steps) = self.steps.take() {
+            // First: a state machine that halts within a pulse would make it longer.
+            self.pins.0.set_output_override(OutputOverride::AlwaysLow);
             let (mut laser, even, odd) = steps.group.stop().free();
             laser.set_pins([(LASER, rp2040_hal::pio::PinState::Low)]);
             self.idle = Some(Idle {

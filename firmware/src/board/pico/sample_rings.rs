@@ -6,7 +6,7 @@
 //! done at any time. The ring's size divides what a channel transfers, so that it begins where
 //! the other has ended. See the datasheet of RP2040, sections 2.5 and 3.5.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU32, Ordering, compiler_fence};
 
 use rp2040_hal::pac::{DMA, PIO0, RESETS};
 use rp2040_hal::pio::{Rx, SM1, SM2};
@@ -135,7 +135,10 @@ impl SampleRings {
 
     /// How many laser cycles have come whole, since the start.
     pub fn completed(&mut self) -> u32 {
+        // What is read of the rings before is read before, and what is read after, after.
+        compiler_fence(Ordering::SeqCst);
         let new = self.written().wrapping_sub(self.words) & (TURN - 1);
+        compiler_fence(Ordering::SeqCst);
         // It has not gone back: see above.
         if new < TURN / 2 {
             let whole = new / WORDS_A_CYCLE;
