@@ -17,6 +17,12 @@ use embedded_hal_mock::eh1::i2c::{Mock, Transaction as Access};
 use proptest::prelude::*;
 
 #[test]
+fn zones_are_nine_or_sixty_four() {
+    assert_eq!(Zones::Nine(SpadMap::Map12).number(), 9);
+    assert_eq!(Zones::SixtyFour.number(), 64);
+}
+
+#[test]
 fn a_sensor_that_runs_the_application_is_not_loaded() {
     let mut bench = measuring();
     bench.set(&some_counts());
