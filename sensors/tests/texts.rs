@@ -1,6 +1,8 @@
 //! What is wrong with settings, in words.
 
-use dtof_sensors::{tdc7200, tmf882x};
+use std::collections::BTreeSet;
+
+use dtof_sensors::{tdc7200, tmf882x, tmf8829};
 
 #[test]
 fn every_error_of_settings_names_what_is_wrong() {
@@ -47,5 +49,61 @@ fn every_error_of_settings_names_what_is_wrong() {
     for (text, display, part) in texts {
         assert!(text.contains(part), "{text}");
         assert_eq!(text, display);
+    }
+}
+
+#[test]
+fn every_error_of_a_poll_says_what_happened() {
+    use tmf882x::Error as Tmf882x;
+    use tmf8829::Error as Tmf8829;
+
+    type Bus = &'static str;
+    let texts = [
+        (
+            Tmf882x::<Bus, Bus>::Bus("cut").to_string(),
+            "TMF882x: I2C: \"cut\"",
+        ),
+        (
+            Tmf882x::<Bus, Bus>::WrongMode { mode: 8 }.to_string(),
+            "TMF882x: is in the wrong mode, 0x08",
+        ),
+        (
+            Tmf8829::<Bus, Bus>::Nack("cut").to_string(),
+            "TMF8829: not acknowledged: \"cut\"",
+        ),
+        (
+            Tmf8829::<Bus, Bus>::Missed {
+                expected: 3,
+                found: 5,
+            }
+            .to_string(),
+            "TMF8829: frame 5 came, not 3",
+        ),
+    ];
+    for (display, text) in texts {
+        assert_eq!(display, text);
+    }
+}
+
+#[test]
+fn every_error_of_settings_of_a_tmf8829_is_its_own_line() {
+    use tmf8829::ConfigError as Of;
+
+    let all = [
+        Of::Address,
+        Of::ZeroIterations,
+        Of::Period,
+        Of::Pixels,
+        Of::Reference,
+        Of::Timeout,
+        Of::LongRange,
+        Of::Peaks,
+        Of::ResultSize,
+    ];
+    let texts: BTreeSet<&str> = all.iter().map(|error| error.text()).collect();
+    assert_eq!(texts.len(), all.len());
+    for error in all {
+        assert!(error.text().len() > 20);
+        assert_eq!(error.text(), error.to_string());
     }
 }
