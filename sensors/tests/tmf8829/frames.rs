@@ -302,6 +302,17 @@ fn a_sensor_that_runs_is_not_loaded() {
     assert_eq!(bench.frames(1), expected(Zones::Z8x8, 0, 0, 0));
 }
 
+/// Register ENABLE: 0x08 is standby, 0x04 power; 0x20 is to start from RAM.
+#[test]
+fn a_sensor_in_standby_is_woken() {
+    let mut bench = Bench::<128>::new(settings(Zones::Z8x8));
+    bench.bus.0.borrow_mut().chip.run();
+    bench.bus.0.borrow_mut().chip.stand_by();
+    bench.bring_up();
+    let enable = bench.bus.0.borrow().chip.enable();
+    assert_eq!(enable & 0x2C, 0x24, "{enable:#04x}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
     /// Whatever the counts are, they come out as they went in.

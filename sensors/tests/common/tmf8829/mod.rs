@@ -123,6 +123,17 @@ impl Chip {
         self.is_switched_on = true;
     }
 
+    /// From there into standby.
+    pub fn stand_by(&mut self) {
+        self.registers[0xF8] = 0x28;
+        self.is_switched_on = false;
+    }
+
+    /// Its register ENABLE.
+    pub fn enable(&self) -> u8 {
+        self.registers[0xF8]
+    }
+
     fn stop(&mut self) {
         self.is_measuring = false;
         self.registers[0xE1] = 0;
