@@ -44,7 +44,7 @@ use crate::units::{
 /// The version of the word layout, which file headers and links announce.
 pub const AER_VERSION: u16 = 3;
 
-/// A bit field of one 64-bit half of a word.
+/// A bit field of one of the four parts of a word.
 #[derive(Clone, Copy)]
 struct Field {
     shift: u32,
@@ -56,58 +56,72 @@ const fn field(shift: u32, bits: u32) -> Field {
 }
 
 impl Field {
-    const fn mask(self) -> u64 {
-        (1 << self.bits) - 1
+    const fn mask(self) -> u32 {
+        u32::MAX >> (u32::BITS - self.bits)
     }
 
-    const fn put(self, value: u64) -> u64 {
+    /// Of a value that fits.
+    const fn put(self, value: u32) -> u32 {
+        debug_assert!(value <= self.mask());
+        value << self.shift
+    }
+
+    /// The lowest bits of a value that may not fit.
+    const fn put_low(self, value: u32) -> u32 {
         (value & self.mask()) << self.shift
     }
 
-    const fn get(self, half: u64) -> u64 {
-        (half >> self.shift) & self.mask()
+    const fn get(self, part: u32) -> u32 {
+        (part >> self.shift) & self.mask()
     }
 }
 
-// The low half of every word.
-const KIND: Field = field(62, 2);
-// The low half of an event.
+// The second part of every word.
+const KIND: Field = field(30, 2);
+// The first part of an event.
 const PIXEL: Field = field(0, 16);
 const EXPOSURE: Field = field(16, 16);
-const CYCLE_LOW: Field = field(32, 16);
-const LEVEL: Field = field(48, 2);
+// The second.
+const CYCLE_LOW: Field = field(0, 16);
+const LEVEL: Field = field(16, 2);
 /// The number of the echo, less 1.
-const ECHO: Field = field(50, 2);
-const PEAK_BIN: Field = field(52, 10);
-// The high half of an event.
+const ECHO: Field = field(18, 2);
+const PEAK_BIN: Field = field(20, 10);
+// The third, and the fourth.
 const PEAK_COUNT: Field = field(0, 24);
-const BACKGROUND: Field = field(24, 24);
-const OFFSET: Field = field(48, 10);
-const FLAGS: Field = field(58, 6);
-// The low half of a dynamic depth event; its pixel, cycle and level are where those of a
-// depth event are.
-const CHANGE_FLAGS: Field = field(52, 6);
-// The high half of a dynamic depth event.
-const POSITION: Field = field(0, 32);
-const CHANGE: Field = field(32, 32);
-// The low half of a control word.
-const CONTROL: Field = field(52, 10);
-const CHECKSUM: Field = field(0, 32);
-// The high half of a time word.
-const CYCLE_HIGH: Field = field(0, 48);
+/// The low bits of the background, and the others in the fourth part.
+const BACKGROUND_LOW: Field = field(24, 8);
+const BACKGROUND_HIGH: Field = field(0, 16);
+const OFFSET: Field = field(16, 10);
+const FLAGS: Field = field(26, 6);
+// The second part of a dynamic depth event; its pixel, cycle and level are where those of a
+// depth event are. The third is the position, the fourth the change.
+const CHANGE_FLAGS: Field = field(20, 6);
+// The second part of a control word. The first of the last word is the checksum.
+const CONTROL: Field = field(20, 10);
 
-const KIND_CONTROL: u64 = 0;
-const KIND_DEPTH_EVENT: u64 = 1;
-const KIND_DYNAMIC_DEPTH: u64 = 2;
-const CONTROL_TIME: u64 = 1;
-const CONTROL_END: u64 = 2;
+const KIND_CONTROL: u32 = 0;
+const KIND_DEPTH_EVENT: u32 = 1;
+const KIND_DYNAMIC_DEPTH: u32 = 2;
+const CONTROL_TIME: u32 = 1;
+const CONTROL_END: u32 = 2;
 
 /// One packed word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AerWord {
-    low: u64,
-    high: u64,
+    /// Least significant first.
+    parts: [u32; 4],
+}
+
+/// The low part of a number, and the high one.
+#[allow(clippy::cast_possible_truncation, reason = "split in two")]
+const fn split(number: u64) -> [u32; 2] {
+    [number as u32, (number >> 32) as u32]
+}
+
+const fn join(low: u32, high: u32) -> u64 {
+    low as u64 | (high as u64) << 32
 }
 
 impl AerWord {
@@ -118,7 +132,9 @@ impl AerWord {
     #[inline]
     #[must_use]
     pub const fn to_le_bytes(self) -> [u8; Self::BYTES] {
-        ((self.high as u128) << 64 | self.low as u128).to_le_bytes()
+        let [first, second, third, fourth] = self.parts;
+        let (low, high) = (join(first, second), join(third, fourth));
+        ((high as u128) << 64 | low as u128).to_le_bytes()
     }
 
     /// A word as it was received. Any bytes make a word; whether it means
@@ -127,10 +143,14 @@ impl AerWord {
     #[must_use]
     pub const fn from_le_bytes(bytes: [u8; Self::BYTES]) -> Self {
         let word = u128::from_le_bytes(bytes);
-        #[allow(clippy::cast_possible_truncation, reason = "split in two halves")]
+        #[allow(clippy::cast_possible_truncation, reason = "split in four parts")]
         Self {
-            low: word as u64,
-            high: (word >> 64) as u64,
+            parts: [
+                word as u32,
+                (word >> 32) as u32,
+                (word >> 64) as u32,
+                (word >> 96) as u32,
+            ],
         }
     }
 
@@ -139,18 +159,20 @@ impl AerWord {
     #[inline]
     #[must_use]
     pub const fn depth_event(event: &DepthEvent) -> Self {
+        let background = event.background.raw();
         Self {
-            low: KIND.put(KIND_DEPTH_EVENT)
-                | PIXEL.put(event.pixel.0 as u64)
-                | EXPOSURE.put(event.exposure as u64)
-                | CYCLE_LOW.put(event.cycle.0)
-                | LEVEL.put(event.level.raw() as u64)
-                | ECHO.put(event.echo.raw() as u64 - 1)
-                | PEAK_BIN.put(event.peak_bin.raw() as u64),
-            high: PEAK_COUNT.put(event.peak_count.raw() as u64)
-                | BACKGROUND.put(event.background.raw() as u64)
-                | OFFSET.put(event.offset.raw().cast_unsigned() as u64)
-                | FLAGS.put(event.flags.bits() as u64),
+            parts: [
+                PIXEL.put(event.pixel.0 as u32) | EXPOSURE.put(event.exposure as u32),
+                KIND.put(KIND_DEPTH_EVENT)
+                    | CYCLE_LOW.put_low(split(event.cycle.0)[0])
+                    | LEVEL.put(event.level.raw() as u32)
+                    | ECHO.put(event.echo.raw() as u32 - 1)
+                    | PEAK_BIN.put(event.peak_bin.raw() as u32),
+                PEAK_COUNT.put(event.peak_count.raw()) | background << BACKGROUND_LOW.shift,
+                BACKGROUND_HIGH.put(background >> BACKGROUND_LOW.bits)
+                    | OFFSET.put_low(event.offset.raw().cast_unsigned() as u32)
+                    | FLAGS.put(event.flags.bits() as u32),
+            ],
         }
     }
 
@@ -159,13 +181,15 @@ impl AerWord {
     #[must_use]
     pub const fn dynamic_depth(event: &DynamicDepthEvent) -> Self {
         Self {
-            low: KIND.put(KIND_DYNAMIC_DEPTH)
-                | PIXEL.put(event.pixel.0 as u64)
-                | CYCLE_LOW.put(event.cycle.0)
-                | LEVEL.put(event.level.raw() as u64)
-                | CHANGE_FLAGS.put(event.flags.bits() as u64),
-            high: POSITION.put(event.position.raw().cast_unsigned() as u64)
-                | CHANGE.put(event.change().cast_unsigned() as u64),
+            parts: [
+                PIXEL.put(event.pixel.0 as u32),
+                KIND.put(KIND_DYNAMIC_DEPTH)
+                    | CYCLE_LOW.put_low(split(event.cycle.0)[0])
+                    | LEVEL.put(event.level.raw() as u32)
+                    | CHANGE_FLAGS.put(event.flags.bits() as u32),
+                event.position.raw().cast_unsigned(),
+                event.change().cast_unsigned(),
+            ],
         }
     }
 
@@ -173,9 +197,14 @@ impl AerWord {
     #[inline]
     #[must_use]
     pub const fn time(cycle: LaserCycle) -> Self {
+        let [low, high] = split(cycle.0 >> CYCLE_LOW.bits);
         Self {
-            low: KIND.put(KIND_CONTROL) | CONTROL.put(CONTROL_TIME),
-            high: CYCLE_HIGH.put(cycle.0 >> CYCLE_LOW.bits),
+            parts: [
+                0,
+                KIND.put(KIND_CONTROL) | CONTROL.put(CONTROL_TIME),
+                low,
+                high,
+            ],
         }
     }
 
@@ -183,9 +212,10 @@ impl AerWord {
     /// of all bytes before this word.
     #[must_use]
     pub const fn end(events: u64, checksum: u32) -> Self {
+        let [low, high] = split(events);
+        let control = KIND.put(KIND_CONTROL) | CONTROL.put(CONTROL_END);
         Self {
-            low: KIND.put(KIND_CONTROL) | CONTROL.put(CONTROL_END) | CHECKSUM.put(checksum as u64),
-            high: events,
+            parts: [checksum, control, low, high],
         }
     }
 }
@@ -305,7 +335,7 @@ impl AerDecoder {
     /// given the next word.
     #[inline]
     pub fn decode(&mut self, word: AerWord) -> Result<AerRecord, AerError> {
-        match KIND.get(word.low) {
+        match KIND.get(word.parts[1]) {
             KIND_DEPTH_EVENT => {
                 let high = self.cycle_high.ok_or(AerError::MissingTime)?;
                 Ok(AerRecord::Event(unpack(word, high)))
@@ -319,24 +349,24 @@ impl AerDecoder {
         }
     }
 
-    #[allow(clippy::cast_possible_truncation, reason = "a 32-bit field")]
     fn control(&mut self, word: AerWord) -> Result<AerRecord, AerError> {
-        match CONTROL.get(word.low) {
+        let [checksum, control, low, high] = word.parts;
+        let number = join(low, high);
+        match CONTROL.get(control) {
             CONTROL_TIME => {
-                let time = AerWord::time(LaserCycle(word.high << CYCLE_LOW.bits));
-                if word != time {
+                let cycle = LaserCycle(number << CYCLE_LOW.bits);
+                if word != AerWord::time(cycle) {
                     return Err(AerError::ReservedBits);
                 }
-                self.cycle_high = Some(word.high);
-                Ok(AerRecord::Time(LaserCycle(word.high << CYCLE_LOW.bits)))
+                self.cycle_high = Some(number);
+                Ok(AerRecord::Time(cycle))
             }
             CONTROL_END => {
-                let checksum = CHECKSUM.get(word.low) as u32;
-                if word != AerWord::end(word.high, checksum) {
+                if word != AerWord::end(number, checksum) {
                     return Err(AerError::ReservedBits);
                 }
                 Ok(AerRecord::End {
-                    events: word.high,
+                    events: number,
                     checksum,
                 })
             }
@@ -345,39 +375,46 @@ impl AerDecoder {
     }
 }
 
+/// The whole laser cycle of an event.
+fn cycle(second: u32, cycle_high: u64) -> LaserCycle {
+    LaserCycle(cycle_high << CYCLE_LOW.bits | u64::from(CYCLE_LOW.get(second)))
+}
+
 /// An event from its word and the upper bits of its laser cycle.
 #[allow(
     clippy::cast_possible_truncation,
     reason = "each field is as wide as its type"
 )]
 fn unpack(word: AerWord, cycle_high: u64) -> DepthEvent {
+    let [first, second, third, fourth] = word.parts;
     // The sign of the offset's ten bits is moved to the top and drawn down.
-    let offset = ((OFFSET.get(word.high) << 6) as u16).cast_signed() >> 6;
+    let offset = ((OFFSET.get(fourth) << 6) as u16).cast_signed() >> 6;
+    let background = BACKGROUND_LOW.get(third) | BACKGROUND_HIGH.get(fourth) << BACKGROUND_LOW.bits;
     DepthEvent {
-        pixel: PixelAddress(PIXEL.get(word.low) as u16),
-        level: BlockLevel::saturating(LEVEL.get(word.low) as u8),
-        echo: EchoNumber::new(ECHO.get(word.low) as u8 + 1).unwrap_or(EchoNumber::LAST),
-        cycle: LaserCycle(cycle_high << CYCLE_LOW.bits | CYCLE_LOW.get(word.low)),
-        exposure: EXPOSURE.get(word.low) as u16,
-        peak_bin: BinIndex::saturating(PEAK_BIN.get(word.low) as u16),
+        pixel: PixelAddress(PIXEL.get(first) as u16),
+        level: BlockLevel::saturating(LEVEL.get(second) as u8),
+        echo: EchoNumber::new(ECHO.get(second) as u8 + 1).unwrap_or(EchoNumber::LAST),
+        cycle: cycle(second, cycle_high),
+        exposure: EXPOSURE.get(first) as u16,
+        peak_bin: BinIndex::saturating(PEAK_BIN.get(second) as u16),
         offset: SubBinOffset::new(offset).unwrap_or(SubBinOffset::CENTRE),
-        peak_count: Count::saturating(PEAK_COUNT.get(word.high) as u32),
-        background: Count::saturating(BACKGROUND.get(word.high) as u32),
-        flags: Flags::from_bits(FLAGS.get(word.high) as u8).unwrap_or(Flags::NONE),
+        peak_count: Count::saturating(PEAK_COUNT.get(third)),
+        background: Count::saturating(background),
+        flags: Flags::from_bits(FLAGS.get(fourth) as u8).unwrap_or(Flags::NONE),
     }
 }
 
 /// The same for a dynamic depth event, whose fields are narrower than their bits.
-#[allow(clippy::cast_possible_truncation, reason = "fields of up to 32 bits")]
+#[allow(clippy::cast_possible_truncation, reason = "fields of up to 16 bits")]
 fn unpack_dynamic_depth(word: AerWord, cycle_high: u64) -> Result<DynamicDepthEvent, AerError> {
-    let position = BinPosition::new((POSITION.get(word.high) as u32).cast_signed());
+    let [first, second, third, fourth] = word.parts;
     let event = DynamicDepthEvent::new(
-        PixelAddress(PIXEL.get(word.low) as u16),
-        BlockLevel::saturating(LEVEL.get(word.low) as u8),
-        LaserCycle(cycle_high << CYCLE_LOW.bits | CYCLE_LOW.get(word.low)),
-        position.ok_or(AerError::OutOfRange)?,
-        (CHANGE.get(word.high) as u32).cast_signed(),
-        Flags::from_bits(CHANGE_FLAGS.get(word.low) as u8).unwrap_or(Flags::NONE),
+        PixelAddress(PIXEL.get(first) as u16),
+        BlockLevel::saturating(LEVEL.get(second) as u8),
+        cycle(second, cycle_high),
+        BinPosition::new(third.cast_signed()).ok_or(AerError::OutOfRange)?,
+        fourth.cast_signed(),
+        Flags::from_bits(CHANGE_FLAGS.get(second) as u8).unwrap_or(Flags::NONE),
     );
     let event = event.ok_or(AerError::OutOfRange)?;
     if AerWord::dynamic_depth(&event) != word {

@@ -71,6 +71,44 @@ fn random_pulses<W: CounterWidth>(bound: f64, seed: u64) {
     }
 }
 
+/// The division, where there is no background: 256 · |r - l| / (l + c + r), halves up.
+fn divided([left, centre, right]: [u32; 3]) -> i16 {
+    let sum = u64::from(left) + u64::from(centre) + u64::from(right);
+    let part = u64::from(right.abs_diff(left));
+    let share = (512 * part + sum).checked_div(2 * sum).unwrap_or(0);
+    let share = i16::try_from(share).unwrap();
+    128 + if right < left { -share } else { share }
+}
+
+/// Processors that do not divide get there bit by bit. So does the one this runs on.
+#[test]
+fn it_is_the_division_to_the_last_bit() {
+    for number in 0..64u32.pow(3) {
+        let counts = [1, 64, 64 * 64].map(|step| number / step % 64);
+        assert_eq!(
+            depth::<Count10>(counts, 0).offset.raw(),
+            divided(counts),
+            "{counts:?}"
+        );
+    }
+    let mut rng = Pcg32::seed_from_u64(4);
+    for _ in 0..450_000 {
+        let counts = [0; 3].map(|_| any_count(&mut rng, Count10::MAX));
+        assert_eq!(
+            depth::<Count10>(counts, 0).offset.raw(),
+            divided(counts),
+            "{counts:?}"
+        );
+        // As wide as counts may be of which no bit is dropped.
+        let counts = [0; 3].map(|_| any_count(&mut rng, 0x3fff));
+        assert_eq!(
+            depth::<Count16>(counts, 0).offset.raw(),
+            divided(counts),
+            "{counts:?}"
+        );
+    }
+}
+
 const NARROW: f64 = 1.0 / 512.0;
 const WIDE: f64 = 1.0 / 256.0;
 
