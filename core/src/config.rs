@@ -44,18 +44,20 @@ use crate::units::{BinIndex, Count, EchoNumber};
 /// some settings, and [`PixelConfigBuilder::build`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+// In this order, so that what photons and looks need lies where one load reaches it.
+#[repr(C)]
 pub struct PixelConfig<const BINS: usize, R: DetectionRule = PaperRule> {
     x: u16,
     l1: u16,
     l2: u16,
     gate: RangeGate<BINS>,
-    rule: R,
-    estimator: DepthEstimator,
     is_one_hit: bool,
-    tracking: Option<Tracking<R>>,
     echoes: EchoNumber,
     peel_reach: u8,
     echo_wait: u8,
+    rule: R,
+    tracking: Option<Tracking<R>>,
+    estimator: DepthEstimator,
 }
 
 /// Settings of pixels that are not checked yet.

@@ -2,23 +2,23 @@
 //!
 //! A centroid of whole bins around the peak bin is drawn towards that bin. The window
 //! then holds more of one flank of the pulse than of the other. Here the window is as
-//! wide as the pulse. It moves, in 1/256 bin, until the centroid of the photons in it is
-//! its own centre. A bin at its end counts with the part that is inside, at the middle of
-//! that part.
+//! wide as the pulse. It lies where the photons in it balance: the sum of their distances
+//! from its middle, the moment, is 0. A bin at its end counts with the part that is
+//! inside, at the middle of that part.
 //!
-//! The window starts on the middle of the peak bin and moves three times, with
-//! half width `h`, position `x` and `n` the photons of a bin,
+//! The moment is taken about the middle of the peak bin, and from there in half bins
+//! towards the photons, until it changes its sign. A straight line between the last two
+//! gives the place:
 //!
 //! ```text
-//! x ← x + Σ n·part·(middle of the part - x) / (Σ n·part - 2h·background)
+//! moment(x) = Σ n · ∫ u du     over the part of each bin from x - h to x + h, u from x on
+//! place     = x + 1/2 bin · moment(x) / (moment(x) - moment(x + 1/2 bin))
 //! ```
 //!
-//! An even background has its own centroid in the middle of the window. So the background
-//! does not move the place where the window comes to rest, only how far each step goes.
-//! For that a mean is needed. The paper's background is the highest bin of a quadrant:
-//! too little is left to divide by, and the steps go too far. So
-//! [`CentredWindow::background_outside`] takes the mean of the bins that are farther from
-//! the peak bin than half the width.
+//! with the half width `h` and `n` the photons of a bin. So there is one division, and no
+//! background is needed: an even background has no moment. Moments about the middle of a
+//! bin have a gain that makes up for the straight line, found for a Gaussian pulse of the
+//! width that suits the window (`window_weights`).
 //!
 //! With `h` = 2σ + 1/2 bins for a pulse of standard deviation σ the error is within 1.2 of
 //! the Cramér–Rao bound, on average within 1.1: `core/tests/depth/error.rs` prints
@@ -27,9 +27,8 @@
 //! A pulse that falls more slowly than it rises, as many do, has a wider window after the
 //! place than before it ([`CentredWindow::with_sides`]). Photons of the wider side count
 //! less, by the square of how much wider it is. So both sides of an even background still
-//! balance. Such a window moves five times. It comes to rest where the sum of the squares of
-//! `distance / half width` has a minimum, if each photon outside counts as 1. That place in
-//! the pulse depends on both half widths, and so does the offset of ranges.
+//! balance. That place in the pulse depends on both half widths, and so does the offset of
+//! ranges.
 //!
 //! ```
 //! use dtof_core::fixed::types::{U8F8, U24F8};
@@ -43,16 +42,18 @@
 //! assert_eq!(depth.offset.raw(), 256); // the peak is bin 40
 //! ```
 //!
-//! Cost on a Cortex-M4: 680 to 770 instructions, once an event; with two half widths 1,040.
+//! Cost on a Cortex-M4: 133 to 139 instructions, once an event.
 
 use fixed::types::{U8F8, U24F8};
 
 use super::estimate::Depth;
+use super::window_weights::Weights;
 use crate::flags::Flags;
 use crate::histogram::counter::CounterWidth;
 use crate::histogram::gate::RangeGate;
+use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak, mean};
-use crate::units::SubBinOffset;
+use crate::units::{BinIndex, Count, SubBinOffset};
 
 /// A window that moves onto the pulse, and how far it reaches before and after its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,19 +61,21 @@ use crate::units::SubBinOffset;
 pub struct CentredWindow {
     before: U8F8,
     after: U8F8,
+    weights: Weights,
 }
 
-/// Bins that a window can reach, from [`BEFORE`] the peak bin on: an offset of -2
+/// Bins that a window can reach, from [`PEAK`] before the peak bin on: an offset of -2
 /// to 2 bins, less or plus 4.
-const REACH: u16 = 12;
-/// How many of these lie before the peak bin.
+const REACH: usize = 2 * PEAK;
+/// Which of these is the peak bin.
+const PEAK: usize = 6;
+/// The same of bins of the histogram.
 const BEFORE: u16 = 6;
-/// What an offset may be.
-const OFFSETS: [i16; 2] = [SubBinOffset::MIN.raw(), SubBinOffset::MAX.raw()];
-/// How often a window moves, and one whose half widths differ, which starts farther from where
-/// it comes to rest.
-const STEPS: u32 = 3;
-const SKEW_STEPS: u32 = 5;
+/// Where a window ends that moves on: the start of the bin two before the peak bin, and two after it.
+const ENDS: [usize; 2] = [PEAK - 2, PEAK + 2];
+
+/// The counters that a window can reach.
+type Bins<W> = [<W as CounterWidth>::Counter; REACH];
 
 impl CentredWindow {
     /// The narrowest half width: 1 bin.
@@ -99,7 +102,7 @@ impl CentredWindow {
             bits >= CentredWindow::MIN.to_bits() && bits <= CentredWindow::MAX.to_bits()
         }
         if is_one(before) && is_one(after) {
-            Some(Self { before, after })
+            Some(Self::with_weights(before, after))
         } else {
             None
         }
@@ -113,14 +116,20 @@ impl CentredWindow {
         let half_width = sigma.saturating_add(sigma).saturating_add(Self::MARGIN);
         match Self::new(half_width) {
             Some(window) => window,
-            None if half_width.to_bits() < Self::MIN.to_bits() => Self {
-                before: Self::MIN,
-                after: Self::MIN,
-            },
-            None => Self {
-                before: Self::MAX,
-                after: Self::MAX,
-            },
+            None if half_width.to_bits() < Self::MIN.to_bits() => {
+                Self::with_weights(Self::MIN, Self::MIN)
+            }
+            None => Self::with_weights(Self::MAX, Self::MAX),
+        }
+    }
+
+    // Not with the rest of a program that learns its settings when it runs.
+    #[inline(never)]
+    const fn with_weights(before: U8F8, after: U8F8) -> Self {
+        Self {
+            before,
+            after,
+            weights: Weights::of(before.to_bits(), after.to_bits()),
         }
     }
 
@@ -174,14 +183,12 @@ impl CentredWindow {
         )
     }
 
-    /// The depth of the pulse around `peak`, less the `background` a bin.
+    /// The depth of the pulse around `peak`.
     ///
-    /// Each step is rounded to the nearest 1/256 bin and limited to a bin; the
-    /// offset to what [`SubBinOffset`] holds. Of counts past 10 bits the lowest are
-    /// dropped, as many as bring the peak within 10. A bin outside the gate counts
-    /// as background; [`Flags::CLIPPED`] tells that the window reaches there, and
-    /// [`Flags::SATURATED`] that the counter of the peak bin is full.
-    #[inline(never)]
+    /// Of counts past 10 bits the lowest are dropped, as many as bring the peak within 10.
+    /// A bin outside the gate counts as `background`; [`Flags::CLIPPED`] tells that the
+    /// window reaches there, or that the offset is at the end of what [`SubBinOffset`] holds,
+    /// and [`Flags::SATURATED`] that the counter of the peak bin is full.
     #[must_use]
     pub fn estimate<const BINS: usize, W: CounterWidth>(
         &self,
@@ -190,195 +197,187 @@ impl CentredWindow {
         peak: Peak,
         background: U24F8,
     ) -> Depth {
+        match bins_within(histogram, gate, peak.bin) {
+            Some(bins) => self.depth::<W>(bins, peak.count),
+            None => self.at_the_gate(histogram, gate, peak, background),
+        }
+    }
+
+    /// The same where some bins are left out. The background is the mean outside if there are
+    /// bins for it.
+    #[inline(always)]
+    pub(super) fn estimate_without<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        peak: Peak,
+        background: U24F8,
+        peeled: &PeeledBins,
+    ) -> Depth {
+        match bins_within(histogram, gate, peak.bin) {
+            Some(bins) => self.depth::<W>(bins, peak.count),
+            None => self.at_the_gate_without(histogram, gate, peak, background, peeled),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn at_the_gate_without<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        peak: Peak,
+        background: U24F8,
+        peeled: &PeeledBins,
+    ) -> Depth {
+        let mut left_out = 0;
+        if peeled.echoes() > 0 {
+            let (first, last) = self.inside(gate, peak.bin.raw());
+            left_out =
+                peeled.bins_among(gate.first()..=gate.last()) - peeled.bins_among(first..=last);
+        }
+        let outside = self.background_outside(histogram, gate, peak, left_out);
+        self.at_the_gate(histogram, gate, peak, outside.unwrap_or(background))
+    }
+
+    /// With the `background` where a bin is outside the gate.
+    #[inline(never)]
+    fn at_the_gate<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        peak: Peak,
+        background: U24F8,
+    ) -> Depth {
+        let background = (background.to_bits().saturating_add(128) >> 8).min(W::MAX);
+        let mut bins = [W::counter(background); REACH];
+        let first = peak.bin.raw().wrapping_sub(BEFORE);
+        for (number, bin) in (0..).zip(&mut bins) {
+            let number = first.wrapping_add(number);
+            if gate.contains(number) {
+                *bin = W::counter(histogram.count(number.into()).unwrap_or(0));
+            }
+        }
+        let mut depth = self.depth::<W>(&bins, peak.count);
+        let middle = (i32::from(peak.bin.raw()) << 8) + i32::from(depth.offset.raw());
+        let start = middle - i32::from(self.before.to_bits());
+        let end = middle + i32::from(self.after.to_bits());
+        if start < i32::from(gate.first()) << 8 || end > i32::from(gate.last() + 1) << 8 {
+            depth.flags |= Flags::CLIPPED;
+        }
+        depth
+    }
+
+    /// Where the photons of `bins` balance.
+    // Most looks end without an event.
+    #[cold]
+    #[inline(never)]
+    fn depth<W: CounterWidth>(&self, bins: &Bins<W>, peak: Count) -> Depth {
         let excess = if W::BITS > 10 {
-            22u32.saturating_sub(peak.count.raw().leading_zeros())
+            22u32.saturating_sub(peak.raw().leading_zeros())
         } else {
             0
         };
-        let scaled = |count: u32| (count >> excess).min(1023).cast_signed();
-        let background = (background.to_bits() >> excess).min(1023 << 8);
-
-        let mut bins = [((background + 128) >> 8).cast_signed(); REACH as usize];
-        let first = peak.bin.raw().wrapping_sub(BEFORE);
-        let last = first.wrapping_add(REACH - 1);
-        if gate.contains(first) && gate.contains(last) {
-            let counts = histogram.counts().get(first.into()..=last.into());
-            for (bin, &count) in bins.iter_mut().zip(counts.unwrap_or_default()) {
-                *bin = scaled(count.into());
-            }
-        } else {
-            for (number, bin) in (0..).zip(&mut bins) {
-                let number = first.wrapping_add(number);
-                if gate.contains(number) {
-                    *bin = scaled(histogram.count(number.into()).unwrap_or(0));
-                }
-            }
-        }
-
-        let before = i32::from(self.before.to_bits());
-        let after = i32::from(self.after.to_bits());
-        let background = background.cast_signed();
-        let offset = if before == after {
-            even(&bins, before, background)
-        } else {
-            Skew::new(before, after).come_to_rest(&bins, background)
-        };
-
         let mut flags = Flags::NONE;
-        if peak.count.raw() >= W::MAX {
+        if peak.raw() >= W::MAX {
             flags |= Flags::SATURATED;
         }
-        let middle = (i32::from(peak.bin.raw()) << 8) + i32::from(offset);
-        let start = i32::from(gate.first()) << 8;
-        let end = i32::from(gate.last() + 1) << 8;
-        // The offset holds no more than two bins about the peak.
-        let [least, most] = OFFSETS;
-        let at_limit = offset <= least || offset >= most;
-        if middle - before < start || middle + after > end || at_limit {
-            flags |= Flags::CLIPPED;
-        }
-        Depth {
-            offset: SubBinOffset::new(offset).unwrap_or(SubBinOffset::CENTRE),
-            flags,
-        }
-    }
-}
-
-/// Moves a window as often as `steps`, each time by the step that `next` has for its place, from
-/// the start of the first bin it can reach. All it reaches lies within these bins, as offsets lie
-/// within two bins about the start of the peak bin.
-#[inline(always)]
-fn come_to_rest(steps: u32, next: impl Fn(i32) -> i16) -> i16 {
-    let [least, most] = OFFSETS;
-    let mut offset = SubBinOffset::CENTRE.raw();
-    for _ in 0..steps {
-        let step = next(i32::from(offset) + i32::from(BEFORE << 8));
-        if step == 0 {
-            break;
-        }
-        offset = (offset + step).clamp(least, most);
-    }
-    offset
-}
-
-/// Where a window of `half` the width comes to rest.
-#[inline(never)]
-fn even(bins: &[i32; REACH as usize], half: i32, background: i32) -> i16 {
-    // So much of the photons in the window is background.
-    let below = (half * background) >> 7;
-    come_to_rest(STEPS, |middle| {
-        Sums::of(bins, middle, middle - half, middle + half).step(below)
-    })
-}
-
-/// A window whose half widths differ.
-struct Skew {
-    before: i32,
-    after: i32,
-    /// What a photon before the place counts, and one after it, in 1/65536.
-    weights: [u32; 2],
-}
-
-/// The weight of a photon that counts as 1.
-const WHOLE: u32 = 1 << 16;
-
-impl Skew {
-    /// The narrower side counts whole, the other by the square of the half widths' ratio.
-    #[inline(always)]
-    fn new(before: i32, after: i32) -> Self {
-        // Below 1, so that its square is below 2³².
-        let [narrow, wide] = [before.min(after), before.max(after)].map(i32::cast_unsigned);
-        let ratio = (narrow << 16).checked_div(wide).unwrap_or(0);
-        let weight = ratio.wrapping_mul(ratio) >> 16;
-        Self {
-            before,
-            after,
-            weights: if before < after {
-                [WHOLE, weight]
-            } else {
-                [weight, WHOLE]
-            },
-        }
-    }
-
-    #[inline(never)]
-    fn come_to_rest(&self, bins: &[i32; REACH as usize], background: i32) -> i16 {
-        let [before, after] = self.weights;
-        let width = weighted(self.before, before) + weighted(self.after, after);
-        let below = (width * background) >> 8;
-        come_to_rest(SKEW_STEPS, |middle| {
-            let sides = [
-                (middle - self.before, middle, before),
-                (middle, middle + self.after, after),
-            ];
-            let mut all = Sums {
-                photons: 0,
-                moment: 0,
-            };
-            for (start, end, weight) in sides {
-                let side = Sums::of(bins, middle, start, end);
-                all.photons += weighted(side.photons, weight);
-                all.moment += weighted(side.moment, weight);
-            }
-            all.step(below)
-        })
-    }
-}
-
-#[inline(always)]
-#[allow(clippy::cast_possible_truncation, reason = "no more than it was")]
-fn weighted(amount: i32, weight: u32) -> i32 {
-    ((i64::from(amount) * i64::from(weight)) >> 16) as i32
-}
-
-/// The photons of a part of the histogram.
-struct Sums {
-    /// How many they are, in 1/256.
-    photons: i32,
-    /// The sum of their distances from a place, in 1/512 bin times that.
-    moment: i32,
-}
-
-impl Sums {
-    /// From `start` to `end`, with the distances from `middle`, all from the start of the first
-    /// of `bins` in 1/256 bin, and within them.
-    #[inline(always)]
-    fn of(bins: &[i32; REACH as usize], middle: i32, start: i32, end: i32) -> Self {
-        let first = (start >> 8).cast_unsigned() as usize;
-        let last = (end >> 8).cast_unsigned() as usize;
-        let part = |bin: usize, part: i32, twice_middle: i32| {
-            let photons = bins.get(bin).copied().unwrap_or(0) * part;
-            (photons, photons * (twice_middle - 2 * middle))
+        let here = self.weights.at_middle::<W>(bins, PEAK, excess);
+        let is_after = here > 0;
+        let edge = PEAK + usize::from(is_after);
+        let there = self.weights.at_start::<W>(bins, edge, excess);
+        let offset = if here == 0 {
+            middle_of(PEAK)
+        } else if has_crossed(here, there) {
+            middle_of(PEAK) + between(here, there)
+        } else {
+            self.farther::<W>(bins, edge, there, excess)
         };
-        let left = part(first, 256 - (start & 255), start + (start | 255) + 1);
-        let right = part(last, end & 255, end + (end & !255));
-
-        // In 1/512 bin.
-        let mut distance = ((start | 255) + 1 - middle) * 2 + 256;
-        let (mut photons, mut moment) = (0, 0);
-        for &count in bins.get(first + 1..last).unwrap_or_default() {
-            photons += count;
-            moment += count * distance;
-            distance += 512;
-        }
-        // Photons in 1/256: at most 8 bins of 10 bits. Their moment is at most 10 bits
-        // times 8 + 12 on one side, and on the other less.
-        Self {
-            photons: (photons << 8) + left.0 + right.0,
-            moment: (moment << 8) + left.1 + right.1,
-        }
+        let offset = match SubBinOffset::new(offset) {
+            Some(offset) if offset > SubBinOffset::MIN && offset < SubBinOffset::MAX => offset,
+            _ => {
+                flags |= Flags::CLIPPED;
+                if is_after {
+                    SubBinOffset::MAX
+                } else {
+                    SubBinOffset::MIN
+                }
+            }
+        };
+        Depth { offset, flags }
     }
 
-    /// How far the centroid lies from the place, in 1/256 bin; `below` of the photons, in
-    /// 1/256, are background.
-    #[inline(always)]
-    #[allow(clippy::cast_possible_truncation, reason = "at most 256")]
-    fn step(&self, below: i32) -> i16 {
-        let signal = (self.photons - below)
-            .max(self.photons >> 2)
-            .cast_unsigned();
-        let rounded = (self.moment.unsigned_abs() + signal).checked_div(2 * signal);
-        let step = rounded.unwrap_or(0).min(256) as i16;
-        if self.moment < 0 { -step } else { step }
+    /// Where they balance if that lies farther than the start of `edge`, with the moment `there`.
+    #[inline(never)]
+    fn farther<W: CounterWidth>(
+        &self,
+        bins: &Bins<W>,
+        mut edge: usize,
+        mut there: i32,
+        excess: u32,
+    ) -> i16 {
+        let is_after = there > 0;
+        while !ENDS.contains(&edge) {
+            let bin = if is_after { edge } else { edge - 1 };
+            let here = self.weights.at_middle::<W>(bins, bin, excess);
+            if has_crossed(there, here) {
+                return start_of(edge) + between(there, here);
+            }
+            edge = if is_after { edge + 1 } else { bin };
+            there = self.weights.at_start::<W>(bins, edge, excess);
+            if has_crossed(here, there) {
+                return middle_of(bin) + between(here, there);
+            }
+        }
+        start_of(edge)
     }
+}
+
+/// The bins about `peak` that a window can reach, if the gate has all of them.
+#[inline(always)]
+fn bins_within<'a, const BINS: usize, W: CounterWidth>(
+    histogram: &'a Histogram<BINS, W>,
+    gate: &RangeGate<BINS>,
+    peak: BinIndex,
+) -> Option<&'a Bins<W>> {
+    let first = peak.raw().wrapping_sub(BEFORE);
+    let last = first.wrapping_add(2 * BEFORE - 1);
+    if !(gate.contains(first) && gate.contains(last)) {
+        return None;
+    }
+    histogram.counts().get(usize::from(first)..)?.first_chunk()
+}
+
+/// Whether a moment is 0, or has not the sign of the one before.
+#[inline(always)]
+const fn has_crossed(before: i32, moment: i32) -> bool {
+    moment == 0 || (before ^ moment) < 0
+}
+
+/// Of one of the [`Bins`], in 1/256 bin from the start of the peak bin.
+#[inline(always)]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    reason = "up to 12 bins"
+)]
+const fn start_of(bin: usize) -> i16 {
+    (bin as i16 - PEAK as i16) * 256
+}
+
+#[inline(always)]
+const fn middle_of(bin: usize) -> i16 {
+    start_of(bin) + 128
+}
+
+/// How far the straight line between two moments half a bin apart, `here` and `there`, goes
+/// before it is 0, in 1/256 bin. The latter has the other sign or is 0.
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation, reason = "at most 128")]
+fn between(here: i32, there: i32) -> i16 {
+    // Moments are below 2²⁵, so that 32 bits hold 128 of them.
+    let (part, other) = (here.unsigned_abs(), there.unsigned_abs());
+    let whole = part + other;
+    let part = (128 * part + whole / 2).checked_div(whole).unwrap_or(0) as i16;
+    if here > 0 { part } else { -part }
 }

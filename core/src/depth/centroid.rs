@@ -81,7 +81,7 @@ pub fn centroid<const BINS: usize, W: CounterWidth>(
     let (left, centre, right) = (left >> excess, centre >> excess, right >> excess);
     let sum = left + centre + right;
     // At most 128 when `peak` is the highest bin.
-    let shift = share(right.abs_diff(left), sum) as i16;
+    let shift = share(right.abs_diff(left), sum).min(256) as i16;
     let shift = if right < left { -shift } else { shift };
     Depth {
         offset: SubBinOffset::new(SubBinOffset::CENTRE.raw() + shift)
@@ -102,7 +102,7 @@ const HAS_DIVISION: bool = cfg!(any(
 fn share(part: u32, whole: u32) -> u32 {
     if HAS_DIVISION {
         let share = ((part << 8) + whole / 2).checked_div(whole);
-        return share.unwrap_or(0).min(256);
+        return share.unwrap_or(0);
     }
     share_bit_by_bit(part, whole)
 }
@@ -125,5 +125,5 @@ const fn share_bit_by_bit(part: u32, whole: u32) -> u32 {
         }
         bit += 1;
     }
-    share + (2 * rest >= whole) as u32
+    if 2 * rest >= whole { share + 1 } else { share }
 }

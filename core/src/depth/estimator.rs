@@ -68,14 +68,7 @@ impl DepthEstimator {
         match self {
             Self::Centroid3 => centroid(histogram, gate, peak, background),
             Self::CentredWindow(window) => {
-                let mut left_out = 0;
-                if peeled.echoes() > 0 {
-                    let (first, last) = window.inside(gate, peak.bin.raw());
-                    left_out = peeled.bins_among(gate.first()..=gate.last())
-                        - peeled.bins_among(first..=last);
-                }
-                let outside = window.background_outside(histogram, gate, peak, left_out);
-                window.estimate(histogram, gate, peak, outside.unwrap_or(background))
+                window.estimate_without(histogram, gate, peak, background, peeled)
             }
         }
     }

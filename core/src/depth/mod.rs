@@ -5,6 +5,7 @@
 //! | `estimate` | what an estimator finds |
 //! | `centroid` | the paper's estimator, of three bins |
 //! | `centred_window` | a window that moves onto the pulse |
+//! | `window_weights` | what photons of each bin count for it |
 //! | `estimator` | the choice of one |
 //! | `range_scale` | from bins to millimetres |
 
@@ -13,6 +14,7 @@ mod centroid;
 mod estimate;
 mod estimator;
 mod range_scale;
+mod window_weights;
 
 pub use centred_window::CentredWindow;
 pub use centroid::centroid;

@@ -19,28 +19,26 @@ pub const PAPER: f64 = 90.68;
 /// With the average of all bins (`average; no event`).
 pub const AVERAGE: f64 = 32.0;
 /// With tracking (`look; tracking; no event`).
-pub const TRACKING: f64 = 404.45;
+pub const TRACKING: f64 = 405.45;
 /// Of a block (`look; block; no event`).
-pub const BLOCK_LOOK: f64 = 250.28;
+pub const BLOCK_LOOK: f64 = 247.28;
 /// An exposure that L2 ends (`look at L2`).
-pub const EXPIRY: f64 = 107.0;
+pub const EXPIRY: f64 = 108.0;
 /// Peak and depth of three bins of an event (`kept peak; event and depth`), and its word (`encode
 /// and to_le_bytes`).
-pub const EVENT: f64 = 517.0 + 49.0;
+pub const EVENT: f64 = 517.0 + 46.0;
 /// More of the depth from a centred window (`centred window, σ 1`, less `centroid`).
-pub const CENTRED: f64 = 728.13 - 68.0;
-/// The same of one with two half widths (`centred window, 1.75 before and 4 after`).
-pub const SKEW: f64 = 1039.84 - 68.0;
+pub const CENTRED: f64 = 135.84 - 68.0;
 
 /// With a window of so many bins (`window of N; no event`).
 #[must_use]
 pub const fn window(bins: u8) -> f64 {
     match bins {
         0 | 1 => 110.88,
-        2 => 136.72,
-        3 => 143.75,
-        4 | 5 => 202.70,
-        _ => 224.80,
+        2 => 134.78,
+        3 => 141.81,
+        4 | 5 => 197.88,
+        _ => 219.97,
     }
 }
 
@@ -84,8 +82,7 @@ pub fn instructions(
     };
     let depth = match settings.estimator() {
         DepthEstimator::Centroid3 => 0.0,
-        DepthEstimator::CentredWindow(window) if window.before() == window.after() => CENTRED,
-        DepthEstimator::CentredWindow(_) => SKEW,
+        DepthEstimator::CentredWindow(_) => CENTRED,
     };
     let events = pixels.events + blocks.events;
     let sum = PHOTON * pixels.photons() as f64

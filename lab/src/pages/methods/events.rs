@@ -49,24 +49,16 @@ pub(super) fn section(values: &mut Values, part: &Part) -> Result<()> {
     values.set("false.least", format!("{:.1}", 100.0 * least));
     values.set("false.most", format!("{:.1}", 100.0 * most));
     let mut compared = String::new();
-    for (rule, is_paper, background, number) in [
-        ("the paper's rule", true, "its own", 1),
-        ("window rule", false, "its own", 1),
-        ("the paper's rule", true, "the rule's", 2),
-    ] {
+    for (rule, is_paper) in [("the paper's rule", true), ("window rule", false)] {
         let those = of(&outcomes, is_paper);
-        let (low, high) = range(those.clone(), number);
-        let (least, most) = over_bound(those.clone(), number);
-        write!(
+        let (low, high) = range(those.clone(), 1);
+        let (least, most) = over_bound(those.clone(), 1);
+        let [surely, worse] = [1, 0].map(|number| better(those.clone(), number));
+        let count = those.count();
+        writeln!(
             compared,
-            "| {rule} | {background} | {low:.2} to {high:.2} | {least:.2} to {most:.2} |"
+            "| {rule} | {low:.2} to {high:.2} | {least:.2} to {most:.2} | {surely} of {count} | {worse} |"
         )?;
-        if number == 1 {
-            let [surely, worse] = [1, 0].map(|number| better(those.clone(), number));
-            writeln!(compared, " {surely} of {} | {worse} |", those.count())?;
-        } else {
-            compared.push_str(" | |\n");
-        }
     }
     values.set("compared", compared);
     let mut tables = String::new();
@@ -86,11 +78,11 @@ fn table<'a>(
     write!(
         text,
         "\nFirst look after {first_look} laser cycles; root mean square errors in bins:\n\n\
-         | pulse σ, bins | background a bin and cycle | rule | α or z | false alarms, % | exposures with an event, % | cycles | photons | centroid of 3 | over the bound | centred window | over the bound | better | centred, the rule's background |\n\
-         |---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n"
+         | pulse σ, bins | background a bin and cycle | rule | α or z | false alarms, % | exposures with an event, % | cycles | photons | centroid of 3 | over the bound | centred window | over the bound | better |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|---|---|\n"
     )?;
     for outcome in outcomes {
-        let [mass, centred, rules] = outcome.placed;
+        let [mass, centred] = outcome.placed;
         let better = outcome.better().map(|number| ESTIMATORS.get(number));
         let better = match better {
             None => "either",
@@ -98,7 +90,7 @@ fn table<'a>(
         };
         writeln!(
             text,
-            "| {} | {} | {} | {:.2} | {:.1} | {:.0} | {:.0} | {:.0} | {} | {:.2} | {} | {:.2} | {better} | {:.3} |",
+            "| {} | {} | {} | {:.2} | {:.1} | {:.0} | {:.0} | {:.0} | {} | {:.2} | {} | {:.2} | {better} |",
             outcome.sigma,
             outcome.background,
             outcome.method.label(),
@@ -110,8 +102,7 @@ fn table<'a>(
             mass.error.text(3),
             mass.over_bound.value,
             centred.error.text(3),
-            centred.over_bound.value,
-            rules.error.value
+            centred.over_bound.value
         )?;
     }
     Ok(())

@@ -35,7 +35,7 @@ const EXPOSURES: u64 = 50;
 pub const STUDY: Study = Study {
     name: "echoes",
     about: "two surfaces of one pixel: both echoes over their distance and ratio",
-    revision: 1,
+    revision: 2,
     few_seeds: 2,
     all_seeds: 40,
     points,

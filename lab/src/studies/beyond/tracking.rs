@@ -37,7 +37,7 @@ const ASKED: (f64, f64) = (0.145, 0.05);
 pub const STUDY: Study = Study {
     name: "tracking",
     about: "laser cycles an event with tracking and without: steady, drifting, jumping, vanishing targets",
-    revision: 1,
+    revision: 2,
     few_seeds: 2,
     all_seeds: 60,
     points,

@@ -33,7 +33,7 @@ const POSITIONS: u32 = 64;
 pub const STUDY: Study = Study {
     name: "depth-error",
     about: "depth error against the Cramér-Rao bound, by pulse, signal and background",
-    revision: 3,
+    revision: 4,
     few_seeds: 30,
     all_seeds: 300,
     points,

@@ -17,7 +17,7 @@ use dtof::rows::grouped;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{DepthEstimator, WindowRule};
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
-use dtof_draw::palette::{CENTRED, PAPER, REFERENCE};
+use dtof_draw::palette::{CENTRED, PAPER};
 use dtof_theory::rates::Rates;
 use rand_core::Rng;
 use rand_pcg::Pcg64;
@@ -30,13 +30,9 @@ pub use crate::studies::methods::time_to_detect::{BACKGROUNDS, SIGMAS};
 /// The first looks, in laser cycles: when there may be few photons, and when most pulses
 /// have photons to spare. L1 is one less.
 pub const FIRST_LOOKS: [u32; 2] = [40, 400];
-/// The estimators, as tallies, tables and figures call them. The first two are a pixel's; the
-/// third, which none has, tells what the window has a background of its own for.
-pub const ESTIMATORS: [(&str, &str); 3] = [
-    ("mass3", "centroid of 3"),
-    ("centred", "centred window"),
-    ("centred-rules", "centred window, the rule's background"),
-];
+/// The estimators, as tallies, tables and figures call them.
+pub const ESTIMATORS: [(&str, &str); 2] =
+    [("mass3", "centroid of 3"), ("centred", "centred window")];
 /// Exposures of a trial, the pulse in as many places, evenly over a bin.
 const EXPOSURES: u32 = 64;
 
@@ -44,7 +40,7 @@ const EXPOSURES: u32 = 64;
 pub const STUDY: Study = Study {
     name: "event-depth",
     about: "depth error of the events of a rule as they come, by pulse, background and estimator",
-    revision: 2,
+    revision: 3,
     few_seeds: 30,
     all_seeds: 300,
     points,
@@ -52,7 +48,7 @@ pub const STUDY: Study = Study {
     results,
 };
 
-/// The estimators that a pixel may have, of [`ESTIMATORS`], for a pulse of `sigma` bins.
+/// [`ESTIMATORS`] for a pulse of `sigma` bins.
 fn estimators(sigma: f64) -> [DepthEstimator; 2] {
     let centred = DepthEstimator::for_pulse(U8F8::saturating_from_num(sigma));
     [DepthEstimator::Centroid3, centred]
@@ -120,7 +116,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
                 add_error(&mut tally, &format!("{name} {estimator}"), error);
             }
             // On the same event: surer than the two apart.
-            let [mass, centred, _] = errors.map(|error| error * error);
+            let [mass, centred] = errors.map(|error| error * error);
             add_value(&mut tally, &format!("{name} excess"), centred - mass);
         }
     }
@@ -140,7 +136,7 @@ fn results(part: &Part) -> Result<Results> {
 
 /// A panel for each rule and pulse, from the earlier first look.
 fn chart(outcomes: &[Outcome]) -> Chart {
-    let pens = [PAPER, CENTRED, REFERENCE];
+    let pens = [PAPER, CENTRED];
     let early = || {
         let outcomes = outcomes.iter();
         outcomes.filter(|outcome| outcome.first_look == FIRST_LOOKS[0])
@@ -151,19 +147,13 @@ fn chart(outcomes: &[Outcome]) -> Chart {
             let is_here = |outcome: &&Outcome| {
                 (outcome.method == Method::Paper) == is_paper && outcome.sigma == sigma
             };
-            // A window rule's background is a mean as well.
-            let count = if is_paper { 3 } else { 2 };
-            let series = pens
-                .into_iter()
-                .enumerate()
-                .take(count)
-                .map(|(number, pen)| {
-                    let dots = early().filter(is_here).map(|outcome| {
-                        let error = outcome.placed[number].error;
-                        error.at(outcome.background)
-                    });
-                    Series::unnamed(pen, Style::JoinedDots, dots.collect())
+            let series = pens.into_iter().enumerate().map(|(number, pen)| {
+                let dots = early().filter(is_here).map(|outcome| {
+                    let error = outcome.placed[number].error;
+                    error.at(outcome.background)
                 });
+                Series::unnamed(pen, Style::JoinedDots, dots.collect())
+            });
             panels.push(Panel {
                 title: format!("{rule}, σ {sigma}"),
                 series: series.collect(),
@@ -180,9 +170,10 @@ fn chart(outcomes: &[Outcome]) -> Chart {
     let better = of_paper().filter(|outcome| outcome.better() == Some(1));
     let worse = of_paper().any(|outcome| outcome.better() == Some(0));
     Chart {
-        finding: "With the paper's rule, a centred window places events better than the centroid".to_owned(), holds: 2 * better.count() > of_paper().count() && !worse,
-        note: "Bars hold 99 %. No pixel's window has the rule's background: it tells what its own is for."
+        finding: "With the paper's rule, a centred window places events better than the centroid"
             .to_owned(),
+        holds: 2 * better.count() > of_paper().count() && !worse,
+        note: "Bars hold 99 %.".to_owned(),
         x: Axis::logarithmic("background photons a bin and laser cycle"),
         y: Axis::linear("root mean square depth error of events, bins"),
         key: key.collect(),
@@ -218,8 +209,8 @@ fn csv(outcomes: &[Outcome]) -> Result<String> {
                 placed.over_bound.value,
                 match better {
                     Some(better) if better == index => "yes",
-                    Some(_) if index < 2 => "no",
-                    _ => "",
+                    Some(_) => "no",
+                    None => "",
                 }
             )?;
         }

@@ -47,7 +47,7 @@ pub struct Outcome {
     /// Mean photons of the pulse.
     pub signal: f64,
     /// As [`ESTIMATORS`].
-    pub placed: [Placed; 3],
+    pub placed: [Placed; 2],
     /// Mean square error of the second estimator less that of the first, event by event,
     /// in bins².
     pub excess: Measured,
@@ -169,7 +169,7 @@ mod tests {
         assert!((outcome.event_share.value - 0.4).abs() < 1e-12);
         assert!((outcome.in_pulse.value - 0.9).abs() < 1e-12);
         assert_eq!((outcome.cycles, outcome.signal), (200.0, 60.0));
-        let [mass, centred, _] = outcome.placed;
+        let [mass, centred] = outcome.placed;
         let value = |of: f64, expected: f64| assert!((of - expected).abs() < 1e-9, "{of}");
         value(mass.error.value, 0.5);
         value(mass.bias.value, 0.0);

@@ -1,9 +1,7 @@
 //! Pixels that watch the same photons until each has had its event.
 
 use anyhow::{Context, Result};
-use dtof_core::{
-    AnyRule, BinPosition, DepthEstimator, DetectionRule, Histogram, RangeGate, detect, z_for,
-};
+use dtof_core::{AnyRule, DepthEstimator, Histogram, RangeGate, detect, z_for};
 use rand_pcg::Pcg64;
 
 use super::{BACKGROUNDS, FIRST_LOOKS};
@@ -76,7 +74,7 @@ pub struct Event {
     pub peak: u16,
     /// Where the pulse lies, in 1/256 bin from the start of bin 0, by each estimator of
     /// [`ESTIMATORS`](super::ESTIMATORS).
-    pub positions: [i32; 3],
+    pub positions: [i32; 2],
 }
 
 /// One exposure of the same photons for all `pixels`, with the events of those that have
@@ -128,25 +126,11 @@ pub fn exposure(
             let [Some(mass), Some(centred)] = estimators.each_ref().map(detect) else {
                 continue;
             };
-            let with_rules = match (
-                estimators[1],
-                pixel.rule.detect(&histogram, &gate, mass.peak),
-            ) {
-                (DepthEstimator::CentredWindow(window), Some(background)) => {
-                    window.estimate(&histogram, &gate, mass.peak, background)
-                }
-                _ => centred.depth,
-            };
-            let position = |offset| BinPosition::of(mass.peak.bin, offset).raw();
             *event = Some(Event {
                 cycles,
                 signal,
                 peak: mass.peak.bin.raw(),
-                positions: [
-                    position(mass.depth.offset),
-                    position(centred.depth.offset),
-                    position(with_rules.offset),
-                ],
+                positions: [mass, centred].map(|found| found.position().raw()),
             });
         }
         events.iter().all(Option::is_some)

@@ -32,8 +32,15 @@
 //! # Ok::<(), AerError>(())
 //! ```
 
+mod field;
+
 use core::fmt;
 
+use self::field::{
+    BACKGROUND_HIGH, BACKGROUND_LOW, CHANGE_FLAGS, CONTROL, CONTROL_END, CONTROL_TIME, CYCLE_LOW,
+    ECHO, EXPOSURE, FLAGS, KIND, KIND_CONTROL, KIND_DEPTH_EVENT, KIND_DYNAMIC_DEPTH, LEVEL, OFFSET,
+    PEAK_BIN, PEAK_COUNT, PIXEL,
+};
 use crate::event::DepthEvent;
 use crate::events::DynamicDepthEvent;
 use crate::flags::Flags;
@@ -43,68 +50,6 @@ use crate::units::{
 
 /// The version of the word layout, which file headers and links announce.
 pub const AER_VERSION: u16 = 3;
-
-/// A bit field of one of the four parts of a word.
-#[derive(Clone, Copy)]
-struct Field {
-    shift: u32,
-    bits: u32,
-}
-
-const fn field(shift: u32, bits: u32) -> Field {
-    Field { shift, bits }
-}
-
-impl Field {
-    const fn mask(self) -> u32 {
-        u32::MAX >> (u32::BITS - self.bits)
-    }
-
-    /// Of a value that fits.
-    const fn put(self, value: u32) -> u32 {
-        debug_assert!(value <= self.mask());
-        value << self.shift
-    }
-
-    /// The lowest bits of a value that may not fit.
-    const fn put_low(self, value: u32) -> u32 {
-        (value & self.mask()) << self.shift
-    }
-
-    const fn get(self, part: u32) -> u32 {
-        (part >> self.shift) & self.mask()
-    }
-}
-
-// The second part of every word.
-const KIND: Field = field(30, 2);
-// The first part of an event.
-const PIXEL: Field = field(0, 16);
-const EXPOSURE: Field = field(16, 16);
-// The second.
-const CYCLE_LOW: Field = field(0, 16);
-const LEVEL: Field = field(16, 2);
-/// The number of the echo, less 1.
-const ECHO: Field = field(18, 2);
-const PEAK_BIN: Field = field(20, 10);
-// The third, and the fourth.
-const PEAK_COUNT: Field = field(0, 24);
-/// The low bits of the background, and the others in the fourth part.
-const BACKGROUND_LOW: Field = field(24, 8);
-const BACKGROUND_HIGH: Field = field(0, 16);
-const OFFSET: Field = field(16, 10);
-const FLAGS: Field = field(26, 6);
-// The second part of a dynamic depth event; its pixel, cycle and level are where those of a
-// depth event are. The third is the position, the fourth the change.
-const CHANGE_FLAGS: Field = field(20, 6);
-// The second part of a control word. The first of the last word is the checksum.
-const CONTROL: Field = field(20, 10);
-
-const KIND_CONTROL: u32 = 0;
-const KIND_DEPTH_EVENT: u32 = 1;
-const KIND_DYNAMIC_DEPTH: u32 = 2;
-const CONTROL_TIME: u32 = 1;
-const CONTROL_END: u32 = 2;
 
 /// One packed word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
