@@ -46,7 +46,7 @@
 #define DTOF_ESTIMATOR_CENTRED_WINDOW 1
 
 // Bytes of a dtof_checked_config_t.
-#define DTOF_CHECKED_CONFIG_SIZE 64
+#define DTOF_CHECKED_CONFIG_SIZE 136
 
 // The same in words of 64 bits.
 #define DTOF_CHECKED_CONFIG_WORDS (DTOF_CHECKED_CONFIG_SIZE / 8)

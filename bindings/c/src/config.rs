@@ -76,7 +76,7 @@ pub struct dtof_config_t {
 }
 
 /// Bytes of a dtof_checked_config_t.
-pub const DTOF_CHECKED_CONFIG_SIZE: usize = 64;
+pub const DTOF_CHECKED_CONFIG_SIZE: usize = 136;
 /// The same in words of 64 bits.
 pub const DTOF_CHECKED_CONFIG_WORDS: usize = DTOF_CHECKED_CONFIG_SIZE / 8;
 /// Its alignment.
