@@ -16,10 +16,10 @@ use crate::{succeed, target_folder};
 pub fn environment(root: &Path, requirements: &str) -> Result<PathBuf> {
     let file = root.join(requirements);
     let wanted = fs::read(&file).with_context(|| requirements.to_owned())?;
-    let folder = Path::new(requirements).parent();
-    let folder = target_folder(root)
-        .join("python")
-        .join(folder.context("no file")?);
+    let folder = Path::new(requirements).parent().context("no file")?;
+    // Beside each other, for what is made anew is cleared.
+    let name = folder.display().to_string().replace('/', "-");
+    let folder = target_folder(root).join("python").join(name);
     let python = folder.join("bin/python");
     // Written last: a folder with it is complete.
     let installed = folder.join("requirements.txt");

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use crate::memory::Memory;
-use crate::sustained::Sustained;
 use crate::table::{COLD, Row};
+use crate::trials::sustained::Sustained;
 
 /// The page but for its tables, each of which stands where its name is in braces.
 const PAGE: &str = include_str!("../page.md");

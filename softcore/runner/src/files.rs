@@ -10,8 +10,8 @@ use crate::document;
 use crate::line::Column::{self, Percent, Told};
 use crate::line::Line;
 use crate::memory::Memory;
-use crate::sustained::Sustained;
 use crate::table::Row;
+use crate::trials::sustained::Sustained;
 
 pub const DOCUMENT: &str = "docs/results/bench/softcore.md";
 

@@ -1,17 +1,13 @@
 //! `cargo softcore`: the core on RV32 processors, in QEMU and on the processors'
 //! own Verilog in simulation, cycle by cycle.
 
-mod counted;
 mod document;
-mod events;
 mod files;
 mod image;
 mod line;
 mod memory;
-mod photons;
 mod program;
 mod rtl;
-mod sustained;
 mod table;
 mod trials;
 mod virt;

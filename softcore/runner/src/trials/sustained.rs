@@ -1,8 +1,8 @@
 //! A rate that a processor sustains, as the file has it.
 
+use super::photons::UNIT;
 use crate::line::Column::{self, Name, Percent, Told};
 use crate::line::Line;
-use crate::photons::UNIT;
 
 /// The results of a run at one rate.
 #[derive(Clone, Debug, PartialEq)]

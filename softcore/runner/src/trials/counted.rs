@@ -3,8 +3,8 @@
 use anyhow::{Context, Result, ensure};
 use dtof_softcore::stream::FEW;
 
-use crate::events;
-use crate::photons::Photon;
+use super::events;
+use super::photons::Photon;
 use crate::program::Ran;
 
 /// The report of the testbench and the program on a run.

@@ -1,18 +1,23 @@
 //! Photons into the FIFO at the paper's setting: the highest rate a processor sustains,
 //! and what comes of lower ones.
 
+mod counted;
+mod events;
+mod photons;
+pub mod sustained;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::counted::Counted;
 use crate::memory::MACROPIXELS;
-use crate::photons::{PER_PHOTON, Photon, Photons, photons};
 use crate::rtl::{Laser, Simulator};
-use crate::sustained::Sustained;
 use crate::table::Row;
+use counted::Counted;
+use photons::{PER_PHOTON, Photon, Photons, photons};
+use sustained::Sustained;
 
 /// Photons of a run at the highest rate, about, or as many as come in so many laser cycles. At
 /// other rates a run has as many laser cycles.

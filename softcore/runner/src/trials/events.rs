@@ -10,7 +10,7 @@ use dtof_core::{
 };
 use dtof_softcore::stream::{self, BINS, Mark};
 
-use crate::photons::Photon;
+use super::photons::Photon;
 
 /// The events of the words over the link.
 ///
