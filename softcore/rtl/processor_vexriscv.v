@@ -36,11 +36,12 @@ module processor (
     wire [2:0] fetch_type, data_type;
     wire [3:0] data_bytes;
 
-    // While one word of a burst is answered the next is asked for.
+    // While one word of a burst is answered the next is asked for. It lies in the same line
+    // of eight words.
     assign fetch_valid = fetch_stb && (!fetch_ready || fetch_type == BURST);
-    assign fetch_address = {fetch_word + {29'd0, fetch_ready}, 2'b00};
+    assign fetch_address = {fetch_word[29:3], fetch_word[2:0] + {2'd0, fetch_ready}, 2'b00};
     assign data_valid = data_stb && (!data_ready || data_type == BURST);
-    assign data_address = {data_word + {29'd0, data_ready}, 2'b00};
+    assign data_address = {data_word[29:3], data_word[2:0] + {2'd0, data_ready}, 2'b00};
     assign data_strobe = data_we ? data_bytes : 4'h0;
 
     VexRiscv cpu (
