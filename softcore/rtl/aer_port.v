@@ -7,7 +7,7 @@
 //   aer_ack    rises when the receiver has taken the half word, falls after REQ has
 //
 // ACK may come at any time: two flip-flops take it over. A receiver that answers at once
-// gets a half word every seven clocks. One that never answers stops the port, and words wait.
+// gets a half word every six clocks. One that never answers stops the port, and words wait.
 module aer_port (
     input             clk,
     input             reset,

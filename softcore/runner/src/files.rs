@@ -61,24 +61,14 @@ impl Files {
         for (expected, measured) in expected.memory.iter_mut().zip(&measured.memory) {
             expected.stack = expected.stack.filter(|_| measured.stack.is_some());
         }
-        let mut differences = Vec::new();
         let texts = expected.texts().into_iter().zip(measured.texts());
         let columns = [Row::COLUMNS, Sustained::COLUMNS, Memory::COLUMNS];
-        for (((_, expected), (_, measured)), columns) in texts.zip(columns) {
-            let (mut expected, mut measured) = (expected.lines(), measured.lines());
-            loop {
-                match (expected.next(), measured.next()) {
-                    (None, None) => break,
-                    (Some(expected), Some(measured)) if is_near(expected, measured, columns) => {}
-                    (expected, measured) => differences.push(format!(
-                        "- {}\n+ {}",
-                        expected.unwrap_or_default(),
-                        measured.unwrap_or_default()
-                    )),
-                }
-            }
-        }
-        differences
+        texts
+            .zip(columns)
+            .flat_map(|(((_, expected), (_, measured)), columns)| {
+                differences(&expected, &measured, columns)
+            })
+            .collect()
     }
 
     /// Compares `measured` with the files.
@@ -100,14 +90,31 @@ impl Files {
     }
 }
 
+/// Lines of two texts that differ.
+pub fn differences(expected: &str, measured: &str, columns: &[Column]) -> Vec<String> {
+    let mut differences = Vec::new();
+    let (mut expected, mut measured) = (expected.lines(), measured.lines());
+    loop {
+        match (expected.next(), measured.next()) {
+            (None, None) => return differences,
+            (Some(expected), Some(measured)) if is_near(expected, measured, columns) => {}
+            (expected, measured) => differences.push(format!(
+                "- {}\n+ {}",
+                expected.unwrap_or_default(),
+                measured.unwrap_or_default()
+            )),
+        }
+    }
+}
+
 /// A file and its text.
-fn text<L: Line>(lines: &[L]) -> (&'static str, String) {
+pub fn text<L: Line>(lines: &[L]) -> (&'static str, String) {
     let lines = iter::once(L::HEADER.to_owned()).chain(lines.iter().map(L::csv));
     (L::FILE, lines.map(|line| line + "\n").collect())
 }
 
 /// The lines of a file but for its header.
-fn lines<L: Line>(root: &Path) -> Result<Vec<L>> {
+pub fn lines<L: Line>(root: &Path) -> Result<Vec<L>> {
     let (file, header) = (L::FILE, L::HEADER);
     let text = fs::read_to_string(root.join(file)).context(file)?;
     let mut lines = text.lines();

@@ -6,6 +6,7 @@ mod files;
 mod image;
 mod line;
 mod memory;
+mod place;
 mod program;
 mod rtl;
 mod table;
@@ -30,6 +31,7 @@ use trials::{Cycles, Trials};
 
 const HELP: &str = "\
 cargo softcore [--qemu-only] [--core NAME]... [--check]
+cargo softcore place [--size N] [--check]
 
 Runs the core on RV32 processors: golden vectors in QEMU, and golden vectors, cycles and
 photon rates on the Verilog of VexRiscv, Ibex, PicoRV32 and SERV. If all of them run, it
@@ -38,7 +40,9 @@ writes docs/results/bench/softcore*.csv and softcore.md.
   --qemu-only   run QEMU only: no cycles, no Verilator
   --core NAME   run this processor only; may be repeated:
                 vexriscv, ibex, picorv32, picorv32-rv32i or serv
-  --check       compare with the files instead of writing them";
+  --check       compare with the files instead of writing them
+
+`place` is cells and clock on an FPGA: cargo softcore place --help";
 
 /// The lines that every program has to print.
 const EXPECTED: &str = "firmware/self-test.out";
@@ -74,13 +78,12 @@ fn last_words(core: &str, program: &str) -> &'static str {
 const ILLEGAL: &str = "trap: illegal instruction";
 
 fn main() -> ExitCode {
-    let done = Options::parse(lexopt::Parser::from_env()).and_then(|options| match options {
-        Some(options) => run(&options),
-        None => {
-            println!("{HELP}");
-            Ok(())
-        }
-    });
+    let mut arguments = env::args_os().skip(1).peekable();
+    let done = if arguments.next_if(|first| first == "place").is_some() {
+        place::run(lexopt::Parser::from_args(arguments))
+    } else {
+        measure(lexopt::Parser::from_args(arguments))
+    };
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -88,6 +91,15 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// The command without a word.
+fn measure(parser: lexopt::Parser) -> Result<()> {
+    if let Some(options) = Options::parse(parser)? {
+        return run(&options);
+    }
+    println!("{HELP}");
+    Ok(())
 }
 
 /// The options of the command line.

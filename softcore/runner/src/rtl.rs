@@ -51,14 +51,8 @@ pub struct Simulator(PathBuf);
 impl Simulator {
     /// Builds it, from the package index first if need be.
     pub fn build(root: &Path, core: Core) -> Result<Self> {
-        let python = python(root)?;
-        let package = core.package();
-        let ask = format!("import {package}; print({package}.data_location)");
-        let mut ask_python = Command::new(python);
-        let ran = program::run(ask_python.args(["-c", &ask]), PATIENCE, None)?;
-        ensure!(ran.code == Some(0), "{package}: {}", ran.said());
-
-        verilate(root, core.name, ran.output.trim()).map(Self)
+        let data = package_folder(root, &core.package())?;
+        verilate(root, core.name, core.name, &data, &[]).map(Self)
     }
 
     /// Runs an image for so many cycles at most.
@@ -92,14 +86,20 @@ pub struct Laser<'a> {
     pub wait: u64,
 }
 
+/// Builds and runs the simulation of a module that is compared with a model there.
+pub fn check(root: &Path, name: &str) -> Result<()> {
+    let test = verilate(root, name, name, Path::new(""), &[])?;
+    let ran = program::run(&mut Command::new(test), PATIENCE, None)?;
+    ensure!(ran.code == Some(0), ran.said());
+    print!("{}", ran.output);
+    Ok(())
+}
+
 /// Whether the FIFO does with random words what a model of it does, and its memory is
 /// block RAM and nothing else: of an iCE40, whose blocks have 4096 bits, that is four for
 /// its 512 words of 32.
 pub fn check_fifo(root: &Path) -> Result<()> {
-    let test = verilate(root, "photon_fifo", "")?;
-    let ran = program::run(&mut Command::new(test), PATIENCE, None)?;
-    ensure!(ran.code == Some(0), ran.said());
-    print!("{}", ran.output);
+    check(root, "photon_fifo")?;
 
     let mut yosys = Command::new("yosys");
     yosys.current_dir(root.join("softcore/rtl"));
@@ -126,22 +126,38 @@ pub fn check_fifo(root: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A Python that has the processors' packages.
-fn python(root: &Path) -> Result<PathBuf> {
+/// The folder of a processor's Verilog, from the package index first if need be.
+pub fn package_folder(root: &Path, package: &str) -> Result<PathBuf> {
+    let python = python(root, "softcore/requirements.txt")?;
+    let ask = format!("import {package}; print({package}.data_location)");
+    let mut ask_python = Command::new(python);
+    let ran = program::run(ask_python.args(["-c", &ask]), PATIENCE, None)?;
+    ensure!(ran.code == Some(0), "{package}: {}", ran.said());
+    Ok(ran.output.trim().into())
+}
+
+/// A Python that has the packages of a file.
+pub fn python(root: &Path, requirements: &str) -> Result<PathBuf> {
     let mut xtask = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    xtask.args(["--locked", "xtask", "python", "softcore/requirements.txt"]);
+    xtask.args(["--locked", "xtask", "python", requirements]);
     let output = xtask.current_dir(root).stderr(Stdio::inherit()).output();
     let output = output.context("cargo does not start")?;
     ensure!(
         output.status.success(),
-        "the packages of the processors are missing, see above"
+        "the packages of {requirements} are missing, see above"
     );
     Ok(String::from_utf8(output.stdout)?.trim().into())
 }
 
-/// Builds the simulation that `softcore/sim/NAME.f` lists, with `data` the processor's
-/// files, and says where it is.
-fn verilate(root: &Path, name: &str, data: &str) -> Result<PathBuf> {
+/// Builds the simulation that `softcore/sim/LIST.f` lists in a folder `name`, with `data` the
+/// processor's files, and says where it is.
+pub fn verilate(
+    root: &Path,
+    list: &str,
+    name: &str,
+    data: &Path,
+    options: &[&str],
+) -> Result<PathBuf> {
     let folder = target_folder(root).join("softcore").join(name);
     fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let softcore = root.join("softcore");
@@ -153,7 +169,8 @@ fn verilate(root: &Path, name: &str, data: &str) -> Result<PathBuf> {
         .env_remove("MAKEFLAGS")
         .env_remove("MAKELEVEL")
         .arg("-f")
-        .arg(softcore.join("sim").join(format!("{name}.f")))
+        .arg(softcore.join("sim").join(format!("{list}.f")))
+        .args(options)
         .arg("--Mdir")
         .arg(&folder);
     let ran = program::run(&mut verilator, PATIENCE, None)?;
