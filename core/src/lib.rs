@@ -78,6 +78,7 @@ mod events;
 mod flags;
 mod histogram;
 mod pixel;
+mod pixel_processor;
 mod statistics;
 mod units;
 
@@ -108,6 +109,7 @@ pub use histogram::gate::{GateError, RangeGate};
 pub use histogram::peeled::PeeledBins;
 pub use histogram::{Histogram, Peak};
 pub use pixel::{AsyncPixel, Decided, Look};
+pub use pixel_processor::{ProcessorError, ProcessorEvent, ProcessorSettings};
 pub use statistics::Statistics;
 pub use units::{
     BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,

@@ -23,7 +23,10 @@ module system #(
     output        aer_first,
     input         aer_ack,          // at any time
 
-    // For simulation, see computer.v.
+    // For simulation, see pixel_processor.v and computer.v.
+    output        look_begins,
+    output        event_leaves,
+    output [5:0]  event_pixel,
     output        print_valid,
     output        mark_valid,
     output        exit_valid,
@@ -87,6 +90,9 @@ module system #(
         .word_valid(word_valid),
         .word(word),
         .word_taken(port_taken && !event_valid),
+        .look_begins(look_begins),
+        .event_leaves(event_leaves),
+        .event_pixel(event_pixel),
         .wb_cyc(wb_cyc),
         .wb_stb(wb_stb),
         .wb_we(wb_we),

@@ -15,6 +15,7 @@ pub mod cache;
 pub mod golden;
 #[cfg_attr(feature = "virt", path = "io_virt.rs")]
 pub mod io;
+pub mod pixels;
 #[cfg(target_arch = "riscv32")]
 #[allow(unsafe_code, reason = "nothing is there yet that could be safe")]
 mod start;

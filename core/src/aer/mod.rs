@@ -198,7 +198,7 @@ impl AerEncoder {
 
     /// The time word that is due before an event of this laser cycle.
     #[inline]
-    const fn time(&mut self, cycle: LaserCycle) -> Option<AerWord> {
+    pub(crate) const fn time(&mut self, cycle: LaserCycle) -> Option<AerWord> {
         let high = cycle.0 >> CYCLE_LOW.bits;
         let time = match self.cycle_high {
             Some(sent) if sent == high => None,

@@ -79,15 +79,20 @@ pub fn centroid<const BINS: usize, W: CounterWidth>(
         0
     };
     let (left, centre, right) = (left >> excess, centre >> excess, right >> excess);
+    Depth {
+        offset: offset_of(left, centre, right),
+        flags,
+    }
+}
+
+/// Where the pulse lies, of counts above the background, in the same unit each.
+#[inline(always)]
+pub(crate) fn offset_of(left: u32, centre: u32, right: u32) -> SubBinOffset {
     let sum = left + centre + right;
     // At most 128 when `peak` is the highest bin.
     let shift = share(right.abs_diff(left), sum).min(256) as i16;
     let shift = if right < left { -shift } else { shift };
-    Depth {
-        offset: SubBinOffset::new(SubBinOffset::CENTRE.raw() + shift)
-            .unwrap_or(SubBinOffset::CENTRE),
-        flags,
-    }
+    SubBinOffset::new(SubBinOffset::CENTRE.raw() + shift).unwrap_or(SubBinOffset::CENTRE)
 }
 
 /// Whether the processor divides: all but the smallest do.

@@ -18,6 +18,7 @@ mod window_weights;
 
 pub use centred_window::CentredWindow;
 pub use centroid::centroid;
+pub(crate) use centroid::offset_of;
 pub use estimate::Depth;
 pub use estimator::DepthEstimator;
 pub use range_scale::{RangeScale, RangeScaleError};

@@ -15,12 +15,14 @@ use crate::target_folder;
 const PROFILE: &str = "firmware";
 
 /// Every program.
-const PROGRAMS: [&str; 8] = [
+const PROGRAMS: [&str; 10] = [
     "self-test",
     "bench",
     "stream-1",
     "stream-4",
     "stream-64",
+    "pixels-hardware",
+    "pixels-program",
     "wrong-vector",
     "illegal-instruction",
     "endless-loop",

@@ -6,6 +6,7 @@ mod files;
 mod image;
 mod line;
 mod memory;
+mod pixels;
 mod place;
 mod program;
 mod rtl;
@@ -32,6 +33,7 @@ use trials::{Cycles, Trials};
 const HELP: &str = "\
 cargo softcore [--qemu-only] [--core NAME]... [--check]
 cargo softcore place [--size N] [--check]
+cargo softcore pixels [--photons N] [--check]
 
 Runs the core on RV32 processors: golden vectors in QEMU, and golden vectors, cycles and
 photon rates on the Verilog of VexRiscv, Ibex, PicoRV32 and SERV. If all of them run, it
@@ -42,7 +44,8 @@ writes docs/results/bench/softcore*.csv and softcore.md.
                 vexriscv, ibex, picorv32, picorv32-rv32i or serv
   --check       compare with the files instead of writing them
 
-`place` is cells and clock on an FPGA: cargo softcore place --help";
+`place` is cells and clock on an FPGA: cargo softcore place --help
+`pixels` is the pixel processor in simulation: cargo softcore pixels --help";
 
 /// The lines that every program has to print.
 const EXPECTED: &str = "firmware/self-test.out";
@@ -79,11 +82,15 @@ const ILLEGAL: &str = "trap: illegal instruction";
 
 fn main() -> ExitCode {
     let mut arguments = env::args_os().skip(1).peekable();
-    let done = if arguments.next_if(|first| first == "place").is_some() {
-        place::run(lexopt::Parser::from_args(arguments))
+    let mut named = |name| arguments.next_if(|first| first == name).is_some();
+    let run = if named("place") {
+        place::run
+    } else if named("pixels") {
+        pixels::run
     } else {
-        measure(lexopt::Parser::from_args(arguments))
+        measure
     };
+    let done = run(lexopt::Parser::from_args(arguments));
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

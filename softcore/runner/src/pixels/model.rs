@@ -1,0 +1,285 @@
+//! What the pixel processor has to do: `AsyncPixel`, fed with the same photons.
+
+use std::collections::VecDeque;
+
+use anyhow::{Context, Result, bail, ensure};
+use dtof_core::{
+    AerEncoder, AerWord, AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig,
+    ProcessorEvent, Statistics,
+};
+
+use super::command::{Command, Happened, register};
+use super::scene::{Events, Scene};
+
+/// Looks whose events may wait.
+const REMEMBERED: usize = 4096;
+
+/// What was looked at, and what came of it.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    pub photons: u64,
+    pub looks: u64,
+    pub late: u64,
+    pub statistics: Statistics,
+    /// Clocks from the end of the deciding laser cycle until the word of an event waited for
+    /// the link, most often that of an event before it.
+    pub latencies: Vec<u64>,
+}
+
+/// The macropixels, and what they wait for.
+pub struct Model {
+    config: PixelConfig<128>,
+    pixels: Vec<AsyncPixel<128>>,
+    encoder: AerEncoder,
+    clock: u64,
+    since_look: u16,
+    cycles: u64,
+    strays: u64,
+    present_full: u64,
+    outcome: Outcome,
+    /// Words that the link has yet to take, and the clock in which the laser cycle ended that
+    /// brought the event.
+    words: VecDeque<(AerWord, Option<u64>)>,
+    /// The laser cycles that looks ended, and the clocks.
+    looked: VecDeque<(u64, u64)>,
+    /// Events that the program is to take.
+    taken: VecDeque<DepthEvent>,
+    events: Events,
+    reads: Vec<u32>,
+    counts: Vec<u32>,
+}
+
+impl Model {
+    pub fn new(scene: &Scene) -> Self {
+        let pixel = |address| AsyncPixel::new(PixelAddress(address));
+        Self {
+            config: scene.config,
+            pixels: (0..1 << scene.pixels_log2).map(pixel).collect(),
+            encoder: AerEncoder::new(),
+            clock: 0,
+            since_look: 0,
+            cycles: 0,
+            strays: 0,
+            present_full: 0,
+            outcome: Outcome::default(),
+            words: VecDeque::new(),
+            looked: VecDeque::new(),
+            taken: VecDeque::new(),
+            events: scene.events,
+            reads: Vec::new(),
+            counts: Vec::new(),
+        }
+    }
+
+    /// The next clock; `happened` gives what happened in clocks before a given one.
+    pub fn clock(
+        &mut self,
+        command: &Command,
+        happened: &mut Told<impl FnMut() -> Result<(u64, Happened)>>,
+    ) -> Result<()> {
+        if let Some((pixel, code)) = command.photon {
+            self.outcome.photons += 1;
+            match self.pixels.get_mut(usize::from(pixel)) {
+                Some(pixel) => pixel.count(&self.config, code),
+                None => self.strays += 1,
+            }
+        }
+        if command.cycle_ends {
+            self.since_look = self.since_look.saturating_add(1);
+            self.cycles += 1;
+            // The system has a register at its pins.
+            let at = self.clock + 1 + u64::from(self.events == Events::System);
+            let looks = self.happened_until(at, happened)?;
+            let is_due = self.since_look >= self.config.x();
+            ensure!(is_due || !looks, "clock {at}: a look that is not due");
+            if looks {
+                self.look();
+            } else if is_due {
+                self.outcome.late += 1;
+            }
+        }
+        self.clock += 1;
+        Ok(())
+    }
+
+    /// Everything up to a look in clock `at`; whether there is one.
+    fn happened_until(
+        &mut self,
+        at: u64,
+        told: &mut Told<impl FnMut() -> Result<(u64, Happened)>>,
+    ) -> Result<bool> {
+        while let Some((clock, happened)) = told.next_until(at)? {
+            match happened {
+                Happened::Look => {
+                    ensure!(
+                        clock == at,
+                        "clock {clock}: a look without the end of a laser cycle"
+                    );
+                    return Ok(true);
+                }
+                _ => self.apply(clock, happened)?,
+            }
+        }
+        Ok(false)
+    }
+
+    fn look(&mut self) {
+        let last = LaserCycle(self.cycles - 1);
+        let passed = std::mem::take(&mut self.since_look);
+        for pixel in &mut self.pixels {
+            let _ =
+                pixel.end_laser_cycles(&self.config, &mut self.outcome.statistics, last, passed);
+        }
+        self.outcome.looks += 1;
+        self.looked.push_back((last.0, self.clock));
+        if self.looked.len() > REMEMBERED {
+            self.looked.pop_front();
+        }
+    }
+
+    fn apply(&mut self, clock: u64, happened: Happened) -> Result<()> {
+        match happened {
+            Happened::Leaves(pixel) => {
+                let pixel = self
+                    .pixels
+                    .get_mut(usize::from(pixel))
+                    .context("no such macropixel")?;
+                let event = pixel.acknowledge();
+                let event = event.with_context(|| format!("clock {clock}: no event waits"))?;
+                if self.events == Events::Link || self.events == Events::System {
+                    let (time, word) = self.encoder.encode(&event);
+                    let mut looked = self.looked.iter().rev();
+                    let looked = looked.find(|(cycle, _)| *cycle == event.cycle.0);
+                    let ended = looked.map(|&(_, clock)| clock);
+                    let time = time.map(|time| (time, None));
+                    self.words.extend(time.into_iter().chain([(word, ended)]));
+                } else {
+                    self.taken.push_back(event);
+                    self.compare_reads(clock)?;
+                }
+            }
+            Happened::Word(word) => {
+                let (expected, ended) = self.words.pop_front().unzip();
+                ensure!(
+                    expected == Some(word),
+                    "clock {clock}: {word:x?}, not {expected:x?}"
+                );
+                let latency = ended.flatten().map(|ended| clock - ended);
+                self.outcome.latencies.extend(latency);
+            }
+            Happened::Read(address, data) if address >= register::COUNTS => self.counts.push(data),
+            Happened::Read(address, data) => {
+                if address == register::WAITING {
+                    self.reads.clear();
+                }
+                self.reads.push(data);
+            }
+            Happened::Look | Happened::End(_) => bail!("clock {clock}: {happened:?}"),
+        }
+        Ok(())
+    }
+
+    /// The event that the program has read, as it is taken.
+    fn compare_reads(&mut self, clock: u64) -> Result<()> {
+        let event = self.taken.pop_front().context("no event")?;
+        // Else it came while the program read, or after.
+        if let &[1, a, b, c, d, e, f, g] = &*self.reads {
+            let read = ProcessorEvent::from_registers([a, b, c, d, e, f, g]);
+            ensure!(
+                read.word() == AerWord::depth_event(&event) && read.depth_event() == Ok(event),
+                "clock {clock}: {event:?} is read as {:?}",
+                read.depth_event()
+            );
+        }
+        Ok(())
+    }
+
+    /// What is left when all photons have come.
+    pub fn end(
+        mut self,
+        told: &mut Told<impl FnMut() -> Result<(u64, Happened)>>,
+    ) -> Result<Outcome> {
+        loop {
+            match told.next()? {
+                (_, Happened::End(waits)) => {
+                    ensure!(!waits && self.words.is_empty(), "words wait");
+                    break;
+                }
+                (clock, happened) => self.apply(clock, happened)?,
+            }
+        }
+        let ended_full = self.outcome.statistics.saturated;
+        let mut all = self.outcome.statistics;
+        for pixel in &self.pixels {
+            pixel.add_photons_to(&mut all);
+        }
+        self.present_full = all.saturated - ended_full;
+        let expected = [
+            all.counted + all.saturated,
+            ended_full,
+            all.rejected,
+            all.gated_out,
+            self.strays,
+            all.events,
+            all.deferred,
+            all.expired,
+            all.expired_deferred,
+            self.outcome.looks,
+            self.outcome.late,
+            self.cycles,
+        ];
+        let (pairs, _) = self.counts.as_chunks::<2>();
+        let counts: Vec<u64> = pairs
+            .iter()
+            .map(|&[low, high]| u64::from(low) | u64::from(high) << 32)
+            .collect();
+        ensure!(
+            counts == expected || !self.events.has_registers(), "counts {counts:?}, not {expected:?}");
+        ensure!(
+            all.photons() + self.strays == self.outcome.photons,
+            "photons"
+        );
+        Ok(Outcome {
+            statistics: all,
+            ..self.outcome
+        })
+    }
+}
+
+/// What the simulation tells, one at a time.
+pub struct Told<F> {
+    read: F,
+    waiting: Option<(u64, Happened)>,
+}
+
+impl<F: FnMut() -> Result<(u64, Happened)>> Told<F> {
+    pub const fn new(read: F) -> Self {
+        Self {
+            read,
+            waiting: None,
+        }
+    }
+
+    pub fn next(&mut self) -> Result<(u64, Happened)> {
+        match self.waiting.take() {
+            Some(told) => Ok(told),
+            None => (self.read)(),
+        }
+    }
+
+    /// The next before clock `at`, or in it: an event that leaves in the clock of a look leaves
+    /// after it.
+    fn next_until(&mut self, at: u64) -> Result<Option<(u64, Happened)>> {
+        let (clock, happened) = self.next()?;
+        let is_before = match happened {
+            Happened::End(_) => false,
+            Happened::Leaves(_) => clock < at,
+            _ => clock <= at,
+        };
+        if is_before {
+            return Ok(Some((clock, happened)));
+        }
+        self.waiting = Some((clock, happened));
+        Ok(None)
+    }
+}

@@ -1,0 +1,204 @@
+//! What comes to the pixel processor, clock by clock.
+
+use anyhow::Result;
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{Count, PaperRule, PixelConfig, RangeGate};
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+
+use super::command::{Access, Command, register, settings};
+
+/// Clocks without photons: for the settings before, for what is under way behind.
+const REST: u64 = 2000;
+
+/// Photons, and what else comes with them.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    pub name: String,
+    pub pixels_log2: u32,
+    pub config: PixelConfig<128>,
+    /// Clocks of a laser cycle: the fewest and the most.
+    pub clocks: [u64; 2],
+    /// The chance that a clock has a photon, in 1/256; at 256 every clock has one.
+    pub rate: u32,
+    /// Of these photons, how many come from targets, in 1/256.
+    pub signal: u32,
+    /// How far from its target a photon may lie, in bins to both sides.
+    pub spread: u16,
+    /// Macropixels whose photons come.
+    pub pixels: Pixels,
+    /// The chance that the link takes a word in a clock, in 1/256.
+    pub link: u32,
+    pub events: Events,
+    /// The clocks with photons.
+    pub length: u64,
+    pub seed: u64,
+}
+
+/// Who takes the events.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Events {
+    /// The link, packed.
+    Link,
+    /// The testbench reads them: a register after so many clocks.
+    Registers(u64),
+    /// A program on the system's processor sees to everything.
+    System,
+}
+
+impl Events {
+    /// Whether the testbench reads and writes registers.
+    pub const fn has_registers(self) -> bool {
+        !matches!(self, Self::System)
+    }
+}
+
+/// Whose photons come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pixels {
+    /// Of all, at random.
+    All,
+    /// Of all in turn, so that all fire at one look.
+    InTurn,
+    /// Of one until so many clocks have passed, then of the next.
+    OneForLong(u64),
+    /// Of all, and of some that there are not.
+    Strays,
+}
+
+/// How the macropixels are configured.
+pub fn config(
+    [x, l1, l2]: [u16; 3],
+    alpha: U8F8,
+    minimum: u32,
+    [first, last]: [u16; 2],
+    is_one_hit: bool,
+) -> Result<PixelConfig<128>> {
+    let rule = PaperRule::new(alpha, Count::saturating(minimum));
+    let gate = RangeGate::new(first, last)?;
+    let builder = PixelConfig::with_rule(rule).x(x).l1(l1).l2(l2).gate(gate);
+    Ok(builder.one_hit_tdc(is_one_hit).build()?)
+}
+
+/// The commands of a scene, each time the same.
+pub struct Commands {
+    scene: Scene,
+    random: Pcg64Mcg,
+    clock: u64,
+    cycle_ends_at: u64,
+    settings: Vec<Access>,
+    turn: u8,
+}
+
+impl Commands {
+    pub fn new(scene: &Scene) -> Result<Self> {
+        let mut settings = settings(&scene.config, scene.events == Events::Link)?;
+        settings.reverse();
+        if !scene.events.has_registers() {
+            settings.clear();
+        }
+        Ok(Self {
+            scene: scene.clone(),
+            random: Pcg64Mcg::seed_from_u64(scene.seed),
+            clock: 0,
+            cycle_ends_at: REST,
+            settings,
+            turn: 0,
+        })
+    }
+
+    fn chance(&mut self, of: u32) -> bool {
+        self.random.next_u32() >> 24 < of
+    }
+
+    fn below(&mut self, end: u32) -> u32 {
+        let product = u64::from(self.random.next_u32()) * u64::from(end);
+        #[allow(clippy::cast_possible_truncation, reason = "below `end`")]
+        let below = (product >> 32) as u32;
+        below
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "few macropixels and bins")]
+    fn photon(&mut self) -> (u8, u16) {
+        let pixels = 1u32 << self.scene.pixels_log2;
+        let pixel = match self.scene.pixels {
+            Pixels::All => self.below(pixels) as u8,
+            Pixels::InTurn => {
+                self.turn = (self.turn + 1) % pixels as u8;
+                self.turn
+            }
+            Pixels::OneForLong(clocks) => (self.clock / clocks % u64::from(pixels)) as u8,
+            Pixels::Strays => self.below(pixels + pixels / 2) as u8,
+        };
+        if !self.chance(self.scene.signal) {
+            // Some past the last bin.
+            let strays = self.scene.pixels == Pixels::Strays;
+            let bins = if strays { 140 } else { 128 };
+            return (pixel, self.below(bins) as u16);
+        }
+        let spread = u32::from(self.scene.spread);
+        let off = self.below(2 * spread + 1) as u16;
+        // The targets move slowly, so that each bin has its turn.
+        let moved = (self.clock >> 14) as u16;
+        let target = (u16::from(pixel) * 37 + moved + 64) & 127;
+        (
+            pixel,
+            (target + off).saturating_sub(self.scene.spread).min(127),
+        )
+    }
+}
+
+impl Iterator for Commands {
+    type Item = Command;
+
+    fn next(&mut self) -> Option<Command> {
+        let clock = self.clock;
+        self.clock += 1;
+        let end = REST + self.scene.length;
+        if clock >= end + 2 * REST {
+            return None;
+        }
+        let mut command = Command::default();
+        if clock < REST {
+            command.access = self.settings.pop();
+            return Some(command);
+        }
+        if clock < end {
+            if self.scene.rate >= 256 || self.chance(self.scene.rate) {
+                command.photon = Some(self.photon());
+            }
+            if clock == self.cycle_ends_at {
+                command.cycle_ends = true;
+                let [fewest, most] = self.scene.clocks;
+                #[allow(clippy::cast_possible_truncation, reason = "few clocks")]
+                let more = self.below((most - fewest + 1) as u32);
+                self.cycle_ends_at += fewest + u64::from(more);
+            }
+            command.link_takes = self.scene.link >= 256 || self.chance(self.scene.link);
+        } else {
+            // The counts, when all has come to rest.
+            command.link_takes = true;
+            let after = clock - end;
+            if self.scene.events.has_registers()
+                && after >= REST
+                && (after - REST) % 8 == 0 && after < REST + 8 * 24 {
+                let number = u32::try_from((after - REST) / 8).ok()?;
+                command.access = Some(Access::Read(register::COUNTS + number));
+            }
+        }
+        if let Events::Registers(period) = self.scene.events
+            && clock < end + REST / 2
+        {
+            // A look at the register, the seven words, and the end of it.
+            let place = clock % (9 * period);
+            if place % period == 0 {
+                let number = u32::try_from(place / period).ok()?;
+                command.access = Some(match number {
+                    8 => Access::Write(register::WAITING, 1),
+                    number => Access::Read(register::WAITING + number),
+                });
+            }
+        }
+        Some(command)
+    }
+}

@@ -1,0 +1,14 @@
+//! The pixel processor; its events packed by the hardware.
+
+#![no_std]
+#![no_main]
+
+#[cfg(not(target_arch = "riscv32"))]
+compile_error!("an image for a soft-core: cargo softcore");
+
+/// The program, which does not end.
+fn run() -> bool {
+    dtof_softcore::pixels::run(dtof_softcore::pixels::Packer::Hardware).is_ok()
+}
+
+dtof_softcore::program!(run);
