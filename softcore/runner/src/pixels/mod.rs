@@ -2,25 +2,30 @@
 
 mod command;
 mod model;
+mod page;
 mod proof;
+mod row;
 mod scene;
 mod system;
 
 use std::collections::BTreeMap;
+use std::fs;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread;
 
 use anyhow::{Context, Result, ensure};
-use dtof_core::Statistics;
 use lexopt::ValueExt;
 use lexopt::prelude::{Long, Short};
 
+use crate::files;
+use crate::line::Line;
 use crate::rtl::verilate;
 
 use command::Happened;
 use model::{Model, Outcome, Told};
+use row::Proof;
 use scene::{Commands, Scene};
 
 const HELP: &str = "\
@@ -68,40 +73,84 @@ pub fn run(parser: lexopt::Parser) -> Result<()> {
         return Ok(());
     };
     let root = &crate::root().canonicalize()?;
-    prove(root, options.photons)
+    let proofs = prove(root, options.photons)?;
+    let latencies = system::measure(root)?;
+    let page = page::text(&proofs, &latencies);
+    println!("\n{page}");
+    if options.check {
+        let mut expected: Vec<Proof> = files::lines(root)?;
+        // Without the recording its scenes are missing, as was said.
+        let is_recorded = |proof: &Proof| proof.scene == proof::RECORDED;
+        if !proofs.iter().any(is_recorded) {
+            expected.retain(|proof| !is_recorded(proof));
+        }
+        check(&expected, &proofs)?;
+        return check(&files::lines(root)?, &latencies);
+    }
+    if options.photons == PHOTONS {
+        for (file, text) in [
+            files::text(&proofs),
+            files::text(&latencies),
+            (page::DOCUMENT, page),
+        ] {
+            fs::write(root.join(file), text).context(file)?;
+            println!("{file}: written");
+        }
+    }
+    Ok(())
 }
 
 /// Runs every scene, with so many photons in all.
-fn prove(root: &Path, photons: u64) -> Result<()> {
-    let scenes = proof::scenes(photons)?;
+fn prove(root: &Path, photons: u64) -> Result<Vec<Proof>> {
+    let scenes = proof::scenes(root, photons)?;
     let mut simulators = BTreeMap::new();
-    let (mut all, mut events) = (0, 0);
+    let mut proofs = Vec::new();
     for scene in &scenes {
         let log2 = scene.pixels_log2;
         if !simulators.contains_key(&log2) {
             let name = format!("pixels-{log2}");
             let size = format!("-GPIXELS_LOG2={log2}");
-            simulators.insert(log2, verilate(root, "pixels", &name, Path::new(""), &[&size])?);
+            let simulator = verilate(root, "pixels", &name, Path::new(""), &[&size])?;
+            simulators.insert(log2, simulator);
         }
         let simulator = simulators.get(&log2).context("no simulator")?;
         let outcome = simulate(&mut Command::new(simulator), scene)?;
-        let Statistics {
-            events: found,
-            deferred,
-            expired,
-            saturated,
-            ..
-        } = outcome.statistics;
+        let statistics = outcome.statistics;
+        let proof = Proof {
+            scene: scene.name.clone(),
+            macropixels: 1 << log2,
+            photons: outcome.photons,
+            cycles: outcome.cycles,
+            looks: outcome.looks,
+            late: outcome.late,
+            events: statistics.events,
+            deferred: statistics.deferred,
+            expired: statistics.expired,
+            full: statistics.saturated,
+        };
         println!(
-            "{}: {} photons, {} looks ({} late), {found} events, {deferred} decisions put off, \
-             {expired} exposures without an event, {saturated} photons in full counters: as dtof-core",
-            scene.name, outcome.photons, outcome.looks, outcome.late
+            "{}, {} macropixels: {} photons and {} events as dtof-core",
+            proof.scene, proof.macropixels, proof.photons, proof.events
         );
-        all += outcome.photons;
-        events += found;
+        proofs.push(proof);
     }
-    system::measure(root, photons / 40)?;
-    println!("pixel processor: {all} photons and {events} events as dtof-core has them");
+    let photons: u64 = proofs.iter().map(|proof| proof.photons).sum();
+    println!("pixel processor: {photons} photons as dtof-core has them");
+    Ok(proofs)
+}
+
+/// Compares what was measured with a file.
+fn check<L: Line>(expected: &[L], measured: &[L]) -> Result<()> {
+    let ((_, expected), (file, measured)) = (files::text(expected), files::text(measured));
+    let differences = files::differences(&expected, &measured, L::COLUMNS);
+    for difference in &differences {
+        println!("{difference}");
+    }
+    ensure!(
+        differences.is_empty(),
+        "not what {file} says, see above; `cargo softcore pixels` writes it"
+    );
+    println!("{file}: as measured");
     Ok(())
 }
 

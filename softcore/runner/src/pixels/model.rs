@@ -18,6 +18,7 @@ const REMEMBERED: usize = 4096;
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
     pub photons: u64,
+    pub cycles: u64,
     pub looks: u64,
     pub late: u64,
     pub statistics: Statistics,
@@ -234,13 +235,16 @@ impl Model {
             .map(|&[low, high]| u64::from(low) | u64::from(high) << 32)
             .collect();
         ensure!(
-            counts == expected || !self.events.has_registers(), "counts {counts:?}, not {expected:?}");
+            counts == expected || !self.events.has_registers(),
+            "counts {counts:?}, not {expected:?}"
+        );
         ensure!(
             all.photons() + self.strays == self.outcome.photons,
             "photons"
         );
         Ok(Outcome {
             statistics: all,
+            cycles: self.cycles,
             ..self.outcome
         })
     }

@@ -1,43 +1,62 @@
 //! Scenes in which the pixel processor has to do what `dtof-core` does.
 
-use anyhow::Result;
+use std::env;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context, Result};
+use dtof::input::tmf8820;
 use dtof_core::fixed::types::U8F8;
 
-use super::scene::{Events, Pixels, Scene, config};
+use super::scene::{Bins, Events, Pixels, Recorded, Scene, config};
 
 const PAPER: [u16; 3] = [4, 40, 2000];
 const WHOLE: [u16; 2] = [0, 127];
 const ALPHA: U8F8 = U8F8::lit("4");
 
+/// The name of scenes with recorded photons.
+pub const RECORDED: &str = "recorded photons";
+
+/// Photons a clock, in 1/256.
+const RATES: [(u32, &str); 4] = [
+    (256, "the paper's setting, a photon a clock"),
+    (128, "the paper's setting, one in two clocks"),
+    (32, "the paper's setting, one in eight clocks"),
+    (4, "the paper's setting, one in 64 clocks"),
+];
+
 /// The scenes, with about so many photons in all.
-pub fn scenes(photons: u64) -> Result<Vec<Scene>> {
+pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
     let paper = config(PAPER, ALPHA, 5, WHOLE, false)?;
     let short = config([1, 1, 30], U8F8::lit("0.5"), 1, [3, 77], true)?;
     let bright = config([50, 400, 4000], U8F8::lit("2.25"), 20, WHOLE, true)?;
     let dim = config([7, 60, 64], U8F8::lit("255.99"), 0, [100, 127], false)?;
     let rare = config([300, 60_000, 65_535], U8F8::lit("0"), 1000, WHOLE, false)?;
-    let each = photons / 16;
+    let each = photons / 17;
     let scene = |name: &str, pixels_log2, config| Scene {
         name: name.to_owned(),
         pixels_log2,
         config,
         clocks: [7, 8],
         rate: 256,
-        signal: 100,
-        spread: 1,
+        bins: Bins::Target(100, 1),
         pixels: Pixels::All,
         link: 256,
         events: Events::Link,
         length: each,
         seed: 1,
     };
-    let mut scenes = vec![
-        scene("the paper's setting, a photon a clock", 2, paper),
-        Scene {
-            rate: 40,
-            length: 2 * each,
-            ..scene("the paper's setting, fewer photons", 2, paper)
-        },
+    let mut scenes = Vec::new();
+    for (rate, name) in RATES {
+        scenes.push(Scene {
+            rate,
+            length: each / 2,
+            ..scene(name, 2, paper)
+        });
+    }
+    scenes.extend([
         Scene {
             clocks: [1, 30],
             rate: 200,
@@ -47,48 +66,44 @@ pub fn scenes(photons: u64) -> Result<Vec<Scene>> {
             ..scene("a slow link, laser cycles of any length, strays", 2, paper)
         },
         Scene {
-            signal: 256,
-            spread: 0,
+            bins: Bins::Target(256, 0),
             pixels: Pixels::InTurn,
             ..scene("all fire at once", 2, paper)
         },
         Scene {
             clocks: [1, 3],
-            signal: 200,
+            bins: Bins::Target(200, 1),
             ..scene("looks as often as there can be any", 2, short)
         },
         Scene {
             pixels: Pixels::OneForLong(100),
-            signal: 250,
-            spread: 2,
+            bins: Bins::Target(250, 2),
             ..scene("one macropixel for long, in a few bins", 2, short)
         },
         Scene {
             clocks: [7, 9],
-            signal: 240,
-            spread: 1,
+            bins: Bins::Target(240, 1),
             pixels: Pixels::OneForLong(40_000),
             ..scene("full counters", 2, bright)
         },
         Scene {
-            signal: 255,
+            bins: Bins::Target(255, 0),
             pixels: Pixels::InTurn,
-            spread: 0,
             clocks: [3, 5],
             ..scene("full counters in all macropixels", 2, bright)
         },
         Scene {
-            signal: 250,
+            bins: Bins::Target(250, 1),
             ..scene("exposures that end", 2, dim)
         },
         Scene {
             clocks: [1, 1],
-            signal: 250,
+            bins: Bins::Target(250, 1),
             ..scene("long exposures", 2, rare)
         },
         Scene {
             events: Events::Registers(3),
-            signal: 60,
+            bins: Bins::Target(60, 1),
             ..scene("the program takes the events", 2, paper)
         },
         Scene {
@@ -96,19 +111,64 @@ pub fn scenes(photons: u64) -> Result<Vec<Scene>> {
             clocks: [5, 12],
             ..scene("a slow program", 2, short)
         },
-        scene("two macropixels", 1, paper),
+        scene("the paper's setting", 1, paper),
         Scene {
             pixels: Pixels::Strays,
-            ..scene("sixteen macropixels", 4, paper)
+            ..scene("the paper's setting, strays", 4, paper)
         },
+        scene("the paper's setting, a photon a clock", 4, paper),
+        scene("the paper's setting, a photon a clock", 6, paper),
         Scene {
-            signal: 256,
+            bins: Bins::Target(256, 1),
             pixels: Pixels::InTurn,
-            ..scene("64 macropixels", 6, paper)
+            ..scene("all fire at once", 6, paper)
         },
-    ];
+    ]);
+    if let Some(histograms) = recorded(root)? {
+        let histograms = Arc::new(histograms);
+        for (pixels_log2, rate) in [(2, 256), (4, 100)] {
+            scenes.push(Scene {
+                rate,
+                bins: Bins::Recorded(Arc::clone(&histograms)),
+                ..scene(RECORDED, pixels_log2, paper)
+            });
+        }
+    }
     for (seed, scene) in (1..).zip(&mut scenes) {
         scene.seed = seed;
     }
     Ok(scenes)
 }
+
+/// A public capture log of a TMF8820, beside the workspace or where `TMF8820_LOG` says: the
+/// histograms of its first captures.
+fn recorded(root: &Path) -> Result<Option<Vec<Recorded>>> {
+    let beside = root.join("../shared/data/tmf8820_plane_gt/distance_data.json");
+    let named = env::var_os("TMF8820_LOG").map(PathBuf::from);
+    let Some(path) = named.or_else(|| Some(beside).filter(|path| path.exists())) else {
+        println!(
+            "SKIPPED: recorded photons: no TMF8820 capture log beside the workspace, nor in TMF8820_LOG"
+        );
+        return Ok(None);
+    };
+    let name = path.display().to_string();
+    let log = tmf8820::read(
+        &name,
+        BufReader::new(File::open(&path).context(name.clone())?),
+    )?;
+    let histograms = log.captures.iter().take(CAPTURES).flatten();
+    let sums = histograms.map(|histogram| {
+        let photons = histogram.iter().scan(0, |sum, photons| {
+            *sum += photons;
+            Some(*sum)
+        });
+        photons.collect()
+    });
+    Ok(Some(
+        sums.filter(|sums: &Recorded| sums.last() > Some(&0))
+            .collect(),
+    ))
+}
+
+/// Captures of nine zones.
+const CAPTURES: usize = 4;

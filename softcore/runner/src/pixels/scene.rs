@@ -1,5 +1,7 @@
 //! What comes to the pixel processor, clock by clock.
 
+use std::sync::Arc;
+
 use anyhow::Result;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, PaperRule, PixelConfig, RangeGate};
@@ -21,10 +23,7 @@ pub struct Scene {
     pub clocks: [u64; 2],
     /// The chance that a clock has a photon, in 1/256; at 256 every clock has one.
     pub rate: u32,
-    /// Of these photons, how many come from targets, in 1/256.
-    pub signal: u32,
-    /// How far from its target a photon may lie, in bins to both sides.
-    pub spread: u16,
+    pub bins: Bins,
     /// Macropixels whose photons come.
     pub pixels: Pixels,
     /// The chance that the link takes a word in a clock, in 1/256.
@@ -34,6 +33,18 @@ pub struct Scene {
     pub length: u64,
     pub seed: u64,
 }
+
+/// Where in its bins a photon lies.
+#[derive(Clone, Debug)]
+pub enum Bins {
+    /// So many of 256 come from a target, so many bins to both sides of its place at most.
+    Target(u32, u16),
+    /// As often in each bin as recorded histograms have it, of one macropixel after another.
+    Recorded(Arc<Vec<Recorded>>),
+}
+
+/// A recorded histogram, as the photons up to each bin.
+pub type Recorded = Vec<u64>;
 
 /// Who takes the events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -130,21 +141,30 @@ impl Commands {
             Pixels::OneForLong(clocks) => (self.clock / clocks % u64::from(pixels)) as u8,
             Pixels::Strays => self.below(pixels + pixels / 2) as u8,
         };
-        if !self.chance(self.scene.signal) {
+        (pixel, self.bin(pixel))
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "few bins")]
+    fn bin(&mut self, pixel: u8) -> u16 {
+        let (signal, spread) = match &self.scene.bins {
+            &Bins::Target(signal, spread) => (signal, spread),
+            Bins::Recorded(histograms) => {
+                let histogram = &histograms[usize::from(pixel) % histograms.len()];
+                let all = histogram.last().copied().unwrap_or(0);
+                let photon = u64::from(self.random.next_u32()) * all >> 32;
+                return histogram.partition_point(|&up_to| up_to <= photon) as u16;
+            }
+        };
+        if !self.chance(signal) {
             // Some past the last bin.
             let strays = self.scene.pixels == Pixels::Strays;
-            let bins = if strays { 140 } else { 128 };
-            return (pixel, self.below(bins) as u16);
+            return self.below(if strays { 140 } else { 128 }) as u16;
         }
-        let spread = u32::from(self.scene.spread);
-        let off = self.below(2 * spread + 1) as u16;
+        let off = self.below(2 * u32::from(spread) + 1) as u16;
         // The targets move slowly, so that each bin has its turn.
         let moved = (self.clock >> 14) as u16;
         let target = (u16::from(pixel) * 37 + moved + 64) & 127;
-        (
-            pixel,
-            (target + off).saturating_sub(self.scene.spread).min(127),
-        )
+        (target + off).saturating_sub(spread).min(127)
     }
 }
 
@@ -181,7 +201,9 @@ impl Iterator for Commands {
             let after = clock - end;
             if self.scene.events.has_registers()
                 && after >= REST
-                && (after - REST) % 8 == 0 && after < REST + 8 * 24 {
+                && (after - REST) % 8 == 0
+                && after < REST + 8 * 24
+            {
                 let number = u32::try_from((after - REST) / 8).ok()?;
                 command.access = Some(Access::Read(register::COUNTS + number));
             }

@@ -5,44 +5,35 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use dtof_softcore::stream;
 
-use super::scene::{Events, Pixels, Scene};
-use super::{Outcome, simulate};
+use super::row::Latency;
+use super::scene::{Bins, Events, Pixels, Scene};
+use super::simulate;
 use crate::image::Images;
 use crate::rtl::{package_folder, verilate};
 
 /// A program for the system, and what it does.
 const PROGRAMS: [(&str, &str); 2] = [
-    ("pixels-hardware", "packed by the pixel processor"),
-    ("pixels-program", "packed by the program"),
+    ("pixels-hardware", "the pixel processor"),
+    ("pixels-program", "the program"),
 ];
 
 /// Photons a clock, in 1/256.
 const RATES: [u32; 6] = [4, 8, 16, 32, 64, 256];
 
-/// Clocks of a laser cycle of 10 MHz, at 75 MHz: one or the other.
+/// Clocks of a run.
+const LENGTH: u64 = 1_000_000;
+
+/// A clock that place and route reaches, for every number of macropixels.
+pub const MEGAHERTZ: f64 = 75.0;
+
+/// Clocks of a laser cycle of 10 MHz at this clock: one or the other.
 const CLOCKS: [u64; 2] = [7, 8];
 
-/// What events took.
-pub struct Latencies {
-    pub packer: &'static str,
-    pub photons: f64,
-    pub outcome: Outcome,
-    pub sorted: Vec<u64>,
-}
-
-impl Latencies {
-    /// The latency that so many of 1000 events do not exceed, in clocks.
-    pub fn of_1000(&self, share: usize) -> Option<u64> {
-        let place = (self.sorted.len() * share).div_ceil(1000);
-        self.sorted.get(place.checked_sub(1)?).copied()
-    }
-}
-
 /// Runs the system at several rates of photons, `length` clocks each.
-pub fn measure(root: &Path, length: u64) -> Result<Vec<Latencies>> {
+pub fn measure(root: &Path) -> Result<Vec<Latency>> {
     let processor = package_folder(root, "pythondata_cpu_vexriscv")?;
     let sizes = ["-GPIXELS_LOG2=2", "-GRAM_BITS=16"];
     let simulator = verilate(root, "system", "system", &processor, &sizes)?;
@@ -54,44 +45,44 @@ pub fn measure(root: &Path, length: u64) -> Result<Vec<Latencies>> {
         fs::write(&words, hexadecimal(&fs::read(&flat)?))?;
         for rate in RATES {
             let scene = Scene {
-                name: format!("the system, {rate}/256 photons a clock, events {packer}"),
+                name: format!("the system, {rate}/256 photons a clock, events packed by {packer}"),
                 pixels_log2: 2,
                 config: stream::config()?,
                 clocks: CLOCKS,
                 rate,
-                signal: 100,
-                spread: 1,
+                bins: Bins::Target(100, 1),
                 pixels: Pixels::All,
                 link: 256,
                 events: Events::System,
-                length,
+                length: LENGTH,
                 seed: rate.into(),
             };
             let mut command = Command::new(&simulator);
             command.arg(format!("+ram={}", words.display()));
             let mut outcome = simulate(&mut command, &scene)?;
-            let mut sorted = std::mem::take(&mut outcome.latencies);
-            sorted.sort_unstable();
-            ensure!(!sorted.is_empty(), "{}: no events", scene.name);
-            let latencies = Latencies {
-                packer,
-                photons: f64::from(rate) / 256.0,
-                outcome,
-                sorted,
+            outcome.latencies.sort_unstable();
+            let sorted = &outcome.latencies;
+            let within = |share: usize| {
+                let place = (sorted.len() * share).div_ceil(1000);
+                let latency = sorted.get(place.saturating_sub(1));
+                latency
+                    .copied()
+                    .with_context(|| format!("{}: no events", scene.name))
+            };
+            let latency = Latency {
+                packer: packer.to_owned(),
+                photons: u64::from(rate) * 1000 / 256,
+                clocks: LENGTH,
+                events: sorted.len() as u64,
+                late: outcome.late,
+                deferred: outcome.statistics.deferred,
+                within: [within(500)?, within(990)?, within(999)?, within(1000)?],
             };
             println!(
-                "{}: {} events, one in {:.0} clocks; {} looks late, {} decisions put off; \
-                 clocks until REQ: median {}, 99 % {}, all {}",
-                scene.name,
-                latencies.sorted.len(),
-                length as f64 / latencies.sorted.len() as f64,
-                latencies.outcome.late,
-                latencies.outcome.statistics.deferred,
-                latencies.of_1000(500).context("none")?,
-                latencies.of_1000(990).context("none")?,
-                latencies.of_1000(1000).context("none")?,
+                "{}: {} events as dtof-core, 99 % within {} clocks",
+                scene.name, latency.events, latency.within[1]
             );
-            all.push(latencies);
+            all.push(latency);
         }
     }
     Ok(all)
