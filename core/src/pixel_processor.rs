@@ -29,7 +29,7 @@ use crate::event::DepthEvent;
 use crate::histogram::counter::{Count10, CounterWidth};
 use crate::units::{EchoNumber, LaserCycle};
 
-/// What the registers LOOK to GATE_END hold.
+/// What the registers `LOOK` to `GATE_END` hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ProcessorSettings([u32; 5]);
@@ -93,20 +93,20 @@ impl ProcessorSettings {
         ]))
     }
 
-    /// The words of the registers LOOK, END, RULE, GATE and GATE_END.
+    /// The words of the registers `LOOK`, `END`, `RULE`, `GATE` and `GATE_END`.
     #[must_use]
     pub const fn registers(&self) -> [u32; 5] {
         self.0
     }
 }
 
-/// An event as the registers EVENT have it.
+/// An event as the registers `EVENT` have it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ProcessorEvent([u32; 7]);
 
 impl ProcessorEvent {
-    /// Of the seven words of EVENT.
+    /// From the seven words of `EVENT`.
     #[must_use]
     pub const fn from_registers(words: [u32; 7]) -> Self {
         Self(words)
@@ -131,8 +131,7 @@ impl ProcessorEvent {
     #[must_use]
     pub const fn cycle(&self) -> LaserCycle {
         let [_, bin, .., high, higher] = self.0;
-        let low = bin as u16;
-        LaserCycle(low as u64 | (high as u64) << 16 | (higher as u64) << 48)
+        LaserCycle((bin & 0xffff) as u64 | (high as u64) << 16 | (higher as u64) << 48)
     }
 
     /// The word of the event, and the time word to send before it if one is due.

@@ -6,14 +6,13 @@ mod page;
 mod proof;
 mod row;
 mod scene;
+mod simulation;
 mod system;
 
-use std::collections::BTreeMap;
+use std::collections::btree_map::{BTreeMap, Entry};
 use std::fs;
-use std::io::{BufReader, BufWriter, Write};
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::thread;
+use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 use lexopt::ValueExt;
@@ -23,10 +22,8 @@ use crate::files;
 use crate::line::Line;
 use crate::rtl::verilate;
 
-use command::Happened;
-use model::{Model, Outcome, Told};
 use row::Proof;
-use scene::{Commands, Scene};
+use simulation::simulate;
 
 const HELP: &str = "\
 cargo softcore pixels [--photons N] [--check]
@@ -107,14 +104,15 @@ fn prove(root: &Path, photons: u64) -> Result<Vec<Proof>> {
     let mut proofs = Vec::new();
     for scene in &scenes {
         let log2 = scene.pixels_log2;
-        if !simulators.contains_key(&log2) {
-            let name = format!("pixels-{log2}");
-            let size = format!("-GPIXELS_LOG2={log2}");
-            let simulator = verilate(root, "pixels", &name, Path::new(""), &[&size])?;
-            simulators.insert(log2, simulator);
-        }
-        let simulator = simulators.get(&log2).context("no simulator")?;
-        let outcome = simulate(&mut Command::new(simulator), scene)?;
+        let simulator = match simulators.entry(log2) {
+            Entry::Occupied(built) => built.into_mut(),
+            Entry::Vacant(place) => {
+                let name = format!("pixels-{log2}");
+                let size = format!("-GPIXELS_LOG2={log2}");
+                place.insert(verilate(root, "pixels", &name, Path::new(""), &[&size])?)
+            }
+        };
+        let outcome = simulate(&mut Command::new(&*simulator), scene)?;
         let statistics = outcome.statistics;
         let proof = Proof {
             scene: scene.name.clone(),
@@ -152,41 +150,4 @@ fn check<L: Line>(expected: &[L], measured: &[L]) -> Result<()> {
     );
     println!("{file}: as measured");
     Ok(())
-}
-
-/// Runs a scene in the simulation, and the same in `dtof-core`.
-fn simulate(simulator: &mut Command, scene: &Scene) -> Result<Outcome> {
-    let mut child = simulator
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .context("the simulation does not start")?;
-    let mut input = BufWriter::with_capacity(1 << 16, child.stdin.take().context("no input")?);
-    let mut output = BufReader::with_capacity(1 << 16, child.stdout.take().context("no output")?);
-    let commands = Commands::new(scene)?;
-    let writer = thread::spawn(move || -> std::io::Result<()> {
-        for command in commands {
-            command.write(&mut input)?;
-        }
-        input.flush()
-    });
-    let mut told = Told::new(|| Happened::read(&mut output));
-    let mut model = Model::new(scene);
-    let outcome = Commands::new(scene)?
-        .try_for_each(|command| model.clock(&command, &mut told))
-        .and_then(|()| model.end(&mut told));
-    if outcome.is_err() {
-        // It may wait to be read.
-        let _ = child.kill();
-    }
-    let written = writer.join();
-    let status = child.wait()?;
-    let outcome = outcome.with_context(|| scene.name.clone())?;
-    ensure!(status.success(), "{}: the simulation fails", scene.name);
-    ensure!(
-        matches!(written, Ok(Ok(()))),
-        "{}: commands are not read",
-        scene.name
-    );
-    Ok(outcome)
 }

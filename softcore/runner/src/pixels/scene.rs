@@ -151,7 +151,7 @@ impl Commands {
             Bins::Recorded(histograms) => {
                 let histogram = &histograms[usize::from(pixel) % histograms.len()];
                 let all = histogram.last().copied().unwrap_or(0);
-                let photon = u64::from(self.random.next_u32()) * all >> 32;
+                let photon = (u64::from(self.random.next_u32()) * all) >> 32;
                 return histogram.partition_point(|&up_to| up_to <= photon) as u16;
             }
         };
@@ -201,7 +201,7 @@ impl Iterator for Commands {
             let after = clock - end;
             if self.scene.events.has_registers()
                 && after >= REST
-                && (after - REST) % 8 == 0
+                && (after - REST).is_multiple_of(8)
                 && after < REST + 8 * 24
             {
                 let number = u32::try_from((after - REST) / 8).ok()?;
@@ -213,7 +213,7 @@ impl Iterator for Commands {
         {
             // A look at the register, the seven words, and the end of it.
             let place = clock % (9 * period);
-            if place % period == 0 {
+            if place.is_multiple_of(period) {
                 let number = u32::try_from(place / period).ok()?;
                 command.access = Some(match number {
                     8 => Access::Write(register::WAITING, 1),

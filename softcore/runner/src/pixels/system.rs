@@ -10,7 +10,7 @@ use dtof_softcore::stream;
 
 use super::row::Latency;
 use super::scene::{Bins, Events, Pixels, Scene};
-use super::simulate;
+use super::simulation::simulate;
 use crate::image::Images;
 use crate::rtl::{package_folder, verilate};
 

@@ -1,0 +1,48 @@
+//! A scene in the simulation and in `dtof-core` at the same time.
+
+use std::io::{BufReader, BufWriter, Write};
+use std::process::{Command, Stdio};
+use std::thread;
+
+use anyhow::{Context, Result, ensure};
+
+use super::command::Happened;
+use super::model::{Model, Outcome, Told};
+use super::scene::{Commands, Scene};
+
+/// Runs a scene in the simulation, and the same in `dtof-core`.
+pub fn simulate(simulator: &mut Command, scene: &Scene) -> Result<Outcome> {
+    let mut child = simulator
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .context("the simulation does not start")?;
+    let mut input = BufWriter::with_capacity(1 << 16, child.stdin.take().context("no input")?);
+    let mut output = BufReader::with_capacity(1 << 16, child.stdout.take().context("no output")?);
+    let commands = Commands::new(scene)?;
+    let writer = thread::spawn(move || -> std::io::Result<()> {
+        for command in commands {
+            command.write(&mut input)?;
+        }
+        input.flush()
+    });
+    let mut told = Told::new(|| Happened::read(&mut output));
+    let mut model = Model::new(scene);
+    let outcome = Commands::new(scene)?
+        .try_for_each(|command| model.clock(&command, &mut told))
+        .and_then(|()| model.end(&mut told));
+    if outcome.is_err() {
+        // It may wait to be read.
+        let _ = child.kill();
+    }
+    let written = writer.join();
+    let status = child.wait()?;
+    let outcome = outcome.with_context(|| scene.name.clone())?;
+    ensure!(status.success(), "{}: the simulation fails", scene.name);
+    ensure!(
+        matches!(written, Ok(Ok(()))),
+        "{}: commands are not read",
+        scene.name
+    );
+    Ok(outcome)
+}
