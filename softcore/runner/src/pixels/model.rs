@@ -34,9 +34,11 @@ pub struct Model {
     encoder: AerEncoder,
     clock: u64,
     since_look: u16,
+    /// The clock of the last look, and the events that it brought.
+    looked_at: u64,
+    fired: u64,
     cycles: u64,
     strays: u64,
-    present_full: u64,
     outcome: Outcome,
     /// Words that the link has yet to take, and the clock in which the laser cycle ended that
     /// brought the event.
@@ -59,9 +61,10 @@ impl Model {
             encoder: AerEncoder::new(),
             clock: 0,
             since_look: 0,
+            looked_at: 0,
+            fired: 0,
             cycles: 0,
             strays: 0,
-            present_full: 0,
             outcome: Outcome::default(),
             words: VecDeque::new(),
             looked: VecDeque::new(),
@@ -94,8 +97,14 @@ impl Model {
             let is_due = self.since_look >= self.config.x();
             ensure!(is_due || !looks, "clock {at}: a look that is not due");
             if looks {
+                self.looked_at = at;
                 self.look();
             } else if is_due {
+                let longest = self.longest_look();
+                ensure!(
+                    at < self.looked_at + longest,
+                    "clock {at}: no look, {longest} clocks after the last one"
+                );
                 self.outcome.late += 1;
             }
         }
@@ -124,13 +133,20 @@ impl Model {
         Ok(false)
     }
 
+    /// Clocks that a look keeps the next one waiting at most.
+    fn longest_look(&self) -> u64 {
+        self.pixels.len() as u64 + self.fired + 18
+    }
+
     fn look(&mut self) {
         let last = LaserCycle(self.cycles - 1);
         let passed = std::mem::take(&mut self.since_look);
+        let before = self.outcome.statistics.events;
         for pixel in &mut self.pixels {
             let _ =
                 pixel.end_laser_cycles(&self.config, &mut self.outcome.statistics, last, passed);
         }
+        self.fired = self.outcome.statistics.events - before;
         self.outcome.looks += 1;
         self.looked.push_back((last.0, self.clock));
         if self.looked.len() > REMEMBERED {
@@ -214,7 +230,6 @@ impl Model {
         for pixel in &self.pixels {
             pixel.add_photons_to(&mut all);
         }
-        self.present_full = all.saturated - ended_full;
         let expected = [
             all.counted + all.saturated,
             ended_full,
