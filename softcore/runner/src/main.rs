@@ -3,6 +3,7 @@
 
 mod document;
 mod files;
+mod formal;
 mod image;
 mod line;
 mod memory;
@@ -34,6 +35,8 @@ const HELP: &str = "\
 cargo softcore [--qemu-only] [--core NAME]... [--check]
 cargo softcore place [--size N] [--check]
 cargo softcore pixels [--photons N] [--check]
+cargo softcore formal
+cargo softcore mutations [--sample N]
 
 Runs the core on RV32 processors: golden vectors in QEMU, and golden vectors, cycles and
 photon rates on the Verilog of VexRiscv, Ibex, PicoRV32 and SERV. If all of them run, it
@@ -45,7 +48,8 @@ writes docs/results/bench/softcore*.csv and softcore.md.
   --check       compare with the files instead of writing them
 
 `place` is cells and clock on an FPGA: cargo softcore place --help
-`pixels` is the pixel processor in simulation: cargo softcore pixels --help";
+`pixels` is the pixel processor in simulation: cargo softcore pixels --help
+`formal` proves properties of its Verilog, `mutations` plants faults there, which have to show.";
 
 /// The lines that every program has to print.
 const EXPECTED: &str = "firmware/self-test.out";
@@ -87,6 +91,10 @@ fn main() -> ExitCode {
         place::run
     } else if named("pixels") {
         pixels::run
+    } else if named("formal") {
+        formal::run
+    } else if named("mutations") {
+        pixels::mutations::run
     } else {
         measure
     };

@@ -159,11 +159,21 @@ pub fn verilate(
     options: &[&str],
 ) -> Result<PathBuf> {
     let folder = target_folder(root).join("softcore").join(name);
-    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
-    let softcore = root.join("softcore");
+    verilate_in(&root.join("softcore"), list, &folder, data, options)
+}
+
+/// The same of a copy of `softcore`, in any folder.
+pub fn verilate_in(
+    softcore: &Path,
+    list: &str,
+    folder: &Path,
+    data: &Path,
+    options: &[&str],
+) -> Result<PathBuf> {
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let mut verilator = Command::new("verilator");
     verilator
-        .env("SOFTCORE", &softcore)
+        .env("SOFTCORE", softcore)
         .env("DATA", data)
         // It calls make, which is told by these what to do.
         .env_remove("MAKEFLAGS")
@@ -172,11 +182,11 @@ pub fn verilate(
         .arg(softcore.join("sim").join(format!("{list}.f")))
         .args(options)
         .arg("--Mdir")
-        .arg(&folder);
+        .arg(folder);
     let ran = program::run(&mut verilator, PATIENCE, None)?;
     ensure!(
         ran.code == Some(0),
-        "{name}: verilator fails\n{}",
+        "{list}: verilator fails\n{}",
         ran.said()
     );
     Ok(folder.join("sim"))

@@ -96,6 +96,10 @@ pub mod register {
     pub const CONTROL: u32 = 0x00;
     pub const LOOK: u32 = 0x01;
     pub const WAITING: u32 = 0x08;
+    pub const HISTOGRAM: u32 = 0x30;
+    pub const BINS: u32 = 0x31;
+    /// The last two bins of the eight.
+    pub const LAST_BINS: u32 = 0x34;
     pub const COUNTS: u32 = 0x40;
 }
 

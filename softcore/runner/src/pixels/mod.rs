@@ -2,8 +2,11 @@
 
 mod command;
 mod model;
+mod mutants;
+pub mod mutations;
 mod page;
 mod proof;
+mod reads;
 mod row;
 mod scene;
 mod simulation;
@@ -22,6 +25,7 @@ use crate::files;
 use crate::line::Line;
 use crate::rtl::verilate;
 
+pub use mutants::Mutant;
 use row::Proof;
 use simulation::simulate;
 
@@ -130,6 +134,12 @@ fn prove(root: &Path, photons: u64) -> Result<Vec<Proof>> {
             "{}, {} macropixels: {} photons and {} events as dtof-core",
             proof.scene, proof.macropixels, proof.photons, proof.events
         );
+        if scene.reads.is_some() {
+            println!(
+                "of histograms, {} times eight bins: as dtof-core",
+                outcome.bins_read
+            );
+        }
         proofs.push(proof);
     }
     let photons: u64 = proofs.iter().map(|proof| proof.photons).sum();

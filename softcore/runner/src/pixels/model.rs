@@ -9,6 +9,7 @@ use dtof_core::{
 };
 
 use super::command::{Command, Happened, register};
+use super::reads::Reads;
 use super::scene::{Events, Scene};
 
 /// Looks whose events may wait.
@@ -21,6 +22,8 @@ pub struct Outcome {
     pub cycles: u64,
     pub looks: u64,
     pub late: u64,
+    /// Times that the program read eight bins of a histogram, which were compared.
+    pub bins_read: u64,
     pub statistics: Statistics,
     /// Clocks from the end of the deciding laser cycle until the word of an event waited for
     /// the link, most often that of an event before it.
@@ -50,6 +53,7 @@ pub struct Model {
     events: Events,
     reads: Vec<u32>,
     counts: Vec<u32>,
+    bins: Reads,
 }
 
 impl Model {
@@ -72,6 +76,7 @@ impl Model {
             events: scene.events,
             reads: Vec::new(),
             counts: Vec::new(),
+            bins: Reads::default(),
         }
     }
 
@@ -88,6 +93,7 @@ impl Model {
                 None => self.strays += 1,
             }
         }
+        self.bins.clock(self.clock, command, &self.pixels);
         if command.cycle_ends {
             self.since_look = self.since_look.saturating_add(1);
             self.cycles += 1;
@@ -147,6 +153,7 @@ impl Model {
                 pixel.end_laser_cycles(&self.config, &mut self.outcome.statistics, last, passed);
         }
         self.fired = self.outcome.statistics.events - before;
+        self.bins.look(self.clock, &self.pixels);
         self.outcome.looks += 1;
         self.looked.push_back((last.0, self.clock));
         if self.looked.len() > REMEMBERED {
@@ -185,6 +192,9 @@ impl Model {
                 self.outcome.latencies.extend(latency);
             }
             Happened::Read(address, data) if address >= register::COUNTS => self.counts.push(data),
+            Happened::Read(address, data) if address >= register::HISTOGRAM => {
+                self.bins.read(clock, address, data)?;
+            }
             Happened::Read(address, data) => {
                 if address == register::WAITING {
                     self.reads.clear();
@@ -259,6 +269,7 @@ impl Model {
         );
         Ok(Outcome {
             statistics: all,
+            bins_read: self.bins.compared,
             cycles: self.cycles,
             ..self.outcome
         })

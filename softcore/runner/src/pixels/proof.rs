@@ -32,6 +32,8 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
     let paper = config(PAPER, ALPHA, 5, WHOLE, false)?;
     let short = config([1, 1, 30], U8F8::lit("0.5"), 1, [3, 77], true)?;
     let bright = config([50, 400, 4000], U8F8::lit("2.25"), 20, WHOLE, true)?;
+    let brighter = config([50, 2000, 6000], U8F8::lit("2.25"), 20, WHOLE, true)?;
+    let every_other = config([2, 3, 50], U8F8::lit("1.5"), 2, [1, 126], false)?;
     let dim = config([7, 60, 64], U8F8::lit("255.99"), 0, [100, 127], false)?;
     let rare = config([300, 60_000, 65_535], U8F8::lit("0"), 1000, WHOLE, false)?;
     let each = photons / 17;
@@ -45,6 +47,7 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
         pixels: Pixels::All,
         link: 256,
         events: Events::Link,
+        reads: None,
         length: each,
         seed: 1,
     };
@@ -90,7 +93,7 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
             bins: Bins::Target(255, 0),
             pixels: Pixels::InTurn,
             clocks: [3, 5],
-            ..scene("full counters in all macropixels", 2, bright)
+            ..scene("full counters in all macropixels", 2, brighter)
         },
         Scene {
             bins: Bins::Target(250, 1),
@@ -99,6 +102,8 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
         Scene {
             clocks: [1, 1],
             bins: Bins::Target(250, 1),
+            // Exposures of more than 65,535 laser cycles.
+            length: each.max(140_000),
             ..scene("long exposures", 2, rare)
         },
         Scene {
@@ -122,6 +127,25 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
             bins: Bins::Target(256, 1),
             pixels: Pixels::InTurn,
             ..scene("all fire at once", 6, paper)
+        },
+        Scene {
+            clocks: [12, 24],
+            bins: Bins::Target(220, 1),
+            ..scene("looks at every other laser cycle", 2, every_other)
+        },
+        Scene {
+            reads: Some(9),
+            clocks: [40, 90],
+            rate: 180,
+            bins: Bins::Target(220, 1),
+            ..scene("the program reads histograms", 2, every_other)
+        },
+        Scene {
+            reads: Some(8),
+            clocks: [3, 5],
+            bins: Bins::Target(240, 1),
+            pixels: Pixels::OneForLong(40_000),
+            ..scene("the program reads full counters", 2, brighter)
         },
     ]);
     if let Some(histograms) = recorded(root)? {

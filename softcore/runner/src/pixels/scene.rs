@@ -29,6 +29,8 @@ pub struct Scene {
     /// The chance that the link takes a word in a clock, in 1/256.
     pub link: u32,
     pub events: Events,
+    /// The testbench reads histograms beside, a register after so many clocks.
+    pub reads: Option<u64>,
     /// The clocks with photons.
     pub length: u64,
     pub seed: u64,
@@ -207,6 +209,19 @@ impl Iterator for Commands {
                 let number = u32::try_from((after - REST) / 8).ok()?;
                 command.access = Some(Access::Read(register::COUNTS + number));
             }
+        }
+        if let Some(period) = self.scene.reads
+            && clock < end
+            && (clock - REST).is_multiple_of(period)
+        {
+            // Which eight bins, whether they are there, the eight.
+            command.access = Some(match (clock - REST) / period % 6 {
+                0 => {
+                    let words = 16 << self.scene.pixels_log2;
+                    Access::Write(register::HISTOGRAM, self.below(words))
+                }
+                number => Access::Read(register::HISTOGRAM + u32::try_from(number - 1).ok()?),
+            });
         }
         if let Events::Registers(period) = self.scene.events
             && clock < end + REST / 2

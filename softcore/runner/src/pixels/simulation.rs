@@ -38,6 +38,11 @@ pub fn simulate(simulator: &mut Command, scene: &Scene) -> Result<Outcome> {
     let written = writer.join();
     let status = child.wait()?;
     let outcome = outcome.with_context(|| scene.name.clone())?;
+    ensure!(
+        scene.reads.is_none() || outcome.bins_read > 0,
+        "{}: no bins were compared",
+        scene.name
+    );
     ensure!(status.success(), "{}: the simulation fails", scene.name);
     ensure!(
         matches!(written, Ok(Ok(()))),

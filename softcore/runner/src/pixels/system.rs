@@ -54,6 +54,7 @@ pub fn measure(root: &Path) -> Result<Vec<Latency>> {
                 pixels: Pixels::All,
                 link: 256,
                 events: Events::System,
+                reads: None,
                 length: LENGTH,
                 seed: rate.into(),
             };

@@ -1,0 +1,285 @@
+//! `cargo softcore formal`: what is proved of the pixel processor's Verilog, for all inputs.
+//!
+//! Each proof is a module `top` of `softcore/formal` around a module of the pixel processor.
+//! Yosys makes both one circuit of gates, for which ABC then shows that no assertion ever
+//! fails. What no reset sets holds anything at first.
+//!
+//! Two kinds of comments in these files join what ports do not: `// probe PATH` behind a wire
+//! gives it what the wire at that path has, `// drive PATH WIRE` gives that path the wire.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail, ensure};
+use lexopt::prelude::{Long, Short};
+
+use crate::pixels::Mutant;
+use crate::program::{self, Ran};
+use crate::{root, target_folder};
+
+const HELP: &str = "\
+cargo softcore formal
+
+Proves properties of the pixel processor with Yosys and ABC, and that each proof fails with a
+fault in the Verilog.";
+
+/// Far more than any proof takes.
+const PATIENCE: Duration = Duration::from_secs(400);
+
+/// How a property is proved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Engine {
+    /// In so many clocks from any state, after which no clock matters any more.
+    Clocks(u32),
+    /// By induction over so many clocks, and in these from the beginning: for ever.
+    Induction(u32),
+    /// With invariants that ABC finds (PDR): for ever.
+    Reachability,
+}
+
+/// A proof: the file of its `top`, the modules, a fault with which it has to fail.
+struct Proof {
+    name: &'static str,
+    sources: &'static [&'static str],
+    says: &'static str,
+    engine: Engine,
+    fault: Mutant,
+}
+
+const PROOFS: [Proof; 5] = [
+    Proof {
+        name: "bin_counter",
+        sources: &[
+            "rtl/pixels/bin_counter.v",
+            "rtl/pixels/word_bin.v",
+            "formal/histogram_ram.sv",
+        ],
+        says: "every photon counts in its bin of both histograms, a look empties the spare one, readers see that",
+        engine: Engine::Induction(5),
+        fault: Mutant {
+            file: "bin_counter",
+            from: "|| c_is_read && c_fresh;",
+            to: ";",
+        },
+    },
+    Proof {
+        name: "decision",
+        sources: &["rtl/pixels/decision.v"],
+        says: "background, root and comparison are the paper's formula",
+        engine: Engine::Clocks(11),
+        fault: Mutant {
+            file: "decision",
+            from: "{2'd0, excess} > above[STEPS + 1]",
+            to: "{2'd0, excess} >= above[STEPS + 1]",
+        },
+    },
+    Proof {
+        name: "event_packer",
+        sources: &["rtl/pixels/event_packer.v"],
+        says: "the offset is the centroid, rounded; words stay until taken; time words come when due",
+        engine: Engine::Induction(3),
+        fault: Mutant {
+            file: "event_packer",
+            from: "remainder <= {2'd0, distance, 9'd0} + {9'd0, sum};",
+            to: "remainder <= {2'd0, distance, 9'd0};",
+        },
+    },
+    Proof {
+        name: "event_queue",
+        sources: &["rtl/pixels/event_queue.v"],
+        says: "what is put in leaves once, in order",
+        engine: Engine::Reachability,
+        fault: Mutant {
+            file: "event_queue",
+            from: "if (put) next <= next + 1'b1;",
+            to: "if (put && !take) next <= next + 1'b1;",
+        },
+    },
+    Proof {
+        name: "look_scan",
+        sources: &["rtl/pixels/look_scan.v"],
+        says: "no macropixel has a second event before its first was taken",
+        engine: Engine::Reachability,
+        fault: Mutant {
+            file: "look_scan",
+            from: "requesting_at_look <= requesting;",
+            to: "requesting_at_look <= 0;",
+        },
+    },
+];
+
+/// Proves everything.
+pub fn run(mut parser: lexopt::Parser) -> Result<()> {
+    if let Some(argument) = parser.next()? {
+        match argument {
+            Short('h') | Long("help") => println!("{HELP}"),
+            other => return Err(other.unexpected().into()),
+        }
+        return Ok(());
+    }
+    let root = &root().canonicalize()?;
+    let all = Instant::now();
+    // The longest of them last as long as all others.
+    thread::scope(|scope| {
+        let running: Vec<_> = PROOFS
+            .iter()
+            .map(|proof| scope.spawn(move || prove(root, proof).with_context(|| proof.name)))
+            .collect();
+        running
+            .into_iter()
+            .try_for_each(|proof| match proof.join() {
+                Ok(line) => {
+                    println!("{}", line?);
+                    Ok(())
+                }
+                Err(_) => bail!("a proof panics"),
+            })
+    })?;
+    println!("{} proofs in {} s", PROOFS.len(), all.elapsed().as_secs());
+    Ok(())
+}
+
+/// Proves one, and that it fails with its fault.
+fn prove(root: &Path, proof: &Proof) -> Result<String> {
+    let began = Instant::now();
+    let depth = |frames: u32| -> Result<()> {
+        let said = solve(root, proof, false, &format!("bmc3 -F {frames}"))?;
+        let wanted = format!("No output asserted in {frames} frames");
+        ensure!(said.contains(&wanted), "an assertion fails: {said}");
+        Ok(())
+    };
+    let how = match proof.engine {
+        Engine::Clocks(clocks) => {
+            depth(clocks)?;
+            format!("in {clocks} clocks from any state")
+        }
+        Engine::Induction(clocks) => {
+            depth(clocks + 1)?;
+            let said = solve(root, proof, false, &format!("orpos; ind -F {clocks}"))?;
+            ensure!(
+                said.contains("Networks are equivalent"),
+                "not shown: {said}"
+            );
+            format!("by induction over {clocks} clocks")
+        }
+        Engine::Reachability => {
+            let said = solve(root, proof, false, "scorr; orpos; pdr")?;
+            ensure!(said.contains("Property proved"), "not shown: {said}");
+            "for every state that can be".to_owned()
+        }
+    };
+    let seconds = began.elapsed().as_secs_f32();
+    let said = solve(root, proof, true, "orpos; bmc3 -F 60")?;
+    ensure!(
+        said.contains("was asserted in frame"),
+        "a fault is not found: {said}"
+    );
+    let Proof {
+        name, says, fault, ..
+    } = proof;
+    Ok(format!(
+        "{name}: {says}: proved {how}, {seconds:.1} s; fails with `{}` as `{}`",
+        fault.from, fault.to
+    ))
+}
+
+/// What ABC says of the circuit, with or without the fault.
+fn solve(root: &Path, proof: &Proof, is_faulty: bool, commands: &str) -> Result<String> {
+    let softcore = root.join("softcore");
+    let folder = target_folder(root).join("softcore/formal");
+    let folder = folder
+        .join(proof.name)
+        .join(if is_faulty { "fault" } else { "right" });
+    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    let top = format!("formal/{}.sv", proof.name);
+    let (mut files, mut joins) = (Vec::new(), String::new());
+    for source in proof.sources.iter().copied().chain([&*top]) {
+        let path = softcore.join(source);
+        let mut text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        if is_faulty
+            && Path::new(source).file_stem() == Some(proof.fault.file.as_ref())
+            && source != top
+        {
+            text = proof.fault.apply(&text)?;
+        }
+        joins += &connections(&text);
+        // Yosys is told names without folders, which may have any letters.
+        let name = source.replace('/', "-");
+        fs::write(folder.join(&name), text)?;
+        files.push(name);
+    }
+    let script = format!(
+        "read_verilog -formal -sv {}\nhierarchy -top top\nproc\nflatten\nmemory_map\n{joins}\
+         opt -full\nasync2sync\nopt -full\ntechmap\nopt -fast\ndffunmap\nabc -g AND -fast\n\
+         opt_clean\nwrite_aiger -zinit circuit.aig\n",
+        files.join(" ")
+    );
+    fs::write(folder.join("script.ys"), script)?;
+    let mut yosys = Command::new("yosys");
+    let ran = succeed(yosys.current_dir(&folder).args(["-q", "-s", "script.ys"]))?;
+    // Without it, the wrapper and the module would stand apart.
+    ensure!(
+        !ran.errors.contains("is used but has no driver"),
+        ran.said()
+    );
+    let mut abc = Command::new("yosys-abc");
+    let commands = format!("read_aiger circuit.aig; fold; strash; {commands}");
+    Ok(succeed(abc.current_dir(&folder).args(["-q", &commands]))?.output)
+}
+
+/// The comments that join, as Yosys has it.
+fn connections(text: &str) -> String {
+    let mut all = String::new();
+    for line in text.lines() {
+        if let Some((wire, path)) = line.split_once("// probe ")
+            && let Some((declared, _)) = wire.split_once(';')
+        {
+            let name = declared.split_whitespace().last().unwrap_or_default();
+            all += &format!("connect -nounset -set {name} \\{path}\n");
+        }
+        if let Some((_, rest)) = line.split_once("// drive ")
+            && let Some((path, wire)) = rest.split_once(' ')
+        {
+            all += &format!("connect -nounset -set \\{path} {wire}\n");
+        }
+    }
+    all
+}
+
+fn succeed(command: &mut Command) -> Result<Ran> {
+    let name = command.get_program().to_string_lossy().into_owned();
+    let ran = program::run(command, PATIENCE, None)
+        .with_context(|| format!("{name}: sudo apt-get install --yes yosys"))?;
+    ensure!(ran.code == Some(0), "{name}: {}", ran.said());
+    Ok(ran)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_fault_has_its_place() {
+        for proof in PROOFS {
+            let file = proof.fault.file;
+            let path = root()
+                .join("softcore/rtl/pixels")
+                .join(file)
+                .with_extension("v");
+            let text = fs::read_to_string(path).unwrap();
+            assert_ne!(proof.fault.apply(&text).unwrap(), text);
+            let source = format!("rtl/pixels/{file}.v");
+            assert!(proof.sources.contains(&&*source), "{file}");
+        }
+    }
+
+    #[test]
+    fn comments_join() {
+        let text = "wire [1:0] a;  // probe dut.b[0].c\n// drive dut.d e\nwire f; // other\n";
+        let joined = "connect -nounset -set a \\dut.b[0].c\nconnect -nounset -set \\dut.d e\n";
+        assert_eq!(connections(text), joined);
+    }
+}
