@@ -235,6 +235,9 @@ impl Model {
                 (clock, happened) => self.apply(clock, happened)?,
             }
         }
+        let waits = self.pixels.iter().find(|pixel| pixel.request());
+        let waits = waits.map(AsyncPixel::address);
+        ensure!(waits.is_none(), "the event of {waits:?} has not left");
         let ended_full = self.outcome.statistics.saturated;
         let mut all = self.outcome.statistics;
         for pixel in &self.pixels {

@@ -33,19 +33,21 @@ const FAST_BUILD: [&str; 7] = [
 ];
 
 const HELP: &str = "\
-cargo softcore mutations [--sample N]
+cargo softcore mutations [--sample N] [--file NAME]
 
 Plants faults in copies of the pixel processor's Verilog, one at a time, and runs the scenes of
 `cargo softcore pixels`, which have to fail.
 
-  --sample N  so many of them, others with each commit";
+  --sample N   so many of them, others with each commit
+  --file NAME  those in softcore/rtl/pixels/NAME.v";
 
 /// Runs the command.
 pub fn run(mut parser: lexopt::Parser) -> Result<()> {
-    let mut sample = None;
+    let (mut sample, mut file) = (None, None);
     while let Some(argument) = parser.next()? {
         match argument {
             Long("sample") => sample = Some(parser.value()?.parse()?),
+            Long("file") => file = Some(parser.value()?.string()?),
             Short('h') | Long("help") => {
                 println!("{HELP}");
                 return Ok(());
@@ -53,13 +55,16 @@ pub fn run(mut parser: lexopt::Parser) -> Result<()> {
             other => return Err(other.unexpected().into()),
         }
     }
-    prove(&crate::root().canonicalize()?, sample)
+    prove(&crate::root().canonicalize()?, sample, file.as_deref())
 }
 
 /// Puts each fault into a copy of the Verilog, all of them or a sample, and fails if the
 /// scenes do not find one.
-fn prove(root: &Path, sample: Option<usize>) -> Result<()> {
-    let chosen = sample.map_or_else(|| (0..MUTANTS.len()).collect(), |many| sampled(root, many));
+fn prove(root: &Path, sample: Option<usize>, file: Option<&str>) -> Result<()> {
+    let mut chosen =
+        sample.map_or_else(|| (0..MUTANTS.len()).collect(), |many| sampled(root, many));
+    chosen.retain(|&number| file.is_none_or(|file| MUTANTS[number].file == file));
+    ensure!(!chosen.is_empty(), "no faults to plant");
     let scenes = proof::scenes(root, PHOTONS)?;
     let folder = target_folder(root).join("softcore/mutants");
     let (next, chosen) = (&AtomicUsize::new(0), &chosen);

@@ -35,6 +35,7 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
     let brighter = config([50, 2000, 6000], U8F8::lit("2.25"), 20, WHOLE, true)?;
     let every_other = config([2, 3, 50], U8F8::lit("1.5"), 2, [1, 126], false)?;
     let dim = config([7, 60, 64], U8F8::lit("255.99"), 0, [100, 127], false)?;
+    let never = config([300, 60_000, 65_535], U8F8::MAX, 0, WHOLE, false)?;
     let rare = config([300, 60_000, 65_535], U8F8::lit("0"), 1000, WHOLE, false)?;
     let each = photons / 17;
     let scene = |name: &str, pixels_log2, config| Scene {
@@ -105,6 +106,11 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
             // Exposures of more than 65,535 laser cycles.
             length: each.max(140_000),
             ..scene("long exposures", 2, rare)
+        },
+        Scene {
+            clocks: [1, 1],
+            length: each.max(140_000),
+            ..scene("exposures that end late, with full counters", 2, never)
         },
         Scene {
             events: Events::Registers(3),

@@ -11,7 +11,7 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 use super::command::{Access, Command, register, settings};
 
 /// Clocks without photons: for the settings before, for what is under way behind.
-const REST: u64 = 2000;
+const REST: u64 = 3000;
 
 /// Photons, and what else comes with them.
 #[derive(Clone, Debug)]
@@ -224,7 +224,7 @@ impl Iterator for Commands {
             });
         }
         if let Events::Registers(period) = self.scene.events
-            && clock < end + REST / 2
+            && clock < end + REST * 9 / 10
         {
             // A look at the register, the seven words, and the end of it.
             let place = clock % (9 * period);
