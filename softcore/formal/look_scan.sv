@@ -11,10 +11,10 @@ module top (
     wire look, found;
     wire [0:0] found_pixel;
     // The photons before a look are in some clocks after it.
-    reg [5:0] on_way = 0;
+    reg [6:0] on_way = 0;
     look_scan #(.PIXELS_LOG2(1)) dut (
-        .clk(clk), .reset(reset), .x(x), .l1(l1), .l2(l2), .is_one_hit(is_one_hit),
-        .cycle_end(cycle_end), .look(look), .scan(on_way[5]), .is_clear(is_clear),
+        .clk(clk), .reset(reset), .emptied(1'b0), .begins(1'b0), .x(x), .l1(l1), .l2(l2), .is_one_hit(is_one_hit),
+        .cycle_end(cycle_end), .look(look), .scan(on_way[6]), .is_clear(is_clear),
         .peak_count(10'd0), .peak_bin(7'd0), .photons(16'd0), .full(24'd0), .background(10'd0),
         .taken(taken), .taken_pixel(taken_pixel), .reading(reading),
         .found(found), .found_pixel(found_pixel)
@@ -25,7 +25,7 @@ module top (
     wire is_found = found && found_pixel == pixel, is_taken = taken && taken_pixel == pixel;
     always @(posedge clk) begin
         if (!(&clock)) clock <= clock + 1'b1;
-        on_way <= reset ? 6'd0 : {on_way[4:0], look};
+        on_way <= reset ? 7'd0 : {on_way[5:0], look};
         waits <= !reset && (is_found || waits && !is_taken);
     end
     always @* begin

@@ -21,6 +21,7 @@ module aer_port (
 );
     reg [127:0] rest;
     reg [3:0] left;                 // half words
+    (* async_reg = "true", shreg_extract = "no" *)
     reg [1:0] acks;
     wire ack = acks[1];
 

@@ -2,12 +2,13 @@
 // data bus at 0xE000_0000 (pixels/), and the AER port (aer_port.v).
 //
 // Words of the pixel processor and of the program leave by the same port, one whole word
-// after another; the program's first, because it has few.
+// after another. A stream has one sender: a program that sends events takes them from the
+// pixel processor, which then packs none.
 //
 // The photon pins belong to `clk`, one photon a clock: `photon_cycle_end` is high in the
 // clock in which a laser cycle ends, and a photon of that clock still belongs to it.
 module system #(
-    parameter PIXELS_LOG2 = 2,      // log2 of the macropixels, 2 to 6
+    parameter PIXELS_LOG2 = 2,      // log2 of the macropixels, 1 to 6
     parameter RAM_BITS = 14,        // log2 of the words of RAM
     parameter RAM_FILE = ""
 ) (
@@ -37,6 +38,7 @@ module system #(
     output        unmapped
 );
     // It is on when the FPGA has been configured.
+    (* async_reg = "true", shreg_extract = "no" *)
     reg [2:0] resets = 3'b111;
     wire in_reset = resets[2];
     always @(posedge clk) resets <= {resets[1:0], reset};

@@ -8,6 +8,8 @@
 
 namespace {
 
+constexpr uint32_t WAITING = 0x08;
+
 struct Access {
     uint32_t address, data;
 };
@@ -31,6 +33,7 @@ int main(int argc, char **argv) {
 
     std::deque<Access> accesses;
     uint32_t clock = 0, command;
+    bool waits = false;
     for (; next(command); clock++) {
         if (command >> 27 & 1) {
             Access access;
@@ -45,8 +48,11 @@ int main(int argc, char **argv) {
         // The answer to the access that is under way.
         if (pixels.wb_ack) {
             if (!pixels.wb_we) tell(READ, clock, pixels.wb_adr, pixels.wb_dat_o);
+            if (pixels.wb_adr == WAITING) waits = !pixels.wb_we && pixels.wb_dat_o & 1;
             accesses.pop_front();
         }
+        // As a program does, an event is taken if it was there when its registers were read.
+        while (!waits && !accesses.empty() && accesses.front().address == (1u << 31 | WAITING)) accesses.pop_front();
         pixels.wb_cyc = pixels.wb_stb = !accesses.empty();
         if (!accesses.empty()) {
             pixels.wb_we = accesses.front().address >> 31;

@@ -4,11 +4,13 @@
 //! and hands those to the link. The program can do what the hardware cannot: average events,
 //! leave some out, send them elsewhere.
 
-use dtof_core::{AerEncoder, ProcessorError, ProcessorEvent, ProcessorSettings};
+use dtof_core::{AerEncoder, ProcessorEvent, ProcessorSettings};
 
 use crate::{io, stream};
 
 const CONTROL: usize = 0x00;
+const RUN: u32 = 1;
+const RUNNING: u32 = 1 << 2;
 const LOOK: usize = 0x01;
 const WAITING: usize = 0x08;
 const EVENT: usize = 0x09;
@@ -42,19 +44,21 @@ fn read(register: usize) -> u32 {
 }
 
 /// Configures the pixel processor as [`stream::config`] says, and starts it. The program's
-/// part never ends.
-///
-/// # Errors
-/// [`ProcessorError`] if the pixel processor cannot do what is configured: it can.
-pub fn run(packer: Packer) -> Result<(), ProcessorError> {
-    let Ok(config) = stream::config() else {
-        return Ok(());
+/// part never ends; `false` if the configuration is refused.
+#[must_use]
+pub fn run(packer: Packer) -> bool {
+    let settings = stream::config().ok();
+    let settings = settings.and_then(|config| ProcessorSettings::of(&config).ok());
+    let Some(settings) = settings else {
+        return false;
     };
-    let settings = ProcessorSettings::of(&config)?;
+    // Settings are taken while it stands still.
+    write(CONTROL, 0);
     for (register, value) in (LOOK..).zip(settings.registers()) {
         write(register, value);
     }
-    write(CONTROL, 1 | u32::from(packer == Packer::Hardware) << 1);
+    write(CONTROL, RUN | u32::from(packer == Packer::Hardware) << 1);
+    while read(CONTROL) & RUNNING == 0 {}
     io::mark(READY);
     let mut encoder = AerEncoder::new();
     loop {

@@ -15,7 +15,7 @@ module event_reader #(
     input                         found,
     input  [PIXELS_LOG2-1:0]      found_pixel,
     input  [6:0]                  found_bin,
-    input  [REST-1:0]                 found_rest,
+    input  [REST-1:0]             found_rest,
     output                        reading,    // more than one is on its way
 
     // The histograms.
@@ -25,7 +25,7 @@ module event_reader #(
     output reg                    put,
     output reg [PIXELS_LOG2-1:0]  put_pixel,
     output reg [6:0]              put_bin,
-    output reg [REST-1:0]             put_rest,
+    output reg [REST-1:0]         put_rest,
     output reg [9:0]              put_left, put_right,
     output reg                    put_clipped,
 
@@ -118,7 +118,7 @@ module event_reader #(
         end
     end
 
-    // Of the live histogram, which is `since` in the comment above.
+    // Of the live histogram.
     genvar lane;
     generate
         for (lane = 0; lane < 8; lane = lane + 1) begin : host_bin

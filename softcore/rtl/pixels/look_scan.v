@@ -13,7 +13,9 @@ module look_scan #(
     parameter PIXELS_LOG2 = 2
 ) (
     input                              clk,
-    input                              reset,     // for as many clocks as there are macropixels
+    input                              reset,     // for as many clocks as there are macropixels,
+    input      [PIXELS_LOG2-1:0]       emptied,   // of which this says the macropixel of the clock
+    input                              begins,    // laser cycles are counted from 0
     input      [15:0]                  x,
     input      [15:0]                  l1,
     input      [15:0]                  l2,
@@ -105,8 +107,8 @@ module look_scan #(
             is_scanned <= 0;
         end
         if (o_valid && &o_pixel) is_scanned <= 1;
+        if (begins) cycle <= 0;
         if (reset) begin
-            cycle <= 0;
             since_look <= 0;
             busy <= 0;
             is_scanned <= 0;
@@ -166,11 +168,8 @@ module look_scan #(
     wire fires = acts && !is_long && !waits && is_clear;
     wire ends = acts && is_long || fires;
     // In reset all exposures are set to 0 in turn.
-    reg [PIXELS_LOG2-1:0] emptied;
-    always @(posedge clk) begin
-        emptied <= emptied + 1'b1;
+    always @(posedge clk)
         if (o_valid || reset) exposures[reset ? emptied : o_pixel] <= ends || reset ? 16'd0 : o_exposure;
-    end
 
     always @(posedge clk) begin
         if (ends) live[o_pixel] <= !live[o_pixel];

@@ -1,4 +1,4 @@
-// The pixel processor: counts the photons of 4 to 64 macropixels of 128 bins, a photon a
+// The pixel processor: counts the photons of 2 to 64 macropixels of 128 bins, a photon a
 // clock, looks at all of them every X laser cycles, and gives their events.
 //
 // It does what `AsyncPixel` of dtof-core does with the paper's rule, 10-bit counters and
@@ -17,7 +17,8 @@ module pixel_processor #(
     input      [15:0] photon_code,
     input             cycle_end,
 
-    // AER words, if the registers say that events leave packed. One stays until it is taken.
+    // AER words, if the registers say that events leave packed. One stays until it is taken,
+    // or `run` falls.
     output            word_valid,
     output     [127:0] word,
     input             word_taken,
@@ -42,13 +43,14 @@ module pixel_processor #(
     wire [9:0] minimum;
     wire [7:0] gate_first, gate_second, gate_middle, gate_fourth, gate_end;
 
-    // Memory is emptied while the processor stands still, a macropixel a clock.
+    // While the processor stands still its memory is emptied, a macropixel a clock.
     reg [PIXELS_LOG2:0] emptied;
     reg running;
+    wire begins;
     wire stopped = !running;
     always @(posedge clk) begin
-        running <= run && emptied[PIXELS_LOG2] && !reset;
-        if (!run || reset) emptied <= 0;
+        running <= run && (running || emptied[PIXELS_LOG2]) && !reset;
+        if (running || reset) emptied <= 0;
         else if (!emptied[PIXELS_LOG2]) emptied <= emptied + 1'b1;
     end
 
@@ -143,7 +145,7 @@ module pixel_processor #(
     wire expired, expired_deferred, deferred;
     wire [23:0] full_ended;
     look_scan #(.PIXELS_LOG2(PIXELS_LOG2)) scanner (
-        .clk(clk), .reset(stopped), .x(x), .l1(l1), .l2(l2), .is_one_hit(is_one_hit),
+        .clk(clk), .reset(stopped), .emptied(emptied[PIXELS_LOG2-1:0]), .begins(begins), .x(x), .l1(l1), .l2(l2), .is_one_hit(is_one_hit),
         .cycle_end(i_end), .look(look), .late(late), .cycle(cycle), .scan_cycle(scan_cycle),
         .scan(scan), .scan_pixel(scan_pixel),
         .peak_count(peak_count), .peak_bin(peak_bin), .photons(photons), .full(full),
@@ -219,7 +221,7 @@ module pixel_processor #(
         .clk(clk), .reset(reset),
         .wb_cyc(wb_cyc), .wb_stb(wb_stb), .wb_we(wb_we), .wb_adr(wb_adr),
         .wb_dat_i(wb_dat_i), .wb_dat_o(wb_dat_o), .wb_ack(wb_ack),
-        .run(run), .packs(packs), .is_one_hit(is_one_hit),
+        .running(running), .run(run), .begins(begins), .packs(packs), .is_one_hit(is_one_hit),
         .x(x), .l1(l1), .l2(l2), .alpha(alpha), .minimum(minimum),
         .gate_first(gate_first), .gate_second(gate_second), .gate_middle(gate_middle),
         .gate_fourth(gate_fourth), .gate_end(gate_end),

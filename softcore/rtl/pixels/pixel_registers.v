@@ -1,8 +1,8 @@
 // The registers of the pixel processor: Wishbone, whole words, an answer in the next clock.
 //
 // Addresses in words
-//   0x00 CONTROL    bit 0 run: 0 empties everything; bit 1: events leave packed (else the
-//                   program takes them)
+//   0x00 CONTROL    bit 0 run: 0 empties everything but COUNTS; bit 1: events leave packed
+//                   (else the program takes them); bit 2, read: photons count
 //   0x01 LOOK       L1 in 31..16, X in 15..0
 //   0x02 END        bit 16: the TDC takes one hit a laser cycle; L2 in 15..0
 //   0x03 RULE       fewest photons of a peak in 25..16, alpha in 1/256 in 15..0
@@ -13,7 +13,7 @@
 //   0x09 EVENT      read: the AER word of the event that waits, in four words, offset 0;
 //                   then right neighbour in 25..16, left one in 9..0; laser cycle 47..16 and
 //                   63..48
-//   0x30 HISTOGRAM  write: macropixel in 9..4, eighth of eight bins in 3..0, to be read;
+//   0x30 HISTOGRAM  write: macropixel in 9..4, part of eight bins in 3..0, to be read;
 //                   read: bit 0 it is not there yet
 //   0x31 BINS       read: four words of two bins each, the lower in 15..0
 //   0x40 COUNTS     read: two words each, the low one first, which holds the high one:
@@ -22,7 +22,9 @@
 //                   that there are not; events; decisions put off; exposures without an
 //                   event; of these, those with a decision put off; looks; laser cycles at
 //                   whose end a look was due but one was under way; laser cycles
-// While `run` is 1, settings are not written.
+// While `run` is 1, settings are not written, nor bit 1 of CONTROL. COUNTS begin anew when it
+// rises, and have 48 bits, laser cycles 64. Of an exposure 2^24 - 1 photons in full counters
+// count.
 module pixel_registers #(
     parameter PIXELS_LOG2 = 2
 ) (
@@ -34,7 +36,9 @@ module pixel_registers #(
     output reg [31:0]  wb_dat_o,
     output reg         wb_ack,
 
+    input              running,
     output reg         run, packs, is_one_hit,
+    output             begins,         // `run` has risen
     output reg [15:0]  x, l1, l2, alpha,
     output reg [9:0]   minimum,
     output reg [7:0]   gate_first, gate_second, gate_middle, gate_fourth, gate_end,
@@ -63,6 +67,7 @@ module pixel_registers #(
 
     // A counter each. They start anew when `run` rises.
     reg was_running;
+    assign begins = reset || run && !was_running;
     wire [KINDS*BITS-1:0] counts;
     reg [BITS-1:0] full;
     genvar kind;
@@ -70,14 +75,14 @@ module pixel_registers #(
         for (kind = 0; kind < KINDS; kind = kind + 1) begin : happened
             reg [BITS-1:0] count;
             always @(posedge clk)
-                if (run && !was_running) count <= 0;
+                if (begins) count <= 0;
                 else if (happens[kind]) count <= count + 1'b1;
             assign counts[BITS*kind +: BITS] = count;
         end
     endgenerate
     always @(posedge clk) begin
         was_running <= run;
-        if (run && !was_running) full <= 0;
+        if (begins) full <= 0;
         else full <= full + {{BITS-24{1'b0}}, full_ended};
     end
 
@@ -102,9 +107,10 @@ module pixel_registers #(
 
     always @(posedge clk) begin
         wb_ack <= access && !reset;
-        if (write && wb_adr == 8'h00) {packs, run} <= wb_dat_i[1:0];
+        if (write && wb_adr == 8'h00) run <= wb_dat_i[0];
         if (write && !run)
             case (wb_adr)
+                8'h00: packs <= wb_dat_i[1];
                 8'h01: {l1, x} <= wb_dat_i;
                 8'h02: {is_one_hit, l2} <= wb_dat_i[16:0];
                 8'h03: {minimum, alpha} <= wb_dat_i[25:0];
@@ -124,11 +130,14 @@ module pixel_registers #(
             host_address <= wb_dat_i[PIXELS_LOG2+3:0];
             host_asks <= 1;
             host_waits <= 1;
+            // What was asked for before does not come.
+            host_on_way <= 0;
+            host_comes <= 0;
         end
 
         if (read && wb_adr[7:5] == 3'd2 && !wb_adr[0]) high <= chosen[63:32];
         casez (wb_adr)
-            8'h00: wb_dat_o <= {30'd0, packs, run};
+            8'h00: wb_dat_o <= {29'd0, running, packs, run};
             8'h01: wb_dat_o <= {l1, x};
             8'h02: wb_dat_o <= {15'd0, is_one_hit, l2};
             8'h03: wb_dat_o <= {6'd0, minimum, alpha};

@@ -8,7 +8,7 @@ compile_error!("an image for a soft-core: cargo softcore");
 
 /// The program, which does not end.
 fn run() -> bool {
-    dtof_softcore::pixels::run(dtof_softcore::pixels::Packer::Hardware).is_ok()
+    dtof_softcore::pixels::run(dtof_softcore::pixels::Packer::Hardware)
 }
 
 dtof_softcore::program!(run);

@@ -8,7 +8,7 @@ compile_error!("an image for a soft-core: cargo softcore");
 
 /// The program, which does not end.
 fn run() -> bool {
-    dtof_softcore::pixels::run(dtof_softcore::pixels::Packer::Program).is_ok()
+    dtof_softcore::pixels::run(dtof_softcore::pixels::Packer::Program)
 }
 
 dtof_softcore::program!(run);

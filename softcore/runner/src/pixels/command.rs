@@ -94,7 +94,7 @@ impl Happened {
 /// The addresses of the registers.
 pub mod register {
     pub const CONTROL: u32 = 0x00;
-    pub const LOOK: u32 = 0x01;
+    pub const SIZE: u32 = 0x06;
     pub const WAITING: u32 = 0x08;
     pub const HISTOGRAM: u32 = 0x30;
     pub const BINS: u32 = 0x31;
@@ -103,13 +103,35 @@ pub mod register {
     pub const COUNTS: u32 = 0x40;
 }
 
-/// The accesses that configure the pixel processor, from its reset on.
-pub fn settings(config: &PixelConfig<128>, packs: bool) -> Result<Vec<Access>> {
-    let settings = ProcessorSettings::of(config)?;
-    let mut accesses: Vec<Access> = (register::LOOK..)
-        .zip(settings.registers())
-        .map(|(address, data)| Access::Write(address, data))
+/// What the registers from `CONTROL` to `SIZE` hold: settings, run, and who packs.
+pub fn held(config: &PixelConfig<128>, packs: bool, pixels_log2: u32) -> Result<Vec<u32>> {
+    let mut held = vec![1 | u32::from(packs) << 1];
+    held.extend(ProcessorSettings::of(config)?.registers());
+    held.push(1 << pixels_log2);
+    Ok(held)
+}
+
+/// The accesses that configure the pixel processor so, from its reset on. Once it runs, what is
+/// written changes nothing.
+pub fn settings(held: &[u32]) -> Vec<Access> {
+    let written = held.split_last().map_or(held, |(_, written)| written);
+    let mut accesses: Vec<Access> = (register::CONTROL..)
+        .zip(written)
+        .skip(1)
+        .map(|(address, &data)| Access::Write(address, data))
         .collect();
-    accesses.push(Access::Write(register::CONTROL, 1 | u32::from(packs) << 1));
-    Ok(accesses)
+    let read_all = (register::CONTROL..=register::SIZE).map(Access::Read);
+    accesses.extend(
+        written
+            .first()
+            .map(|&run| Access::Write(register::CONTROL, run)),
+    );
+    accesses.extend(read_all.clone());
+    let others = (register::CONTROL..).zip(written);
+    // It still runs.
+    accesses.extend(
+        others.map(|(address, &data)| Access::Write(address, !data | u32::from(address == 0))),
+    );
+    accesses.extend(read_all);
+    accesses
 }

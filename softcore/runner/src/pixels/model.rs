@@ -51,15 +51,18 @@ pub struct Model {
     /// Events that the program is to take.
     taken: VecDeque<DepthEvent>,
     events: Events,
+    /// What the registers of the settings hold.
+    held: Vec<u32>,
     reads: Vec<u32>,
     counts: Vec<u32>,
     bins: Reads,
 }
 
 impl Model {
-    pub fn new(scene: &Scene) -> Self {
+    pub fn new(scene: &Scene) -> Result<Self> {
         let pixel = |address| AsyncPixel::new(PixelAddress(address));
-        Self {
+        Ok(Self {
+            held: scene.held()?,
             config: scene.config,
             pixels: (0..1 << scene.pixels_log2).map(pixel).collect(),
             encoder: AerEncoder::new(),
@@ -77,7 +80,7 @@ impl Model {
             reads: Vec::new(),
             counts: Vec::new(),
             bins: Reads::default(),
-        }
+        })
     }
 
     /// The next clock; `happened` gives what happened in clocks before a given one.
@@ -195,6 +198,15 @@ impl Model {
             Happened::Read(address, data) if address >= register::HISTOGRAM => {
                 self.bins.read(clock, address, data)?;
             }
+            Happened::Read(address, data) if address <= register::SIZE => {
+                let expected = self.held.get(usize::try_from(address)?).copied();
+                // Whether it runs yet is not in the model.
+                let known = if address == 0 { 3 } else { u32::MAX };
+                ensure!(
+                    expected == Some(data & known),
+                    "clock {clock}: {data:x} in register {address}, not {expected:x?}"
+                );
+            }
             Happened::Read(address, data) => {
                 if address == register::WAITING {
                     self.reads.clear();
@@ -209,15 +221,15 @@ impl Model {
     /// The event that the program has read, as it is taken.
     fn compare_reads(&mut self, clock: u64) -> Result<()> {
         let event = self.taken.pop_front().context("no event")?;
-        // Else it came while the program read, or after.
-        if let &[1, a, b, c, d, e, f, g] = &*self.reads {
-            let read = ProcessorEvent::from_registers([a, b, c, d, e, f, g]);
-            ensure!(
-                read.word() == AerWord::depth_event(&event) && read.depth_event() == Ok(event),
-                "clock {clock}: {event:?} is read as {:?}",
-                read.depth_event()
-            );
-        }
+        let &[1, a, b, c, d, e, f, g] = &*self.reads else {
+            bail!("clock {clock}: an event is taken that was not read");
+        };
+        let read = ProcessorEvent::from_registers([a, b, c, d, e, f, g]);
+        ensure!(
+            read.word() == AerWord::depth_event(&event) && read.depth_event() == Ok(event),
+            "clock {clock}: {event:?} is read as {:?}",
+            read.depth_event()
+        );
         Ok(())
     }
 

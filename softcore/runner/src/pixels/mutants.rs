@@ -27,7 +27,7 @@ const fn mutant(file: &'static str, from: &'static str, to: &'static str) -> Mut
 }
 
 /// All of them.
-pub const MUTANTS: [Mutant; 60] = [
+pub const MUTANTS: [Mutant; 69] = [
     // Counting: words on their way, valid bits, full counters.
     mutant(
         "bin_counter",
@@ -314,5 +314,42 @@ pub const MUTANTS: [Mutant; 60] = [
         "pixel_registers",
         "host_comes <= host_on_way[1];",
         "host_comes <= host_on_way[0];",
+    ),
+    mutant(
+        "pixel_processor",
+        "a_quadrant <= bin < gate_middle ?",
+        "a_quadrant <= bin <= gate_middle ?",
+    ),
+    mutant("pixel_processor", "bin >= gate_fourth", "bin > gate_fourth"),
+    mutant(
+        "pixel_processor",
+        "is_clipped, &count}",
+        "&count, is_clipped}",
+    ),
+    mutant(
+        "pixel_processor",
+        "wire is_gated = bin >= gate_first && bin < gate_end;",
+        "wire is_gated = bin > gate_first && bin < gate_end;",
+    ),
+    mutant(
+        "pixel_processor",
+        "strayed <= i_valid && is_stray;",
+        "strayed <= i_valid && is_stray && !is_rejected;",
+    ),
+    mutant(
+        "pixel_processor",
+        ".cycle_high(event_cycle[63:16])",
+        ".cycle_high(48'd0)",
+    ),
+    mutant("pixel_registers", "if (write && !run)", "if (write)"),
+    mutant(
+        "pixel_registers",
+        "8'h08: wb_dat_o <= {31'd0, event_waiting && !packs};",
+        "8'h08: wb_dat_o <= 0;",
+    ),
+    mutant(
+        "pixel_registers",
+        "8'h0d: wb_dat_o <= {6'd0, event_right, 6'd0, event_left};",
+        "8'h0d: wb_dat_o <= {6'd0, event_left, 6'd0, event_right};",
     ),
 ];

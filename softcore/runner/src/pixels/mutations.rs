@@ -177,6 +177,9 @@ mod tests {
             let others = &MUTANTS[..number];
             assert!(!others.contains(mutant), "twice: {mutant:?}");
         }
+        let page = crate::root().join("docs/softcore.md");
+        let told = format!("plants {} faults", MUTANTS.len());
+        assert!(fs::read_to_string(page).unwrap().contains(&told), "{told}");
         assert!(MUTANTS[0].apply("").is_err());
         let twice = MUTANTS[0].from.repeat(2);
         assert!(MUTANTS[0].apply(&twice).is_err());

@@ -8,7 +8,7 @@ use dtof_core::{Count, PaperRule, PixelConfig, RangeGate};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
-use super::command::{Access, Command, register, settings};
+use super::command::{Access, Command, held, register, settings};
 
 /// Clocks without photons: for the settings before, for what is under way behind.
 const REST: u64 = 3000;
@@ -93,6 +93,13 @@ pub fn config(
     Ok(builder.one_hit_tdc(is_one_hit).build()?)
 }
 
+impl Scene {
+    /// What the registers of the settings hold.
+    pub fn held(&self) -> Result<Vec<u32>> {
+        held(&self.config, self.events == Events::Link, self.pixels_log2)
+    }
+}
+
 /// The commands of a scene, each time the same.
 pub struct Commands {
     scene: Scene,
@@ -105,7 +112,7 @@ pub struct Commands {
 
 impl Commands {
     pub fn new(scene: &Scene) -> Result<Self> {
-        let mut settings = settings(&scene.config, scene.events == Events::Link)?;
+        let mut settings = settings(&scene.held()?);
         settings.reverse();
         if !scene.events.has_registers() {
             settings.clear();

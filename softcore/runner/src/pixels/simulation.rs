@@ -27,7 +27,7 @@ pub fn simulate(simulator: &mut Command, scene: &Scene) -> Result<Outcome> {
         input.flush()
     });
     let mut told = Told::new(|| Happened::read(&mut output));
-    let mut model = Model::new(scene);
+    let mut model = Model::new(scene)?;
     let outcome = Commands::new(scene)?
         .try_for_each(|command| model.clock(&command, &mut told))
         .and_then(|()| model.end(&mut told));
