@@ -49,7 +49,7 @@ struct Proof {
     fault: Mutant,
 }
 
-const PROOFS: [Proof; 5] = [
+const PROOFS: [Proof; 6] = [
     Proof {
         name: "bin_counter",
         sources: &[
@@ -107,6 +107,17 @@ const PROOFS: [Proof; 5] = [
             file: "look_scan",
             from: "requesting_at_look <= requesting;",
             to: "requesting_at_look <= 0;",
+        },
+    },
+    Proof {
+        name: "peak_keeper",
+        sources: &["rtl/pixels/peak_keeper.v"],
+        says: "a look shows the peak, the maxima and the numbers of photons as they were when it passed",
+        engine: Engine::Induction(3),
+        fault: Mutant {
+            file: "peak_keeper",
+            from: "f_valid && f_pixel == e_pixel ? f_next : states[e_pixel]",
+            to: "states[e_pixel]",
         },
     },
 ];
