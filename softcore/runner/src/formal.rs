@@ -49,7 +49,7 @@ struct Proof {
     fault: Mutant,
 }
 
-const PROOFS: [Proof; 6] = [
+const PROOFS: [Proof; 7] = [
     Proof {
         name: "bin_counter",
         sources: &[
@@ -96,6 +96,21 @@ const PROOFS: [Proof; 6] = [
             file: "event_queue",
             from: "if (put) next <= next + 1'b1;",
             to: "if (put && !take) next <= next + 1'b1;",
+        },
+    },
+    Proof {
+        name: "event_reader",
+        sources: &[
+            "rtl/pixels/event_reader.v",
+            "rtl/pixels/event_queue.v",
+            "rtl/pixels/word_bin.v",
+        ],
+        says: "the neighbours are the counts at the look, though photons came since",
+        engine: Engine::Clocks(7),
+        fault: Mutant {
+            file: "event_reader",
+            from: "t_ended - t_since",
+            to: "t_ended",
         },
     },
     Proof {
