@@ -6,6 +6,9 @@ use std::error::Error;
 use std::fs;
 use std::path::Path;
 
+/// 64 KiB from address 0 on.
+const SYSTEM_RAM: u32 = 64 << 10;
+
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed=image.x");
@@ -15,11 +18,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Ok(());
     }
     let here = env::var("CARGO_MANIFEST_DIR")?;
-    let memory = if env::var_os("CARGO_FEATURE_VIRT").is_some() {
-        "virt.x"
-    } else {
-        "testbench.x"
-    };
+    let virt = env::var_os("CARGO_FEATURE_VIRT").is_some();
+    let memory = if virt { "virt.x" } else { "testbench.x" };
     // The linker looks for `memory.x` in the folder it is started in before all
     // others, and there it finds that of a board.
     let map = fs::read_to_string(Path::new(&here).join("memory").join(memory))?;
@@ -29,5 +29,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rustc-link-arg-bins=-T{}", script.display());
     // Sections start where the one before ends, not at the next page.
     println!("cargo::rustc-link-arg-bins=--nmagic");
+    // `rtl/system.v` has less RAM than the testbench.
+    for bin in ["pixels-hardware", "pixels-program"]
+        .iter()
+        .filter(|_| !virt)
+    {
+        println!("cargo::rustc-link-arg-bin={bin}=--defsym=_ram_end={SYSTEM_RAM:#x}");
+    }
     Ok(())
 }

@@ -61,6 +61,7 @@ impl Images {
             fs::write(folder.join(program), &bytes)?;
             if !virt {
                 let flat = flat(&bytes).with_context(|| built.display().to_string())?;
+                fs::write(folder.join(format!("{program}.hex")), hexadecimal(&flat))?;
                 fs::write(folder.join(format!("{program}.bin")), flat)?;
             }
         }
@@ -75,6 +76,11 @@ impl Images {
     /// The memory from address 0 on that a program is.
     pub fn flat(&self, program: &str) -> PathBuf {
         self.folder.join(format!("{program}.bin"))
+    }
+
+    /// The same as words, a line each, for the RAM of an FPGA.
+    pub fn words(&self, program: &str) -> PathBuf {
+        self.folder.join(format!("{program}.hex"))
     }
 
     /// Bytes a program takes.
@@ -100,6 +106,18 @@ fn flat(elf: &[u8]) -> Result<Vec<u8>> {
     }
     ensure!(!memory.is_empty(), "an empty image");
     Ok(memory)
+}
+
+/// A line a word, as `$readmemh` reads it.
+fn hexadecimal(bytes: &[u8]) -> String {
+    let words = bytes.chunks(4).map(|bytes| {
+        let mut word = [0; 4];
+        for (to, from) in word.iter_mut().zip(bytes) {
+            *to = *from;
+        }
+        format!("{:08x}\n", u32::from_le_bytes(word))
+    });
+    words.collect()
 }
 
 /// Bytes of an image.

@@ -35,7 +35,7 @@ cargo softcore pixels [--photons N] [--check]
 Runs the pixel processor in simulation against dtof-core, bit for bit, alone and in the whole
 system, and writes docs/results/bench/pixels.csv and pixels.md.
 
-  --photons N  photons of the scenes in all, 10 million unless told; others write nothing
+  --photons N  about so many photons in all, 10 million unless told; others write nothing
   --check      compare with the files instead of writing them";
 
 /// Photons of a run unless others are asked for.

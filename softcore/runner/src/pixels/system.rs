@@ -1,7 +1,6 @@
 //! How long an event takes in the whole system, from the end of the laser cycle that decides to
 //! REQ at the AER port.
 
-use std::fs;
 use std::path::Path;
 use std::process::Command;
 
@@ -35,14 +34,12 @@ const CLOCKS: [u64; 2] = [7, 8];
 /// Runs the system at several rates of photons, `length` clocks each.
 pub fn measure(root: &Path) -> Result<Vec<Latency>> {
     let processor = package_folder(root, "pythondata_cpu_vexriscv")?;
-    let sizes = ["-GPIXELS_LOG2=2", "-GRAM_BITS=16"];
-    let simulator = verilate(root, "system", "system", &processor, &sizes)?;
+    // Its RAM and its macropixels are those it has by itself.
+    let simulator = verilate(root, "system", "system", &processor, &[])?;
     let images = Images::build(root, "rv32im", false)?;
     let mut all = Vec::new();
     for (program, packer) in PROGRAMS {
-        let flat = images.flat(program);
-        let words = flat.with_extension("hex");
-        fs::write(&words, hexadecimal(&fs::read(&flat)?))?;
+        let words = images.words(program);
         for rate in RATES {
             let scene = Scene {
                 name: format!("the system, {rate}/256 photons a clock, events packed by {packer}"),
@@ -87,16 +84,4 @@ pub fn measure(root: &Path) -> Result<Vec<Latency>> {
         }
     }
     Ok(all)
-}
-
-/// A line a word, as `$readmemh` reads it.
-fn hexadecimal(bytes: &[u8]) -> String {
-    let words = bytes.chunks(4).map(|bytes| {
-        let mut word = [0; 4];
-        for (to, from) in word.iter_mut().zip(bytes) {
-            *to = *from;
-        }
-        format!("{:08x}\n", u32::from_le_bytes(word))
-    });
-    words.collect()
 }
