@@ -88,6 +88,11 @@ impl Chip {
                 let at = 24 + 3 * usize::from(entry);
                 bytes[at..at + 3].copy_from_slice(&[100 + half, low, high]);
             }
+            // No second targets: they have no confidence, or no distance.
+            for (entry, none) in (18..36).zip([[0, 200, 1], [100, 0, 0]].into_iter().cycle()) {
+                let at = 24 + 3 * entry;
+                bytes[at..at + 3].copy_from_slice(&none);
+            }
             return bytes;
         }
         let (half, n) = (self.at / 30, self.at % 30);

@@ -56,7 +56,12 @@ impl<const CHUNK: usize> Bench<CHUNK> {
 
     pub fn poll(&mut self) -> Polled {
         self.now_ms = self.now_ms.wrapping_add(1);
-        self.sensor.poll(self.now_ms, &mut self.sink).unwrap()
+        let before = self.sensor.counts().histograms;
+        let polled = self.sensor.poll(self.now_ms, &mut self.sink).unwrap();
+        // Photons have come if a histogram is whole.
+        let is_whole = self.sensor.counts().histograms > before;
+        assert_eq!(polled == Polled::Data, is_whole);
+        polled
     }
 
     pub fn bring_up(&mut self) {

@@ -32,7 +32,8 @@ const RATES: [u32; 6] = [4, 8, 16, 32, 64, 256];
 /// Clocks of a run.
 const LENGTH: u64 = 1_000_000;
 
-/// A clock that place and route reaches, for every number of macropixels.
+/// A clock that place and route reaches for 4 and 16 macropixels in the whole system, and nearly
+/// for 64.
 pub const MEGAHERTZ: f64 = 75.0;
 
 /// Clocks of a laser cycle of 10 MHz at this clock: one or the other.
