@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::{cargo, target_folder, toolchain, uf2};
+use crate::{cargo, layout, target_folder, toolchain, uf2};
 
 const PROFILE: &str = "firmware";
 const SMALL_PROFILE: &str = "firmware-small";
@@ -282,6 +282,7 @@ fn link(
     ensure!(status.success(), "{image} does not build, see above");
 
     let built = folder.join(target).join(profile).join(image);
+    layout::check(&built)?;
     fs::copy(&built, &kept).with_context(|| built.display().to_string())?;
     Ok(kept)
 }

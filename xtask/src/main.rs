@@ -8,6 +8,7 @@ mod firmware;
 mod flash;
 mod hil;
 mod image;
+mod layout;
 mod python;
 mod self_test;
 mod sizes;

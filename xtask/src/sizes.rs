@@ -9,6 +9,7 @@ use object::read::elf::{ElfFile32, SectionHeader};
 use object::{Object, ObjectSymbol};
 
 use crate::firmware::{Board, Build, Sensor};
+use crate::layout;
 
 /// Macropixels and blocks of them the sidecar has room for.
 const MOST_PIXELS: u64 = 256;
@@ -30,7 +31,7 @@ const ARRAYS: [(u64, u64); 7] = [
 const MOST_FLASH: u64 = 64 * 1024;
 const MOST_FLASH_WITH_SENSOR: u64 = 82 * 1024;
 const MOST_RAM: u64 = 128 * 1024 - STACK_RESERVE;
-/// Bytes of its RAM that are left to the stack.
+/// Bytes of its RAM that each linker script gives to the stack.
 const STACK_RESERVE: u64 = 19 * 1024;
 /// Bytes of them that an image may need; the rest is for the report of a panic.
 const MOST_STACK: u64 = 12 * 1024;
@@ -60,9 +61,8 @@ pub fn print(root: &Path) -> Result<()> {
             let left =
                 address(&path, "_stack_start")?.saturating_sub(address(&path, "_stack_end")?);
             ensure!(
-                left >= STACK_RESERVE,
-                "{left} bytes of its RAM are left to the stack, of {STACK_RESERVE}: fewer PIXELS or BLOCKS in \
-                 its `src/bin` leave more"
+                left == STACK_RESERVE,
+                "its linker script gives the stack {left} bytes, not {STACK_RESERVE}"
             );
             if board == Board::Stm32F405 {
                 // The first is the one without a sensor.
@@ -83,8 +83,10 @@ pub fn print(root: &Path) -> Result<()> {
         // It writes through tables of functions; its stack has no bound.
         println!("{name:<24} {flash:>8} {ram:>8} {:>8}", "-");
     }
-    println!("bytes; RAM without the stack, which has what is left; of it the most that the");
-    println!("machine code can need, interrupts included, up to a panic");
+    println!(
+        "bytes; RAM without the stack, which has {STACK_RESERVE}; of it the most that the machine"
+    );
+    println!("code can need, interrupts included, up to a panic");
     let (ram, pixels, blocks) = of_pixels.context("no image of the real board")?;
     let [pixel, block] = [pixels / MOST_PIXELS, blocks / MOST_BLOCKS];
     let others = ram - MOST_PIXELS * pixel - MOST_BLOCKS * block;
@@ -146,8 +148,8 @@ impl Sizes {
     /// A section at `address` when the image runs, which does or does not have
     /// content.
     fn add(&mut self, address: u64, size: u64, has_content: bool) {
-        // The RAM of every board; no image uses what lies elsewhere.
-        let in_ram = address >= 0x2000_0000;
+        // No image uses what lies elsewhere.
+        let in_ram = address >= layout::RAM;
         if in_ram {
             self.ram += size;
         }

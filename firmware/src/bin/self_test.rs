@@ -14,7 +14,7 @@ compile_error!("an image for a board: cargo xtask self-test");
 use core::fmt;
 use core::panic::PanicInfo;
 
-use cortex_m_rt::{ExceptionFrame, entry, exception};
+use cortex_m_rt::entry;
 use dtof_firmware::self_test;
 use semihosting::process::ExitCode;
 use semihosting::{io, println};
@@ -40,12 +40,5 @@ impl fmt::Write for Lines {
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     println!("{info}");
-    ExitCode::FAILURE.exit_process()
-}
-
-#[allow(unsafe_code, reason = "the attribute asks for it")]
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    println!("hard fault at {:#010x}", frame.pc());
     ExitCode::FAILURE.exit_process()
 }

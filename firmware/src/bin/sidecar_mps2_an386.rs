@@ -8,8 +8,8 @@ compile_error!("an image for a board: cargo xtask image mps2-an386");
 
 use core::panic::PanicInfo;
 
-use cortex_m_rt::{ExceptionFrame, entry, exception};
-use dtof_firmware::board::{mps2_an386::Mps2An386, turn};
+use cortex_m_rt::entry;
+use dtof_firmware::board::{mps2_an386::Mps2An386, on_panic, turn};
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_sensors::Sensor;
 use dtof_sensors::simulated;
@@ -43,11 +43,5 @@ fn main() -> ! {
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    Mps2An386::on_panic(info)
-}
-
-#[allow(unsafe_code, reason = "the attribute asks for it")]
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    Mps2An386::on_hard_fault(frame)
+    on_panic(info)
 }

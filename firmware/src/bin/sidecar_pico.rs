@@ -8,10 +8,10 @@ compile_error!("an image for a board: cargo xtask image pico");
 
 use core::panic::PanicInfo;
 
-use cortex_m_rt::{ExceptionFrame, entry, exception};
+use cortex_m_rt::entry;
 #[cfg(feature = "sensor-photon-timer")]
 use dtof_core::checked;
-use dtof_firmware::board::{pico::Pico, turn};
+use dtof_firmware::board::{on_panic, pico::Pico, turn};
 #[cfg(feature = "sensor-photon-timer")]
 use dtof_firmware::photon_timer::{Config, Settings};
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
@@ -66,11 +66,5 @@ fn main() -> ! {
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    Pico::on_panic(info)
-}
-
-#[allow(unsafe_code, reason = "the attribute asks for it")]
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    Pico::on_hard_fault(frame)
+    on_panic(info)
 }

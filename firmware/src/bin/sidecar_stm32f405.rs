@@ -8,8 +8,8 @@ compile_error!("an image for a board: cargo xtask image stm32f405");
 
 use core::panic::PanicInfo;
 
-use cortex_m_rt::{ExceptionFrame, entry, exception};
-use dtof_firmware::board::{stm32f405::Stm32F405, turn};
+use cortex_m_rt::entry;
+use dtof_firmware::board::{on_panic, stm32f405::Stm32F405, turn};
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_sensors::Sensor;
 #[cfg(not(any(
@@ -54,11 +54,5 @@ fn main() -> ! {
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    Stm32F405::on_panic(info)
-}
-
-#[allow(unsafe_code, reason = "the attribute asks for it")]
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    Stm32F405::on_hard_fault(frame)
+    on_panic(info)
 }

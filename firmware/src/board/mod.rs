@@ -6,13 +6,18 @@
 //! from there, and implements [`Board`]. An image is one build with the feature
 //! of its board and one file in `src/bin`; its memory is in the linker script
 //! `build.rs` chooses.
+//!
+//! The file also has `laser_off`, which [`fault`] calls first on a panic or a hard fault, and
+//! `end`, which it calls last.
 
+pub mod fault;
 #[cfg(all(target_os = "none", feature = "mps2-an386"))]
 pub mod mps2_an386;
 #[cfg(all(target_os = "none", feature = "pico"))]
 pub mod pico;
 #[cfg(all(target_os = "none", feature = "board"))]
 mod report;
+pub mod reset_reason;
 #[cfg(all(target_os = "none", feature = "stm32f405"))]
 pub mod stm32f405;
 pub mod systick;
@@ -33,9 +38,27 @@ compile_error!("an image is for one board: choose one of mps2-an386, pico and st
 ))]
 compile_error!("an image is for one sensor: choose one of the features sensor-*");
 
+#[cfg(all(target_os = "none", feature = "board"))]
+pub use self::fault::on_panic;
+#[cfg(all(target_os = "none", feature = "mps2-an386"))]
+use self::mps2_an386 as chip;
+#[cfg(all(target_os = "none", feature = "pico"))]
+use self::pico as chip;
+#[cfg(all(target_os = "none", feature = "stm32f405"))]
+use self::stm32f405 as chip;
 pub use self::transmit::{Transmitter, transmit};
 
 use crate::serial::Serial;
+
+/// Whether the image drives a real sensor, and with it a laser. A debugger that halts the
+/// processor then does not halt the watchdog: the laser would go on without end.
+#[cfg(all(target_os = "none", any(feature = "pico", feature = "stm32f405")))]
+const DRIVES_SENSOR: bool = cfg!(any(
+    feature = "sensor-photon-timer",
+    feature = "sensor-tdc7200",
+    feature = "sensor-tmf8829",
+    feature = "sensor-tmf882x",
+));
 
 /// The parts of a board that the main loop needs.
 pub trait Board {

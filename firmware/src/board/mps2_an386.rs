@@ -8,21 +8,21 @@
 //! Design Kit (DDI 0479).
 
 use core::cell::RefCell;
-use core::panic::PanicInfo;
 use core::ptr;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::NVIC;
 use cortex_m::peripheral::syst::SystClkSource;
-use cortex_m_rt::{ExceptionFrame, exception};
+use cortex_m_rt::exception;
 use critical_section::Mutex;
 use defmt_semihosting as _;
 use semihosting::experimental::env;
 use semihosting::process::ExitCode;
 use static_cell::ConstStaticCell;
 
-use super::{Board, Transmitter, report, transmit};
+use super::reset_reason::{self, ResetReason};
+use super::{Board, Transmitter, transmit};
 use crate::serial::{BoardBuffers, Buffers, Serial, SerialInterrupt};
 
 /// The clock of processor and UART.
@@ -98,17 +98,33 @@ impl Mps2An386 {
         code.exit_process()
     }
 
-    /// Reports a panic and ends the emulator with a failure.
-    pub fn on_panic(info: &PanicInfo<'_>) -> ! {
-        report::panic(info);
-        Self::exit(ExitCode::FAILURE)
+    /// Lights LED0, which stands for a laser, or switches it off.
+    pub fn set_laser(on: bool) {
+        /// User LEDs of the FPGA's I/O: LED0 is bit 0 (Application Note 386, "FPGA system
+        /// control and I/O").
+        const LED: *mut u32 = ptr::without_provenance_mut(0x4002_8000);
+        // SAFETY: the address is that of a register of this board, which touches no memory.
+        #[allow(unsafe_code, reason = "registers are reached by address")]
+        unsafe {
+            ptr::write_volatile(LED, on.into());
+        }
     }
 
-    /// Reports a hard fault and ends the emulator with a failure.
-    pub fn on_hard_fault(frame: &ExceptionFrame) -> ! {
-        report::hard_fault(frame);
-        Self::exit(ExitCode::FAILURE)
+    /// Why the board has started: an emulator is always switched on.
+    #[must_use]
+    pub fn reset_reason(&self) -> ResetReason {
+        reset_reason::take().unwrap_or(ResetReason::PowerOn)
     }
+}
+
+/// Switches LED0 off, which stands for a laser.
+pub(super) fn laser_off() {
+    Mps2An386::set_laser(false);
+}
+
+/// Ends the emulator with a failure.
+pub(super) fn end() -> ! {
+    Mps2An386::exit(ExitCode::FAILURE)
 }
 
 impl Board for Mps2An386 {

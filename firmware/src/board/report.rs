@@ -3,7 +3,7 @@
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-#[cfg(not(feature = "pico"))]
+#[cfg(not(any(feature = "pico", feature = "bench", feature = "self-test")))]
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::ExceptionFrame;
 
@@ -12,36 +12,56 @@ pub fn panic(info: &PanicInfo<'_>) {
     once(|| defmt::error!("{}", defmt::Display2Format(info)));
 }
 
-/// Reports a hard fault: where it happened. A Cortex-M0+ says no more of it.
-#[cfg(feature = "pico")]
-pub fn hard_fault(frame: &ExceptionFrame) {
+/// Reports a hard fault: where it happened, if `frame` is left, and what the processor says of
+/// it.
+#[cfg(not(any(feature = "bench", feature = "self-test")))]
+pub fn hard_fault(is_overflow: bool, frame: Option<&ExceptionFrame>) {
     once(|| {
-        defmt::error!(
-            "hard fault at {=u32:#010x}: LR {=u32:#010x}",
-            frame.pc(),
-            frame.lr(),
-        );
+        if is_overflow {
+            defmt::error!("stack overflow");
+        }
+        if let Some(frame) = frame {
+            defmt::error!(
+                "hard fault at {=u32:#010x}: LR {=u32:#010x}",
+                frame.pc(),
+                frame.lr(),
+            );
+        }
+        registers();
     });
 }
 
-/// Reports a hard fault: where it happened, and what the processor says of it.
-#[cfg(not(feature = "pico"))]
-pub fn hard_fault(frame: &ExceptionFrame) {
+/// The same of an image that ends by itself. It ends here: after a reset it would begin again.
+#[cfg(any(feature = "bench", feature = "self-test"))]
+pub fn hard_fault(is_overflow: bool, frame: Option<&ExceptionFrame>) {
+    let what = if is_overflow {
+        "stack overflow"
+    } else {
+        "hard fault"
+    };
+    match frame {
+        Some(frame) => semihosting::println!("{what} at {:#010x}", frame.pc()),
+        None => semihosting::println!("{what}"),
+    }
+    semihosting::process::ExitCode::FAILURE.exit_process()
+}
+
+/// A Cortex-M0+ has none of a fault.
+#[cfg(all(feature = "pico", not(any(feature = "bench", feature = "self-test"))))]
+const fn registers() {}
+
+#[cfg(not(any(feature = "pico", feature = "bench", feature = "self-test")))]
+fn registers() {
     // SAFETY: the registers are only read, and reading them changes nothing.
     #[allow(unsafe_code, reason = "nobody can hand over the peripherals here")]
     let scb = unsafe { &*SCB::PTR };
-    once(|| {
-        defmt::error!(
-            "hard fault at {=u32:#010x}: LR {=u32:#010x}, CFSR {=u32:#010x}, HFSR {=u32:#010x}, \
-             MMFAR {=u32:#010x}, BFAR {=u32:#010x}",
-            frame.pc(),
-            frame.lr(),
-            scb.cfsr.read(),
-            scb.hfsr.read(),
-            scb.mmfar.read(),
-            scb.bfar.read(),
-        );
-    });
+    defmt::error!(
+        "CFSR {=u32:#010x}, HFSR {=u32:#010x}, MMFAR {=u32:#010x}, BFAR {=u32:#010x}",
+        scb.cfsr.read(),
+        scb.hfsr.read(),
+        scb.mmfar.read(),
+        scb.bfar.read(),
+    );
 }
 
 /// Does not report what goes wrong while reporting, or without end.

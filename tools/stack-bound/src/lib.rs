@@ -12,6 +12,7 @@ mod thumb;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::mem;
 use std::ops::Range;
 use std::path::Path;
 
@@ -29,7 +30,9 @@ const NMI: usize = 2;
 const HARD_FAULT: usize = 3;
 
 /// Bytes of stack an image can need: the main loop, a handler of an interrupt on
-/// it (all have the same priority), and on that the hard fault's and the NMI's.
+/// it (all have the same priority), and on that the hard fault's and the NMI's. The hard
+/// fault's may start the stack anew, as it may come from an overflow: it then needs its
+/// own bytes from the start on.
 ///
 /// # Errors
 /// If the file is no such image, or a function in it has no bound.
@@ -49,19 +52,27 @@ pub fn of_image(path: &Path) -> Result<u64> {
     needs.resolve_usb_device();
     let mut bound = 0;
     let mut handlers = 0;
+    let mut nmi = 0;
+    let mut anew = 0;
     for (index, vector) in vectors.enumerate().skip(1) {
         // Reserved entries are 0.
         if vector == 0 {
             continue;
         }
+        let starts_anew = index == HARD_FAULT && needs.lets_start_anew(vector & !1);
         let need = needs.of(vector & !1)?;
         match index {
             1 => bound += need,
-            NMI | HARD_FAULT => bound += EXCEPTION_FRAME + need,
+            NMI => nmi = EXCEPTION_FRAME + need,
+            HARD_FAULT if starts_anew => {
+                bound += EXCEPTION_FRAME;
+                anew = need;
+            }
+            HARD_FAULT => bound += EXCEPTION_FRAME + need,
             _ => handlers = handlers.max(EXCEPTION_FRAME + need),
         }
     }
-    Ok((bound + handlers).into())
+    Ok(((bound + handlers).max(anew) + nmi).into())
 }
 
 /// The functions defmt asks of a logger, in defmt-rtt, and how often each calls one
@@ -129,6 +140,12 @@ impl Needs {
                 function.goes_to.extend(&class);
             }
         }
+    }
+
+    /// Lets the function at `address` set the stack pointer. Gives whether it does.
+    fn lets_start_anew(&mut self, address: u32) -> bool {
+        let function = self.functions.get_mut(&address);
+        function.is_some_and(|function| mem::take(&mut function.sets_stack_pointer))
     }
 
     /// The stack that the function at `address` needs.
@@ -335,6 +352,26 @@ mod tests {
             needs.resolve_usb_device();
             assert_eq!(needs.of(0).ok(), need);
         }
+    }
+
+    #[test]
+    fn a_handler_that_starts_the_stack_anew_has_a_bound_and_others_have_none() {
+        let sets = |goes_to: &[u32]| Function {
+            takes: 4,
+            goes_to: goes_to.iter().copied().collect(),
+            sets_stack_pointer: true,
+            ..Function::default()
+        };
+        let mut needs = Needs {
+            functions: [(0, sets(&[])), (2, sets(&[]))].into(),
+            known: BTreeMap::new(),
+            under_way: Vec::new(),
+        };
+        assert!(needs.lets_start_anew(0));
+        assert_eq!(needs.of(0).unwrap(), 4);
+        assert!(needs.of(2).is_err());
+        // Asked again, or of what is not there.
+        assert!(!needs.lets_start_anew(0) && !needs.lets_start_anew(4));
     }
 
     #[test]

@@ -10,8 +10,7 @@
 #[cfg(not(all(target_os = "none", feature = "board")))]
 compile_error!("an image for a board: cargo xtask bench");
 
-// What the board boots with, and its interrupts.
-#[cfg(feature = "pico")]
+// What the board boots with, its interrupts and its hard fault.
 use dtof_firmware as _;
 
 mod counter;
@@ -28,7 +27,7 @@ mod windows;
 
 use core::panic::PanicInfo;
 
-use cortex_m_rt::{ExceptionFrame, entry, exception};
+use cortex_m_rt::entry;
 use semihosting::println;
 use semihosting::process::ExitCode;
 
@@ -60,12 +59,5 @@ fn main() -> ! {
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     println!("{info}");
-    ExitCode::FAILURE.exit_process()
-}
-
-#[allow(unsafe_code, reason = "the attribute asks for it")]
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    println!("hard fault at {:#010x}", frame.pc());
     ExitCode::FAILURE.exit_process()
 }

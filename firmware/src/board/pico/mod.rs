@@ -21,12 +21,11 @@ mod sample_rings;
 mod usb;
 
 use core::cell::RefCell;
-use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
 use cortex_m::peripheral::syst::SystClkSource;
-use cortex_m_rt::{ExceptionFrame, exception};
+use cortex_m_rt::exception;
 use critical_section::Mutex;
 use defmt_rtt as _;
 use embedded_io::WriteReady;
@@ -36,16 +35,20 @@ use rp2040_hal::gpio::bank0::{Gpio0, Gpio1};
 use rp2040_hal::gpio::{FunctionUart, Pin, Pins, PullDown, PullUp};
 use rp2040_hal::pac::{self, Interrupt, UART0, interrupt};
 use rp2040_hal::uart::{DataBits, Reader, StopBits, UartConfig, UartPeripheral, Writer};
-use rp2040_hal::watchdog::Watchdog;
+use rp2040_hal::watchdog::{ScratchRegister, Watchdog};
 use rp2040_hal::{Clock, Sio};
 use static_cell::ConstStaticCell;
 
 use self::usb::Usb;
-use super::{Board, Transmitter, report, systick, transmit};
+use super::reset_reason::{self, ResetReason};
+use super::{Board, DRIVES_SENSOR, Transmitter, systick, transmit};
 use crate::serial::{BoardBuffers, Buffers, Serial, SerialInterrupt};
 
 const BAUD: u32 = 1_000_000;
 const CRYSTAL_HZ: u32 = 12_000_000;
+/// In a scratch register of the watchdog, which a reset by it leaves as it is: the image has
+/// started the watchdog.
+const WATCHED: u32 = 0xd70f_0d06;
 
 /// What the chip's ROM loads first: it sets the flash up for reading.
 #[unsafe(link_section = ".boot2")]
@@ -88,6 +91,7 @@ pub struct SensorPort {
 /// The board, once started.
 pub struct Pico {
     watchdog: Watchdog,
+    reset_reason: ResetReason,
 }
 
 impl Pico {
@@ -106,7 +110,12 @@ impl Pico {
         // A debugger may have reset the processor alone: what an image had started goes on.
         let reset = resets.reset();
         reset.modify(|_, w| w.pio0().set_bit().dma().set_bit());
+        let cause = device.WATCHDOG.reason().read().bits();
+        let chip_reset = device.VREG_AND_CHIP_RESET.chip_reset().read().bits();
         let mut watchdog = Watchdog::new(device.WATCHDOG);
+        let watched = watchdog.read_scratch(ScratchRegister::Scratch0) == WATCHED;
+        let reset_reason =
+            reset_reason::take().unwrap_or(ResetReason::of_rp2040(cause, chip_reset, watched));
         let Ok(clocks) = init_clocks_and_plls(
             CRYSTAL_HZ,
             device.XOSC,
@@ -165,9 +174,9 @@ impl Pico {
             NVIC::unmask(Interrupt::USBCTRL_IRQ);
         }
 
-        // A breakpoint is no reason to reset.
-        watchdog.pause_on_debug(true);
+        watchdog.write_scratch(ScratchRegister::Scratch0, WATCHED);
         watchdog.start(1.secs());
+        pause_watchdog_on_debug(!DRIVES_SENSOR);
         let sensor = SensorPort {
             #[cfg(feature = "sensor-photon-timer")]
             pins: (pins.gpio2.into_function(), pins.gpio3.into_function()),
@@ -178,25 +187,42 @@ impl Pico {
             #[cfg(feature = "sensor-photon-timer")]
             resets,
         };
-        (Self { watchdog }, serial, sensor)
+        let board = Self {
+            watchdog,
+            reset_reason,
+        };
+        (board, serial, sensor)
     }
 
-    /// Lets the laser rest, reports a panic and resets.
-    pub fn on_panic(info: &PanicInfo<'_>) -> ! {
-        #[cfg(feature = "sensor-photon-timer")]
-        photon_timer::laser_off();
-        report::panic(info);
-        // All of the chip: its processor can reset itself alone, and the PIO would go on.
-        rp2040_hal::reset()
+    /// Why the board has started.
+    #[must_use]
+    pub const fn reset_reason(&self) -> ResetReason {
+        self.reset_reason
     }
+}
 
-    /// The same of a hard fault.
-    pub fn on_hard_fault(frame: &ExceptionFrame) -> ! {
-        #[cfg(feature = "sensor-photon-timer")]
-        photon_timer::laser_off();
-        report::hard_fault(frame);
-        rp2040_hal::reset()
-    }
+/// Holds the pin of the laser low, if the image drives one.
+pub(super) fn laser_off() {
+    #[cfg(feature = "sensor-photon-timer")]
+    photon_timer::laser_off();
+}
+
+/// Resets all of the chip: its processor can reset itself alone, and the PIO would go on.
+pub(super) fn end() -> ! {
+    rp2040_hal::reset()
+}
+
+/// Whether the watchdog waits while a debugger halts the processor. Only once it has started:
+/// rp2040-hal writes the register anew when it starts it, and its own function would stop it.
+fn pause_watchdog_on_debug(pause: bool) {
+    // SAFETY: the watchdog goes on, and nothing else writes the register meanwhile.
+    #[allow(unsafe_code, reason = "rp2040-hal keeps the register")]
+    let control = unsafe { &*pac::WATCHDOG::PTR }.ctrl();
+    control.modify(|_, w| {
+        w.pause_dbg0().bit(pause);
+        w.pause_dbg1().bit(pause);
+        w.pause_jtag().bit(pause)
+    });
 }
 
 impl Board for Pico {

@@ -19,12 +19,11 @@
 mod sensor_port;
 
 use core::cell::RefCell;
-use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{NVIC, SCB};
-use cortex_m_rt::{ExceptionFrame, exception};
+use cortex_m_rt::exception;
 use critical_section::Mutex;
 use defmt_rtt as _;
 use static_cell::ConstStaticCell;
@@ -38,7 +37,8 @@ use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 pub use self::sensor_port::SensorPort;
 
-use super::{Board, Transmitter, report, systick, transmit};
+use super::reset_reason::{self, ResetReason};
+use super::{Board, DRIVES_SENSOR, Transmitter, systick, transmit};
 use crate::serial::{BoardBuffers, Buffers, Serial, SerialInterrupt};
 
 const BAUD: u32 = 1_000_000;
@@ -60,6 +60,7 @@ static SENSOR_READY: AtomicBool = AtomicBool::new(false);
 /// The board, once started.
 pub struct Stm32F405 {
     watchdog: IndependentWatchdog,
+    reset_reason: ResetReason,
 }
 
 impl Stm32F405 {
@@ -74,6 +75,10 @@ impl Stm32F405 {
         else {
             panic!("the board is started twice");
         };
+        let cause = device.RCC.csr().read().bits();
+        // The flags add up otherwise.
+        device.RCC.csr().modify(|_, w| w.rmvf().clear());
+        let reset_reason = reset_reason::take().unwrap_or(ResetReason::of_stm32f4(cause));
         let clocks = if cfg!(feature = "pll-off") {
             ClockConfig::hsi()
         } else {
@@ -136,23 +141,34 @@ impl Stm32F405 {
         }
 
         let mut watchdog = IndependentWatchdog::new(device.IWDG);
-        // A breakpoint is no reason to reset.
-        watchdog.stop_on_debug(&device.DBGMCU, true);
+        watchdog.stop_on_debug(&device.DBGMCU, !DRIVES_SENSOR);
         watchdog.start(1000.millis());
-        (Self { watchdog }, serial, sensor)
+        let board = Self {
+            watchdog,
+            reset_reason,
+        };
+        (board, serial, sensor)
     }
 
-    /// Reports a panic and resets.
-    pub fn on_panic(info: &PanicInfo<'_>) -> ! {
-        report::panic(info);
-        SCB::sys_reset()
+    /// Why the board has started.
+    #[must_use]
+    pub const fn reset_reason(&self) -> ResetReason {
+        self.reset_reason
     }
+}
 
-    /// Reports a hard fault and resets.
-    pub fn on_hard_fault(frame: &ExceptionFrame) -> ! {
-        report::hard_fault(frame);
-        SCB::sys_reset()
-    }
+/// Drives PC6 low, ENABLE or EN of the sensor: `BR6` of `GPIOC_BSRR` (RM0090, 8.4.7). Before
+/// the port has started nothing happens.
+pub(super) fn laser_off() {
+    // SAFETY: a write of 1 concerns this pin alone, and the image does nothing more.
+    #[allow(unsafe_code, reason = "nobody can hand over the pin here")]
+    let port = unsafe { &*pac::GPIOC::PTR };
+    port.bsrr().write(|w| w.br6().reset());
+}
+
+/// Resets the chip.
+pub(super) fn end() -> ! {
+    SCB::sys_reset()
 }
 
 impl Board for Stm32F405 {

@@ -1,0 +1,188 @@
+//! Why a board has started: what the image before it left in RAM, or else what the chip says.
+
+#[cfg(all(target_os = "none", feature = "board"))]
+pub use self::word::{remember, take};
+
+/// Why a board has started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ResetReason {
+    /// It was switched on. On RP2040 this may have been a brown-out.
+    PowerOn,
+    /// The image panicked.
+    Panic,
+    /// The image had a hard fault; a stack overflow is one.
+    Fault,
+    /// The watchdog was not fed.
+    Watchdog,
+    /// The supply was too low for a while.
+    BrownOut,
+    /// The reset pin, a debugger, or the image itself.
+    Reset,
+}
+
+/// Words that random RAM does not hold.
+const PANIC: u32 = 0xd70f_9a21;
+const FAULT: u32 = 0xd70f_fa17;
+
+impl ResetReason {
+    /// The word that stands for a panic or a fault in RAM.
+    const fn word(self) -> u32 {
+        match self {
+            Self::Panic => PANIC,
+            Self::Fault => FAULT,
+            Self::PowerOn | Self::Watchdog | Self::BrownOut | Self::Reset => 0,
+        }
+    }
+
+    /// The reverse; `None` if it is no such word.
+    const fn of_word(word: u32) -> Option<Self> {
+        match word {
+            PANIC => Some(Self::Panic),
+            FAULT => Some(Self::Fault),
+            _ => None,
+        }
+    }
+
+    /// What an RP2040 says: `REASON` of its watchdog and `CHIP_RESET` of `VREG_AND_CHIP_RESET`
+    /// (RP2040 datasheet, 4.7.6 and 2.12.8). `watched` is whether the image had started the
+    /// watchdog: the boot ROM ends the copying of an image by the same watchdog.
+    #[must_use]
+    pub const fn of_rp2040(reason: u32, chip_reset: u32, watched: bool) -> Self {
+        const TIMER: u32 = 1 << 0;
+        const FORCE: u32 = 1 << 1;
+        /// Power-on or brown-out.
+        const HAD_POR: u32 = 1 << 8;
+        // Resets of the chip clear it.
+        if reason & TIMER != 0 && watched {
+            Self::Watchdog
+        } else if reason & (TIMER | FORCE) == 0 && chip_reset & HAD_POR != 0 {
+            Self::PowerOn
+        } else {
+            Self::Reset
+        }
+    }
+
+    /// What `RCC_CSR` of an STM32F405 says (RM0090, 7.3.21). More than one flag is set: a
+    /// power-on is a brown-out as well, and every reset shows at the reset pin.
+    #[must_use]
+    pub const fn of_stm32f4(csr: u32) -> Self {
+        const BORRSTF: u32 = 1 << 25;
+        const PORRSTF: u32 = 1 << 27;
+        const IWDGRSTF: u32 = 1 << 29;
+        const WWDGRSTF: u32 = 1 << 30;
+        if csr & PORRSTF != 0 {
+            Self::PowerOn
+        } else if csr & BORRSTF != 0 {
+            Self::BrownOut
+        } else if csr & (IWDGRSTF | WWDGRSTF) != 0 {
+            Self::Watchdog
+        } else {
+            Self::Reset
+        }
+    }
+}
+
+#[cfg(all(target_os = "none", feature = "board"))]
+mod word {
+    use core::ptr;
+    use core::sync::atomic::{AtomicU32, Ordering};
+
+    use super::ResetReason;
+
+    /// A reset leaves it as it is.
+    #[unsafe(link_section = ".uninit.RESET_REASON")]
+    #[allow(unsafe_code, reason = "its place is given by the section's name")]
+    static WORD: AtomicU32 = AtomicU32::new(0);
+
+    /// Leaves word for the start after the reset that follows: of a panic or a fault.
+    pub fn remember(reason: ResetReason) {
+        WORD.store(reason.word(), Ordering::Relaxed);
+    }
+
+    /// What the image before this reset has left, once.
+    #[must_use]
+    pub fn take() -> Option<ResetReason> {
+        // SAFETY: it is valid, aligned, and shared with nothing that interrupts this.
+        #[allow(unsafe_code, reason = "the compiler takes its value to be 0")]
+        let word = unsafe { ptr::read_volatile(WORD.as_ptr()) };
+        WORD.store(0, Ordering::Relaxed);
+        ResetReason::of_word(word)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ResetReason::{self, *};
+
+    #[test]
+    fn a_word_is_of_a_panic_or_a_fault_and_of_nothing_else() {
+        for reason in [Panic, Fault] {
+            assert_eq!(ResetReason::of_word(reason.word()), Some(reason));
+        }
+        for reason in [PowerOn, Watchdog, BrownOut, Reset] {
+            assert_eq!(ResetReason::of_word(reason.word()), None);
+        }
+        // Cleared RAM, erased flash, the paint of the stack.
+        for word in [0, u32::MAX, 0xcccc_cccc] {
+            assert_eq!(ResetReason::of_word(word), None);
+        }
+    }
+
+    #[test]
+    fn rp2040() {
+        const POR: u32 = 1 << 8;
+        const RUN: u32 = 1 << 16;
+        const PSM: u32 = 1 << 20;
+        for (reason, chip_reset, watched, expected) in [
+            (0, POR, false, PowerOn),
+            // What the RAM of the watchdog held before is no matter.
+            (0, POR, true, PowerOn),
+            (0, RUN, false, Reset),
+            (0, PSM, true, Reset),
+            (0, 0, false, Reset),
+            // The chip's last reset of its own stays to be seen.
+            (1, POR, true, Watchdog),
+            (1, RUN, true, Watchdog),
+            (1, POR, false, Reset),
+            (2, POR, true, Reset),
+            (2, RUN, false, Reset),
+            (3, POR, true, Watchdog),
+            (3, POR, false, Reset),
+        ] {
+            let found = ResetReason::of_rp2040(reason, chip_reset, watched);
+            assert_eq!(found, expected, "{reason:#x} {chip_reset:#x} {watched}");
+        }
+    }
+
+    #[test]
+    fn stm32f4() {
+        const BOR: u32 = 1 << 25;
+        const PIN: u32 = 1 << 26;
+        const POR: u32 = 1 << 27;
+        const SFT: u32 = 1 << 28;
+        const IWDG: u32 = 1 << 29;
+        const WWDG: u32 = 1 << 30;
+        const LPWR: u32 = 1 << 31;
+        /// Not flags of resets: the internal oscillator runs.
+        const LSI: u32 = 0b11;
+        for (csr, expected) in [
+            (POR | BOR | PIN, PowerOn),
+            (POR | BOR | PIN | LSI, PowerOn),
+            (POR | BOR | PIN | IWDG | SFT, PowerOn),
+            (BOR | PIN, BrownOut),
+            (BOR | PIN | IWDG, BrownOut),
+            (PIN | IWDG, Watchdog),
+            (PIN | IWDG | LSI, Watchdog),
+            (PIN | WWDG, Watchdog),
+            (PIN | SFT | IWDG, Watchdog),
+            (PIN | SFT, Reset),
+            (PIN | LPWR, Reset),
+            (PIN, Reset),
+            (LSI, Reset),
+            (0, Reset),
+        ] {
+            assert_eq!(ResetReason::of_stm32f4(csr), expected, "{csr:#x}");
+        }
+    }
+}
