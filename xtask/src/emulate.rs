@@ -19,7 +19,7 @@ pub fn emulate(root: &Path, board: Board, port: Option<u16>, end: Option<&str>) 
     if let Some(reason) = emulator::cannot_run(board)? {
         bail!("{reason}");
     }
-    let image = board.build_for_emulator(root, Build::Sidecar)?;
+    let image = board.build_for_emulator(root, Build::Sidecar, &[])?;
     let mut command = emulator::command(board, &image, Some(port), end);
     println!("the serial port is tcp:127.0.0.1:{port}; Ctrl-C ends");
     println!("what the board sends while nobody is connected is lost");

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 
+use crate::laser::Laser;
 use crate::{cargo, layout, target_folder, toolchain, uf2};
 
 const PROFILE: &str = "firmware";
@@ -56,23 +57,26 @@ impl Board {
 
     /// Builds an image as it goes onto the board; that of a TMF8820/21/28 or TMF8829 has the
     /// sensor's own program in it, which `TMF882X_IMAGE` or `TMF8829_IMAGE` names.
-    pub fn build(self, root: &Path, what: Build) -> Result<PathBuf> {
+    pub fn build(self, root: &Path, what: Build, risks: &[Risk]) -> Result<PathBuf> {
         let program = match what {
             Build::With(sensor) => sensor.program()?,
             _ => None,
         };
-        self.link(root, what, None, program.as_ref())
+        self.link(root, what, &features(what, risks)?, program.as_ref())
     }
 
-    /// The same without the sensor's own program.
+    /// The same without the sensor's own program, and without risks.
     pub fn build_bare(self, root: &Path, what: Build) -> Result<PathBuf> {
-        self.link(root, what, None, None)
+        self.link(root, what, &[], None)
     }
 
     /// The same for QEMU, whose `stm32f405` has no PLL.
-    pub fn build_for_emulator(self, root: &Path, what: Build) -> Result<PathBuf> {
-        let feature = (self == Self::Stm32F405).then_some("pll-off");
-        self.link(root, what, feature, None)
+    pub fn build_for_emulator(self, root: &Path, what: Build, risks: &[Risk]) -> Result<PathBuf> {
+        let mut features = features(what, risks)?;
+        if self == Self::Stm32F405 {
+            features.push("pll-off");
+        }
+        self.link(root, what, &features, None)
     }
 
     /// Builds the image that counts instructions, `small` or fast.
@@ -86,7 +90,7 @@ impl Board {
         self,
         root: &Path,
         what: Build,
-        more: Option<&str>,
+        more: &[&str],
         program: Option<&Program>,
     ) -> Result<PathBuf> {
         let sidecar = format!("sidecar-{}", self.name());
@@ -96,13 +100,58 @@ impl Board {
             Build::SelfTest => ("self-test", Some("self-test")),
         };
         let board = [self.name()].into_iter();
-        let features: Vec<&str> = board.chain(feature).chain(more).collect();
+        let features: Vec<&str> = board.chain(feature).chain(more.iter().copied()).collect();
         let image = link(root, self.target(), image, &features, program, PROFILE)?;
+        if let Some(laser) = Laser::read(&image)? {
+            eprintln!("{}", laser.text());
+        }
         if self == Self::Pico {
             eprintln!("for its drive: {}", uf2::write(&image)?.display());
         }
         Ok(image)
     }
+}
+
+/// What an image is built with only on request, as a laser may be on for longer then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Risk {
+    /// The photon timer may have pulses over 1 µs and over 2 % of the time.
+    LaserBeyondLimits,
+    /// A host may switch its timeout off.
+    LaserOnWithoutHost,
+}
+
+impl Risk {
+    /// The option of `cargo xtask image` and `flash`, and the feature.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LaserBeyondLimits => "laser-beyond-limits",
+            Self::LaserOnWithoutHost => "laser-on-without-host",
+        }
+    }
+
+    fn warning(self) -> &'static str {
+        match self {
+            Self::LaserBeyondLimits => {
+                "the laser may have pulses over 1 us and be on for more than 2 % of the time"
+            }
+            Self::LaserOnWithoutHost => "a host may let the laser go on after it falls silent",
+        }
+    }
+}
+
+/// The features of `risks` for an image, after a warning of each.
+fn features(what: Build, risks: &[Risk]) -> Result<Vec<&'static str>> {
+    for &risk in risks {
+        let concerns = match risk {
+            Risk::LaserBeyondLimits => what == Build::With(Sensor::PhotonTimer),
+            Risk::LaserOnWithoutHost => what != Build::SelfTest,
+        };
+        let name = risk.name();
+        ensure!(concerns, "--{name} is not for this image");
+        eprintln!("warning: --{name}: {}", risk.warning());
+    }
+    Ok(risks.iter().map(|risk| risk.name()).collect())
 }
 
 /// The images of a board.
@@ -252,14 +301,13 @@ fn link(
     profile: &str,
 ) -> Result<PathBuf> {
     toolchain::ensure_target(target)?;
-    let folder = target_folder(root);
-    let kept = folder.join("images");
-    fs::create_dir_all(&kept).with_context(|| kept.display().to_string())?;
+    let target_folder = target_folder(root);
+    let folder = target_folder.join("images");
+    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let more = features.iter().filter(|&&feature| !image.contains(feature));
     let name: Vec<&str> = iter::once(image).chain(more.copied()).collect();
     let name = name.join("+");
-    let kept = kept.join(&name);
-    if !kept.exists() {
+    if !is_kept(&folder, &name) {
         eprintln!("building {name} for the first time");
     }
     let mut cargo = cargo();
@@ -276,25 +324,49 @@ fn link(
         .args((!io::stderr().is_terminal()).then_some("--quiet"))
         .args(["--bin", image, "--features", &features.join(",")])
         .args(["--target", target, "--profile", profile, "--target-dir"])
-        .arg(&folder)
+        .arg(&target_folder)
         .status()
         .context("cargo does not start")?;
     ensure!(status.success(), "{image} does not build, see above");
 
-    let built = folder.join(target).join(profile).join(image);
+    let built = target_folder.join(target).join(profile).join(image);
     layout::check(&built)?;
+    let kept = folder.join(match Laser::read(&built)? {
+        Some(laser) => format!("{name}+{}", laser.file_name()),
+        None => name,
+    });
     fs::copy(&built, &kept).with_context(|| built.display().to_string())?;
     Ok(kept)
 }
 
+/// Whether the folder has an image of this name. The numbers of a laser follow it.
+fn is_kept(folder: &Path, name: &str) -> bool {
+    let is_it = |file: &str| {
+        let rest = file.strip_prefix(name);
+        let numbers = rest.and_then(|rest| rest.strip_prefix('+'));
+        rest == Some("")
+            || numbers.is_some_and(|text| text.starts_with(|c: char| c.is_ascii_digit()))
+    };
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries
+        .filter_map(|entry| entry.file_name().into_string().ok())
+        .any(|file| is_it(&file))
+}
+
 /// Builds an image and prints its path.
-pub fn image(root: &Path, board: &str, what: Option<&str>, emulator: bool) -> Result<()> {
+pub fn image(
+    root: &Path,
+    board: &str,
+    what: Option<&str>,
+    emulator: bool,
+    risks: &[Risk],
+) -> Result<()> {
     let board = Board::named(board)?;
     let what = Build::named(board, what)?;
     let path = if emulator {
-        board.build_for_emulator(root, what)?
+        board.build_for_emulator(root, what, risks)?
     } else {
-        board.build(root, what)?
+        board.build(root, what, risks)?
     };
     println!("{}", path.display());
     Ok(())
@@ -303,6 +375,24 @@ pub fn image(root: &Path, board: &str, what: Option<&str>, emulator: bool) -> Re
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_risk_is_the_feature_of_its_name_and_for_images_that_it_concerns() {
+        let risks = [Risk::LaserBeyondLimits, Risk::LaserOnWithoutHost];
+        let names = risks.map(Risk::name);
+        let manifest = include_str!("../../firmware/Cargo.toml");
+        for name in names {
+            assert!(manifest.contains(&format!("\n{name} = []\n")), "{name}");
+        }
+        let timer = Build::With(Sensor::PhotonTimer);
+        assert_eq!(features(timer, &risks).unwrap(), names);
+        assert_eq!(features(timer, &[]).unwrap(), [""; 0]);
+        for what in [Build::Sidecar, Build::With(Sensor::Tdc7200)] {
+            assert!(features(what, &[Risk::LaserOnWithoutHost]).is_ok());
+            assert!(features(what, &[Risk::LaserBeyondLimits]).is_err());
+        }
+        assert!(features(Build::SelfTest, &[Risk::LaserOnWithoutHost]).is_err());
+    }
 
     #[test]
     fn a_program_is_raw_bytes_that_fit() {

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::firmware::{Board, Build};
+use crate::firmware::{Board, Build, Risk};
 use crate::tools::PROBE_RS;
 
 /// The controller of a board, as probe-rs calls it: that of the Discovery.
@@ -18,11 +18,17 @@ pub fn chip(board: Board) -> Result<&'static str> {
 }
 
 /// Writes an image onto the board and shows what it logs until interrupted.
-pub fn flash(root: &Path, board: Board, named: Option<&str>, what: Build) -> Result<()> {
+pub fn flash(
+    root: &Path,
+    board: Board,
+    named: Option<&str>,
+    what: Build,
+    risks: &[Risk],
+) -> Result<()> {
     // Before anything is built.
     PROBE_RS.require()?;
     let chip = named.map_or_else(|| chip(board), Ok)?;
-    let image = board.build(root, what)?;
+    let image = board.build(root, what, risks)?;
     let status = Command::new(PROBE_RS.program)
         .args(["run", "--non-interactive", "--chip", chip])
         .arg(&image)

@@ -8,6 +8,7 @@ mod firmware;
 mod flash;
 mod hil;
 mod image;
+mod laser;
 mod layout;
 mod python;
 mod self_test;
@@ -24,21 +25,23 @@ use anyhow::{Context, Result, bail, ensure};
 use lexopt::prelude::{Long, Short, Value};
 use lexopt::{Parser, ValueExt};
 
-use firmware::{Board, Build};
+use firmware::{Board, Build, Risk};
 
 const HELP: &str = "\
 cargo xtask <command>
 
   setup         install the missing parts of rust-toolchain.toml, and the emulators,
                 Verilator and the other tools if that needs no question
-  image BOARD [SENSOR | self-test] [--emulator]
+  image BOARD [SENSOR | self-test] [--emulator] [LASER]
                 build an image and print its path: the sidecar or the self-test.
                 BOARD is mps2-an386, pico or stm32f405. SENSOR is tdc7200, tmf8829,
                 tmf882x or tmf8828-8x8 on stm32f405, photon-timer on pico. For pico a
                 .uf2 lies beside it, to be copied onto the board without a probe.
                 --emulator builds for QEMU, with its slower clock and without the
-                sensor's own program
-  flash [--chip CHIP] [BOARD] [SENSOR | self-test]
+                sensor's own program. LASER is --laser-beyond-limits (the photon timer may
+                have pulses over 1 us and over 2 % of the time) or --laser-on-without-host
+                (a host may let the laser go on after it falls silent)
+  flash [--chip CHIP] [BOARD] [SENSOR | self-test] [LASER]
                 write an image onto a board (stm32f405) with a debug probe, and show its
                 log. CHIP is the name in probe-rs, by default that of the Discovery
   hil --device DEVICE [--chip CHIP] [--out DIR] [BOARD]
@@ -46,7 +49,7 @@ cargo xtask <command>
                 the self-test, the clock cycles of the core's operations, and the demo's
                 photons, decided as on this computer. Writes BOARD.md into DIR, out/hil
                 without it
-  emulate [--port PORT] [BOARD] [exit | panic | fault]
+  emulate [--port PORT] [BOARD] [exit | panic | fault | overflow]
                 run the sidecar of a board (mps2-an386) in its emulator, its serial port on
                 a TCP port (5386). A last word ends mps2-an386 in that way
   sizes         print flash, RAM and stack of each image
@@ -87,6 +90,7 @@ struct Options {
     out: Option<String>,
     emulator: bool,
     port: Option<u16>,
+    risks: Vec<Risk>,
 }
 
 fn run() -> Result<()> {
@@ -108,6 +112,12 @@ fn run() -> Result<()> {
             ("hil", Long("device")) => options.device = Some(parser.value()?.string()?),
             ("flash" | "hil", Long("chip")) => options.chip = Some(parser.value()?.string()?),
             ("image", Long("emulator")) => options.emulator = true,
+            ("image" | "flash", Long("laser-beyond-limits")) => {
+                options.risks.push(Risk::LaserBeyondLimits);
+            }
+            ("image" | "flash", Long("laser-on-without-host")) => {
+                options.risks.push(Risk::LaserOnWithoutHost);
+            }
             ("emulate", Long("port")) => {
                 let number = parser.value()?.string()?;
                 let port = number.parse();
@@ -134,13 +144,19 @@ fn run() -> Result<()> {
             }
         }
         ("image", [board, what @ ..]) if what.len() < 2 => {
-            firmware::image(root, board, what.first().copied(), options.emulator)?;
+            firmware::image(
+                root,
+                board,
+                what.first().copied(),
+                options.emulator,
+                &options.risks,
+            )?;
         }
         ("flash", words) => {
             let (board, what) = Board::chosen(words, Board::Stm32F405);
             ensure!(what.len() < 2, "flash: one image at a time");
             let what = Build::named(board, what.first().copied())?;
-            flash::flash(root, board, options.chip.as_deref(), what)?;
+            flash::flash(root, board, options.chip.as_deref(), what, &options.risks)?;
         }
         ("hil", words) => {
             let (board, []) = Board::chosen(words, Board::Stm32F405) else {
@@ -158,7 +174,7 @@ fn run() -> Result<()> {
             let (board, end) = Board::chosen(words, Board::Mps2An386);
             let end = match (board, end) {
                 (_, []) => None,
-                (Board::Mps2An386, &[end @ ("exit" | "panic" | "fault")]) => Some(end),
+                (Board::Mps2An386, &[end @ ("exit" | "panic" | "fault" | "overflow")]) => Some(end),
                 _ => bail!("what is `{}`? `cargo xtask help` says", end.join(" ")),
             };
             emulate::emulate(root, board, options.port, end)?;

@@ -24,7 +24,7 @@ static BLOCKS: ConstStaticCell<Vec<Block, 42>> = ConstStaticCell::new(Vec::new()
 #[entry]
 fn main() -> ! {
     let (mut board, mut serial) = Mps2An386::start();
-    defmt::info!("mps2-an386 started");
+    defmt::info!("mps2-an386 started: {}", board.reset_reason());
     let unpaced = board.obey_command_line();
     let mut sensor = simulated::scene();
     if unpaced.is_some() {

@@ -34,6 +34,17 @@ const LASER: Config = checked!(Config::new(Settings {
     pulse_ns: number(option_env!("LASER_PULSE_NS"), 100),
 }));
 
+/// For `cargo xtask image`, which prints what this image does with the laser.
+#[cfg(feature = "sensor-photon-timer")]
+#[unsafe(link_section = ".laser_clocks")]
+#[unsafe(no_mangle)]
+#[used]
+#[allow(
+    unsafe_code,
+    reason = "found by its name, and kept by that of its section"
+)]
+static LASER_CLOCKS: [u32; 3] = LASER.laser_clocks();
+
 /// The number in a text, or `default` without one.
 #[cfg(feature = "sensor-photon-timer")]
 const fn number(text: Option<&str>, default: u32) -> u32 {
@@ -50,7 +61,7 @@ const fn number(text: Option<&str>, default: u32) -> u32 {
 fn main() -> ! {
     #[allow(unused_variables, reason = "the simulated sensor is not connected")]
     let (mut board, mut serial, port) = Pico::start();
-    defmt::info!("pico started");
+    defmt::info!("pico started: {}", board.reset_reason());
     #[cfg(feature = "sensor-photon-timer")]
     let mut sensor = port.photon_timer(LASER);
     #[cfg(not(feature = "sensor-photon-timer"))]

@@ -30,7 +30,7 @@ static BLOCKS: ConstStaticCell<Vec<Block, 42>> = ConstStaticCell::new(Vec::new()
 fn main() -> ! {
     #[allow(unused_variables, reason = "the simulated sensor is not connected")]
     let (mut board, mut serial, port) = Stm32F405::start();
-    defmt::info!("stm32f405 started");
+    defmt::info!("stm32f405 started: {}", board.reset_reason());
     #[cfg(feature = "sensor-tdc7200")]
     let mut sensor = port.tdc7200();
     #[cfg(feature = "sensor-tmf8829")]

@@ -7,7 +7,8 @@ pub use self::word::{remember, take};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ResetReason {
-    /// It was switched on. On RP2040 this may have been a brown-out.
+    /// It was switched on. RP2040 says the same of a brown-out, and so does STM32F405 unless its
+    /// option bytes (`BOR_LEV`) switch the brown-out reset on.
     PowerOn,
     /// The image panicked.
     Panic,
@@ -21,29 +22,7 @@ pub enum ResetReason {
     Reset,
 }
 
-/// Words that random RAM does not hold.
-const PANIC: u32 = 0xd70f_9a21;
-const FAULT: u32 = 0xd70f_fa17;
-
 impl ResetReason {
-    /// The word that stands for a panic or a fault in RAM.
-    const fn word(self) -> u32 {
-        match self {
-            Self::Panic => PANIC,
-            Self::Fault => FAULT,
-            Self::PowerOn | Self::Watchdog | Self::BrownOut | Self::Reset => 0,
-        }
-    }
-
-    /// The reverse; `None` if it is no such word.
-    const fn of_word(word: u32) -> Option<Self> {
-        match word {
-            PANIC => Some(Self::Panic),
-            FAULT => Some(Self::Fault),
-            _ => None,
-        }
-    }
-
     /// What an RP2040 says: `REASON` of its watchdog and `CHIP_RESET` of `VREG_AND_CHIP_RESET`
     /// (RP2040 datasheet, 4.7.6 and 2.12.8). `watched` is whether the image had started the
     /// watchdog: the boot ROM ends the copying of an image by the same watchdog.
@@ -53,7 +32,7 @@ impl ResetReason {
         const FORCE: u32 = 1 << 1;
         /// Power-on or brown-out.
         const HAD_POR: u32 = 1 << 8;
-        // Resets of the chip clear it.
+        // Resets of the whole chip clear the first register; the second outlives the others.
         if reason & TIMER != 0 && watched {
             Self::Watchdog
         } else if reason & (TIMER | FORCE) == 0 && chip_reset & HAD_POR != 0 {
@@ -90,14 +69,21 @@ mod word {
 
     use super::ResetReason;
 
+    /// Words that random RAM does not hold.
+    const WORDS: [(ResetReason, u32); 2] = [
+        (ResetReason::Panic, 0xd70f_9a21),
+        (ResetReason::Fault, 0xd70f_fa17),
+    ];
+
     /// A reset leaves it as it is.
     #[unsafe(link_section = ".uninit.RESET_REASON")]
     #[allow(unsafe_code, reason = "its place is given by the section's name")]
     static WORD: AtomicU32 = AtomicU32::new(0);
 
-    /// Leaves word for the start after the reset that follows: of a panic or a fault.
+    /// Leaves word of a panic or a fault for the start after the reset that follows.
     pub fn remember(reason: ResetReason) {
-        WORD.store(reason.word(), Ordering::Relaxed);
+        let entry = WORDS.iter().find(|(of, _)| *of == reason);
+        WORD.store(entry.map_or(0, |&(_, word)| word), Ordering::Relaxed);
     }
 
     /// What the image before this reset has left, once.
@@ -107,7 +93,8 @@ mod word {
         #[allow(unsafe_code, reason = "the compiler takes its value to be 0")]
         let word = unsafe { ptr::read_volatile(WORD.as_ptr()) };
         WORD.store(0, Ordering::Relaxed);
-        ResetReason::of_word(word)
+        let entry = WORDS.iter().find(|&&(_, of)| of == word);
+        entry.map(|&(reason, _)| reason)
     }
 }
 
@@ -116,27 +103,12 @@ mod tests {
     use super::ResetReason::{self, *};
 
     #[test]
-    fn a_word_is_of_a_panic_or_a_fault_and_of_nothing_else() {
-        for reason in [Panic, Fault] {
-            assert_eq!(ResetReason::of_word(reason.word()), Some(reason));
-        }
-        for reason in [PowerOn, Watchdog, BrownOut, Reset] {
-            assert_eq!(ResetReason::of_word(reason.word()), None);
-        }
-        // Cleared RAM, erased flash, the paint of the stack.
-        for word in [0, u32::MAX, 0xcccc_cccc] {
-            assert_eq!(ResetReason::of_word(word), None);
-        }
-    }
-
-    #[test]
     fn rp2040() {
         const POR: u32 = 1 << 8;
         const RUN: u32 = 1 << 16;
         const PSM: u32 = 1 << 20;
         for (reason, chip_reset, watched, expected) in [
             (0, POR, false, PowerOn),
-            // What the RAM of the watchdog held before is no matter.
             (0, POR, true, PowerOn),
             (0, RUN, false, Reset),
             (0, PSM, true, Reset),

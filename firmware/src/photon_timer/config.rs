@@ -17,6 +17,12 @@ const BESIDE: u32 = 5;
 /// counter and to count.
 const SHORTEST: u32 = 2;
 
+/// Clocks of the longest pulse within limits: 1 µs.
+const MOST_PULSE: u32 = 125;
+
+/// A pulse within limits takes one clock of so many: 2 % of the time.
+const LEAST_CLOCKS_A_CLOCK: u32 = 50;
+
 /// Of the laser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
@@ -44,6 +50,10 @@ pub enum ConfigError {
     NoPulse,
     /// The laser's pulse takes the whole laser cycle, less 2 clocks.
     LongPulse,
+    /// The laser's pulse is longer than 1 µs, without the feature `laser-beyond-limits`.
+    PulseBeyondLimit,
+    /// The laser is on for more than 2 % of the time, without the feature `laser-beyond-limits`.
+    DutyBeyondLimit,
 }
 
 impl ConfigError {
@@ -55,6 +65,12 @@ impl ConfigError {
             Self::TooSlow => "there is to be a laser cycle a second or more",
             Self::NoPulse => "the laser's pulse is 0 ns",
             Self::LongPulse => "the laser's pulse leaves no pause in its laser cycle",
+            Self::PulseBeyondLimit => {
+                "the laser's pulse is longer than 1000 ns, which takes the feature laser-beyond-limits"
+            }
+            Self::DutyBeyondLimit => {
+                "the laser is on for more than 2 % of the time, which takes the feature laser-beyond-limits"
+            }
         }
     }
 }
@@ -68,11 +84,36 @@ impl fmt::Display for ConfigError {
 impl Error for ConfigError {}
 
 impl Config {
-    /// The laser cycle is rounded to the nearest clock, its pulse up, to 2 clocks at least.
+    /// The laser cycle is rounded to the nearest clock, its pulse up, to 2 clocks at least. What
+    /// is rounded has to keep to the limits: a pulse of at most 1 µs, at most 2 % of the time.
+    /// They bound what a laser that is wired wrongly or built too strong does to an eye. The
+    /// feature `laser-beyond-limits` lifts them.
     ///
     /// # Errors
     /// [`ConfigError`] says what cannot be.
     pub const fn new(settings: Settings) -> Result<Self, ConfigError> {
+        let config = match Self::of_hardware(settings) {
+            Ok(config) => config,
+            Err(error) => return Err(error),
+        };
+        if cfg!(feature = "laser-beyond-limits") {
+            return Ok(config);
+        }
+        config.within_limits()
+    }
+
+    const fn within_limits(self) -> Result<Self, ConfigError> {
+        if self.pulse > MOST_PULSE {
+            return Err(ConfigError::PulseBeyondLimit);
+        }
+        if self.pulse * LEAST_CLOCKS_A_CLOCK > self.period {
+            return Err(ConfigError::DutyBeyondLimit);
+        }
+        Ok(self)
+    }
+
+    /// All that the hardware can do.
+    const fn of_hardware(settings: Settings) -> Result<Self, ConfigError> {
         let Settings { laser_hz, pulse_ns } = settings;
         if laser_hz == 0 {
             return Err(ConfigError::TooSlow);
@@ -110,6 +151,13 @@ impl Config {
         self.period - BINS
     }
 
+    /// The clock in Hz, and of its clocks those of a laser cycle and of the laser's pulse: what
+    /// `cargo xtask image` reads from the image and prints.
+    #[must_use]
+    pub const fn laser_clocks(&self) -> [u32; 3] {
+        [CLOCK_HZ, self.period, self.pulse]
+    }
+
     /// Laser cycles in a thousand seconds, rounded down.
     #[must_use]
     pub const fn laser_millihertz(&self) -> u64 {
@@ -133,8 +181,14 @@ impl Config {
 mod tests {
     use super::*;
 
+    /// Within the limits or not.
     fn config(laser_hz: u32, pulse_ns: u32) -> Result<Config, ConfigError> {
-        Config::new(Settings { laser_hz, pulse_ns })
+        Config::of_hardware(Settings { laser_hz, pulse_ns })
+    }
+
+    /// As an image is built without the feature `laser-beyond-limits`.
+    fn limited(laser_hz: u32, pulse_ns: u32) -> Result<Config, ConfigError> {
+        config(laser_hz, pulse_ns)?.within_limits()
     }
 
     #[test]
@@ -166,6 +220,59 @@ mod tests {
         assert!(config(100_000, 1248 * 8).is_ok());
         assert_eq!(config(100_000, 1248 * 8 + 1), Err(ConfigError::LongPulse));
         assert_eq!(config(100_000, u32::MAX), Err(ConfigError::LongPulse));
+    }
+
+    #[test]
+    fn a_pulse_of_a_microsecond_passes_and_a_longer_one_takes_the_feature() {
+        // Of 10,000 Hz: 2 % are 2 µs.
+        assert_eq!(limited(10_000, 1000).unwrap().pulse(), 125);
+        let beyond = Err(ConfigError::PulseBeyondLimit);
+        for pulse_ns in [1001, 1008, 2000, 99_000] {
+            assert_eq!(limited(10_000, pulse_ns), beyond, "{pulse_ns}");
+        }
+        // 99 % of the time, and half of it.
+        assert_eq!(limited(100_000, 9_900), beyond);
+        assert_eq!(limited(100, 5_000_000), beyond);
+    }
+
+    #[test]
+    fn two_percent_of_the_time_pass_and_more_takes_the_feature() {
+        let beyond = Err(ConfigError::DutyBeyondLimit);
+        // 13 clocks of 650: 125 MHz / 650 = 192,307.7 Hz. Up to 192,455 Hz round to as many clocks.
+        for laser_hz in [192_307, 192_308, 192_455] {
+            let config = limited(laser_hz, 104).unwrap();
+            assert_eq!([config.pulse(), config.period()], [13, 650]);
+        }
+        assert_eq!(config(192_456, 104).unwrap().period(), 649);
+        assert_eq!(limited(192_456, 104), beyond);
+        // A pulse of 97 ns takes 13 clocks as well, one of 96 ns 12.
+        assert_eq!(limited(192_456, 97), beyond);
+        assert!(limited(192_456, 96).is_ok());
+        // 1 µs of 50 µs.
+        assert!(limited(20_000, 1000).is_ok());
+        assert_eq!(config(20_002, 1000).unwrap().period(), 6249);
+        assert_eq!(limited(20_002, 1000), beyond);
+        // The shortest pulse at any rate.
+        assert!(limited(800_000, 16).is_ok());
+        assert!(limited(943_396, 1).is_ok());
+        assert_eq!(limited(800_000, 100), beyond);
+    }
+
+    #[test]
+    fn the_limits_hold_unless_the_feature_lifts_them() {
+        let settings = Settings {
+            laser_hz: 100_000,
+            pulse_ns: 9_900,
+        };
+        let lifted = cfg!(feature = "laser-beyond-limits");
+        assert_eq!(Config::new(settings).is_ok(), lifted);
+        assert_eq!(
+            Config::new(Settings {
+                pulse_ns: 0,
+                ..settings
+            }),
+            Err(ConfigError::NoPulse)
+        );
     }
 
     #[test]

@@ -17,16 +17,18 @@ use crate::{root, succeed};
 pub const NODE: &str = "node";
 pub const NPM: &str = "npm";
 
-/// The path of the image, of the sidecar unless something else is named. `laser_hz` is the rate
-/// of the photon timer.
-pub fn image(what: &[&str], laser_hz: Option<u32>) -> Result<PathBuf> {
+/// The path of the image, of the sidecar unless something else is named. `laser` is the rate of the
+/// photon timer in Hz, and its pulse in nanoseconds.
+pub fn image(what: &[&str], laser: Option<(u32, u32)>) -> Result<PathBuf> {
     let mut cargo = Command::new(env!("CARGO"));
     cargo
         .args(["--locked", "xtask", "image", "pico"])
         .args(what);
-    match laser_hz {
-        Some(hz) => cargo.env("LASER_HZ", hz.to_string()),
-        None => cargo.env_remove("LASER_HZ"),
+    match laser {
+        Some((hz, pulse_ns)) => cargo
+            .env("LASER_HZ", hz.to_string())
+            .env("LASER_PULSE_NS", pulse_ns.to_string()),
+        None => cargo.env_remove("LASER_HZ").env_remove("LASER_PULSE_NS"),
     };
     let cargo = cargo.current_dir(root()).stdin(Stdio::null());
     let output = cargo.stderr(Stdio::inherit()).output()?;
