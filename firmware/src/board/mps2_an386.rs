@@ -69,9 +69,10 @@ impl Mps2An386 {
     }
 
     /// Does what the words behind the image's name on the emulator's command line
-    /// (`-semihosting-config arg=…`) ask for. `exit`, `panic` and `fault` show that each
-    /// end is seen. Gives N of `unpaced=N`: laser cycles that the simulated sensor makes
-    /// as fast as they are worked on, and none after them.
+    /// (`-semihosting-config arg=…`) ask for. `exit`, `panic`, `fault` and `overflow` show that
+    /// each end is seen; all but the first begin with a laser that is on. Gives N of
+    /// `unpaced=N`: laser cycles that the simulated sensor makes as fast as they are worked on,
+    /// and none after them.
     ///
     /// # Panics
     /// On request.
@@ -82,10 +83,16 @@ impl Mps2An386 {
         let mut unpaced = None;
         for word in env::args::<128>().ok()?.skip(1).flatten() {
             let cycles = word.strip_prefix("unpaced=");
+            if ["panic", "fault", "overflow"].contains(&word) {
+                Self::set_laser(true);
+                // A debugger can stop here and see it.
+                defmt::warn!("the laser is on: {=str}", word);
+            }
             match (word, cycles.and_then(|cycles| cycles.parse().ok())) {
                 ("exit", _) => Self::exit(ExitCode::SUCCESS),
                 ("panic", _) => panic!("as asked for on the command line"),
                 ("fault", _) => cortex_m::asm::udf(),
+                ("overflow", _) => overflow(),
                 (_, cycles @ Some(_)) => unpaced = cycles,
                 _ => defmt::warn!("what is `{=str}`?", word),
             }
@@ -115,6 +122,14 @@ impl Mps2An386 {
     pub fn reset_reason(&self) -> ResetReason {
         reset_reason::take().unwrap_or(ResetReason::PowerOn)
     }
+}
+
+/// Pushes what a call saves, again and again, as recursion without end does. It is a loop in
+/// assembly: `cargo xtask sizes` refuses an image with a function that calls itself.
+#[unsafe(naked)]
+#[allow(unsafe_code, reason = "it takes all of the stack")]
+extern "C" fn overflow() -> ! {
+    core::arch::naked_asm!("nop", "0: push {{r0-r7, lr}}", "b 0b")
 }
 
 /// Switches LED0 off, which stands for a laser.

@@ -66,10 +66,10 @@ impl ConfigError {
             Self::NoPulse => "the laser's pulse is 0 ns",
             Self::LongPulse => "the laser's pulse leaves no pause in its laser cycle",
             Self::PulseBeyondLimit => {
-                "the laser's pulse is longer than 1000 ns, which takes the feature laser-beyond-limits"
+                "the laser's pulse is longer than 1000 ns: only the feature laser-beyond-limits allows that"
             }
             Self::DutyBeyondLimit => {
-                "the laser is on for more than 2 % of the time, which takes the feature laser-beyond-limits"
+                "the laser is on for more than 2 % of the time: only the feature laser-beyond-limits allows that"
             }
         }
     }

@@ -67,6 +67,20 @@ impl Debugger {
         words.try_into().ok().context("not 16 registers")
     }
 
+    /// Sets the stack pointer and the next instruction.
+    pub fn set_registers(&mut self, stack_pointer: u32, next: u32) -> Result<()> {
+        self.send("g")?;
+        let mut digits = self.reply()?;
+        for (register, value) in [(13, stack_pointer), (15, next)] {
+            let value = format!("{:08x}", value.swap_bytes());
+            digits.replace_range(8 * register..8 * register + 8, &value);
+        }
+        self.send(&format!("G{digits}"))?;
+        let reply = self.reply()?;
+        ensure!(reply == "OK", "the debugger says `{reply}`");
+        Ok(())
+    }
+
     /// What lies at these addresses.
     pub fn memory(&mut self, addresses: Range<u64>) -> Result<Vec<u8>> {
         let mut memory = Vec::new();

@@ -7,7 +7,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use dtof::device::{self, Port};
 
 use crate::cargo;
@@ -72,6 +72,7 @@ fn command(board: Board, image: &Path, port: u16, words: &[&str]) -> Command {
 /// An emulator, ended when dropped. It is under a debugger's control, so that
 /// the stack can be read before it ends.
 pub struct Emulator {
+    board: Board,
     child: Child,
     port: u16,
     debugger: Debugger,
@@ -86,6 +87,24 @@ pub struct End {
     pub output: Vec<u8>,
     /// Bytes of the stack that were used.
     pub stack: u64,
+    /// What the laser of mps2-an386 was while it ran and is at the end; LED0 stands for it.
+    pub laser: Option<Laser>,
+}
+
+/// A laser that was on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Laser {
+    pub is_on: bool,
+    /// Words of the statics that have changed since it was on.
+    pub changed: usize,
+}
+
+/// What a stack that overflowed has left.
+pub struct Overflow {
+    /// What was logged before the reset, and after it.
+    pub logs: [Vec<u8>; 2],
+    /// Words of the statics that changed before the reset.
+    pub changed: usize,
 }
 
 impl Emulator {
@@ -116,6 +135,7 @@ impl Emulator {
             }
         };
         Ok(Self {
+            board,
             child,
             port,
             debugger,
@@ -138,10 +158,14 @@ impl Emulator {
         for &address in &self.image.semihosting {
             self.debugger.set_breakpoint(address, true)?;
         }
+        let mut statics = None;
         loop {
             self.debugger.resume()?;
             self.debugger.wait_for_stop()?;
             let registers = self.debugger.registers()?;
+            if statics.is_none() && self.laser_is_on()? {
+                statics = Some(self.statics()?);
+            }
             if SYS_EXIT.contains(&registers[0]) {
                 break;
             }
@@ -154,6 +178,13 @@ impl Emulator {
             self.debugger.set_breakpoint(address, true)?;
         }
         let stack = self.stack()?;
+        let laser = match statics {
+            None => None,
+            Some(before) => Some(Laser {
+                is_on: self.laser_is_on()?,
+                changed: changed(&before, &self.statics()?),
+            }),
+        };
         for &address in &self.image.semihosting {
             self.debugger.set_breakpoint(address, false)?;
         }
@@ -175,7 +206,73 @@ impl Emulator {
                 .and_then(|output| output.join().ok())
                 .unwrap_or_default(),
             stack,
+            laser,
         })
+    }
+
+    /// Lets the image run for a while and then call a function on a stack that is full, so that it
+    /// resets its board; and run again.
+    pub fn overflow(mut self) -> Result<Overflow> {
+        let while_it_runs = Duration::from_millis(300);
+        self.debugger.resume()?;
+        thread::sleep(while_it_runs);
+        self.debugger.interrupt()?;
+        let before = self.statics()?;
+        // The first instruction of `main` is a push.
+        let full = u32::try_from(self.image.stack.start)? + 4;
+        let main = u32::try_from(self.image.address("main")? & !1)?;
+        self.debugger.set_registers(full, main)?;
+        let reset = self.image.address("Reset")? & !1;
+        self.debugger.set_breakpoint(reset, true)?;
+        self.debugger.resume()?;
+        self.debugger.wait_for_stop()?;
+        let next = self.debugger.registers()?[15];
+        ensure!(
+            u64::from(next) == reset,
+            "it stops at {next:#x}, not at its reset"
+        );
+        let changed = changed(&before, &self.statics()?);
+        let first = self.log()?;
+        self.debugger.set_breakpoint(reset, false)?;
+        self.debugger.resume()?;
+        thread::sleep(while_it_runs);
+        self.debugger.interrupt()?;
+        let second = self.log()?;
+        Ok(Overflow {
+            logs: [first, second],
+            changed,
+        })
+    }
+
+    /// What the image has logged since its start, as long as it fits: the first channel of RTT to
+    /// the debugger, which nothing has read.
+    fn log(&mut self) -> Result<Vec<u8>> {
+        let block = self.image.address("_SEGGER_RTT")?;
+        // An ID of 16 bytes, two numbers of channels, a name; the buffer, its size, where it is full.
+        let words = self.debugger.memory(block + 28..block + 40)?;
+        let (words, _) = words.as_chunks();
+        let words: Vec<u64> = words
+            .iter()
+            .map(|word| u32::from_le_bytes(*word).into())
+            .collect();
+        let &[buffer, size, full] = &*words else {
+            bail!("no channel of RTT");
+        };
+        ensure!(full < size, "no channel of RTT");
+        self.debugger.memory(buffer..buffer + full)
+    }
+
+    /// Whether LED0 of mps2-an386 is lit: bit 0 of the first register of its FPGA's I/O.
+    fn laser_is_on(&mut self) -> Result<bool> {
+        const LED: u64 = 0x4002_8000;
+        Ok(match self.board {
+            Board::Mps2An386 => self.debugger.memory(LED..LED + 4)?[0] & 1 != 0,
+            Board::Stm32F405 => false,
+        })
+    }
+
+    fn statics(&mut self) -> Result<Vec<u8>> {
+        self.debugger.memory(self.image.statics.clone())
     }
 
     /// Ends QEMU; bytes of the stack that were used.
@@ -189,6 +286,12 @@ impl Emulator {
         let memory = self.debugger.memory(self.image.stack.clone())?;
         Ok(stack::high_water(&memory))
     }
+}
+
+/// How many words differ.
+fn changed(before: &[u8], after: &[u8]) -> usize {
+    let words = before.chunks(4).zip(after.chunks(4));
+    words.filter(|(before, after)| before != after).count()
 }
 
 /// Two TCP ports that are free now; should another take one meanwhile, the emulator ends

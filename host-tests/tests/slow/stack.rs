@@ -1,11 +1,12 @@
 //! What an image has used of its stack.
 //!
-//! Before `main`, cortex-m-rt paints the stack. The stack grows downwards, so
+//! Before `main`, cortex-m-rt paints the stack. The stack is lowest in RAM and grows downwards, so
 //! that all above the lowest word that has lost its paint has been used. What a
 //! function reserves and never writes to keeps its paint; it does not count
 //! unless something below it was written to. So what a run has used is held
 //! against what the machine code can need (`stack_bound`).
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::ops::Range;
 use std::path::Path;
@@ -27,6 +28,9 @@ pub const MOST: u64 = 7 * 1024;
 pub struct Image {
     /// From where it ends to where it begins, which is above.
     pub stack: Range<u64>,
+    /// What lies above: all statics.
+    pub statics: Range<u64>,
+    symbols: BTreeMap<String, u64>,
     /// Where it may ask the emulator for something.
     pub semihosting: Vec<u64>,
 }
@@ -35,13 +39,18 @@ impl Image {
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = fs::read(path).with_context(|| path.display().to_string())?;
         let file = object::File::parse(&*bytes)?;
-        let address = |name| {
-            let symbol = file.symbol_by_name(name);
-            let symbol = symbol.with_context(|| format!("no symbol {name} in the image"))?;
-            anyhow::Ok(symbol.address())
+        let symbols = file.symbols();
+        let symbols = symbols.filter_map(|symbol| Some((symbol.name().ok()?, symbol.address())));
+        let symbols = symbols.map(|(name, address)| (name.to_owned(), address));
+        let mut image = Self {
+            stack: 0..0,
+            statics: 0..0,
+            symbols: symbols.collect(),
+            semihosting: Vec::new(),
         };
-        let stack = address("_stack_end")?..address("_stack_start")?;
-        let mut semihosting = Vec::new();
+        let [end, start] = [image.address("_stack_end")?, image.address("_stack_start")?];
+        image.stack = end..start;
+        image.statics = start..image.address("__sheap")?;
         for section in file.sections() {
             if section.kind() == SectionKind::Text {
                 let pairs = section.data()?.chunks(2);
@@ -49,10 +58,17 @@ impl Image {
                 let found = addresses
                     .zip(pairs)
                     .filter(|(_, pair)| *pair == SEMIHOSTING);
-                semihosting.extend(found.map(|(address, _)| address));
+                image.semihosting.extend(found.map(|(address, _)| address));
             }
         }
-        Ok(Self { stack, semihosting })
+        Ok(image)
+    }
+
+    /// Where a symbol is.
+    pub fn address(&self, name: &str) -> Result<u64> {
+        let address = self.symbols.get(name);
+        let address = address.with_context(|| format!("no symbol {name} in the image"))?;
+        Ok(*address)
     }
 }
 
