@@ -20,6 +20,28 @@ use crate::{cargo, succeed};
 const ARRAY: &str = "8x8";
 const CYCLES: &str = "1000";
 
+/// What needs a person: the step, what to do, and what is to be seen in the log of
+/// `cargo xtask flash`. The results say that it was not tried; whoever tries it changes the line.
+const BY_HAND: [(&str, &str, &str); 3] = [
+    (
+        "Stack overflow",
+        "halt the board with a debugger, set the stack pointer to `_stack_end` + 4 and the next instruction to \
+         `main`, and let it run",
+        "`stack overflow`, then `started: Fault`; the laser is off at once",
+    ),
+    (
+        "Watchdog",
+        "flash an image with a real sensor, and halt the board with a debugger for two seconds",
+        "`started: Watchdog`; the laser is off after one second",
+    ),
+    (
+        "Brown-out",
+        "lower the supply until the board stops, and raise it again",
+        "`started: PowerOn`, on an STM32F405 whose option bytes have BOR_LEV on `started: BrownOut`; the \
+         laser is off",
+    ),
+];
+
 /// A board with a debug probe and a serial line.
 pub struct Rig {
     root: &'static Path,
@@ -65,6 +87,12 @@ pub fn run(rig: &Rig) -> Result<()> {
         println!("{line}");
         let _ = write!(text, "\n## {part}\n\n{line}\n{more}");
     }
+    let mut by_hand = String::from("\n## By hand\n\n");
+    for (what, to_do, to_see) in BY_HAND {
+        let _ = writeln!(by_hand, "- {what}: not tried. Do: {to_do}. See: {to_see}.");
+    }
+    print!("{by_hand}");
+    text.push_str(&by_hand);
     let file = rig.out.join(format!("{name}.md"));
     fs::write(&file, text).with_context(|| file.display().to_string())?;
     println!("{}: written; please send it", file.display());

@@ -67,6 +67,9 @@ fn a_board_is_tried_and_its_results_are_one_file() -> Result<()> {
         "lines as in `firmware/self-test.out`",
         "| photon: AsyncPixel::count |",
         "events, all as on this computer",
+        "- Stack overflow: not tried. Do: ",
+        "- Watchdog: not tried. Do: ",
+        "- Brown-out: not tried. Do: ",
     ] {
         ensure!(found.contains(text), "no `{text}`: {found}");
     }
