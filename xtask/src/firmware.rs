@@ -330,7 +330,7 @@ fn link(
     ensure!(status.success(), "{image} does not build, see above");
 
     let built = target_folder.join(target).join(profile).join(image);
-    layout::check(&built)?;
+    layout::check(&built, image == "bench")?;
     let kept = folder.join(match Laser::read(&built)? {
         Some(laser) => format!("{name}+{}", laser.file_name()),
         None => name,

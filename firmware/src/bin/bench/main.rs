@@ -10,7 +10,9 @@
 #[cfg(not(all(target_os = "none", feature = "board")))]
 compile_error!("an image for a board: cargo xtask bench");
 
-// What the board boots with, its interrupts and its hard fault.
+// What the board boots with, its interrupts and its hard fault. Elsewhere the library is left out:
+// optimised for size, the compiler would take generic functions from it and count them.
+#[cfg(feature = "pico")]
 use dtof_firmware as _;
 
 mod counter;
@@ -28,6 +30,8 @@ mod windows;
 use core::panic::PanicInfo;
 
 use cortex_m_rt::entry;
+#[cfg(not(feature = "pico"))]
+use cortex_m_rt::{ExceptionFrame, exception};
 use semihosting::println;
 use semihosting::process::ExitCode;
 
@@ -59,5 +63,13 @@ fn main() -> ! {
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     println!("{info}");
+    ExitCode::FAILURE.exit_process()
+}
+
+#[cfg(not(feature = "pico"))]
+#[allow(unsafe_code, reason = "the attribute asks for it")]
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    println!("hard fault at {:#010x}", frame.pc());
     ExitCode::FAILURE.exit_process()
 }
