@@ -1,112 +1,168 @@
-// An RP2040 with an image: rp2040js, and what it leaves to its caller.
+// A Raspberry Pi Pico with an image: its clock, its resets, its serial port, and the record of
+// what its laser's pin does. `chip.js` says what of the chip is there.
+//
+// It runs rp2040js, which leaves this to its caller:
 //
 // - It has one core and no boot ROM: the image starts at its vector table, as the second stage
-//   of the boot would start it.
-// - State machines of the PIO do not step with the core: here all that are enabled step once a
-//   clock. Delays of their instructions and clock dividers are not there.
-// - A DMA transfer of a word is an alarm of the clock, which ticks once a clock as well.
-// - A handler would run at an odd address, as its vector is, and read tables beside its code wrongly.
+//   of the boot would start it. As on the chip the last 256 bytes of the memory then are that second
+//   stage, and the stack of the boot ROM is taken to have used 256 bytes below.
+// - All runs at 125 MHz. On the chip the boot ROM and the start of an image after a reset of the chip
+//   run at about 6.5 MHz, and the boot ROM takes its time, which is not there.
+// - State machines of the PIO do not step with the core: see `pio.js`.
+// - A DMA transfer of a word is an alarm of the clock.
 // - An interrupt that comes while the core sleeps would be taken even when all are held back. So
 //   the core never sleeps for long: this file knows that it does.
+//
+// Resets. The watchdog, when it is triggered or its timer has run out, resets the chip: all
+// begins anew but memory, the watchdog's scratch registers, its reason, and what this file has
+// recorded. A write of AIRCR.SYSRESETREQ resets the core alone: PIO, DMA, pins and peripherals go on,
+// until the image resets them. The flash is the image's file again after either. Clocks are counted
+// from power-on.
 
-import { RP2040, USBCDC } from 'rp2040js';
+import { Chip, FLASH } from './chip.js';
 import { CLOCK_NS } from './edges.js';
+import { FAULTS } from './faults.js';
+import { Host } from './host.js';
+import { level, milliseconds, Pulses } from './pulses.js';
 import { answer } from './semihosting.js';
 
-const FLASH = 0x10000000;
-const RAM = 0x20000000;
-const VECTORS = FLASH + 0x100;
-/** UARTRSR, UARTIFLS, UARTDMACR: registers of the UART that are not there. */
-const UART_GAPS = new Set([0x04, 0x34, 0x48]);
-/** AIRCR, through which an image resets the chip. */
-const AIRCR = 0xd0c;
 /** Clocks until a pin's level is in step with the chip's clock, and seen. */
 const SYNCHRONISER = 2;
 /** Clocks of a byte at 1 Mbaud. */
 const CLOCKS_A_BYTE = 1250;
+const CLOCKS_A_MS = 125_000;
 const PAINT = 0xcccccccc;
+const BRANCH_TO_ITSELF = 0xe7fe;
+/** What REASON of the watchdog says after a reset of the chip. */
+const REASONS = { watchdog: 1, forced: 2 };
+/** Functions that only a panic reaches. */
+const PANIC_HANDLERS = /on_panic|rust_begin_unwind/;
 
 export class Machine {
   /**
    * `elf` is what `readElf` gives. `edges` are changes of pins, counted in clocks from the first
-   * clock in which pin `origin` is high, or from the start without it. With `oneClock` every
-   * instruction takes one clock. With `usb` the serial port is that of the USB, not the UART.
+   * clock in which pin `laser` is high if `fromLaser`, else from the start. With `oneClock` every
+   * instruction takes one clock. With `usb` the serial port is that of the USB, not the UART. After
+   * `boots` boots it ends. `plant` is `{ kind, ms }`, counted from the first pulse of the laser.
    */
-  constructor(elf, { edges = [], origin = null, oneClock = false, usb = false, warn = () => {} } = {}) {
-    const rp2040 = new RP2040();
-    this.rp2040 = rp2040;
+  constructor(
+    elf,
+    {
+      edges = [],
+      laser = 2,
+      fromLaser = false,
+      oneClock = false,
+      usb = false,
+      boots = 10,
+      plant = null,
+      warn = () => {},
+    } = {},
+  ) {
     this.elf = elf;
     this.edges = edges;
     this.nextEdge = 0;
-    this.origin = origin;
-    this.edgesFrom = origin === null ? 0 : null;
+    this.laser = laser;
+    this.pulses = new Pulses();
+    this.edgesFrom = fromLaser ? null : 0;
     this.oneClock = oneClock;
+    this.mostBoots = boots;
+    this.plant = plant;
+    this.warn = warn;
+    this.codeEnd = Chip.codeEnd(elf);
     this.clocks = 0;
-    this.asleep = false;
     /** The exit code, once the image has ended. */
     this.ended = null;
     this.instructions = 0;
     this.sleptClocks = 0;
     this.pioClocks = 0;
-    this.triggers = 0;
-    this.wasHigh = false;
     /** Clocks spent at each instruction. */
     this.spent = new Float64Array(1 << 19);
     this.input = [];
     this.nextInput = 0;
     this.onOutput = () => {};
-    rp2040.logger = { debug() {}, info() {}, warn: (_, text) => warn(text), error: (_, text) => warn(text) };
-    for (const { address, bytes } of elf.segments) {
-      const [memory, start] = address < RAM ? [rp2040.flash, FLASH] : [rp2040.sram, RAM];
-      memory.set(bytes, address - start);
-    }
-    const inFlash = elf.segments.filter(({ address }) => address < RAM);
-    this.codeEnd = Math.max(...inFlash.map(({ address, bytes }) => address + bytes.length - FLASH));
-    rp2040.core.VTOR = VECTORS;
-    rp2040.core.reset();
-    rp2040.onBreak = (code) => this.onBreak(code);
-    this.usb = usb ? new USBCDC(rp2040.usbCtrl) : null;
-    /** The endpoint that waits for a packet of the host, and its most bytes. */
-    this.wanted = null;
-    if (usb) {
-      this.usb.onSerialData = (bytes) => bytes.forEach((byte) => this.onOutput(byte));
-      // Its own forgets a packet that is wanted before it knows the device.
-      rp2040.usbCtrl.onEndpointRead = (endpoint, size) => {
-        this.wanted = endpoint > 0 ? { endpoint, size } : this.wanted;
-      };
-    } else {
-      rp2040.uart[0].onByte = (byte) => this.onOutput(byte);
-    }
-    this.fillGaps();
+    /** The device of the USB has gone from the host, which had its port open. */
+    this.onGone = () => {};
+    /** Clocks of what has happened. */
+    this.lastInput = null;
+    this.dtrLow = null;
+    this.planted = null;
+    /** The clock from which the fault is due. */
+    this.plantFrom = Infinity;
+    /** The clock and the reason of each boot. */
+    this.boots = [];
+    this.host = usb
+      ? new Host({
+          onBytes: (bytes) => bytes.forEach((byte) => this.onOutput(byte)),
+          onClosed: () => {
+            this.dtrLow = this.clocks;
+          },
+          onGone: () => this.onGone(),
+        })
+      : null;
+    /** Levels of the pins from outside. */
+    this.inputs = new Set();
+    this.levels = 0;
+    this.powerOn();
   }
 
-  fillGaps() {
-    const { rp2040 } = this;
-    for (const uart of rp2040.uart) {
-      const { readUint32, writeUint32 } = uart;
-      uart.readUint32 = (offset) => (UART_GAPS.has(offset) ? 0 : readUint32.call(uart, offset));
-      uart.writeUint32 = (offset, value) => UART_GAPS.has(offset) || writeUint32.call(uart, offset, value);
-    }
-    const { core, ppb } = rp2040;
-    const { exceptionEntry } = core;
-    core.exceptionEntry = (number) => {
-      exceptionEntry.call(core, number);
-      core.PC = (core.PC & ~1) >>> 0;
-    };
-    const { writeUint32 } = ppb;
-    ppb.writeUint32 = (offset, value) =>
-      offset === AIRCR ? this.end(1, 'the image resets the chip') : writeUint32.call(ppb, offset, value);
-    rp2040.peripherals[0x40058].onWatchdogTrigger = () => this.end(1, 'the watchdog resets the chip');
-    for (const pio of rp2040.pio) {
-      pio.run = () => {};
+  get rp2040() {
+    return this.chip.rp2040;
+  }
+
+  powerOn() {
+    this.makeChip();
+    this.boot('power');
+  }
+
+  makeChip() {
+    /** The clock at which that of the chip was 0. */
+    this.origin = this.clocks;
+    this.chip = null;
+    const chip = new Chip(this.elf, {
+      now: () => this.clocks,
+      changed: (clock) => this.changed(clock),
+      onReset: (kind) => this.onReset(kind),
+      onUsbReset: () => this.host?.attach(this.rp2040.usbCtrl),
+      onBreak: () => this.onBreak(),
+      warn: this.warn,
+    });
+    this.chip = chip;
+    if (this.host === null) {
+      chip.rp2040.uart[0].onByte = (byte) => this.onOutput(byte);
+    } else {
+      this.host.attach(chip.rp2040.usbCtrl);
     }
     // Asked once a sample and else the sum of 30 pins.
-    let levels = 0;
-    this.setPin = (pin, level) => {
-      rp2040.gpio[pin].setInputValue(level);
-      levels = rp2040.gpio.reduce((sum, gpio, index) => sum | (gpio.inputValue ? 1 << index : 0), 0);
-    };
-    Object.defineProperty(rp2040, 'gpioValues', { get: () => levels });
+    Object.defineProperty(chip.rp2040, 'gpioValues', { get: () => this.levels });
+    this.inputs.forEach((pin) => chip.rp2040.gpio[pin].setInputValue(true));
+    this.changed(this.clocks);
+  }
+
+  boot(reason) {
+    this.asleep = false;
+    /** The reset that has been asked for. */
+    this.request = null;
+    if (this.boots.length === this.mostBoots) {
+      return this.end(1, `the image has booted ${this.mostBoots} times`);
+    }
+    this.boots.push({ clock: this.clocks, reason });
+  }
+
+  onReset(kind) {
+    // The stronger one holds.
+    this.request = this.request === null || this.request === 'core' ? kind : this.request;
+  }
+
+  reset() {
+    const kind = this.request;
+    if (kind === 'core') {
+      this.chip.resetCore();
+    } else {
+      const old = this.chip;
+      this.makeChip();
+      this.chip.inherit(old, REASONS[kind]);
+    }
+    this.boot(kind);
   }
 
   end(code, why) {
@@ -116,42 +172,91 @@ export class Machine {
     this.ended ??= code;
   }
 
-  onBreak(code) {
-    if (code !== 0xab) {
-      return this.end(1, `the image stops at ${this.rp2040.core.PC.toString(16)}`);
-    }
+  onBreak() {
     const exit = answer(this.rp2040);
     if (exit !== undefined) {
       this.end(exit);
     }
   }
 
-  get pioRuns() {
-    return !this.rp2040.pio[0].stopped || !this.rp2040.pio[1].stopped;
+  /** A pin may have changed: its output, or how its input comes in. */
+  changed(clock) {
+    if (this.chip === null) {
+      return;
+    }
+    const { gpio } = this.rp2040;
+    if (this.inputs.size > 0) {
+      this.levels = gpio.reduce((sum, pin, index) => sum | (pin.inputValue ? 1 << index : 0), 0);
+    }
+    const begins = this.pulses.update(level(gpio[this.laser]), clock);
+    if (begins && this.pulses.count === 1) {
+      // What an instruction does to a pin is to be seen outside from the next clock on.
+      this.edgesFrom ??= clock + 1;
+      if (this.plant !== null) {
+        this.plantFrom = clock + this.plant.ms * CLOCKS_A_MS;
+      }
+    }
   }
 
-  /** Runs for about so many clocks, or until the image ends or sleeps with nothing due by then. */
+  setPin(pin, isHigh) {
+    // Samples before the change are of the level before.
+    this.chip.pio.settle(this.clocks - 1);
+    this.inputs[isHigh ? 'add' : 'delete'](pin);
+    this.rp2040.gpio[pin].setInputValue(isHigh);
+    this.levels = this.rp2040.gpio.reduce((sum, gpio, index) => sum | (gpio.inputValue ? 1 << index : 0), 0);
+  }
+
+  /** Runs for about so many clocks, or until the image ends. */
   run(clocks) {
-    const { core } = this.rp2040;
     const until = this.clocks + clocks;
     while (this.clocks < until && this.ended === null) {
-      if (this.asleep) {
-        this.sleep(until);
-        continue;
-      }
-      const { PC } = core;
-      if (PC >>> 28 === 1 && PC - FLASH >= this.codeEnd) {
-        return this.end(1, `the image runs on at ${PC.toString(16)}, where no code is`);
-      }
-      const cycles = core.executeInstruction();
-      const taken = this.oneClock ? 1 : cycles;
-      this.instructions++;
-      this.spent[(PC & 0xfffff) >> 1] += taken;
-      if (core.waiting) {
-        core.waiting = false;
+      if (this.request !== null) {
+        this.reset();
+      } else if (this.clocks >= this.plantFrom && !this.asleep) {
+        this.plantFault();
+      } else if (this.chip.isLockedUp) {
+        this.pass(until);
+      } else if (this.asleep) {
+        this.pass(until);
         this.asleep = !this.interrupted();
+      } else {
+        this.step();
       }
-      this.advance(taken);
+    }
+  }
+
+  step() {
+    const { chip } = this;
+    const { core } = chip.rp2040;
+    if (core.interruptsUpdated) {
+      chip.takeInterrupts();
+    }
+    const { PC } = core;
+    if (PC >>> 28 === 1 && PC - FLASH >= this.codeEnd) {
+      return this.end(1, `the image runs on at ${PC.toString(16)}, where no code is`);
+    }
+    const cycles = chip.step();
+    const taken = this.oneClock ? 1 : cycles;
+    this.instructions++;
+    this.spent[(PC & 0xfffff) >> 1] += taken;
+    if (core.waiting) {
+      core.waiting = false;
+      this.asleep = !this.interrupted();
+    } else if (core.PC === PC && core.readUint16(PC) === BRANCH_TO_ITSELF) {
+      // Only an interrupt ends it.
+      this.asleep = !this.interrupted();
+    }
+    this.advance(this.clocks + taken);
+  }
+
+  plantFault() {
+    // The instruction that the fault is planted at is the next one.
+    this.chip.takeInterrupts();
+    if (FAULTS[this.plant.kind](this)) {
+      this.planted = this.clocks;
+      this.plantFrom = Infinity;
+    } else {
+      this.step();
     }
   }
 
@@ -160,86 +265,78 @@ export class Machine {
     return core.pendingSystick || core.pendingPendSV || (core.pendingInterrupts & core.enabledInterrupts) !== 0;
   }
 
-  sleep(until) {
-    const { clock } = this.rp2040;
-    let clocks = 1;
-    if (!this.pioRuns) {
-      const toAlarm = clock.nextAlarm ? Math.ceil(clock.nanosToNextAlarm / CLOCK_NS) : Infinity;
-      const toInput = this.input.length > 0 ? this.nextInput - this.clocks : Infinity;
-      clocks = Math.max(1, Math.min(toAlarm, toInput, until - this.clocks));
-    }
-    this.sleptClocks += clocks;
-    this.advance(clocks);
-    this.asleep = !this.interrupted();
+  /** The clock of the next alarm. */
+  get nextAlarm() {
+    const { nextAlarm } = this.rp2040.clock;
+    return nextAlarm ? this.origin + Math.ceil(nextAlarm.nanos / CLOCK_NS) : Infinity;
   }
 
-  /** Lets so many clocks pass. */
-  advance(clocks) {
-    if (this.pioRuns) {
-      for (let left = clocks; left > 0; left--) {
-        this.clocks++;
-        this.stepPio();
-        this.rp2040.clock.tick(CLOCK_NS);
-      }
+  /** The clock in which the next edge comes. */
+  get nextChange() {
+    const isDue = this.edgesFrom !== null && this.nextEdge < this.edges.length;
+    return isDue ? this.edgesFrom + this.edges[this.nextEdge].clock + SYNCHRONISER : Infinity;
+  }
+
+  /** Lets time pass until something happens, without instructions. */
+  pass(until) {
+    const from = this.clocks;
+    const toInput = this.input.length > 0 ? this.nextInput : Infinity;
+    const plant = this.plantFrom > from ? this.plantFrom : Infinity;
+    const next = Math.min(until, this.nextAlarm, this.chip.pio.due, this.nextChange, toInput, plant);
+    this.advance(Math.max(from + 1, Math.ceil(next)));
+    this.sleptClocks += this.clocks - from;
+  }
+
+  /** Lets time pass up to clock `until`. */
+  advance(until) {
+    const { pio } = this.chip;
+    const { clock } = this.chip.rp2040;
+    const from = this.clocks;
+    if (pio.due > until && this.nextChange > until) {
+      this.clocks = until;
+      clock.tick((until - from) * CLOCK_NS);
     } else {
-      this.clocks += clocks;
-      this.rp2040.clock.tick(clocks * CLOCK_NS);
-      this.changePins();
+      this.advanceInSteps(until);
+    }
+    if (pio.runs) {
+      this.pioClocks += until - from;
     }
     if (this.input.length > 0 && this.clocks >= this.nextInput) {
       this.feed();
     }
   }
 
+  advanceInSteps(until) {
+    const { pio } = this.chip;
+    const { clock } = this.chip.rp2040;
+    while (this.clocks < until) {
+      const next = Math.max(this.clocks + 1, Math.min(until, pio.due, this.nextChange, this.nextAlarm));
+      if (next > this.clocks + 1) {
+        clock.tick((next - 1 - this.clocks) * CLOCK_NS);
+      }
+      this.clocks = next;
+      while (this.nextChange <= next) {
+        const { pin, level: isHigh } = this.edges[this.nextEdge++];
+        this.setPin(pin, isHigh);
+      }
+      if (pio.due <= next) {
+        pio.step(next);
+      }
+      clock.tick(CLOCK_NS);
+    }
+  }
+
   /** Gives the serial port the next byte, or of the USB the next packet, if it has room. */
   feed() {
-    const { uart, usbCtrl } = this.rp2040;
-    if (this.usb === null) {
-      if (!uart[0].rxFIFO.full) {
-        uart[0].feedByte(this.input.shift());
-        this.nextInput = this.clocks + CLOCKS_A_BYTE;
+    const [uart] = this.rp2040.uart;
+    if (this.host !== null) {
+      if (this.host.send(this.input)) {
+        this.lastInput = this.clocks;
       }
-    } else if (this.usb.initialized && this.wanted !== null) {
-      const { endpoint, size } = this.wanted;
-      this.wanted = null;
-      usbCtrl.endpointReadDone(endpoint, Uint8Array.from(this.input.splice(0, size)));
-    }
-  }
-
-  stepPio() {
-    this.changePins();
-    for (const pio of this.rp2040.pio) {
-      if (pio.stopped) {
-        continue;
-      }
-      for (const machine of pio.machines) {
-        if (machine.enabled) {
-          machine.step();
-        }
-      }
-      pio.checkChangedPins();
-    }
-    this.pioClocks++;
-    if (this.origin !== null) {
-      const { gpio, pio } = this.rp2040;
-      const isHigh = ((pio[0].pinValues >>> this.origin) & 1) === 1 && gpio[this.origin].outputValue;
-      if (isHigh && !this.wasHigh) {
-        this.triggers++;
-        // What an instruction does to a pin is to be seen outside from the next clock on.
-        this.edgesFrom ??= this.clocks + 1;
-      }
-      this.wasHigh = isHigh;
-    }
-  }
-
-  changePins() {
-    while (
-      this.edgesFrom !== null &&
-      this.nextEdge < this.edges.length &&
-      this.edgesFrom + this.edges[this.nextEdge].clock + SYNCHRONISER <= this.clocks
-    ) {
-      const { pin, level } = this.edges[this.nextEdge++];
-      this.setPin(pin, level);
+    } else if (!uart.rxFIFO.full) {
+      uart.feedByte(this.input.shift());
+      this.lastInput = this.clocks;
+      this.nextInput = this.clocks + CLOCKS_A_BYTE;
     }
   }
 
@@ -251,6 +348,32 @@ export class Machine {
       at += 4;
     }
     return start - at;
+  }
+
+  /** What has been done. */
+  report() {
+    const { clocks, instructions, sleptClocks, pioClocks } = this;
+    const time = (clock) => (clock === null ? null : milliseconds(clock));
+    const panicked = this.elf.functions.some(
+      ({ name, address }) => PANIC_HANDLERS.test(name) && this.spent[(address & 0xfffff) >> 1] > 0,
+    );
+    return {
+      clocks,
+      instructions,
+      sleptClocks,
+      pioClocks,
+      stack: this.stackUsed(),
+      endMs: milliseconds(clocks),
+      laser: this.pulses.report(clocks),
+      lastInputMs: time(this.lastInput),
+      dtrLowMs: time(this.dtrLow),
+      plantedMs: time(this.planted),
+      bootsMs: this.boots.map(({ clock }) => milliseconds(clock)),
+      bootReasons: this.boots.map(({ reason }) => reason),
+      panicked,
+      hardFaults: this.chip.hardFaults,
+      isLockedUp: this.chip.isLockedUp,
+    };
   }
 
   /** The functions that took the most clocks: `{ name, clocks }`. */

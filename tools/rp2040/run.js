@@ -4,19 +4,40 @@ import { createServer } from 'node:net';
 import { parseArgs } from 'node:util';
 import { CLOCK_NS, readEdges } from './edges.js';
 import { readElf } from './elf.js';
+import { FAULTS } from './faults.js';
 import { Machine } from './machine.js';
+import { milliseconds } from './pulses.js';
 
 const HELP = `\
 node run.js IMAGE [options]
 
   --port N        put the serial port on this TCP port of this computer
   --edges FILE    change pins as the file says: lines of \`nanoseconds pin level\`
-  --from PIN      count the file's time from the first clock in which this pin is high
-  --usb           put the serial port of the USB there, not the UART
+  --from PIN      count the file's time from the first clock in which this pin is high, and
+                  record the pulses of this pin; without it those of pin 2, the laser's
+  --usb           put the serial port of the USB there, not the UART. A client that connects
+                  opens it (DTR and RTS), and one that disconnects closes it
+  --plant KIND@MS plant a fault, so many milliseconds after the laser's first pulse. KIND is
+                    fault       an undefined instruction: a hard fault
+                    hang        a loop without end; interrupts go on
+                    lockup      the core stops; all else goes on
+                    core-reset  the core is reset, and nothing else
+                    overflow    a function begins with no room on the stack: the core locks up
+                    overflow-entered
+                                the same, but the handler of the hard fault is entered
+                    panic       a function that panics is called
+  --boots N       end with a failure instead of booting once more than this (10)
   --attached      end when standard input does
+  --for MS        with a port: end so many milliseconds after the last of these: the client has
+                  gone, DTR is low, the fault is planted. Once the client has gone,
+                  time runs as fast as it can
   --count         let every instruction take one clock: the timer then counts them
   --report        print what it has done, and where time went, to standard error at the end
-  --warn          print what the emulator lacks`;
+  --warn          print what the emulator lacks
+
+Times are those of the image, in milliseconds since power-on where the report has them. A
+watchdog resets the chip; AIRCR resets the core alone. The image then boots again. It ends by
+semihosting.`;
 
 /** Clocks between two looks at the serial port's client. */
 const SLICE = 50_000;
@@ -28,6 +49,9 @@ function main() {
       port: { type: 'string' },
       edges: { type: 'string' },
       from: { type: 'string' },
+      plant: { type: 'string' },
+      boots: { type: 'string' },
+      for: { type: 'string' },
       attached: { type: 'boolean' },
       count: { type: 'boolean' },
       usb: { type: 'boolean' },
@@ -40,60 +64,102 @@ function main() {
     process.stderr.write(`${HELP}\n`);
     process.exit(values.help ? 0 : 2);
   }
-  const numbers = [values.port ?? '0', values.from ?? '0'].map(Number);
-  if (!numbers.every((number) => Number.isInteger(number) && number >= 0)) {
-    throw new Error('--port and --from take a whole number');
-  }
+  const whole = (name) => {
+    const number = Number(values[name]);
+    if (values[name] !== undefined && !(Number.isInteger(number) && number >= 0)) {
+      throw new Error(`--${name} takes a whole number`);
+    }
+    return values[name] === undefined ? undefined : number;
+  };
   const machine = new Machine(readElf(positionals[0]), {
     edges: values.edges ? readEdges(values.edges) : [],
-    origin: values.from === undefined ? null : numbers[1],
+    laser: whole('from'),
+    fromLaser: values.from !== undefined,
     oneClock: values.count === true,
     usb: values.usb === true,
+    boots: whole('boots'),
+    plant: values.plant === undefined ? null : readPlant(values.plant),
     warn: values.warn ? (text) => process.stderr.write(`emulator: ${text}\n`) : undefined,
   });
+  const done = () => finish(machine, values.report);
   if (values.port === undefined) {
     while (machine.ended === null) {
       machine.run(SLICE);
     }
-    return finish(machine, values.report);
+    return done();
   }
   if (values.attached) {
     process.stdin.on('end', () => machine.end(0)).resume();
   }
-  serve(machine, numbers[0], () => finish(machine, values.report));
+  serve(machine, whole('port'), whole('for') ?? null, done);
 }
 
-/** Runs it with its serial port on a TCP port, never ahead of this computer's time. */
-function serve(machine, port, done) {
+function readPlant(text) {
+  const [kind, ms, ...more] = text.split('@');
+  const isRight = more.length === 0 && Object.hasOwn(FAULTS, kind) && /^\d+(\.\d+)?$/.test(ms ?? '');
+  if (!isRight) {
+    throw new Error(`--plant takes KIND@MS, where KIND is ${Object.keys(FAULTS).join(', ')}`);
+  }
+  return { kind, ms: Number(ms) };
+}
+
+/**
+ * Runs it with its serial port on a TCP port, never ahead of this computer's time. With `forMs`
+ * it ends by itself, and is ahead once its client has gone.
+ */
+function serve(machine, port, forMs, done) {
   let client = null;
   let output = [];
+  /** The clock at which the last client went. */
+  let gone = null;
   machine.onOutput = (byte) => output.push(byte);
+  machine.onGone = () => client?.destroy();
   const server = createServer({ noDelay: true }, (socket) => {
     client?.destroy();
     client = socket;
+    machine.host?.open();
     socket.on('data', (bytes) => machine.input.push(...bytes));
     socket.on('error', () => {});
     socket.on('close', () => {
-      client = client === socket ? null : client;
+      if (client === socket) {
+        client = null;
+        gone = machine.clocks;
+      }
     });
   });
   server.on('error', (error) => {
     process.stderr.write(`error: ${error.message}\n`);
     process.exit(1);
   });
+  const isOver = () => {
+    const isWaiting = machine.plant !== null && machine.planted === null;
+    if (forMs === null || client !== null || gone === null || machine.host?.isOpen || isWaiting) {
+      return false;
+    }
+    const last = Math.max(gone, machine.dtrLow ?? 0, machine.planted ?? 0);
+    return milliseconds(machine.clocks - last) >= forMs;
+  };
   const start = performance.now();
   const turn = () => {
+    if (client === null && machine.input.length === 0) {
+      // As a kernel, which sends what has been written first.
+      machine.host?.close();
+    }
     machine.run(SLICE);
     if (output.length > 0) {
       client?.write(Buffer.from(output));
       output = [];
     }
+    if (isOver()) {
+      machine.end(0);
+    }
     if (machine.ended !== null) {
       return done();
     }
     const ahead = (machine.clocks * CLOCK_NS) / 1e6 - (performance.now() - start);
+    const isFree = forMs !== null && client === null && gone !== null;
     // Idle time must not run ahead of the client's; busy time is behind it.
-    if (ahead > 2) {
+    if (ahead > 2 && !isFree) {
       setTimeout(turn, ahead);
     } else {
       setImmediate(turn);
@@ -104,10 +170,7 @@ function serve(machine, port, done) {
 
 function finish(machine, report) {
   if (report) {
-    const functions = machine.profile(12).map(({ name, clocks }) => ({ name, clocks }));
-    const { clocks, instructions, sleptClocks, pioClocks, triggers } = machine;
-    const stack = machine.stackUsed();
-    process.stderr.write(`${JSON.stringify({ clocks, instructions, sleptClocks, pioClocks, triggers, stack, functions })}\n`);
+    process.stderr.write(`${JSON.stringify({ ...machine.report(), functions: machine.profile(12) })}\n`);
   }
   process.exit(machine.ended);
 }
