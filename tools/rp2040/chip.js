@@ -7,6 +7,7 @@
 // - RESETS and the resets of the watchdog and of AIRCR do nothing. Here RESETS resets PIO, DMA,
 //   pins, pads and USB; other peripherals keep their registers. The resets of the chip and of the core
 //   are asked for at the machine.
+// - The alarm of the watchdog would come again and again, without end.
 // - The chip's reset register (CHIP_RESET) and some of the UART's registers are not there.
 
 import { RP2040 } from 'rp2040js';
@@ -340,6 +341,9 @@ export class Chip {
     };
     watchdog.onWatchdogTrigger = () => {
       const { wdsel } = peripherals[PSM];
+      // Its alarm would come again and again in the same clock.
+      watchdog.timer.enable = false;
+      watchdog.alarm.enable = false;
       this.reset(resets.wdsel);
       if (wdsel & PSM_FIRST) {
         this.onReset(watchdog.reason === 1 ? 'watchdog' : 'forced');

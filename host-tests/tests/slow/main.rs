@@ -14,6 +14,7 @@ mod debugger;
 mod emulator;
 mod hil;
 mod histograms;
+mod laser;
 mod pico;
 mod readers;
 mod report;

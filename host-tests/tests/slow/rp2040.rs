@@ -59,7 +59,7 @@ pub struct Rp2040 {
     port: u16,
 }
 
-/// What a run has done.
+/// What a run has done. Times are those of the image, in milliseconds since power-on.
 #[derive(Debug)]
 pub struct Done {
     /// What was printed.
@@ -67,8 +67,36 @@ pub struct Done {
     pub success: bool,
     /// Bytes of the stack that were used.
     pub stack: u64,
-    /// Pulses of the laser.
-    pub triggers: u64,
+    pub end_ms: f64,
+    pub laser: Laser,
+    /// When the last byte came that the host sent.
+    pub last_input_ms: Option<f64>,
+    /// When the USB's host has closed the port.
+    pub dtr_low_ms: Option<f64>,
+    pub planted_ms: Option<f64>,
+    /// The first is at power-on.
+    pub boots: Vec<Boot>,
+    /// The panic handler has run.
+    pub panicked: bool,
+    pub hard_faults: u64,
+}
+
+/// What the laser's pin has done, as it left the chip.
+#[derive(Clone, Debug)]
+pub struct Laser {
+    pub pulses: u64,
+    pub longest_ns: u64,
+    pub last_high_ms: Option<f64>,
+    /// It is high at the end.
+    pub is_high: bool,
+}
+
+/// A start of the image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Boot {
+    pub ms: f64,
+    /// `power`, `watchdog`, `forced` (by software, through the watchdog) or `core`.
+    pub reason: String,
 }
 
 impl Rp2040 {
@@ -89,6 +117,21 @@ impl Rp2040 {
         Self::spawn(node)
     }
 
+    /// Starts an image in which a fault is planted, `fault_ms` after the laser's first pulse.
+    /// `for_ms` after it, and after the client has gone, the emulator ends.
+    pub fn start_with_fault(image: &Path, kind: &str, fault_ms: u32, for_ms: u32) -> Result<Self> {
+        let mut node = command(image);
+        node.args(["--plant", &format!("{kind}@{fault_ms}")]);
+        Self::spawn(ending_after(node, for_ms))
+    }
+
+    /// The same without a fault, with the serial port of the USB.
+    pub fn start_with_usb_for(image: &Path, for_ms: u32) -> Result<Self> {
+        let mut node = command(image);
+        node.arg("--usb");
+        Self::spawn(ending_after(node, for_ms))
+    }
+
     fn spawn(mut node: Command) -> Result<Self> {
         let [port, _] = free_ports()?;
         node.args(["--port", &port.to_string(), "--from", "2", "--attached"]);
@@ -106,6 +149,11 @@ impl Rp2040 {
     /// Ends it.
     pub fn stop(mut self) -> Result<Done> {
         drop(self.child.stdin.take());
+        self.wait()
+    }
+
+    /// Waits until it ends by itself.
+    pub fn wait(mut self) -> Result<Done> {
         let mut report = String::new();
         let mut stderr = self.child.stderr.take().context("no report")?;
         stderr.read_to_string(&mut report)?;
@@ -130,6 +178,11 @@ pub fn run(image: &Path) -> Result<Done> {
     done(&report, output.stdout, output.status.success())
 }
 
+fn ending_after(mut node: Command, for_ms: u32) -> Command {
+    node.args(["--for", &for_ms.to_string()]);
+    node
+}
+
 fn command(image: &Path) -> Command {
     let mut node = Command::new(NODE);
     node.arg(folder().join("run.js")).arg(image).arg("--report");
@@ -140,12 +193,36 @@ fn command(image: &Path) -> Command {
 fn done(report: &str, output: Vec<u8>, success: bool) -> Result<Done> {
     let line = report.lines().last().unwrap_or_default();
     let value: Value = serde_json::from_str(line).with_context(|| report.to_owned())?;
-    let number = |name: &str| value[name].as_u64().with_context(|| report.to_owned());
+    let laser = &value["laser"];
+    let number = |of: &Value, name: &str| of[name].as_u64().with_context(|| report.to_owned());
+    let flag = |of: &Value, name: &str| of[name].as_bool().with_context(|| report.to_owned());
+    let time = |name: &str| value[name].as_f64();
+    let list = |name: &str| value[name].as_array().with_context(|| report.to_owned());
+    let boots = list("bootsMs")?.iter().zip(list("bootReasons")?);
+    let boots = boots.filter_map(|(ms, reason)| {
+        let reason = reason.as_str()?.to_owned();
+        Some(Boot {
+            ms: ms.as_f64()?,
+            reason,
+        })
+    });
     Ok(Done {
         output,
         success,
-        stack: number("stack")?,
-        triggers: number("triggers")?,
+        stack: number(&value, "stack")?,
+        end_ms: time("endMs").with_context(|| report.to_owned())?,
+        laser: Laser {
+            pulses: number(laser, "pulses")?,
+            longest_ns: number(laser, "longestNs")?,
+            last_high_ms: laser["lastHighMs"].as_f64(),
+            is_high: flag(laser, "isHigh")?,
+        },
+        last_input_ms: time("lastInputMs"),
+        dtr_low_ms: time("dtrLowMs"),
+        planted_ms: time("plantedMs"),
+        boots: boots.collect(),
+        panicked: flag(&value, "panicked")?,
+        hard_faults: number(&value, "hardFaults")?,
     })
 }
 
