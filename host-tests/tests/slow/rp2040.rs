@@ -119,7 +119,7 @@ impl Rp2040 {
 
     /// Starts an image in which a fault is planted, `fault_ms` after the laser's first pulse.
     /// `for_ms` after it, and after the client has gone, the emulator ends.
-    pub fn start_with_fault(image: &Path, kind: &str, fault_ms: u32, for_ms: u32) -> Result<Self> {
+    pub fn start_with_fault(image: &Path, kind: &str, fault_ms: f64, for_ms: u32) -> Result<Self> {
         let mut node = command(image);
         node.args(["--plant", &format!("{kind}@{fault_ms}")]);
         Self::spawn(ending_after(node, for_ms))
