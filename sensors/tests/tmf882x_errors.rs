@@ -9,7 +9,7 @@ use common::tmf882x::{
 };
 use common::{Broken, Given};
 use dtof_sensors::tmf882x::{BootCommand, Command, Error, Waiting};
-use dtof_sensors::{Polled, SensorFault};
+use dtof_sensors::{Polled, Sensor, SensorFault};
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::Transaction as Access;
 
@@ -350,4 +350,31 @@ fn a_set_that_begins_too_early_is_kept() {
 
 fn out_of_order(expected: u8, found: u8) -> Error<ErrorKind, Broken> {
     Error::OutOfOrder { expected, found }
+}
+
+#[test]
+fn a_stop_that_is_not_acknowledged_switches_the_chip_off() {
+    let mut bench = measuring();
+    bench.enable.driven.take();
+    let stop = write(0x41, &[0x08, 0xFF]);
+    bench.i2c.update_expectations(std::slice::from_ref(&stop));
+    bench.sensor.stop();
+    bench.i2c.done();
+    assert!(bench.enable.driven.borrow().is_empty(), "it was told");
+
+    for has_failed in [false, true] {
+        let mut bench = measuring();
+        if has_failed {
+            let polled = bench.serve(&[read(0x41, 0xE1, &[0]).with_error(NACK)]);
+            assert_eq!(polled, Err(Error::Nack(NACK)));
+        }
+        bench.enable.driven.take();
+        let stop = [stop.clone().with_error(NACK)];
+        bench
+            .i2c
+            .update_expectations(if has_failed { &[] } else { &stop[..] });
+        bench.sensor.stop();
+        bench.i2c.done();
+        assert_eq!(*bench.enable.driven.borrow(), [false]);
+    }
 }

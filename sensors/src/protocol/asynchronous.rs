@@ -40,10 +40,15 @@ where
         self.protocol.restart();
     }
 
-    /// Tells the sensor to stop; if that fails, the next start sees to it.
+    /// Tells the sensor to stop. One that cannot be told, or does not acknowledge, may measure
+    /// all the same: its ENABLE goes low.
     pub async fn stop_async(&mut self) {
-        if let Request::Write { address, bytes } = self.protocol.stop() {
-            let _ = self.i2c.write(address, bytes).await;
+        let is_told = match self.protocol.stop() {
+            Request::Write { address, bytes } => self.i2c.write(address, bytes).await.is_ok(),
+            _ => false,
+        };
+        if !is_told {
+            self.switch_off();
         }
     }
 

@@ -397,3 +397,23 @@ fn a_stop_stops_the_chip_and_a_start_begins_anew() {
     // One when it came up, which may have been measuring, and one at the end.
     assert_eq!(stops.count(), 2);
 }
+
+/// Its laser is off then, whatever the bus does.
+#[test]
+fn a_stop_that_the_chip_does_not_acknowledge_switches_it_off() {
+    // The driver has met the error before, or meets it now.
+    for has_failed in [false, true] {
+        let mut bench = measuring();
+        bench.bus.0.borrow_mut().is_unplugged = true;
+        if has_failed {
+            error(&mut bench, 10_000);
+        }
+        assert_eq!(bench.sensor.is_measuring(), !has_failed);
+        assert!(bench.bus.0.borrow().chip.is_measuring);
+        bench.sensor.stop();
+        assert!(!bench.bus.0.borrow().chip.is_measuring);
+        bench.bus.0.borrow_mut().is_unplugged = false;
+        bench.sensor.start(U16F16::ZERO);
+        recovers(&mut bench);
+    }
+}
