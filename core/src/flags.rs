@@ -3,7 +3,8 @@
 use core::fmt;
 use core::ops::{BitOr, BitOrAssign};
 
-/// What is to be said against an event. Six bits; unknown ones are kept.
+/// What is to be said against an event. Five bits. A sixth, for "confirmed by
+/// neighbouring pixels", is reserved: no event has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Flags(u8);
@@ -31,10 +32,10 @@ impl Flags {
     /// exposure, and may be a part of it.
     pub const TAIL: Self = Self(1 << 4);
 
-    /// From bits, or `None` above six bits.
+    /// From bits, or `None` above five bits.
     #[must_use]
     pub const fn from_bits(bits: u8) -> Option<Self> {
-        if bits < 64 { Some(Self(bits)) } else { None }
+        if bits < 32 { Some(Self(bits)) } else { None }
     }
 
     /// The bits.

@@ -75,7 +75,7 @@ proptest! {
         background in 0u32..1024,
         bin in 1u16..127,
         (pixel, exposure, cycle) in (any::<u16>(), any::<u16>(), any::<u64>()),
-        flags in 0u8..64,
+        flags in 0u8..32,
     ) {
         let mut counts = [0u32; 128];
         counts[usize::from(bin) - 1] = left;

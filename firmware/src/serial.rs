@@ -34,7 +34,7 @@
 
 use core::convert::Infallible;
 use core::hint;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 use heapless::spsc::{Consumer, Producer, Queue};
@@ -56,6 +56,15 @@ pub struct Buffers<const RECEIVE: usize, const TRANSMIT: usize> {
     receive: Queue<u8, RECEIVE>,
     transmit: Queue<u8, TRANSMIT>,
     lost: AtomicU32,
+    line: Line,
+}
+
+/// What the port knows of the program at its other end.
+struct Line {
+    /// A program has the port open, as far as the port can tell.
+    listens: AtomicBool,
+    /// It was closed since the main loop asked last.
+    was_closed: AtomicBool,
 }
 
 impl<const RECEIVE: usize, const TRANSMIT: usize> Buffers<RECEIVE, TRANSMIT> {
@@ -66,6 +75,10 @@ impl<const RECEIVE: usize, const TRANSMIT: usize> Buffers<RECEIVE, TRANSMIT> {
             receive: Queue::new(),
             transmit: Queue::new(),
             lost: AtomicU32::new(0),
+            line: Line {
+                listens: AtomicBool::new(true),
+                was_closed: AtomicBool::new(false),
+            },
         }
     }
 
@@ -75,16 +88,18 @@ impl<const RECEIVE: usize, const TRANSMIT: usize> Buffers<RECEIVE, TRANSMIT> {
     pub fn split(&mut self, start_sending: fn()) -> (SerialInterrupt<'_>, Serial<'_>) {
         let (received, to_read) = self.receive.split();
         let (to_send, sending) = self.transmit.split();
-        let lost = &self.lost;
+        let (lost, line) = (&self.lost, &self.line);
         let interrupt = SerialInterrupt {
             received,
             sending,
             lost,
+            line,
         };
         let serial = Serial {
             to_read,
             to_send,
             lost,
+            line,
             start_sending,
         };
         (interrupt, serial)
@@ -102,6 +117,7 @@ pub struct SerialInterrupt<'a> {
     received: Producer<'a, u8>,
     sending: Consumer<'a, u8>,
     lost: &'a AtomicU32,
+    line: &'a Line,
 }
 
 impl SerialInterrupt<'_> {
@@ -121,6 +137,16 @@ impl SerialInterrupt<'_> {
         // Nobody else writes it, so that it need not be one step.
         let lost = self.lost.load(Ordering::Relaxed);
         self.lost.store(lost.saturating_add(1), Ordering::Relaxed);
+    }
+
+    /// A program at the other end has the port open, or no longer. A port that cannot tell
+    /// never calls it.
+    #[inline]
+    pub fn set_listening(&mut self, listens: bool) {
+        self.line.listens.store(listens, Ordering::Relaxed);
+        if !listens {
+            self.line.was_closed.store(true, Ordering::Relaxed);
+        }
     }
 
     /// Whether there is something to send.
@@ -143,6 +169,7 @@ pub struct Serial<'a> {
     to_read: Consumer<'a, u8>,
     to_send: Producer<'a, u8>,
     lost: &'a AtomicU32,
+    line: &'a Line,
     start_sending: fn(),
 }
 
@@ -151,6 +178,19 @@ impl Serial<'_> {
     #[must_use]
     pub fn lost(&self) -> u32 {
         self.lost.load(Ordering::Relaxed)
+    }
+
+    /// Whether a program at the other end has had the port open since this was last asked, and
+    /// has it open now: true where the port cannot tell.
+    #[must_use]
+    pub fn listens(&mut self) -> bool {
+        // In two steps, as not every processor can do it in one. What is closed in between is
+        // not open in the line below.
+        let was_closed = self.line.was_closed.load(Ordering::Relaxed);
+        if was_closed {
+            self.line.was_closed.store(false, Ordering::Relaxed);
+        }
+        self.line.listens.load(Ordering::Relaxed) && !was_closed
     }
 
     /// Whether a byte waits to be read.

@@ -107,13 +107,22 @@ fn the_host_is_told_what_the_sensor_is() {
         bin_width: told.bin_width,
         offset: told.offset,
         laser_millihertz: told.laser_millihertz,
+        bins: told.bins,
     };
     let mut host = Host::new(1, 0);
     let mut with_one = device::<8>(Some(told));
     let body = host.answer(&mut with_one, 0, message::SENSOR_REQUEST, &[]);
-    // Then the range of bin 0, and the laser rate.
+    // Then the range of bin 0, the laser rate, the bins, and what is reserved.
     let rate = [8, 7, 6, 5, 4, 3, 2, 1];
-    let expected = [[3, 0, 0, 0, 160, 0].as_slice(), &[0; 4], &rate].concat();
+    let bins = [128, 0];
+    let expected = [
+        [3, 0, 0, 0, 160, 0].as_slice(),
+        &[0; 4],
+        &rate,
+        &bins,
+        &[0; 4],
+    ]
+    .concat();
     assert_eq!(body, expected);
     assert_eq!(SensorRecord::from_le_bytes(&body), Some(Some(told_record)));
 

@@ -1,24 +1,27 @@
-//! The engine beside the sensor, and a host that sends it anything.
+//! The engine beside the sensor, and a host that sends it anything, is silent, closes its port or
+//! ends its session.
 
 use std::collections::VecDeque;
 
+use dtof_core::fixed::types::U16F16;
 use dtof_core::{AerDecoder, AerRecord, AerWord};
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 
 use dtof_link::endpoint::{BODY_BYTES, Endpoint};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
-use dtof_link::{Report, Token};
+use dtof_link::{Configuration, Report, Source, Token};
+use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
 
 use crate::Input;
 
 /// Messages of any kind and body, over a good wire. Events are words that mean something, answers
-/// come, and no photon is missing from the report.
+/// come, and no photon is missing from the report. The sensor runs while it may, and not longer.
 pub fn sidecar(data: &[u8]) {
     let mut pixels = heapless::Vec::<Pixel, 16>::new();
     let mut blocks = heapless::Vec::<Block, 4>::new();
-    let mut device = Sidecar::new(&mut pixels, &mut blocks, None);
-    let mut host = Host::new();
+    let mut device = Sidecar::new(&mut pixels, &mut blocks, Some(About::new(16)));
+    let mut host = Host::new(1, 0);
     let mut input = Input::new(data);
     let mut now = 0;
     let mut cycles = 0;
@@ -30,10 +33,34 @@ pub fn sidecar(data: &[u8]) {
             160..180 => message::STATISTICS_REQUEST,
             180..200 => message::SYNCHRONISE,
             200..220 => message::HISTOGRAM_REQUEST,
-            // The others are the link's own.
-            other => other.min(0xef),
+            220..228 => SILENCE,
+            228..236 => LISTENING,
+            236..240 => END,
+            // Those that there are not. Those from 0x80 on are a device's.
+            other => other & 0x7f,
         };
         let length = usize::from(input.byte());
+        match kind {
+            SILENCE => {
+                host.speaks = false;
+                for _ in 0..20 * length {
+                    now += 1;
+                    host.exchange(&mut device, now);
+                }
+                host.speaks = true;
+                continue;
+            }
+            LISTENING => {
+                host.listens = length % 2 == 0;
+                device.set_listening(host.listens);
+                continue;
+            }
+            END => {
+                host.end(&mut device, &mut now);
+                continue;
+            }
+            _ => {}
+        }
         let body = input.bytes(length.min(BODY_BYTES));
         // Three bytes ask for up to 65,535 laser cycles, each of which all pixels may look at.
         if kind == message::PHOTONS {
@@ -66,6 +93,12 @@ pub fn sidecar(data: &[u8]) {
     panic!("the device takes no more messages");
 }
 
+/// Not messages: for a while the host says nothing; its port is closed, or open again; its session
+/// ends, and the next begins.
+const SILENCE: u8 = 0xf0;
+const LISTENING: u8 = 0xf1;
+const END: u8 = 0xf2;
+
 /// Laser cycles of one input.
 const MOST_CYCLES: u64 = 1 << 19;
 
@@ -80,7 +113,37 @@ fn cycles_of(mut body: &[u8]) -> u64 {
     all
 }
 
+/// A sensor without photons.
+#[derive(Default)]
+struct Laser {
+    is_on: bool,
+    starts: u32,
+}
+
+impl Sensor for Laser {
+    type Error = SensorFault;
+
+    fn about(&self) -> About {
+        About::new(16)
+    }
+
+    fn start(&mut self, _: U16F16) {
+        self.is_on = true;
+        self.starts += 1;
+    }
+
+    fn stop(&mut self) {
+        self.is_on = false;
+    }
+
+    fn poll(&mut self, _: u32, _: &mut impl PhotonSink) -> Result<Polled, SensorFault> {
+        assert!(self.is_on, "asked while it is off");
+        Ok(Polled::Idle)
+    }
+}
+
 struct Host {
+    session: u16,
     endpoint: Endpoint,
     deframer: Deframer,
     down: Deframer,
@@ -89,21 +152,56 @@ struct Host {
     /// What was sent and is not answered yet: configurations, requests of statistics, and of
     /// messages of photons how many they hold.
     asked: VecDeque<(u8, u64)>,
-    /// Photons since the configuration, if there is one.
+    /// The configurations among them.
+    configurations: VecDeque<Option<Configuration>>,
+    /// Photons of the link since the configuration, if there is one.
     photons: Option<u64>,
+    /// Photons of the link count.
+    takes_link: bool,
+    laser: Laser,
+    /// The sensor may run, until no frame has come for so many milliseconds.
+    allowed: Option<u32>,
+    listens: bool,
+    speaks: bool,
+    spoke_ms: u32,
 }
 
 impl Host {
-    fn new() -> Self {
+    fn new(session: u16, now: u32) -> Self {
         Self {
-            endpoint: Endpoint::host(1, greeting(0, 0), 0),
+            session,
+            endpoint: Endpoint::host(session, greeting(0, 0), now),
             deframer: Deframer::new(),
             down: Deframer::new(),
             decoder: AerDecoder::new(),
             events: 0,
             asked: VecDeque::new(),
+            configurations: VecDeque::new(),
             photons: None,
+            takes_link: false,
+            laser: Laser::default(),
+            allowed: None,
+            listens: true,
+            speaks: true,
+            spoke_ms: now,
         }
+    }
+
+    /// Ends the session and begins the next. The sensor is off between the two.
+    fn end(&mut self, device: &mut Sidecar, now: &mut u32) {
+        if !self.endpoint.is_open() {
+            return;
+        }
+        self.endpoint.end(*now);
+        self.allowed = None;
+        for _ in 0..300 {
+            *now += 1;
+            self.exchange(device, *now);
+        }
+        assert!(self.endpoint.is_lost() && !device.endpoint().is_open());
+        let next = Self::new(self.session.wrapping_add(1), *now);
+        let before = std::mem::replace(self, next);
+        (self.laser, self.listens) = (before.laser, before.listens);
     }
 
     fn note(&mut self, kind: u8, mut body: &[u8]) {
@@ -122,12 +220,16 @@ impl Host {
         if kinds.contains(&kind) {
             self.asked.push_back((kind, photons));
         }
+        if kind == message::CONFIGURE {
+            let configuration = Configuration::from_le_bytes(body);
+            self.configurations.push_back(configuration.ok());
+        }
     }
 
     /// What was asked before this answer is done.
     fn answered(&mut self, question: u8) {
         while let Some((kind, photons)) = self.asked.pop_front() {
-            if let Some(all) = &mut self.photons {
+            if let Some(all) = self.photons.as_mut().filter(|_| self.takes_link) {
                 *all += photons;
             }
             if kind == question {
@@ -142,7 +244,14 @@ impl Host {
         let mut wire = [0; WIRE_BYTES];
         for rounds in 0.. {
             assert!(rounds < 10_000, "they never stop talking");
-            let length = self.endpoint.transmit(now, &mut wire);
+            let length = if self.speaks {
+                self.endpoint.transmit(now, &mut wire)
+            } else {
+                0
+            };
+            if length > 0 {
+                self.spoke_ms = now;
+            }
             for &byte in &wire[..length] {
                 if let Some(frame) = self.down.push(byte) {
                     device.receive(frame, now);
@@ -159,9 +268,15 @@ impl Host {
                 self.read(message.kind, &message.body);
             }
             if length + answer == 0 {
-                return;
+                break;
             }
         }
+        if !self.listens || self.allowed.is_some_and(|most| now - self.spoke_ms >= most) {
+            self.allowed = None;
+        }
+        device.poll_sensor(&mut self.laser, now);
+        assert_eq!(self.laser.is_on, self.allowed.is_some(), "the laser");
+        assert_eq!(self.laser.is_on, device.sensor_is_running());
     }
 
     fn read(&mut self, kind: u8, body: &[u8]) {
@@ -182,12 +297,21 @@ impl Host {
             message::CONFIGURED => {
                 self.answered(message::CONFIGURE);
                 (self.events, self.photons) = (0, Some(0));
+                let taken = self.configurations.pop_front().flatten();
+                let taken = taken.expect("one that a device knows");
+                self.takes_link = taken.source == Source::Link;
+                let timeout = Some(u32::from(taken.host_timeout_ms));
+                self.allowed = timeout.filter(|_| !self.takes_link);
             }
-            message::REFUSED => self.answered(message::CONFIGURE),
+            message::REFUSED => {
+                self.answered(message::CONFIGURE);
+                self.configurations.pop_front();
+            }
             message::STATISTICS => {
                 self.answered(message::STATISTICS_REQUEST);
                 let report = Report::from_le_bytes(body).expect("a report");
                 assert_eq!(report.link.corrupt, 0, "a good wire");
+                assert_eq!(report.sensor_starts, self.laser.starts);
                 let events = report.statistics.events + report.blocks.events;
                 assert!(self.events <= events, "events that none has decided");
                 let of = &report.statistics;

@@ -62,6 +62,10 @@ pub struct Configuration {
     pub source: Source,
     /// Changes of depth that are sent in place of depth events.
     pub dynamic_depth: Option<DynamicDepth>,
+    /// The sensor stops once no frame of the host has come for so many milliseconds:
+    /// [`Self::HOST_TIMEOUTS_MS`]. With 0 it never does, which a device refuses unless its
+    /// firmware was built for that.
+    pub host_timeout_ms: u16,
 }
 
 // What the choices are on the wire.
@@ -83,7 +87,11 @@ const TRACKING: u8 = 1;
 
 impl Configuration {
     /// Bytes of the record.
-    pub const BYTES: usize = 50;
+    pub const BYTES: usize = 67;
+    /// What the host timeout may be, in milliseconds. A host sends a frame every 50 ms.
+    pub const HOST_TIMEOUTS_MS: core::ops::RangeInclusive<u16> = 200..=60_000;
+    /// The host timeout unless another is configured, in milliseconds.
+    pub const HOST_TIMEOUT_MS: u16 = 3_000;
     /// What a minimum count may be: photons that a counter of 10 bits holds.
     const MINIMUM_COUNTS: core::ops::RangeInclusive<u16> = 1..=1023;
 
@@ -160,7 +168,9 @@ impl Configuration {
             .chain(self.columns.to_le_bytes())
             .chain([binning.levels.raw()])
             .chain(binning.patience.to_le_bytes())
-            .chain([tracking, self.echoes.raw(), self.peel_reach, self.echo_wait]);
+            .chain([tracking, self.echoes.raw(), self.peel_reach, self.echo_wait])
+            // The bytes after it are reserved.
+            .chain(self.host_timeout_ms.to_le_bytes());
         let mut bytes = [0; Self::BYTES];
         for (place, byte) in bytes.iter_mut().zip(fields) {
             *place = byte;
@@ -197,6 +207,8 @@ impl Configuration {
         let [levels] = fields.next()?;
         let patience = u16::from_le_bytes(fields.next()?);
         let [tracking, echoes, peel_reach, echo_wait] = fields.next()?;
+        let host_timeout_ms = u16::from_le_bytes(fields.next()?);
+        let Fields(reserved) = fields;
 
         let changes = |reference| DynamicDepth {
             threshold_mm,
@@ -206,6 +218,12 @@ impl Configuration {
             return Err(Refusal::MinimumCount);
         }
         let minimum_count = Count::saturating(minimum_count.into());
+        if host_timeout_ms != 0 && !Self::HOST_TIMEOUTS_MS.contains(&host_timeout_ms) {
+            return Err(Refusal::HostTimeout);
+        }
+        if reserved.iter().any(|&byte| byte != 0) {
+            return Err(Refusal::Reserved);
+        }
         Ok(Self {
             rule: match rule {
                 PAPER_RULE => PaperRule::new(alpha, minimum_count).into(),
@@ -257,6 +275,7 @@ impl Configuration {
                 (DYNAMIC_DEPTH_EVENTS, REPORTED) => Some(changes(Reference::Reported)),
                 _ => return Err(Refusal::Unknown),
             },
+            host_timeout_ms,
         })
     }
 }

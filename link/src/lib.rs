@@ -2,7 +2,7 @@
 //! ## Modules
 //!
 //! [`message`] has the kinds of messages; [`Configuration`], [`Token`], [`Refusal`],
-//! [`Report`], [`SensorRecord`] and [`HistogramPart`] are their bodies. [`endpoint`] is
+//! [`Report`], [`StopReason`], [`SensorRecord`] and [`HistogramPart`] are their bodies. [`endpoint`] is
 //! one end, [`frame`] what lies between them.
 
 #![no_std]
@@ -26,6 +26,7 @@ mod numbered;
 mod refusal;
 mod report;
 mod sensor;
+mod stop_reason;
 mod token;
 
 pub use self::adaptive_binning::AdaptiveBinning;
@@ -35,4 +36,5 @@ pub use self::histogram::{HistogramHead, HistogramMessage, HistogramPart, NoHist
 pub use self::refusal::Refusal;
 pub use self::report::Report;
 pub use self::sensor::{FaultRecord, SensorRecord};
+pub use self::stop_reason::StopReason;
 pub use self::token::Token;

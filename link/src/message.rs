@@ -2,7 +2,7 @@
 //!
 //! | kind | to | message | body |
 //! |---|---|---|---|
-//! | 0x01 | device | configure | [`Configuration`](crate::Configuration), 50 bytes |
+//! | 0x01 | device | configure | [`Configuration`](crate::Configuration), 67 bytes |
 //! | 0x02 | device | photons | [`Token`](crate::Token)s |
 //! | 0x03 | device | synchronise | anything |
 //! | 0x04 | device | statistics request | none |
@@ -12,8 +12,8 @@
 //! | 0x82 | host | refused | a [`Refusal`](crate::Refusal), 1 byte |
 //! | 0x83 | host | events | AER words of 16 bytes |
 //! | 0x84 | host | synchronised | the same, after all that came before it |
-//! | 0x85 | host | statistics | [`Report`](crate::Report), 201 bytes |
-//! | 0x86 | host | sensor | [`SensorRecord`](crate::SensorRecord), 18 bytes |
+//! | 0x85 | host | statistics | [`Report`](crate::Report), 210 bytes |
+//! | 0x86 | host | sensor | [`SensorRecord`](crate::SensorRecord), 24 bytes |
 //! | 0x87 | host | histogram | [`HistogramPart`](crate::HistogramPart), or why there is none |
 //!
 //! Reserved: 0x07 and 0x88 for a settings request and the settings.
@@ -23,7 +23,7 @@ use dtof_core::AER_VERSION;
 use crate::endpoint::GREETING_BYTES;
 
 /// The version both ends announce when a session begins.
-pub const LINK_VERSION: u16 = 5;
+pub const LINK_VERSION: u16 = 6;
 
 /// Host to device: a [`Configuration`](crate::Configuration).
 pub const CONFIGURE: u8 = 0x01;

@@ -44,6 +44,10 @@ numbered! {
         Blocks = 17: "the device has no room for the blocks of pixels",
         /// Tracking with a rule that has none.
         Tracking = 18: "tracking needs the window rule",
+        /// The host timeout is not 200 ms to 60 s, or 0, which takes a firmware of its own.
+        HostTimeout = 19: "the host timeout must be 200 to 60000 ms",
+        /// A field that has no meaning yet is not 0.
+        Reserved = 20: "a reserved field is not 0",
     }
 }
 

@@ -28,18 +28,26 @@ pub struct Report {
     /// The last of them: the number of a
     /// [`FaultRecord`](crate::FaultRecord), 0 before the first.
     pub last_sensor_error: u8,
+    /// How often the sensor was started, since the device was switched on or reset.
+    pub sensor_starts: u32,
+    /// How often it was stopped.
+    pub sensor_stops: u32,
+    /// Why it stopped last: the number of a [`StopReason`](crate::StopReason), 0 if it has not.
+    pub stop_reason: u8,
     /// The device's end of the link.
     pub link: LinkCounters,
 }
 
 impl Report {
     /// Bytes of the record.
-    pub const BYTES: usize = Self::WIDE * 8 + 10 * 4 + 1;
+    pub const BYTES: usize = Self::WIDE * 8 + Self::NARROW * 4 + 2;
     /// Numbers of 8 bytes.
     const WIDE: usize = 20;
+    /// Numbers of 4 bytes.
+    const NARROW: usize = 12;
 
     /// Its numbers in the order they are sent: those of 8 bytes, then those of 4.
-    const fn numbers(&mut self) -> ([&mut u64; Self::WIDE], [&mut u32; 10]) {
+    const fn numbers(&mut self) -> ([&mut u64; Self::WIDE], [&mut u32; Self::NARROW]) {
         let (pixels, blocks) = (&mut self.statistics, &mut self.blocks);
         let link = &mut self.link;
         (
@@ -69,6 +77,8 @@ impl Report {
                 &mut self.overrun,
                 &mut self.unknown,
                 &mut self.sensor_errors,
+                &mut self.sensor_starts,
+                &mut self.sensor_stops,
                 &mut link.frames,
                 &mut link.corrupt,
                 &mut link.oversized,
@@ -83,7 +93,7 @@ impl Report {
     /// The bytes to send.
     #[must_use]
     pub fn to_le_bytes(mut self) -> Vec<u8, { Self::BYTES }> {
-        let last = [self.last_sensor_error];
+        let last = [self.last_sensor_error, self.stop_reason];
         let (wide, narrow) = self.numbers();
         let wide = wide.into_iter().flat_map(|number| number.to_le_bytes());
         let narrow = narrow.into_iter().flat_map(|number| number.to_le_bytes());
@@ -99,10 +109,11 @@ impl Report {
     #[must_use]
     pub fn from_le_bytes(bytes: &[u8]) -> Option<Self> {
         let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;
-        let (&last_sensor_error, numbers) = bytes.split_last()?;
+        let (numbers, &[last_sensor_error, stop_reason]) = bytes.split_last_chunk()?;
         let (eights, fours) = numbers.split_at_checked(Self::WIDE * 8)?;
         let mut report = Self {
             last_sensor_error,
+            stop_reason,
             ..Self::default()
         };
         let (wide, narrow) = report.numbers();

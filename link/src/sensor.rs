@@ -17,11 +17,13 @@ pub struct SensorRecord {
     pub offset: I24F8,
     /// Laser cycles a second in thousandths, 0 if that is not known.
     pub laser_millihertz: u64,
+    /// Bins that can hold photons. Those after them are not measured.
+    pub bins: u16,
 }
 
 impl SensorRecord {
     /// Bytes of the record.
-    pub const BYTES: usize = 18;
+    pub const BYTES: usize = 24;
 
     /// The record as bytes. A device without a sensor sends one without pixels.
     #[must_use]
@@ -35,6 +37,8 @@ impl SensorRecord {
         let mut bytes = [0; Self::BYTES];
         let rate = sensor.laser_millihertz.to_le_bytes();
         let fields = [a, b, c, d, e, f, g, h, i, j].into_iter().chain(rate);
+        // The last four bytes are reserved.
+        let fields = fields.chain(sensor.bins.to_le_bytes());
         for (place, byte) in bytes.iter_mut().zip(fields) {
             *place = byte;
         }
@@ -42,11 +46,16 @@ impl SensorRecord {
     }
 
     /// Reads the record: the sensor, or that there is none. `None` if the length is
-    /// wrong.
+    /// wrong or a reserved byte is not 0.
     #[must_use]
     pub fn from_le_bytes(bytes: &[u8]) -> Option<Option<Self>> {
         let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;
-        let [a, b, c, d, e, f, g, h, i, j, rate @ ..] = *bytes;
+        let (&[a, b, c, d, e, f, g, h, i, j], rest) = bytes.split_first_chunk()?;
+        let (&rate, rest) = rest.split_first_chunk()?;
+        let (&bins, reserved) = rest.split_first_chunk()?;
+        if reserved.iter().any(|&byte| byte != 0) {
+            return None;
+        }
         let pixels = u16::from_le_bytes([a, b]);
         let bin_width = U16F16::from_le_bytes([c, d, e, f]);
         Some((pixels > 0).then_some(Self {
@@ -54,6 +63,7 @@ impl SensorRecord {
             bin_width: (bin_width > 0).then_some(bin_width),
             offset: I24F8::from_le_bytes([g, h, i, j]),
             laser_millihertz: u64::from_le_bytes(rate),
+            bins: u16::from_le_bytes(bins),
         }))
     }
 }

@@ -1,5 +1,6 @@
 //! One end of the link, frame by frame and millisecond by millisecond.
 
+use dtof_link::StopReason;
 use dtof_link::endpoint::{
     BODY_BYTES, Endpoint, Full, GREETING_BYTES, KEEP_ALIVE_MS, RETRANSMIT_MOST_MS, RETRANSMIT_MS,
     WINDOW,
@@ -12,8 +13,12 @@ const SESSION: u16 = 0x1234;
 const LOW: u8 = 0x34;
 const HIGH: u8 = 0x12;
 
+/// A message of a host, and one of a device.
 const MESSAGE: u8 = 0x40;
+const ANSWER: u8 = 0x80;
 const KEEP_ALIVE: u8 = 0xf0;
+const KEEP_ALIVE_OF_DEVICE: u8 = 0xf4;
+const END: u8 = 0xf5;
 const HELLO: u8 = 0xf1;
 const WELCOME: u8 = 0xf2;
 const NO_SESSION: u8 = 0xf3;
@@ -107,34 +112,111 @@ fn a_second_welcome_changes_nothing_and_a_second_hello_begins_anew_after_a_messa
 }
 
 #[test]
-fn what_is_of_another_session_is_foreign_and_a_device_says_so() {
-    for kind in [MESSAGE, KEEP_ALIVE, NO_SESSION, 0xf4, 0xff] {
+fn what_is_of_another_session_or_of_the_own_kind_is_foreign_and_a_device_answers_a_host() {
+    let of_host = [0, MESSAGE, 0x7f, KEEP_ALIVE, END];
+    let of_device = [ANSWER, 0xef, KEEP_ALIVE_OF_DEVICE, NO_SESSION];
+    for kind in of_host.into_iter().chain(of_device).chain([0xf6, 0xff]) {
         for is_ours in [false, true] {
             let mut strange = frame(kind, 0, 0);
             strange[1] ^= u8::from(!is_ours);
-            let is_known = is_ours && kind <= KEEP_ALIVE;
+            let is_known = is_ours && of_host.contains(&kind);
             let mut device = device();
             device.receive(Ok(&strange), 30);
             assert!(!device.is_lost());
+            assert_eq!(device.is_open(), !(is_ours && kind == END));
             assert_eq!(device.counters().foreign, u32::from(!is_known));
             assert_eq!(device.silent_ms(40), if is_known { 10 } else { 40 });
             let answers = sent(&mut device, 30);
-            let refused = [NO_SESSION, strange[1], HIGH, 0, 0, 4];
+            let refused = [NO_SESSION, strange[1], HIGH, 0, 0, 4, 0];
             assert_eq!(
                 answers.contains(&refused.to_vec()),
-                !is_ours && kind <= KEEP_ALIVE,
+                (!is_ours && of_host.contains(&kind)) || (is_ours && kind == END),
                 "{kind:#x} {is_ours}"
             );
 
             let mut host = host();
             host.receive(Ok(&strange), 30);
             assert_eq!(host.is_lost(), is_ours && kind == NO_SESSION);
-            let is_known = is_known || is_ours && kind == NO_SESSION;
+            let is_known = is_ours && of_device.contains(&kind);
             assert_eq!(host.counters().foreign, u32::from(!is_known));
             let answers = kinds(&sent(&mut host, 30));
             assert!(!answers.contains(&(NO_SESSION, 0)));
         }
     }
+}
+
+/// As a terminal with an echo gives them back.
+#[test]
+fn a_device_that_hears_itself_hears_no_host() {
+    let mut device = device();
+    device.offer(ANSWER, b"1").unwrap();
+    for now in 0..2000 {
+        for frame in sent(&mut device, now) {
+            device.receive(Ok(&frame), now);
+        }
+    }
+    assert!(device.counters().foreign > 30);
+    assert_eq!(device.silent_ms(2000), 2000);
+    assert!(device.is_open() && !device.is_settled());
+    assert_eq!(device.take(), None);
+}
+
+#[test]
+fn a_host_ends_its_session_until_the_device_has_forgotten_it() {
+    let (mut host, mut device) = (host(), device());
+    assert!(device.take_began());
+    host.offer(MESSAGE, b"1").unwrap();
+    let message = sent(&mut host, 10);
+    device.receive(Ok(&message[0]), 10);
+    host.offer(MESSAGE, b"2").unwrap();
+    host.end(11);
+    // The first is lost on the way; nothing else is sent.
+    let mut ends = Vec::new();
+    for now in 11..200 {
+        ends.extend(sent(&mut host, now).into_iter().map(|end| (now, end)));
+    }
+    let end = vec![END, LOW, HIGH, 0, 0, 4];
+    let expected = [11, 61, 111, 161].map(|now| (now, end.clone()));
+    assert_eq!(ends, expected);
+
+    device.set_stop_reason(StopReason::EndOfSession);
+    device.receive(Ok(&end), 200);
+    assert!(device.take_ended() && !device.take_ended() && !device.is_open());
+    // A message that had arrived before belonged to the session.
+    assert_eq!(device.take(), None);
+    let forgotten = [
+        NO_SESSION,
+        LOW,
+        HIGH,
+        0,
+        0,
+        4,
+        StopReason::EndOfSession as u8,
+    ];
+    assert_eq!(sent(&mut device, 200), [forgotten]);
+    assert_eq!(sent(&mut device, 300), [[0; 0]; 0]);
+    // Once more, as the answer may be lost.
+    device.receive(Ok(&end), 310);
+    assert!(!device.take_ended());
+    assert_eq!(sent(&mut device, 310), [forgotten]);
+
+    host.receive(Ok(&forgotten), 320);
+    assert!(host.is_lost());
+    assert_eq!(host.stop_reason(), Some(StopReason::EndOfSession));
+    assert_eq!(sent(&mut host, 5000), [[0; 0]; 0]);
+
+    // The reason stays over sessions.
+    device.receive(Ok(&[&frame(HELLO, 0, 0)[..], &HOST].concat()), 400);
+    assert!(device.is_open() && device.take_began());
+    assert_eq!(device.stop_reason(), Some(StopReason::EndOfSession));
+}
+
+#[test]
+fn a_host_without_a_session_has_none_to_end() {
+    let mut host = Endpoint::host(SESSION, HOST, 0);
+    host.end(0);
+    let hello = [&[HELLO, LOW, HIGH, 0, 0, 4][..], &HOST].concat();
+    assert_eq!(sent(&mut host, 0), [hello]);
 }
 
 #[test]
@@ -163,13 +245,13 @@ fn a_window_of_messages_is_under_way_and_no_more() {
     assert_eq!(host.offer(MESSAGE, b"5"), Err(Full));
     let all = [0, 1, 2, 3].map(|number| (MESSAGE, number));
     assert_eq!(kinds(&sent(&mut host, 10)), all);
-    host.receive(Ok(&frame(KEEP_ALIVE, 0, 3)), 20);
+    host.receive(Ok(&frame(KEEP_ALIVE_OF_DEVICE, 0, 3)), 20);
     assert_eq!((host.room(), host.is_settled()), (3, false));
     // Older than what is known, and what was never sent.
-    host.receive(Ok(&frame(KEEP_ALIVE, 0, 2)), 20);
-    host.receive(Ok(&frame(KEEP_ALIVE, 0, 5)), 20);
+    host.receive(Ok(&frame(KEEP_ALIVE_OF_DEVICE, 0, 2)), 20);
+    host.receive(Ok(&frame(KEEP_ALIVE_OF_DEVICE, 0, 5)), 20);
     assert_eq!(host.room(), 3);
-    host.receive(Ok(&frame(KEEP_ALIVE, 0, 4)), 20);
+    host.receive(Ok(&frame(KEEP_ALIVE_OF_DEVICE, 0, 4)), 20);
     assert!(host.is_settled());
 }
 
@@ -184,7 +266,10 @@ fn messages_are_taken_once_and_in_order_while_there_is_room() {
     let counters = device.counters();
     assert_eq!((counters.out_of_order, counters.duplicate), (2, 1));
     // It says that it expects 4, and has no room for it.
-    assert_eq!(sent(&mut device, 1), [[KEEP_ALIVE, LOW, HIGH, 0, 4, 4]]);
+    assert_eq!(
+        sent(&mut device, 1),
+        [[KEEP_ALIVE_OF_DEVICE, LOW, HIGH, 0, 4, 4]]
+    );
     assert_eq!(sent(&mut device, 1), [[0; 0]; 0]);
     for number in 0..4 {
         assert_eq!(device.take().unwrap().body, [number]);
@@ -197,7 +282,7 @@ fn who_has_nothing_to_say_says_so_after_a_while() {
     let mut host = host();
     host.offer(MESSAGE, b"1").unwrap();
     assert_eq!(kinds(&sent(&mut host, 7)), [(MESSAGE, 0)]);
-    host.receive(Ok(&frame(KEEP_ALIVE, 0, 1)), 8);
+    host.receive(Ok(&frame(KEEP_ALIVE_OF_DEVICE, 0, 1)), 8);
     let mut said = Vec::new();
     for now in 8..300 {
         said.extend(sent(&mut host, now).iter().map(|_| now));
@@ -227,10 +312,10 @@ fn what_is_not_acknowledged_is_repeated_alone_and_ever_more_seldom() {
     assert_eq!(times[5].0 - times[4].0, RETRANSMIT_MOST_MS);
 
     // Once it arrives the others follow at once.
-    host.receive(Ok(&frame(KEEP_ALIVE, 0, 1)), 6000);
+    host.receive(Ok(&frame(KEEP_ALIVE_OF_DEVICE, 0, 1)), 6000);
     assert_eq!(kinds(&sent(&mut host, 6000)), [(MESSAGE, 1), (MESSAGE, 2)]);
     assert_eq!(host.counters().retransmitted, 8);
-    host.receive(Ok(&frame(KEEP_ALIVE, 0, 3)), 6001);
+    host.receive(Ok(&frame(KEEP_ALIVE_OF_DEVICE, 0, 3)), 6001);
 }
 
 /// How long until a message is repeated, after `arrived` others at the longest wait.
@@ -239,7 +324,7 @@ fn wait_after(arrived: u8) -> u32 {
     host.offer(MESSAGE, &[]).unwrap();
     (0..6000).for_each(|now| drop(sent(&mut host, now)));
     for number in 1..=arrived {
-        host.receive(Ok(&frame(KEEP_ALIVE, 0, number)), 6000);
+        host.receive(Ok(&frame(KEEP_ALIVE_OF_DEVICE, 0, number)), 6000);
         assert!(host.is_settled());
         host.offer(MESSAGE, &[]).unwrap();
         assert_eq!(kinds(&sent(&mut host, 6000)), [(MESSAGE, number)]);

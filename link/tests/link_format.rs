@@ -11,7 +11,8 @@ use dtof_link::frame::{Deframer, FrameError, PAYLOAD_BYTES, WIRE_BYTES, encode};
 use dtof_link::message::greeting;
 use dtof_link::message::{CONFIGURE, PHOTONS};
 use dtof_link::{
-    AdaptiveBinning, Configuration, DynamicDepth, Refusal, Report, SensorRecord, Source, Token,
+    AdaptiveBinning, Configuration, DynamicDepth, Refusal, Report, SensorRecord, Source,
+    StopReason, Token,
 };
 use proptest::prelude::*;
 
@@ -51,7 +52,21 @@ fn both_ends_send_the_golden_frames() {
     assert_eq!(photons, golden("photons 0"));
     give(&mut device, &photons);
     assert_eq!(device.take().unwrap().body, body[..]);
-    assert_eq!(next(&mut device, 0), golden("keep-alive"));
+    let alive = next(&mut device, 0);
+    assert_eq!(alive, golden("keep-alive of a device"));
+    give(&mut host, &alive);
+    assert_eq!(next(&mut host, 50), golden("keep-alive of a host"));
+
+    host.end(51);
+    let end = next(&mut host, 51);
+    assert_eq!(end, golden("end of session 0x1234"));
+    device.set_stop_reason(StopReason::Silence);
+    give(&mut device, &end);
+    let forgotten = next(&mut device, 0);
+    assert_eq!(forgotten, golden("no session"));
+    give(&mut host, &forgotten);
+    assert!(!device.is_open() && host.is_lost());
+    assert_eq!(host.stop_reason(), Some(StopReason::Silence));
 }
 
 #[test]
@@ -87,6 +102,7 @@ fn a_host_configures_with_the_golden_frame() {
             threshold_mm: U24F8::lit("100"),
             reference: Reference::Reported,
         }),
+        host_timeout_ms: 3000,
     };
     host.offer(CONFIGURE, &configuration.to_le_bytes()).unwrap();
     assert_eq!(next(&mut host, 0), golden("configure 0"));
@@ -161,13 +177,17 @@ fn configuration() -> impl Strategy<Value = Configuration> {
         echoes,
         any::<(bool, bool, [u8; 2])>(),
         any::<[u16; 7]>(),
-        any::<(u32, i32)>(),
+        (
+            any::<u32>(),
+            any::<i32>(),
+            prop_oneof![Just(0), Configuration::HOST_TIMEOUTS_MS],
+        ),
     )
         .prop_map(
             |(rule, estimator, dynamic_depth, source, binning, echoes, plain, words, range)| {
                 let [x, l1, l2, first, last, pixels, columns] = words;
                 let (one_hit_tdc, tracking, [peel_reach, echo_wait]) = plain;
-                let (width, offset) = range;
+                let (width, offset, host_timeout_ms) = range;
                 Configuration {
                     rule,
                     estimator,
@@ -187,6 +207,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                     offset_mm: I24F8::from_bits(offset),
                     source,
                     dynamic_depth,
+                    host_timeout_ms,
                 }
             },
         )
@@ -228,6 +249,8 @@ proptest! {
         numbers in any::<[u8; Configuration::BYTES]>(), minimum_count in 1u16..=1023,
         choices in prop::array::uniform6(0u8..3), rule in 0u8..4, width in 0u8..9,
         before in 200u16..1100, after in 200u16..1100, levels in 0u8..5, patience in 0u16..9, echoes in 0u8..6,
+        host_timeout in prop_oneof![Just(0u16), 190u16..210, 59_990u16..60_010, any::<u16>()],
+        reserved in prop::option::of((52usize..67, 1u8..)),
     ) {
         let mut bytes = numbers;
         bytes[2..4].copy_from_slice(&minimum_count.to_le_bytes());
@@ -241,7 +264,13 @@ proptest! {
         bytes[30..32].copy_from_slice(&before.to_le_bytes());
         bytes[32..34].copy_from_slice(&after.to_le_bytes());
         bytes[44..46].copy_from_slice(&patience.to_le_bytes());
+        bytes[50..52].copy_from_slice(&host_timeout.to_le_bytes());
+        bytes[52..].fill(0);
+        if let Some((at, value)) = reserved {
+            bytes[at] = value;
+        }
         let found = Configuration::from_le_bytes(&bytes);
+        let is_off_limits = host_timeout != 0 && !(200..=60_000).contains(&host_timeout);
         let unknown = source == 2 || rule == 3 || estimator == 2 || output == 2 || hits == 2
             || (output == 1 && reference == 2)
             || levels == 4 || tracking == 2 || !(1..=4).contains(&echoes);
@@ -250,6 +279,7 @@ proptest! {
             unknown || (rule == 1 && !(1..=7).contains(&width))
                 || (estimator == 1 && ![before, after].iter().all(|half| (256..=1024).contains(half)))
                 || (levels > 0 && patience == 0)
+                || is_off_limits || reserved.is_some()
         );
         if let Ok(configuration) = found {
             let again = Configuration::from_le_bytes(&configuration.to_le_bytes());
@@ -265,17 +295,23 @@ proptest! {
     }
 
     #[test]
-    fn sensors_come_back(pixels: u16, width: u32, offset: i32, laser_millihertz: u64) {
+    fn sensors_come_back(
+        pixels: u16, width: u32, offset: i32, laser_millihertz: u64, bins: u16,
+        at in 20usize..24, value in 1u8..,
+    ) {
         let sensor = SensorRecord {
             pixels,
             bin_width: (width > 0).then_some(U16F16::from_bits(width)),
             offset: I24F8::from_bits(offset),
             laser_millihertz,
+            bins,
         };
-        let bytes = SensorRecord::to_le_bytes(Some(&sensor));
+        let mut bytes = SensorRecord::to_le_bytes(Some(&sensor));
         let expected = (pixels > 0).then_some(sensor);
         prop_assert_eq!(SensorRecord::from_le_bytes(&bytes), Some(expected));
         prop_assert_eq!(SensorRecord::from_le_bytes(&bytes[1..]), None);
+        bytes[at] = value;
+        prop_assert_eq!(SensorRecord::from_le_bytes(&bytes), None);
     }
 
     #[test]

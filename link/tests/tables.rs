@@ -6,7 +6,9 @@ use std::fmt::Display;
 use dtof_core::Statistics;
 use dtof_link::endpoint::{BODY_BYTES, LinkCounters, WINDOW};
 use dtof_link::frame::WIRE_BYTES;
-use dtof_link::{Configuration, FaultRecord, NoHistogram, Refusal, Report, SensorRecord};
+use dtof_link::{
+    Configuration, FaultRecord, NoHistogram, Refusal, Report, SensorRecord, StopReason,
+};
 
 /// The table of the document under this heading describes each of so many bytes once, in
 /// order.
@@ -64,20 +66,23 @@ fn a_report_lies_as_the_document_says() {
         overrun: 21,
         unknown: 22,
         sensor_errors: 23,
+        sensor_starts: 24,
+        sensor_stops: 25,
         link: LinkCounters {
-            frames: 24,
-            corrupt: 25,
-            oversized: 26,
-            foreign: 27,
-            out_of_order: 28,
-            duplicate: 29,
-            retransmitted: 30,
+            frames: 26,
+            corrupt: 27,
+            oversized: 28,
+            foreign: 29,
+            out_of_order: 30,
+            duplicate: 31,
+            retransmitted: 32,
         },
-        last_sensor_error: 31,
+        last_sensor_error: 33,
+        stop_reason: 34,
     };
     let wide = (1u64..=20).flat_map(u64::to_le_bytes);
-    let narrow = (21u32..=30).flat_map(u32::to_le_bytes);
-    let expected: Vec<u8> = wide.chain(narrow).chain([31]).collect();
+    let narrow = (21u32..=32).flat_map(u32::to_le_bytes);
+    let expected: Vec<u8> = wide.chain(narrow).chain([33, 34]).collect();
     assert_eq!(report.to_le_bytes(), expected[..]);
 }
 
@@ -102,7 +107,7 @@ fn are_documented<T: Display>(all: &[T], number: impl Fn(&T) -> u8, table: &str)
 #[test]
 fn every_refusal_has_its_own_number_and_reason() {
     let all: Vec<Refusal> = (0..=255).filter_map(Refusal::from_number).collect();
-    assert_eq!(all.len(), 18);
+    assert_eq!(all.len(), 20);
     are_documented(&all, |&refusal| refusal as u8, "\n| reason | |\n");
 }
 
@@ -111,6 +116,27 @@ fn every_sensor_fault_has_its_own_number_and_words() {
     let all: Vec<FaultRecord> = (0..=255).filter_map(FaultRecord::from_number).collect();
     assert_eq!(all.len(), 9);
     are_documented(&all, |&fault| fault as u8, "\n| last sensor error | |\n");
+}
+
+#[test]
+fn every_reason_of_a_stop_has_its_own_number_and_words() {
+    let all: Vec<StopReason> = (0..=255).filter_map(StopReason::from_number).collect();
+    assert_eq!(all.len(), 10);
+    are_documented(
+        &all,
+        |&reason| reason as u8,
+        "\n| reason of the last stop | |\n",
+    );
+}
+
+#[test]
+fn the_document_tells_the_limits_of_the_host_timeout() {
+    let (least, most) = Configuration::HOST_TIMEOUTS_MS.into_inner();
+    let row = format!("| 50-51 | host timeout, {least} to {most}; 0 ");
+    assert!(
+        include_str!("../../docs/link-format.md").contains(&row),
+        "{row}"
+    );
 }
 
 #[test]

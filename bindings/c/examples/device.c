@@ -3,7 +3,10 @@
  *     device [PORT]     0 or none: a free port, which it prints
  *
  * On a microcontroller a UART takes the place of the socket, and a TDC that of `simulate`. It
- * ends when the host has gone. */
+ * ends when the host has gone.
+ *
+ * The sensor stands for a laser: it is off unless a host that is alive has configured it. Each
+ * start and stop is a line of the output. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <poll.h>
@@ -30,6 +33,8 @@ static dtof_statistics_t statistics;
 static dtof_aer_encoder_t encoder;
 static dtof_report_t report;
 static int is_configured, sensor_runs;
+/* Of the configuration: how long the host may be silent. */
+static uint16_t host_timeout_ms;
 
 /* Words that wait for the link. */
 static uint8_t words[15 * DTOF_WORD_BYTES];
@@ -65,6 +70,30 @@ static uint32_t now_ms(void)
     return (uint32_t)now.tv_sec * 1000u + (uint32_t)(now.tv_nsec / 1000000);
 }
 
+static void start_sensor(void)
+{
+    /* Here your laser goes on, and nowhere else. */
+    sensor_runs = 1;
+    report.sensor_starts++;
+    printf("sensor on\n");
+    fflush(stdout);
+}
+
+/* Only a further configuration starts it again. The host hears the reason. */
+static void stop_sensor(uint8_t reason)
+{
+    if (!sensor_runs) {
+        return;
+    }
+    /* Here your laser goes off, before anything else is done. */
+    sensor_runs = 0;
+    report.sensor_stops++;
+    report.stop_reason = reason;
+    check("reason", dtof_link_set_stop_reason(&link_to_host, reason));
+    printf("sensor off, reason %u\n", (unsigned)reason);
+    fflush(stdout);
+}
+
 /* Takes the host's configuration on, or says why not. The one before stays then. */
 static dtof_status_t configure(const dtof_message_t *message)
 {
@@ -79,6 +108,10 @@ static dtof_status_t configure(const dtof_message_t *message)
         && wanted.bin_width_ps_q16 != BIN_WIDTH_PS_Q16) {
         status = DTOF_ERROR_BIN_WIDTH;
     }
+    /* A host that would never be silent for too long. */
+    if (status == DTOF_OK && wanted.host_timeout_ms == 0) {
+        status = DTOF_ERROR_HOST_TIMEOUT;
+    }
     if (status == DTOF_OK) {
         status = dtof_scale_init(&scale, wanted.bin_width_ps_q16, wanted.offset_mm_q8);
     }
@@ -88,15 +121,18 @@ static dtof_status_t configure(const dtof_message_t *message)
     if (status != DTOF_OK) {
         return status;
     }
+    stop_sensor(DTOF_STOP_CONFIGURATION);
     config = checked;
+    host_timeout_ms = wanted.host_timeout_ms;
     for (uint16_t pixel = 0; pixel < PIXELS; pixel++) {
         check("pixel", dtof_pixel_init(&pixels[pixel], sizeof pixels[pixel], pixel));
     }
     memset(&statistics, 0, sizeof statistics);
     report.cycles = 0;
-    /* A host that wants photons from the link wants the sensor to stop: that is how it leaves. */
-    sensor_runs = wanted.source == DTOF_SOURCE_SENSOR;
     is_configured = 1;
+    if (wanted.source == DTOF_SOURCE_SENSOR) {
+        start_sensor();
+    }
     return DTOF_OK;
 }
 
@@ -137,7 +173,8 @@ static void act(const dtof_message_t *message)
     case DTOF_MESSAGE_SENSOR_REQUEST:
         answer_kind = DTOF_MESSAGE_SENSOR;
         answer_length = DTOF_SENSOR_BYTES;
-        check("sensor", dtof_sensor_write(PIXELS, BIN_WIDTH_PS_Q16, LASER_HZ * 1000u, 0, answer));
+        check("sensor", dtof_sensor_write(PIXELS, DTOF_BINS, BIN_WIDTH_PS_Q16, LASER_HZ * 1000u, 0,
+                                          answer));
         break;
     case DTOF_MESSAGE_HISTOGRAM_REQUEST: {
         uint8_t reason = is_configured ? DTOF_NO_HISTOGRAM_PIXEL : DTOF_NO_HISTOGRAM_CONFIGURATION;
@@ -253,6 +290,25 @@ static void simulate(void)
     report.cycles++;
 }
 
+/* A session has begun or ended: nothing is left of it, or of the one before. */
+static void start_over(uint8_t session)
+{
+    stop_sensor(session == DTOF_SESSION_ENDED ? DTOF_STOP_END_OF_SESSION : DTOF_STOP_NEW_SESSION);
+    is_configured = has_answer = sends_histogram = 0;
+    filled = 0;
+    check("encoder", dtof_aer_encoder_init(&encoder));
+}
+
+/* Stops the sensor of a host that is silent. */
+static void look_after_host(void)
+{
+    uint32_t silent_ms;
+    check("silence", dtof_link_silent_ms(&link_to_host, now_ms(), &silent_ms));
+    if (silent_ms >= host_timeout_ms) {
+        stop_sensor(DTOF_STOP_SILENCE);
+    }
+}
+
 /* Waits for the host: a socket that is connected. */
 static int connected(uint16_t port)
 {
@@ -275,7 +331,8 @@ static int connected(uint16_t port)
     return host;
 }
 
-/* Whether all of a frame has gone. */
+/* Whether all of a frame has gone. It does not wait for a silent host: until its timeout, less is
+ * sent than a socket holds. */
 static int sent(int host, const uint8_t *bytes, size_t length)
 {
     while (length > 0) {
@@ -300,7 +357,7 @@ int main(int arguments, char **argument)
     int host = connected((uint16_t)port);
     uint32_t simulated_ms = now_ms();
     for (;;) {
-        uint8_t bytes[DTOF_WIRE_BYTES], began = 0;
+        uint8_t bytes[DTOF_WIRE_BYTES], session = DTOF_SESSION_UNCHANGED;
         size_t length;
         struct pollfd wait = {.fd = host, .events = POLLIN};
         if (poll(&wait, 1, 1) > 0) {
@@ -309,14 +366,12 @@ int main(int arguments, char **argument)
                 break;
             }
             check("bytes", dtof_link_receive(&link_to_host, bytes, (size_t)received, now_ms(),
-                                             &began));
+                                             &session));
         }
-        if (began) {
-            /* Nothing is left of the session before. */
-            is_configured = sensor_runs = has_answer = sends_histogram = 0;
-            filled = 0;
-            check("encoder", dtof_aer_encoder_init(&encoder));
+        if (session != DTOF_SESSION_UNCHANGED) {
+            start_over(session);
         }
+        look_after_host();
         for (uint32_t now = now_ms(); simulated_ms != now; simulated_ms++) {
             /* A histogram stays as it is until all of it has gone. */
             if (sensor_runs && !sends_histogram) {
@@ -327,9 +382,12 @@ int main(int arguments, char **argument)
         do {
             check("frame", dtof_link_transmit(&link_to_host, now_ms(), bytes, &length));
             if (!sent(host, bytes, length)) {
+                stop_sensor(DTOF_STOP_NOT_LISTENING);
                 return EXIT_SUCCESS;
             }
         } while (length > 0);
     }
+    /* The connection is closed, as USB says that no program has the port open. */
+    stop_sensor(DTOF_STOP_NOT_LISTENING);
     return EXIT_SUCCESS;
 }

@@ -16,6 +16,17 @@
 // time; different objects are independent. Objects that a function takes as `const` may be
 // shared while nobody changes them.
 //
+// Laser: it is off unless a host that is alive has configured the device. The library does not
+// know your laser, so your firmware keeps this rule:
+// 1. It is off after every start, and in handlers of faults, before anything else.
+// 2. It goes on only when a configuration that takes photons from the sensor was accepted.
+// 3. It goes off when another configuration is accepted, when dtof_link_receive gives
+//    DTOF_SESSION_BEGAN or DTOF_SESSION_ENDED, when dtof_link_silent_ms gives the configuration's
+//    host_timeout_ms or more, and when USB says that no program has the port open. It stays off
+//    until rule 2.
+// 4. A refused configuration changes nothing: a laser that is on stays on, one that is off, off.
+// 5. Each time it goes off, dtof_link_set_stop_reason and dtof_report_t tell the host why.
+//
 // Units: a name that ends in _q8, _q12 or _q16 is in 1/256, 1/4096 or 1/65536 of its unit.
 
 #ifndef DTOF_H
@@ -109,7 +120,7 @@
 #define DTOF_ECHOES 4
 
 // The version of the words, which file headers announce.
-#define DTOF_AER_VERSION 3
+#define DTOF_AER_VERSION 4
 
 // Bytes of a word.
 #define DTOF_WORD_BYTES 16
@@ -185,8 +196,50 @@
 // gives.
 #define DTOF_MESSAGE_HISTOGRAM 135
 
+// No session has begun or ended.
+#define DTOF_SESSION_UNCHANGED 0
+
+// A host has begun a session.
+#define DTOF_SESSION_BEGAN 1
+
+// The host has ended its session.
+#define DTOF_SESSION_ENDED 2
+
+// The sensor has not stopped since the device was switched on.
+#define DTOF_STOP_NONE 0
+
+// The sensor stopped for another configuration.
+#define DTOF_STOP_CONFIGURATION 1
+
+// For a new session.
+#define DTOF_STOP_NEW_SESSION 2
+
+// Because the host ended its session.
+#define DTOF_STOP_END_OF_SESSION 3
+
+// Because the host was silent.
+#define DTOF_STOP_SILENCE 4
+
+// Because no program has the USB port open, or the cable is unplugged.
+#define DTOF_STOP_NOT_LISTENING 5
+
+// Before this start the firmware gave up, as on a failed assertion.
+#define DTOF_STOP_PANIC 6
+
+// Before this start there was a hard fault, a stack overflow included.
+#define DTOF_STOP_FAULT 7
+
+// The watchdog reset the device.
+#define DTOF_STOP_WATCHDOG 8
+
+// The supply voltage was too low.
+#define DTOF_STOP_BROWN_OUT 9
+
+// The reset pin or a debugger reset the device.
+#define DTOF_STOP_RESET 10
+
 // Bytes of a dtof_link_t.
-#define DTOF_LINK_SIZE 2520
+#define DTOF_LINK_SIZE 2528
 
 // The same in words of 64 bits.
 #define DTOF_LINK_WORDS (DTOF_LINK_SIZE / 8)
@@ -195,10 +248,10 @@
 #define DTOF_LINK_ALIGN 8
 
 // Bytes of the body of SENSOR.
-#define DTOF_SENSOR_BYTES 18
+#define DTOF_SENSOR_BYTES 24
 
 // Bytes of the body of STATISTICS.
-#define DTOF_REPORT_BYTES 201
+#define DTOF_REPORT_BYTES 210
 
 // Photons come over the link.
 #define DTOF_SOURCE_LINK 0
@@ -289,9 +342,9 @@ enum dtof_status_t
     DTOF_ERROR_NO_MESSAGE = 61,
     // A message holds 244 bytes at most.
     DTOF_ERROR_MESSAGE_LENGTH = 62,
-    // The kind of a message is below 240.
+    // The kind of a message to the host is 128 to 239.
     DTOF_ERROR_MESSAGE_KIND = 63,
-    // The reason is none of DTOF_NO_HISTOGRAM_...
+    // The reason is none of DTOF_NO_HISTOGRAM_..., or none of DTOF_STOP_...
     DTOF_ERROR_REASON = 64,
     // The configuration of the host is not one this library knows.
     DTOF_ERROR_CONFIGURATION = 70,
@@ -307,6 +360,10 @@ enum dtof_status_t
     DTOF_ERROR_PATIENCE = 75,
     // There is no room for blocks of pixels. This library has none.
     DTOF_ERROR_BLOCKS = 76,
+    // The host timeout is not 200 to 60,000 ms.
+    DTOF_ERROR_HOST_TIMEOUT = 77,
+    // A field of the configuration that has no meaning yet is not 0.
+    DTOF_ERROR_RESERVED_FIELD = 78,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -461,7 +518,7 @@ typedef struct dtof_event_t {
     uint8_t level;
     // Which echo of the exposure: 1 to 4.
     uint8_t echo;
-    // DTOF_FLAG_..., added up: below 64.
+    // DTOF_FLAG_..., added up: below 32.
     uint8_t flags;
 } dtof_event_t;
 
@@ -547,6 +604,10 @@ typedef struct dtof_device_config_t {
     int32_t offset_mm_q8;
     // Pixels, with addresses from 0.
     uint16_t pixels;
+    // The laser goes off once the host has been silent for so many milliseconds: 200 to 60,000.
+    // 0 means never. Refuse that with DTOF_ERROR_HOST_TIMEOUT, unless your laser may run
+    // without a host.
+    uint16_t host_timeout_ms;
     // DTOF_SOURCE_...
     uint8_t source;
 } dtof_device_config_t;
@@ -563,8 +624,14 @@ typedef struct dtof_report_t {
     uint32_t unknown;
     // Errors of the sensor.
     uint32_t sensor_errors;
-    // The last of them, as docs/link-format.md numbers them: 0 if there was none.
+    // How often the sensor, and with it the laser, was started since the device was switched on.
+    uint32_t sensor_starts;
+    // How often it was stopped.
+    uint32_t sensor_stops;
+    // The last of its errors, as docs/link-format.md numbers them: 0 if there was none.
     uint8_t last_sensor_error;
+    // Why it stopped last: DTOF_STOP_...
+    uint8_t stop_reason;
 } dtof_report_t;
 
 #ifdef __cplusplus
@@ -582,7 +649,7 @@ const char *dtof_version(void);
 uint16_t dtof_bins(void);
 
 // What goes into a message DTOF_MESSAGE_REFUSED when a configuration is refused for the error
-// `status`: 1 to 18. For errors that the link has no number for it is 1, "not known".
+// `status`: 1 to 20. For errors that the link has no number for it is 1, "not known".
 //
 // Threads: any.
 uint8_t dtof_refusal_of(uint8_t status);
@@ -811,8 +878,9 @@ dtof_status_t dtof_aer_decode(struct dtof_aer_decoder_t *decoder,
 dtof_status_t dtof_link_init(struct dtof_link_t *link, size_t size, uint16_t pixels);
 
 // Takes `length` bytes that have come over the wire. `now_ms` is a clock of milliseconds that
-// may wrap. `began` gets 1 if a session has begun: forget configuration, events and statistics
-// of the one before. Else it gets 0.
+// may wrap. `session` gets one of DTOF_SESSION_...: after DTOF_SESSION_BEGAN and
+// DTOF_SESSION_ENDED switch the laser off, and forget configuration, events and statistics of
+// the session before.
 //
 // Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
 // Threads: nobody else uses `link` meanwhile.
@@ -820,7 +888,7 @@ dtof_status_t dtof_link_receive(struct dtof_link_t *link,
                                 const uint8_t *bytes,
                                 size_t length,
                                 uint32_t now_ms,
-                                uint8_t *began);
+                                uint8_t *session);
 
 // The next bytes to put on the wire: `wire` has room for DTOF_WIRE_BYTES, `length` gets how
 // many there are, 0 if none are due. Call it until then, and again at least every 10 ms.
@@ -846,8 +914,8 @@ dtof_status_t dtof_link_peek(const struct dtof_link_t *link, uint8_t *kind);
 // Threads: nobody else uses `link` meanwhile.
 dtof_status_t dtof_link_take(struct dtof_link_t *link, struct dtof_message_t *message);
 
-// Sends a message, sooner or later, whole, once and in order. `kind` is one of
-// DTOF_MESSAGE_..., `body` has `length` bytes, up to DTOF_BODY_BYTES.
+// Sends a message, sooner or later, whole, once and in order. `kind` is one of those
+// DTOF_MESSAGE_... that go to the host, `body` has `length` bytes, up to DTOF_BODY_BYTES.
 //
 // Errors: DTOF_ERROR_FULL if four are under way: offer it again later. DTOF_ERROR_MESSAGE_KIND,
 // DTOF_ERROR_MESSAGE_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
@@ -863,25 +931,49 @@ dtof_status_t dtof_link_offer(struct dtof_link_t *link,
 // Threads: nobody else uses `link` meanwhile.
 dtof_status_t dtof_link_state(const struct dtof_link_t *link, struct dtof_link_state_t *state);
 
+// How long the host of the session has not been heard, in milliseconds: no whole frame of it has
+// come. `now_ms` is the clock of dtof_link_receive, and not before its last time. Without a
+// session it is 4,294,967,295.
+//
+// While the sensor runs, call it at least every 10 ms. Switch the laser off once it gives
+// `host_timeout_ms` of the configuration or more.
+//
+// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+// Threads: nobody else changes `link` meanwhile.
+dtof_status_t dtof_link_silent_ms(const struct dtof_link_t *link,
+                                  uint32_t now_ms,
+                                  uint32_t *silent_ms);
+
+// Why the sensor stopped last: one of DTOF_STOP_..., but not DTOF_STOP_NONE. A host whose session
+// the device has forgotten is told it. Call it when the sensor stops, and after a reset with
+// the cause of that.
+//
+// Errors: DTOF_ERROR_REASON, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+// Threads: nobody else uses `link` meanwhile.
+dtof_status_t dtof_link_set_stop_reason(struct dtof_link_t *link,
+                                        uint8_t reason);
+
 // Reads the body of CONFIGURE. What this library does not have is refused: blocks of pixels
 // and dynamic depth.
 //
 // Errors: DTOF_ERROR_CONFIGURATION if it is not one this library knows, DTOF_ERROR_BLOCKS,
 // DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_WINDOW_WIDTH, DTOF_ERROR_HALF_WIDTH,
-// DTOF_ERROR_PATIENCE, DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
-// dtof_refusal_of makes each the answer to the host.
+// DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT, DTOF_ERROR_RESERVED_FIELD, DTOF_ERROR_LENGTH,
+// DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT. dtof_refusal_of makes each the answer to the host.
 // Threads: nobody else uses `config` meanwhile.
 dtof_status_t dtof_device_config_read(const uint8_t *body,
                                       size_t length,
                                       struct dtof_device_config_t *config);
 
-// Writes the body of SENSOR, DTOF_SENSOR_BYTES: the pixels of the sensor, 0 if there is none;
-// the width of its bins in 1/65536 ps, 0 if as wide as the host says; the range of the start of
-// bin 0 in 1/256 mm; laser cycles a second in thousandths, 0 if not known.
+// Writes the body of SENSOR, DTOF_SENSOR_BYTES: the pixels of the sensor, 0 if there is none; how
+// many bins it measures, up to DTOF_BINS; the width of its bins in 1/65536 ps, 0 if as wide as the
+// host says; laser cycles a second in thousandths, 0 if not known; the range of the start of bin 0
+// in 1/256 mm.
 //
 // Errors: DTOF_ERROR_NULL.
 // Threads: any.
 dtof_status_t dtof_sensor_write(uint16_t pixels,
+                                uint16_t bins,
                                 uint32_t bin_width_ps_q16,
                                 uint64_t laser_millihertz,
                                 int32_t offset_mm_q8,

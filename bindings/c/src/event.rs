@@ -44,7 +44,7 @@ pub struct dtof_event_t {
     pub level: u8,
     /// Which echo of the exposure: 1 to 4.
     pub echo: u8,
-    /// DTOF_FLAG_..., added up: below 64.
+    /// DTOF_FLAG_..., added up: below 32.
     pub flags: u8,
 }
 

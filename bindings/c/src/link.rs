@@ -4,7 +4,7 @@ use core::mem::MaybeUninit;
 
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
-use dtof_link::message;
+use dtof_link::{StopReason, message};
 
 use crate::memory::{
     Tagged, all_plain, array_mut, check, holds, initialise, put, status, tagged, tagged_mut,
@@ -12,6 +12,7 @@ use crate::memory::{
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{
     DTOF_ERROR_FULL, DTOF_ERROR_MESSAGE_KIND, DTOF_ERROR_MESSAGE_LENGTH, DTOF_ERROR_NO_MESSAGE,
+    DTOF_ERROR_REASON,
 };
 use crate::version::dtof_bins;
 
@@ -66,11 +67,54 @@ const _: () = assert!(
         && DTOF_MESSAGE_HISTOGRAM == message::HISTOGRAM
 );
 
-/// Kinds from here on are no messages.
-const FIRST_UNNUMBERED: u8 = 0xf0;
+/// The kinds of a device's messages. Those below are a host's, those above no messages.
+const OF_DEVICE: core::ops::Range<u8> = 0x80..0xf0;
+
+/// No session has begun or ended.
+pub const DTOF_SESSION_UNCHANGED: u8 = 0;
+/// A host has begun a session.
+pub const DTOF_SESSION_BEGAN: u8 = 1;
+/// The host has ended its session.
+pub const DTOF_SESSION_ENDED: u8 = 2;
+
+/// The sensor has not stopped since the device was switched on.
+pub const DTOF_STOP_NONE: u8 = 0;
+/// The sensor stopped for another configuration.
+pub const DTOF_STOP_CONFIGURATION: u8 = 1;
+/// For a new session.
+pub const DTOF_STOP_NEW_SESSION: u8 = 2;
+/// Because the host ended its session.
+pub const DTOF_STOP_END_OF_SESSION: u8 = 3;
+/// Because the host was silent.
+pub const DTOF_STOP_SILENCE: u8 = 4;
+/// Because no program has the USB port open, or the cable is unplugged.
+pub const DTOF_STOP_NOT_LISTENING: u8 = 5;
+/// Before this start the firmware gave up, as on a failed assertion.
+pub const DTOF_STOP_PANIC: u8 = 6;
+/// Before this start there was a hard fault, a stack overflow included.
+pub const DTOF_STOP_FAULT: u8 = 7;
+/// The watchdog reset the device.
+pub const DTOF_STOP_WATCHDOG: u8 = 8;
+/// The supply voltage was too low.
+pub const DTOF_STOP_BROWN_OUT: u8 = 9;
+/// The reset pin or a debugger reset the device.
+pub const DTOF_STOP_RESET: u8 = 10;
+const _: () = assert!(
+    DTOF_STOP_CONFIGURATION == StopReason::Configuration as u8
+        && DTOF_STOP_NEW_SESSION == StopReason::NewSession as u8
+        && DTOF_STOP_END_OF_SESSION == StopReason::EndOfSession as u8
+        && DTOF_STOP_SILENCE == StopReason::Silence as u8
+        && DTOF_STOP_NOT_LISTENING == StopReason::NotListening as u8
+        && DTOF_STOP_PANIC == StopReason::Panic as u8
+        && DTOF_STOP_FAULT == StopReason::Fault as u8
+        && DTOF_STOP_WATCHDOG == StopReason::Watchdog as u8
+        && DTOF_STOP_BROWN_OUT == StopReason::BrownOut as u8
+        && DTOF_STOP_RESET == StopReason::Reset as u8
+        && StopReason::from_number(DTOF_STOP_RESET + 1).is_none()
+);
 
 /// Bytes of a dtof_link_t.
-pub const DTOF_LINK_SIZE: usize = 2520;
+pub const DTOF_LINK_SIZE: usize = 2528;
 /// The same in words of 64 bits.
 pub const DTOF_LINK_WORDS: usize = DTOF_LINK_SIZE / 8;
 /// Its alignment.
@@ -151,8 +195,9 @@ pub unsafe extern "C" fn dtof_link_init(
 }
 
 /// Takes `length` bytes that have come over the wire. `now_ms` is a clock of milliseconds that
-/// may wrap. `began` gets 1 if a session has begun: forget configuration, events and statistics
-/// of the one before. Else it gets 0.
+/// may wrap. `session` gets one of DTOF_SESSION_...: after DTOF_SESSION_BEGAN and
+/// DTOF_SESSION_ENDED switch the laser off, and forget configuration, events and statistics of
+/// the session before.
 ///
 /// Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
 /// Threads: nobody else uses `link` meanwhile.
@@ -162,20 +207,28 @@ pub unsafe extern "C" fn dtof_link_receive(
     bytes: *const u8,
     length: usize,
     now_ms: u32,
-    began: *mut u8,
+    session: *mut u8,
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
         let (link, bytes) = unsafe { (tagged_mut(link)?, all_plain(bytes, length)?) };
         // Before a byte is taken.
-        check(began)?;
+        check(session)?;
         for &byte in bytes {
             if let Some(frame) = link.deframer.push(byte) {
                 link.endpoint.receive(frame, now_ms);
             }
         }
+        // What happened last: of the two the link keeps one.
+        let change = if link.endpoint.take_began() {
+            DTOF_SESSION_BEGAN
+        } else if link.endpoint.take_ended() {
+            DTOF_SESSION_ENDED
+        } else {
+            DTOF_SESSION_UNCHANGED
+        };
         // SAFETY: the same promise.
-        unsafe { put(began, link.endpoint.take_began().into()) }
+        unsafe { put(session, change) }
     })
 }
 
@@ -246,8 +299,8 @@ pub unsafe extern "C" fn dtof_link_take(
     })
 }
 
-/// Sends a message, sooner or later, whole, once and in order. `kind` is one of
-/// DTOF_MESSAGE_..., `body` has `length` bytes, up to DTOF_BODY_BYTES.
+/// Sends a message, sooner or later, whole, once and in order. `kind` is one of those
+/// DTOF_MESSAGE_... that go to the host, `body` has `length` bytes, up to DTOF_BODY_BYTES.
 ///
 /// Errors: DTOF_ERROR_FULL if four are under way: offer it again later. DTOF_ERROR_MESSAGE_KIND,
 /// DTOF_ERROR_MESSAGE_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
@@ -260,7 +313,7 @@ pub unsafe extern "C" fn dtof_link_offer(
     length: usize,
 ) -> dtof_status_t {
     status(|| {
-        if kind >= FIRST_UNNUMBERED {
+        if !OF_DEVICE.contains(&kind) {
             return Err(DTOF_ERROR_MESSAGE_KIND);
         }
         if length > DTOF_BODY_BYTES {
@@ -307,5 +360,54 @@ pub unsafe extern "C" fn dtof_link_state(
         };
         // SAFETY: the same promise.
         unsafe { put(state, now) }
+    })
+}
+
+/// How long the host of the session has not been heard, in milliseconds: no whole frame of it has
+/// come. `now_ms` is the clock of dtof_link_receive, and not before its last time. Without a
+/// session it is 4,294,967,295.
+///
+/// While the sensor runs, call it at least every 10 ms. Switch the laser off once it gives
+/// `host_timeout_ms` of the configuration or more.
+///
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: nobody else changes `link` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_link_silent_ms(
+    link: *const dtof_link_t,
+    now_ms: u32,
+    silent_ms: *mut u32,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let endpoint = &unsafe { tagged(link)? }.endpoint;
+        let silent = if endpoint.is_open() {
+            endpoint.silent_ms(now_ms)
+        } else {
+            u32::MAX
+        };
+        // SAFETY: the same promise.
+        unsafe { put(silent_ms, silent) }
+    })
+}
+
+/// Why the sensor stopped last: one of DTOF_STOP_..., but not DTOF_STOP_NONE. A host whose session
+/// the device has forgotten is told it. Call it when the sensor stops, and after a reset with
+/// the cause of that.
+///
+/// Errors: DTOF_ERROR_REASON, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: nobody else uses `link` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_link_set_stop_reason(
+    link: *mut dtof_link_t,
+    reason: u8,
+) -> dtof_status_t {
+    status(|| {
+        let reason = StopReason::from_number(reason).ok_or(DTOF_ERROR_REASON)?;
+        // SAFETY: the caller's promise, see the crate.
+        unsafe { tagged_mut(link)? }
+            .endpoint
+            .set_stop_reason(reason);
+        Ok(())
     })
 }

@@ -15,10 +15,10 @@ use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::DTOF_ERROR_BLOCKS;
 
 /// Bytes of the body of SENSOR.
-pub const DTOF_SENSOR_BYTES: usize = 18;
+pub const DTOF_SENSOR_BYTES: usize = 24;
 const _: () = assert!(DTOF_SENSOR_BYTES == SensorRecord::BYTES);
 /// Bytes of the body of STATISTICS.
-pub const DTOF_REPORT_BYTES: usize = 201;
+pub const DTOF_REPORT_BYTES: usize = 210;
 const _: () = assert!(DTOF_REPORT_BYTES == Report::BYTES);
 
 /// Photons come over the link.
@@ -39,6 +39,10 @@ pub struct dtof_device_config_t {
     pub offset_mm_q8: i32,
     /// Pixels, with addresses from 0.
     pub pixels: u16,
+    /// The laser goes off once the host has been silent for so many milliseconds: 200 to 60,000.
+    /// 0 means never. Refuse that with DTOF_ERROR_HOST_TIMEOUT, unless your laser may run
+    /// without a host.
+    pub host_timeout_ms: u16,
     /// DTOF_SOURCE_...
     pub source: u8,
 }
@@ -48,8 +52,8 @@ pub struct dtof_device_config_t {
 ///
 /// Errors: DTOF_ERROR_CONFIGURATION if it is not one this library knows, DTOF_ERROR_BLOCKS,
 /// DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_WINDOW_WIDTH, DTOF_ERROR_HALF_WIDTH,
-/// DTOF_ERROR_PATIENCE, DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
-/// dtof_refusal_of makes each the answer to the host.
+/// DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT, DTOF_ERROR_RESERVED_FIELD, DTOF_ERROR_LENGTH,
+/// DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT. dtof_refusal_of makes each the answer to the host.
 /// Threads: nobody else uses `config` meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_device_config_read(
@@ -72,6 +76,7 @@ pub unsafe extern "C" fn dtof_device_config_read(
             bin_width_ps_q16: wanted.bin_width_ps.to_bits(),
             offset_mm_q8: wanted.offset_mm.to_bits(),
             pixels: wanted.pixels,
+            host_timeout_ms: wanted.host_timeout_ms,
             source: match wanted.source {
                 Source::Link => DTOF_SOURCE_LINK,
                 Source::Sensor => DTOF_SOURCE_SENSOR,
@@ -121,15 +126,17 @@ fn settings_of(wanted: &Configuration) -> dtof_config_t {
     settings
 }
 
-/// Writes the body of SENSOR, DTOF_SENSOR_BYTES: the pixels of the sensor, 0 if there is none;
-/// the width of its bins in 1/65536 ps, 0 if as wide as the host says; the range of the start of
-/// bin 0 in 1/256 mm; laser cycles a second in thousandths, 0 if not known.
+/// Writes the body of SENSOR, DTOF_SENSOR_BYTES: the pixels of the sensor, 0 if there is none; how
+/// many bins it measures, up to DTOF_BINS; the width of its bins in 1/65536 ps, 0 if as wide as the
+/// host says; laser cycles a second in thousandths, 0 if not known; the range of the start of bin 0
+/// in 1/256 mm.
 ///
 /// Errors: DTOF_ERROR_NULL.
 /// Threads: any.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_sensor_write(
     pixels: u16,
+    bins: u16,
     bin_width_ps_q16: u32,
     laser_millihertz: u64,
     offset_mm_q8: i32,
@@ -143,6 +150,7 @@ pub unsafe extern "C" fn dtof_sensor_write(
             bin_width: (bin_width_ps_q16 > 0).then_some(U16F16::from_bits(bin_width_ps_q16)),
             offset: I24F8::from_bits(offset_mm_q8),
             laser_millihertz,
+            bins,
         };
         *body = SensorRecord::to_le_bytes((pixels > 0).then_some(&sensor));
         Ok(())
@@ -163,8 +171,14 @@ pub struct dtof_report_t {
     pub unknown: u32,
     /// Errors of the sensor.
     pub sensor_errors: u32,
-    /// The last of them, as docs/link-format.md numbers them: 0 if there was none.
+    /// How often the sensor, and with it the laser, was started since the device was switched on.
+    pub sensor_starts: u32,
+    /// How often it was stopped.
+    pub sensor_stops: u32,
+    /// The last of its errors, as docs/link-format.md numbers them: 0 if there was none.
     pub last_sensor_error: u8,
+    /// Why it stopped last: DTOF_STOP_...
+    pub stop_reason: u8,
 }
 
 /// Writes the body of STATISTICS, DTOF_REPORT_BYTES. Of `statistics` the events must be those
@@ -193,6 +207,9 @@ pub unsafe extern "C" fn dtof_report_write(
             unknown: report.unknown,
             sensor_errors: report.sensor_errors,
             last_sensor_error: report.last_sensor_error,
+            sensor_starts: report.sensor_starts,
+            sensor_stops: report.sensor_stops,
+            stop_reason: report.stop_reason,
             link: *link.endpoint.counters(),
             ..Report::default()
         };

@@ -79,9 +79,9 @@ pub enum dtof_status_t {
     DTOF_ERROR_NO_MESSAGE = 61,
     /// A message holds 244 bytes at most.
     DTOF_ERROR_MESSAGE_LENGTH = 62,
-    /// The kind of a message is below 240.
+    /// The kind of a message to the host is 128 to 239.
     DTOF_ERROR_MESSAGE_KIND = 63,
-    /// The reason is none of DTOF_NO_HISTOGRAM_...
+    /// The reason is none of DTOF_NO_HISTOGRAM_..., or none of DTOF_STOP_...
     DTOF_ERROR_REASON = 64,
 
     /// The configuration of the host is not one this library knows.
@@ -98,6 +98,10 @@ pub enum dtof_status_t {
     DTOF_ERROR_PATIENCE = 75,
     /// There is no room for blocks of pixels. This library has none.
     DTOF_ERROR_BLOCKS = 76,
+    /// The host timeout is not 200 to 60,000 ms.
+    DTOF_ERROR_HOST_TIMEOUT = 77,
+    /// A field of the configuration that has no meaning yet is not 0.
+    DTOF_ERROR_RESERVED_FIELD = 78,
 }
 
 use dtof_status_t::*;
@@ -150,7 +154,7 @@ impl From<AerError> for dtof_status_t {
 }
 
 /// The reasons of the link, and the errors that stand for them.
-const REFUSALS: [(Refusal, dtof_status_t); 19] = [
+const REFUSALS: [(Refusal, dtof_status_t); 21] = [
     (Refusal::Unknown, DTOF_ERROR_CONFIGURATION),
     (Refusal::ZeroX, DTOF_ERROR_ZERO_X),
     (Refusal::XAboveL1, DTOF_ERROR_X_ABOVE_L1),
@@ -170,6 +174,8 @@ const REFUSALS: [(Refusal, dtof_status_t); 19] = [
     (Refusal::Patience, DTOF_ERROR_PATIENCE),
     (Refusal::Blocks, DTOF_ERROR_BLOCKS),
     (Refusal::Tracking, DTOF_ERROR_TRACKING),
+    (Refusal::HostTimeout, DTOF_ERROR_HOST_TIMEOUT),
+    (Refusal::Reserved, DTOF_ERROR_RESERVED_FIELD),
 ];
 
 impl From<Refusal> for dtof_status_t {
@@ -181,7 +187,7 @@ impl From<Refusal> for dtof_status_t {
 }
 
 /// What goes into a message DTOF_MESSAGE_REFUSED when a configuration is refused for the error
-/// `status`: 1 to 18. For errors that the link has no number for it is 1, "not known".
+/// `status`: 1 to 20. For errors that the link has no number for it is 1, "not known".
 ///
 /// Threads: any.
 #[unsafe(no_mangle)]
@@ -202,7 +208,7 @@ pub extern "C" fn dtof_status_text(status: u8) -> *const c_char {
 }
 
 /// Every status. A test reads the enum and finds none missing.
-const TEXTS: [(dtof_status_t, &CStr); 41] = [
+const TEXTS: [(dtof_status_t, &CStr); 43] = [
     (DTOF_OK, c"done"),
     (DTOF_ERROR_NULL, c"a pointer is null"),
     (DTOF_ERROR_ALIGNMENT, c"a pointer is not aligned"),
@@ -267,7 +273,7 @@ const TEXTS: [(dtof_status_t, &CStr); 41] = [
     ),
     (
         DTOF_ERROR_MESSAGE_KIND,
-        c"the kind of a message is below 240",
+        c"the kind of a message to the host is 128 to 239",
     ),
     (DTOF_ERROR_REASON, c"unknown reason"),
     (
@@ -292,4 +298,9 @@ const TEXTS: [(dtof_status_t, &CStr); 41] = [
         c"the patience of adaptive binning must be at least 1",
     ),
     (DTOF_ERROR_BLOCKS, c"there is no room for blocks of pixels"),
+    (
+        DTOF_ERROR_HOST_TIMEOUT,
+        c"the host timeout must be 200 to 60000 ms",
+    ),
+    (DTOF_ERROR_RESERVED_FIELD, c"a reserved field is not 0"),
 ];

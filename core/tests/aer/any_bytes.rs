@@ -22,6 +22,7 @@ fn check_any_bytes(bytes: [u8; 16]) {
     let decoded = decoder.decode(word);
     let (kind, control) = (number >> 62 & 3, number >> 52 & 0x3ff);
     match (kind, control) {
+        (1, _) if number >> 127 == 1 => assert_eq!(decoded, Err(AerError::ReservedBits)),
         (1, _) => {
             let Ok(AerRecord::Event(event)) = decoded else {
                 panic!("{decoded:?}");
@@ -48,7 +49,7 @@ fn check_any_bytes(bytes: [u8; 16]) {
             let in_range = (-512..=262_399).contains(&position)
                 && (-262_911..=262_911).contains(&change)
                 && change != 0;
-            let reserved = number >> 16 & 0xffff | number >> 50 & 3 | number >> 58 & 0xf;
+            let reserved = number >> 16 & 0xffff | number >> 50 & 3 | number >> 57 & 0x1f;
             match decoded {
                 Ok(AerRecord::DynamicDepth(event)) => {
                     assert!(in_range && reserved == 0);
@@ -85,7 +86,7 @@ fn random_bytes_decode_as_documented_or_not_at_all() {
         // A tenth dynamic depth events, most of them with a position and a change that
         // can be.
         if number % 10 == 1 {
-            let word = u128::from_le_bytes(bytes) & !(0xf << 58 | 3 << 50 | 0xffff << 16);
+            let word = u128::from_le_bytes(bytes) & !(0x1f << 57 | 3 << 50 | 0xffff << 16);
             let small = word >> 64 & 0x3_ffff | (word >> 96 & 0x3_ffff) << 32;
             let few = 1 << (rng.next_u32() % 128);
             let few = if rng.next_u32() % 4 == 0 { few } else { 0 };
@@ -111,7 +112,7 @@ fn all_combinations_of_the_boundaries_of_a_dynamic_depth_event() {
         ] {
             for position in [-512, -1, 0, 1, 262_399] {
                 for change in [-262_911, -1, 1, 262_911] {
-                    for flags in 0..64 {
+                    for flags in 0..32 {
                         let event = DynamicDepthEvent::new(
                             PixelAddress(pixel),
                             BlockLevel::new(level).unwrap(),
@@ -171,6 +172,15 @@ fn every_position_and_change_of_a_dynamic_depth_event() {
 fn every_kind_and_control_code() {
     for top in 0..=0xfffu128 {
         check_any_bytes((top << 52).to_le_bytes());
+    }
+}
+
+/// Those with the sixth bit are refused.
+#[test]
+fn every_value_of_the_flags_and_of_the_bit_above() {
+    for flags in 0..64u128 {
+        check_any_bytes((1 << 62 | flags << 122).to_le_bytes());
+        check_any_bytes((2 << 62 | 1 << 96 | flags << 52).to_le_bytes());
     }
 }
 

@@ -45,7 +45,7 @@ pub fn bit_table(heading: &str) -> Vec<Field> {
     let table: Vec<Field> = rows(&section(heading))
         .into_iter()
         .map(|row| {
-            let (first, last) = row[0].split_once('-').unwrap();
+            let (first, last) = row[0].split_once('-').unwrap_or((row[0], row[0]));
             Field {
                 first: first.parse().unwrap(),
                 last: last.parse().unwrap(),
@@ -186,7 +186,7 @@ pub fn event(numbers: [u64; 10]) -> DepthEvent {
         offset: SubBinOffset::new((next() % 1024) as i16 - 512).unwrap(),
         peak_count: Count::new(next() as u32 % (1 << 24)).unwrap(),
         background: Count::new(next() as u32 % (1 << 24)).unwrap(),
-        flags: Flags::from_bits(next() as u8 % 64).unwrap(),
+        flags: Flags::from_bits(next() as u8 % 32).unwrap(),
     }
 }
 

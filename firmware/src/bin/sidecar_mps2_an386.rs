@@ -24,7 +24,8 @@ static BLOCKS: ConstStaticCell<Vec<Block, 42>> = ConstStaticCell::new(Vec::new()
 #[entry]
 fn main() -> ! {
     let (mut board, mut serial) = Mps2An386::start();
-    defmt::info!("mps2-an386 started: {}", board.reset_reason());
+    let reason = board.reset_reason();
+    defmt::info!("mps2-an386 started: {}", reason);
     let unpaced = board.obey_command_line();
     let mut sensor = simulated::scene();
     if unpaced.is_some() {
@@ -32,10 +33,17 @@ fn main() -> ! {
     }
     let mut left = unpaced.unwrap_or_default();
     let mut sidecar = Sidecar::new(PIXELS.take(), BLOCKS.take(), Some(sensor.about()));
+    sidecar.set_stop_reason(reason.into());
+    let mut is_lit = false;
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
             let lost = serial.lost();
+            sidecar.set_listening(serial.listens());
             let Ok(()) = sidecar.poll_with(&mut sensor, serial, lost, now_ms);
+            if is_lit != sidecar.sensor_is_running() {
+                is_lit = !is_lit;
+                Mps2An386::set_laser(is_lit);
+            }
             sidecar.simulate(&mut sensor, &mut left);
         });
     }

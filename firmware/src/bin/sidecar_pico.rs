@@ -67,9 +67,11 @@ fn main() -> ! {
     #[cfg(not(feature = "sensor-photon-timer"))]
     let mut sensor = simulated::scene();
     let mut sidecar = Sidecar::new(PIXELS.take(), BLOCKS.take(), Some(sensor.about()));
+    sidecar.set_stop_reason(board.reset_reason().into());
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
             let lost = serial.lost();
+            sidecar.set_listening(serial.listens());
             let Ok(()) = sidecar.poll_with(&mut sensor, serial, lost, now_ms);
         });
     }

@@ -3,6 +3,8 @@
 #[cfg(all(target_os = "none", feature = "board"))]
 pub use self::word::{remember, take};
 
+use dtof_link::StopReason;
+
 /// Why a board has started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -22,6 +24,20 @@ pub enum ResetReason {
     Reset,
 }
 
+impl From<ResetReason> for Option<StopReason> {
+    /// What a host is told of it: nothing stopped when the board was switched on.
+    fn from(reason: ResetReason) -> Self {
+        match reason {
+            ResetReason::PowerOn => None,
+            ResetReason::Panic => Some(StopReason::Panic),
+            ResetReason::Fault => Some(StopReason::Fault),
+            ResetReason::Watchdog => Some(StopReason::Watchdog),
+            ResetReason::BrownOut => Some(StopReason::BrownOut),
+            ResetReason::Reset => Some(StopReason::Reset),
+        }
+    }
+}
+
 impl ResetReason {
     /// What an RP2040 says: `REASON` of its watchdog and `CHIP_RESET` of `VREG_AND_CHIP_RESET`
     /// (RP2040 datasheet, 4.7.6 and 2.12.8). `watched` is whether the image had started the
@@ -32,10 +48,11 @@ impl ResetReason {
         const FORCE: u32 = 1 << 1;
         /// Power-on or brown-out.
         const HAD_POR: u32 = 1 << 8;
-        // Resets of the whole chip clear the first register; the second outlives the others.
+        // Resets of the whole chip clear the first register and what the image has left of the
+        // watchdog; the second register outlives the others.
         if reason & TIMER != 0 && watched {
             Self::Watchdog
-        } else if reason & (TIMER | FORCE) == 0 && chip_reset & HAD_POR != 0 {
+        } else if reason & (TIMER | FORCE) == 0 && chip_reset & HAD_POR != 0 && !watched {
             Self::PowerOn
         } else {
             Self::Reset
@@ -109,7 +126,8 @@ mod tests {
         const PSM: u32 = 1 << 20;
         for (reason, chip_reset, watched, expected) in [
             (0, POR, false, PowerOn),
-            (0, POR, true, PowerOn),
+            // Of the processor alone.
+            (0, POR, true, Reset),
             (0, RUN, false, Reset),
             (0, PSM, true, Reset),
             (0, 0, false, Reset),

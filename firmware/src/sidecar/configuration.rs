@@ -1,7 +1,7 @@
 //! Taking a configuration on.
 
 use dtof_core::{AnyRule, Array, Binning, Feed, PixelAddress, PixelConfig, RangeGate, RangeScale};
-use dtof_link::{AdaptiveBinning, Configuration, Refusal, Source};
+use dtof_link::{AdaptiveBinning, Configuration, Refusal, Source, StopReason};
 
 use super::{Block, Pixel, Sidecar};
 
@@ -10,6 +10,9 @@ impl Sidecar<'_> {
     /// The one before stays if the device cannot do what is wanted.
     pub(super) fn configure(&mut self, body: &[u8]) -> Result<(), Refusal> {
         let wanted = Configuration::from_le_bytes(body)?;
+        if wanted.host_timeout_ms == 0 && !cfg!(feature = "laser-on-without-host") {
+            return Err(Refusal::HostTimeout);
+        }
         let (first, mut last) = wanted.gate;
         if wanted.source == Source::Sensor {
             let sensor = self.sensor.ok_or(Refusal::NoSensor)?;
@@ -68,7 +71,10 @@ impl Sidecar<'_> {
         self.dynamic_depth = dynamic_depth;
         self.bin_width = wanted.bin_width_ps;
         self.source = wanted.source;
+        self.host_timeout_ms = wanted.host_timeout_ms;
+        self.stopping.get_or_insert(StopReason::Configuration);
         self.started = false;
+        self.off = false;
         self.restart_counts();
         Ok(())
     }

@@ -11,6 +11,11 @@
 //! world. A sensor does not wait; there the slot stays full and the pixel puts
 //! its decisions off, as the paper has it. [`Sidecar::poll_with`] asks the sensor
 //! as well.
+//!
+//! The sensor, and with it a laser, runs only while a host wants it: from a configuration
+//! that takes its photons on, until another configuration or session, the end of the session,
+//! [`Sidecar::set_listening`], or a host that is silent for as long as it has configured.
+//! Only a further configuration starts it again.
 
 mod configuration;
 mod events;
@@ -27,7 +32,7 @@ use dtof_core::{
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, Message};
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
-use dtof_link::{DynamicDepth, Report, SensorRecord, Source};
+use dtof_link::{Configuration, DynamicDepth, Report, SensorRecord, Source, StopReason};
 use dtof_sensors::{About, SensorFault};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::spsc::Queue;
@@ -120,6 +125,18 @@ pub struct Sidecar<'a> {
     running: bool,
     /// It was started for the configuration in force.
     started: bool,
+    /// It stays off until another configuration.
+    off: bool,
+    /// A program has the host's port open, as far as the port can tell.
+    listens: bool,
+    /// Of the configuration in force: how long the host may be silent, 0 for ever.
+    host_timeout_ms: u16,
+    /// Why the sensor is to stop: the first reason since it was polled last.
+    stopping: Option<StopReason>,
+    /// Why it stopped last.
+    stop_reason: Option<StopReason>,
+    sensor_starts: u32,
+    sensor_stops: u32,
     photons: Option<Photons>,
     /// Waits for room in the window; nothing else is done before it.
     answer: Option<Answer>,
@@ -177,6 +194,13 @@ impl<'a> Sidecar<'a> {
             sensor,
             running: false,
             started: false,
+            off: false,
+            listens: true,
+            host_timeout_ms: Configuration::HOST_TIMEOUT_MS,
+            stopping: None,
+            stop_reason: None,
+            sensor_starts: 0,
+            sensor_stops: 0,
             photons: None,
             answer: None,
             encoder: AerEncoder::new(),
@@ -251,8 +275,11 @@ impl<'a> Sidecar<'a> {
     /// Takes what was found on the wire.
     pub fn receive(&mut self, frame: Result<&[u8], FrameError>, now_ms: u32) {
         self.endpoint.receive(frame, now_ms);
+        if self.endpoint.take_ended() {
+            self.start_over(StopReason::EndOfSession);
+        }
         if self.endpoint.take_began() {
-            self.start_over();
+            self.start_over(StopReason::NewSession);
         }
     }
 
@@ -331,8 +358,9 @@ impl<'a> Sidecar<'a> {
         }
     }
 
-    /// A new session: nothing is left of the one before.
-    fn start_over(&mut self) {
+    /// A session has ended or begun: nothing of it, or of the one before, remains.
+    fn start_over(&mut self, reason: StopReason) {
+        self.stopping.get_or_insert(reason);
         self.pixels.clear();
         self.blocks.clear();
         self.config = None;
@@ -377,6 +405,9 @@ impl<'a> Sidecar<'a> {
             overrun,
             unknown: self.unknown,
             sensor_errors: self.sensor_errors,
+            sensor_starts: self.sensor_starts,
+            sensor_stops: self.sensor_stops,
+            stop_reason: self.stop_reason.map_or(0, |reason| reason as u8),
             last_sensor_error: self
                 .sensor_fault
                 .map_or(0, |fault| records::fault(fault) as u8),

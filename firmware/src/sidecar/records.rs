@@ -9,6 +9,7 @@ pub(super) const fn sensor(about: &About) -> SensorRecord {
         bin_width: about.bin_width,
         offset: about.offset,
         laser_millihertz: about.laser_millihertz,
+        bins: about.bins,
     }
 }
 

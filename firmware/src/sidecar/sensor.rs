@@ -5,8 +5,8 @@ use embedded_io::{Read, ReadReady, Write, WriteReady};
 
 use super::events::has_room_for_events;
 use super::{BINS, Sidecar};
-use dtof_link::Source;
 use dtof_link::message;
+use dtof_link::{Source, StopReason};
 use dtof_sensors::simulated::Simulated;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault};
 
@@ -39,10 +39,26 @@ impl Sidecar<'_> {
     /// Asks `sensor` while a configuration takes photons from it, and again while
     /// it has more, up to a bound. Its errors are counted in the report, which names
     /// the last.
+    ///
+    /// It stops the sensor first if nobody may want it any more: see the module.
     pub fn poll_sensor(&mut self, sensor: &mut impl Sensor, now_ms: u32) {
-        let wanted = self.config.is_some() && self.source == Source::Sensor;
+        if !self.listens {
+            self.stop_sensor(StopReason::NotListening);
+        } else if self.host_is_silent(now_ms) {
+            self.stop_sensor(StopReason::Silence);
+        }
+        let is_configured = self.config.is_some() && self.source == Source::Sensor;
+        let wanted = is_configured && !self.off;
+        if self.running && !(wanted && self.started) {
+            self.sensor_stops = self.sensor_stops.saturating_add(1);
+            self.set_stop_reason(self.stopping);
+        } else if is_configured && self.off && self.stopping.is_some() {
+            // Before it has started.
+            self.set_stop_reason(self.stopping);
+        }
         if wanted && !self.started {
             sensor.start(self.bin_width);
+            self.sensor_starts = self.sensor_starts.saturating_add(1);
             if sensor.is_one_hit() {
                 self.config = self.config.map(PixelConfig::with_one_hit_tdc);
                 let one_hit = |(config, patience): (PixelConfig<_, _>, _)| {
@@ -54,7 +70,9 @@ impl Sidecar<'_> {
         } else if !wanted && self.running {
             sensor.stop();
             self.running = false;
+            self.no_whole_histogram();
         }
+        self.stopping = None;
         for _ in 0..POLLS {
             if !self.takes_sensor() {
                 return;
@@ -122,11 +140,45 @@ impl Sidecar<'_> {
         }
     }
 
+    /// Whether the sensor runs, and with it a laser.
+    #[must_use]
+    pub const fn sensor_is_running(&self) -> bool {
+        self.running
+    }
+
+    /// Whether a program has the host's port open, as far as the port can tell. While it has
+    /// not, the sensor is off.
+    pub const fn set_listening(&mut self, listens: bool) {
+        self.listens = listens;
+    }
+
+    /// Why the sensor stopped last, which hosts are told: after a reset, its reason.
+    pub const fn set_stop_reason(&mut self, reason: Option<StopReason>) {
+        self.stop_reason = reason;
+        if let Some(reason) = reason {
+            self.endpoint.set_stop_reason(reason);
+        }
+    }
+
+    /// The sensor is off from the next poll on, until a configuration.
+    fn stop_sensor(&mut self, reason: StopReason) {
+        if !self.off {
+            self.off = true;
+            self.stopping = Some(reason);
+        }
+    }
+
+    const fn host_is_silent(&self, now_ms: u32) -> bool {
+        let most = self.host_timeout_ms as u32;
+        most > 0 && self.endpoint.silent_ms(now_ms) >= most
+    }
+
     /// Whether photons of a sensor count. Those that come while a configuration
     /// waits for the last events of the one before belong to neither.
     fn takes_sensor(&self) -> bool {
         self.config.is_some()
             && self.source == Source::Sensor
+            && !self.off
             && self.question() != Some(message::CONFIGURE)
     }
 }

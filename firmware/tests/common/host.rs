@@ -34,6 +34,7 @@ pub const CONFIGURATION: Configuration = Configuration {
     offset_mm: I24F8::ZERO,
     source: Source::Sensor,
     dynamic_depth: None,
+    host_timeout_ms: Configuration::HOST_TIMEOUT_MS,
 };
 
 /// A device with room for so many pixels and no block.

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use std::{fs, thread};
 
 use anyhow::{Context, Result, ensure};
-use dtof::device::{Client, DeviceEngine, configuration, monitor};
+use dtof::device::{Client, DeviceEngine, HostTimeout, configuration, monitor};
 use dtof::engine::Engine;
 use dtof::engine::host::host_engine;
 use dtof::engine::settings::Settings;
@@ -365,6 +365,7 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
             pixels: 16,
             columns: 4,
             dynamic_depth: None,
+            host_timeout: HostTimeout::default(),
         },
         |elapsed| elapsed >= Duration::from_secs(3),
         &mut monitor::Outputs {
@@ -406,6 +407,7 @@ fn says_unplugged(
         pixels.into(),
         Source::Sensor,
         None,
+        HostTimeout::default(),
     )?)?;
     let since = Instant::now();
     let report = loop {

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use anyhow::{Result, ensure};
-use dtof::device::Client;
-use dtof::device::histograms::collect;
+use dtof::device::histograms::{SoFar, collect};
+use dtof::device::{Client, HostTimeout};
 use dtof::engine::settings::Settings;
 
 /// Collects them for some seconds. The scene has half a background photon a laser cycle in 128 bins,
@@ -12,7 +12,9 @@ use dtof::engine::settings::Settings;
 pub fn are_those_of_the_scene(client: &mut Client, settings: &Settings) -> Result<()> {
     const PIXELS: u16 = 16;
     let length = Duration::from_secs(4);
-    let collected = collect(client, settings, PIXELS, |so_far| so_far.elapsed >= length)?;
+    let timeout = HostTimeout::default();
+    let done = |so_far: &SoFar| so_far.elapsed >= length;
+    let collected = collect(client, settings, PIXELS, timeout, done)?;
     ensure!(collected.full == 0);
     for (pixel, counts) in (0u32..).zip(&collected.histograms) {
         let cycles = collected.cycles[pixel as usize] as f64;

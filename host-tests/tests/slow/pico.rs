@@ -11,7 +11,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use dtof::device::{Client, configuration};
+use dtof::device::{Client, HostTimeout, configuration};
 use dtof::engine::host::host_engine;
 use dtof::engine::settings::Settings;
 use dtof::input::source::{Geometry, Photon, PixelPhotons, Slice};
@@ -138,7 +138,8 @@ impl Timer {
         let mut client = Client::new(board.connect()?)?;
         let about = client.sensor()?.context("no sensor")?;
         ensure!(about.bin_width == Some(U16F16::from_num(BIN_NS * 1000)));
-        let wanted = configuration(settings, 1, 1, Source::Sensor, None)?;
+        let timeout = HostTimeout::default();
+        let wanted = configuration(settings, 1, 1, Source::Sensor, None, timeout)?;
         client.configure(&wanted)?;
         Ok(Self { board, client })
     }

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
-use dtof::device::{Client, configuration};
+use dtof::device::{Client, HostTimeout, configuration};
 use dtof::engine::host::host_engine;
 use dtof::engine::settings::Settings;
 use dtof::events::aer_file::Event;
@@ -52,8 +52,12 @@ fn on_device(image: &Path, settings: &Settings, cycles: u64) -> Result<Sensed> {
     let mut emulator = Emulator::start(BOARD, image, &[&format!("unpaced={cycles}")])?;
     let mut client = Client::new(emulator.connect()?)?;
     let start = Instant::now();
-    let wanted = configuration(settings, PIXELS, ARRAY.columns, Source::Sensor, None)?;
-    client.configure(&wanted)?;
+    let configure = |client: &mut Client, source| {
+        let (columns, timeout) = (ARRAY.columns, HostTimeout::default());
+        let wanted = configuration(settings, PIXELS, columns, source, None, timeout)?;
+        client.configure(&wanted)
+    };
+    configure(&mut client, Source::Sensor)?;
     let (mut events, mut last) = (Vec::new(), client.report()?);
     let (mut length, mut moved) = (None, Instant::now());
     loop {
@@ -82,8 +86,7 @@ fn on_device(image: &Path, settings: &Settings, cycles: u64) -> Result<Sensed> {
         last = report;
     }
     // After the answer there are no more events.
-    let none = Source::Link;
-    client.configure(&configuration(settings, PIXELS, ARRAY.columns, none, None)?)?;
+    configure(&mut client, Source::Link)?;
     ensure!(client.take_events().is_empty(), "events past the last");
     Ok(Sensed {
         events,

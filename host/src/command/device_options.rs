@@ -5,12 +5,35 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use dtof::cli::arguments::{fixed, whole};
+use dtof::device::HostTimeout;
 use dtof::jobs::operation::Operation;
 use dtof::settings::{Sensor, SettingsFile};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_link::DynamicDepth;
 
 use super::dynamic_depth;
+
+/// How long a device goes on without this program.
+#[derive(Args)]
+pub struct HostOptions {
+    /// The device stops its sensor, and with it the laser, once this program has been silent for so
+    /// many seconds, 0.2 to 60. With 0 it never does, which a device refuses unless its firmware
+    /// was built with `laser-on-without-host` [default: 3]
+    #[arg(long, value_name = "SECONDS", value_parser = HostTimeout::from_seconds, allow_hyphen_values = true)]
+    host_timeout: Option<HostTimeout>,
+}
+
+impl HostOptions {
+    /// Whether it was given.
+    pub fn is_given(&self) -> bool {
+        self.host_timeout.is_some()
+    }
+
+    /// How long it is.
+    pub fn timeout(&self) -> HostTimeout {
+        self.host_timeout.unwrap_or_default()
+    }
+}
 
 /// The device's image, its pixels and how they operate.
 #[derive(Args)]
@@ -34,6 +57,8 @@ pub struct DeviceOptions {
     /// The device sends only changes of depth, with a polarity
     #[arg(long)]
     dynamic_depth: bool,
+    #[command(flatten)]
+    host: HostOptions,
     #[command(flatten)]
     of_dynamic_depth: dynamic_depth::Options,
     #[command(flatten)]
@@ -62,8 +87,14 @@ impl DeviceOptions {
     /// # Errors
     /// What is wrong with them.
     pub fn are_given(&self) -> Result<bool> {
-        let is_given = self.image.is_some() || self.pixels.is_some() || self.changes()?.is_some();
+        let is_given = self.image.is_some() || self.pixels.is_some() || self.host.is_given();
+        let is_given = is_given || self.changes()?.is_some();
         Ok(is_given || self.said()? != SettingsFile::default())
+    }
+
+    /// How long the device goes on without this program.
+    pub fn host_timeout(&self) -> HostTimeout {
+        self.host.timeout()
     }
 
     /// Whether changes of depth are asked for, and which.

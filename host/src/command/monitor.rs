@@ -11,7 +11,7 @@ use dtof::cli::arguments::{path, whole};
 use dtof::cli::interrupt;
 use dtof::device::monitor::map::{LiveMap, SHOW_CURSOR};
 use dtof::device::monitor::{Outputs, Recording, Task, monitor};
-use dtof::device::{self, Client, Setup};
+use dtof::device::{self, Client, Setup, end_sessions};
 use dtof::settings::SettingsFile;
 
 use super::device_options::DeviceOptions;
@@ -57,12 +57,13 @@ impl Monitor {
         let name = || self.device.clone();
         let mut client = Client::new(device::open(&self.device, image)?).with_context(name)?;
         interrupt::listen(|| {
+            end_sessions();
             if io::stderr().is_terminal() {
                 let _ = write!(io::stderr(), "{SHOW_CURSOR}");
             }
         })?;
         let setup = Setup::of(&mut client, said, self.options.pixels).with_context(name)?;
-        super::warn(Path::new(&self.device), setup.warning.clone(), false);
+        super::warn(Path::new(&self.device), setup.warnings.clone(), false);
         let length = self
             .seconds
             .map(|seconds| Duration::from_secs(seconds.into()));
@@ -91,6 +92,7 @@ impl Monitor {
             pixels,
             columns: geometry.columns,
             dynamic_depth,
+            host_timeout: self.options.host_timeout(),
         };
         let monitored = monitor(
             &mut client,
@@ -105,6 +107,8 @@ impl Monitor {
             },
         )
         .with_context(name);
+        // The sensor does not wait for the disk.
+        drop(client);
         let finish = if monitored.is_ok() {
             Recording::finish
         } else {

@@ -54,6 +54,7 @@ impl View {
                     said: self.options.said()?,
                     pixels: self.options.pixels,
                     dynamic_depth: self.options.changes()?,
+                    host_timeout: self.options.host_timeout(),
                     open: Box::new({
                         let name = name.clone();
                         move || device::open(&name, image.as_deref())
@@ -74,7 +75,7 @@ impl View {
                 Feed::Playback(playback)
             }
         };
-        interrupt::listen(|| ())?;
+        interrupt::listen(device::end_sessions)?;
         let foxglove = self.foxglove;
         let foxglove = foxglove.map(|port| Foxglove::bind(port, self.foxglove_origin));
         let foxglove = foxglove.transpose()?;

@@ -1,7 +1,11 @@
 //! The host's end of the link over a real port.
 
+mod ending;
 mod wait;
 
+use std::panic::resume_unwind;
+use std::sync::{Arc, Mutex};
+use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail, ensure};
@@ -13,15 +17,21 @@ use dtof_link::{Configuration, Refusal, Report, SensorRecord};
 
 use super::assembly::{Assembly, HistogramAnswer};
 use super::port::Port;
+use super::stopped::Stopped;
 use crate::events::aer_file::Event;
+pub use ending::end_sessions;
+use ending::{MOST, Shared, lock};
 use wait::Wait;
 
 /// A device that says nothing for so long is gone.
 const SILENCE: Duration = Duration::from_secs(5);
 
-/// A session with a device.
+/// A session with a device. It ends when this is dropped: the device stops its sensor then, and
+/// with it the laser.
 pub struct Client {
-    port: Box<dyn Port>,
+    port: Shared,
+    /// The port has failed, and is not used again.
+    is_gone: bool,
     endpoint: Endpoint,
     deframer: Deframer,
     decoder: AerDecoder,
@@ -53,8 +63,11 @@ impl Client {
             .unwrap_or_default();
         let session = (time.as_millis() % 65_521) as u16;
         let now = Instant::now();
+        let port = Arc::new(Mutex::new(port));
+        ending::begin(session, &port);
         let mut client = Self {
             port,
+            is_gone: false,
             endpoint: Endpoint::host(session, greeting(0, 0), 0),
             deframer: Deframer::new(),
             decoder: AerDecoder::new(),
@@ -124,8 +137,14 @@ impl Client {
                     .body
                     .first()
                     .and_then(|&number| Refusal::from_number(number));
-                Err(refusal.context("for a reason this program does not know")?)
-                    .context("the device refuses the configuration")
+                let refusal = refusal.context("for a reason this program does not know")?;
+                let refused =
+                    if configuration.host_timeout_ms == 0 && refusal == Refusal::HostTimeout {
+                        "--host-timeout 0 is for firmware that was built with laser-on-without-host"
+                    } else {
+                        "the device refuses the configuration"
+                    };
+                Err(refusal).context(refused)
             }
             kind => bail!("the device answers with message {kind:#04x}"),
         }
@@ -311,34 +330,19 @@ impl Client {
 
     /// Sends what is due and takes what has come. Waits a moment if nothing has.
     ///
+    /// A device whose sensor runs stops it unless this is called again and again: see
+    /// [`HostTimeout`](super::HostTimeout).
+    ///
     /// # Errors
     /// If the device is gone or has been restarted.
     pub fn exchange(&mut self) -> Result<()> {
-        let mut wire = [0; WIRE_BYTES];
-        loop {
-            let length = self.endpoint.transmit(self.now_ms(), &mut wire);
-            if length == 0 {
-                break;
-            }
-            self.port
-                .send(&wire[..length])
-                .context("the device cannot be written to")?;
+        let exchanged = self.transfer();
+        self.is_gone |= exchanged.is_err();
+        exchanged?;
+        if self.endpoint.is_lost() {
+            return Err(Stopped::forgotten(self.endpoint.stop_reason()).into());
         }
-        let mut bytes = [0; 4096];
-        let length = self
-            .port
-            .receive(&mut bytes)
-            .context("the device cannot be read from")?;
         let now_ms = self.now_ms();
-        for &byte in &bytes[..length] {
-            if let Some(frame) = self.deframer.push(byte) {
-                self.endpoint.receive(frame, now_ms);
-            }
-        }
-        ensure!(
-            !self.endpoint.is_lost(),
-            "the device has been restarted and has forgotten this session"
-        );
         let silent = Duration::from_millis(self.endpoint.silent_ms(now_ms).into());
         ensure!(
             silent < SILENCE,
@@ -348,10 +352,60 @@ impl Client {
         Ok(())
     }
 
+    /// Does `work`, which may take long, while the device goes on hearing this program. What the
+    /// device sends waits.
+    pub fn exchange_during<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> T {
+        thread::scope(|scope| {
+            let working = scope.spawn(work);
+            // A device that is gone is so at the next exchange, too.
+            while !working.is_finished() && self.exchange().is_ok() {}
+            working.join().unwrap_or_else(|panic| resume_unwind(panic))
+        })
+    }
+
+    /// Frames to the port and from it.
+    fn transfer(&mut self) -> Result<()> {
+        let mut port = lock(&self.port);
+        let mut wire = [0; WIRE_BYTES];
+        loop {
+            let length = self.endpoint.transmit(self.now_ms(), &mut wire);
+            if length == 0 {
+                break;
+            }
+            port.send(&wire[..length])
+                .context("the device cannot be written to")?;
+        }
+        let mut bytes = [0; 4096];
+        let length = port
+            .receive(&mut bytes)
+            .context("the device cannot be read from")?;
+        drop(port);
+        let now_ms = self.now_ms();
+        for &byte in &bytes[..length] {
+            if let Some(frame) = self.deframer.push(byte) {
+                self.endpoint.receive(frame, now_ms);
+            }
+        }
+        Ok(())
+    }
+
     /// Wraps after 49 days, as the link's clock does.
     #[allow(clippy::cast_possible_truncation)]
     fn now_ms(&self) -> u32 {
         self.started.elapsed().as_millis() as u32
+    }
+}
+
+impl Drop for Client {
+    fn drop(&mut self) {
+        if !self.endpoint.is_open() {
+            return;
+        }
+        self.endpoint.end(self.now_ms());
+        let since = Instant::now();
+        while !self.is_gone && !self.endpoint.is_lost() && since.elapsed() < MOST {
+            self.is_gone = self.transfer().is_err();
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use dtof_link::{FaultRecord, NoHistogram, Report, Source};
 
 use super::assembly::HistogramAnswer;
 use super::exposures::Exposures;
-use super::{Client, configuration};
+use super::{Client, HostTimeout, Stopped, configuration};
 use crate::engine::settings::Settings;
 
 /// Laser cycles between looks.
@@ -52,14 +52,17 @@ pub struct Collected {
 }
 
 /// Collects histograms of `pixels` pixels, addresses 0 up, until `done`, asked again and again,
-/// says so. Bins are as wide as `settings` say. The sensor rests then.
+/// says so. Bins are as wide as `settings` say. The sensor rests then. It stops sooner if this program
+/// is silent for `host_timeout`.
 ///
 /// # Errors
-/// If the device refuses, is gone or gives nothing, or a pixel has no histogram when it is done.
+/// If the device refuses, is gone, stops its sensor or gives nothing, or a pixel has no histogram
+/// when it is done.
 pub fn collect(
     client: &mut Client,
     settings: &Settings,
     pixels: u16,
+    host_timeout: HostTimeout,
     mut done: impl FnMut(&SoFar) -> bool,
 ) -> Result<Collected> {
     let mut exposures = Exposures::new(pixels, client.bins());
@@ -67,6 +70,7 @@ pub fn collect(
         client,
         settings,
         pixels,
+        host_timeout,
         l2: FIRST,
         is_whole: false,
         events: 0,
@@ -76,11 +80,12 @@ pub fn collect(
         news: Instant::now(),
     };
     work.configure(Source::Sensor)?;
-    work.first = work.client.report()?;
+    work.first = work.check_running()?;
     while !work.round(&mut exposures, &mut done)? {
         work.adapt(&mut exposures)?;
     }
     exposures.close();
+    work.check_running()?;
     work.configure(Source::Link)?;
     let events = if work.is_whole { 0 } else { work.events };
     let collected = Collected {
@@ -102,6 +107,7 @@ struct Collecting<'a> {
     client: &'a mut Client,
     settings: &'a Settings,
     pixels: u16,
+    host_timeout: HostTimeout,
     l2: u16,
     is_whole: bool,
     /// Of a sensor that gives whole histograms they mean nothing.
@@ -126,10 +132,25 @@ impl Collecting<'_> {
             l2: self.l2,
             ..self.settings.clone()
         };
-        let wanted = configuration(&settings, self.pixels, self.pixels.into(), source, None)?;
+        let columns = self.pixels.into();
+        let wanted = configuration(
+            &settings,
+            self.pixels,
+            columns,
+            source,
+            None,
+            self.host_timeout,
+        )?;
         self.client.configure(&wanted)?;
         self.news = Instant::now();
         Ok(())
+    }
+
+    /// A report of a sensor that runs.
+    fn check_running(&mut self) -> Result<Report> {
+        let report = self.client.report()?;
+        Stopped::check(&report, self.host_timeout)?;
+        Ok(report)
     }
 
     /// Asks every pixel once. Says whether that is all.
@@ -192,7 +213,7 @@ impl Collecting<'_> {
         if self.news.elapsed() < STALLED {
             return Ok(());
         }
-        let report = self.client.report()?;
+        let report = self.check_running()?;
         let seconds = STALLED.as_secs();
         ensure!(
             answers || report.unknown == self.first.unknown,
@@ -230,6 +251,8 @@ impl Collecting<'_> {
         if l2 < self.l2 || f64::from(l2) >= WORTH_IT * f64::from(self.l2) {
             self.l2 = l2;
             exposures.close();
+            // A sensor that has stopped is not started again.
+            self.check_running()?;
             self.configure(Source::Sensor)?;
         }
         Ok(())

@@ -5,11 +5,13 @@ mod assembly;
 mod client;
 mod exposures;
 pub mod histograms;
+mod host_timeout;
 pub mod monitor;
 mod open;
 mod port;
 mod qemu;
-mod setup;
+pub mod setup;
+mod stopped;
 
 use anyhow::{Result, bail, ensure};
 use dtof_core::{DepthEvent, PixelAddress, Statistics};
@@ -17,10 +19,12 @@ use dtof_link::endpoint::BODY_BYTES;
 use dtof_link::{Configuration, DynamicDepth, Report, Source, Token, message};
 
 pub use assembly::{HistogramAnswer, PixelHistogram};
-pub use client::Client;
+pub use client::{Client, end_sessions};
+pub use host_timeout::HostTimeout;
 pub use open::open;
 pub use port::Port;
 pub use setup::Setup;
+pub use stopped::Stopped;
 
 use crate::engine::Engine;
 use crate::engine::settings::Settings;
@@ -60,7 +64,14 @@ impl DeviceEngine {
             settings.bins
         );
         let pixels = u16::try_from(addresses.len())?;
-        let wanted = configuration(settings, pixels, array.columns, Source::Link, None)?;
+        let wanted = configuration(
+            settings,
+            pixels,
+            array.columns,
+            Source::Link,
+            None,
+            HostTimeout::default(),
+        )?;
         client.configure(&wanted)?;
         Ok(Self {
             client,
@@ -78,7 +89,7 @@ impl DeviceEngine {
 }
 
 /// The settings as the device takes them. With `dynamic_depth` it sends changes of depth
-/// in place of depth events.
+/// in place of depth events. A sensor that it takes photons from stops after `host_timeout`.
 ///
 /// # Errors
 /// If there are no bins, or it is to read frames.
@@ -88,6 +99,7 @@ pub fn configuration(
     columns: u32,
     source: Source,
     dynamic_depth: Option<DynamicDepth>,
+    host_timeout: HostTimeout,
 ) -> Result<Configuration> {
     ensure!(
         settings.frame.is_none(),
@@ -113,6 +125,7 @@ pub fn configuration(
         offset_mm: settings.offset_mm,
         source,
         dynamic_depth,
+        host_timeout_ms: host_timeout.milliseconds(),
     })
 }
 

@@ -13,7 +13,7 @@ use dtof_core::RangeScale;
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::{DynamicDepth, Report, Source};
 
-use crate::device::{Client, configuration};
+use crate::device::{Client, HostTimeout, Stopped, configuration};
 use crate::engine::settings::Settings;
 use crate::events::aer_file::Event;
 use crate::events::events_csv;
@@ -36,6 +36,8 @@ pub struct Task<'a> {
     pub columns: u32,
     /// It is to send changes of depth in place of depth events.
     pub dynamic_depth: Option<DynamicDepth>,
+    /// It stops its sensor once this program has been silent for so long.
+    pub host_timeout: HostTimeout,
 }
 
 /// The array of so many `pixels`, to draw and to record: in so many `columns`, or else as
@@ -156,8 +158,12 @@ struct Readers {
 /// what is read by nobody ends alone. The device takes no photons from its sensor then.
 /// Every event that has arrived is written, also if the device is gone.
 ///
+/// An output that blocks keeps this from being heard: the device stops its sensor after the host
+/// timeout, and this ends with the reason once the output goes on.
+///
 /// # Errors
-/// If the device refuses the settings or is gone, or what is written cannot be.
+/// If the device refuses the settings, is gone or has stopped its sensor, or what is written
+/// cannot be.
 pub fn monitor(
     client: &mut Client,
     task: &Task,
@@ -188,6 +194,7 @@ fn watch(
             task.columns,
             source,
             task.dynamic_depth,
+            task.host_timeout,
         )
     };
     check_masked(task.settings)?;
@@ -205,6 +212,8 @@ fn watch(
         first: client.report()?,
         last: [0; 2],
     };
+    let is_running = |report: &Report| Stopped::check(report, task.host_timeout);
+    is_running(&figures.first)?;
     let recorded = outputs.recording.is_some();
     let goes_on = |readers: &Readers| recorded || (readers.events && readers.statistics);
     let mut asked = false;
@@ -218,6 +227,7 @@ fn watch(
         if let Some(report) = report {
             let line = figures.line(client, &report, outputs.masked);
             outputs.tell(line, readers)?;
+            is_running(&report)?;
             asked = false;
         }
     }
@@ -235,6 +245,7 @@ fn watch(
         };
         let line = figures.line(client, &report, outputs.masked);
         outputs.tell(line, readers)?;
+        is_running(&report)?;
     }
     // After the answer there are no more events.
     client.configure(&configuration(Source::Link)?)

@@ -25,7 +25,9 @@ pub fn open(name: &str, image: Option<&Path>) -> Result<Box<dyn Port>> {
     if let Some(address) = name.strip_prefix("tcp:") {
         return Ok(Box::new(tcp(address).with_context(|| name.to_owned())?));
     }
-    let port = serialport::new(name, BAUD).timeout(PATIENCE).open();
+    // A device on USB stops its sensor while DTR is low.
+    let port = serialport::new(name, BAUD).timeout(PATIENCE);
+    let port = port.dtr_on_open(true).open();
     match port {
         Ok(port) => Ok(Box::new(port)),
         Err(error) if error.kind == serialport::ErrorKind::Io(ErrorKind::NotFound) => {

@@ -5,10 +5,10 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::{Result, bail, ensure};
 use dtof_core::fixed::types::I24F8;
-use dtof_link::SensorRecord;
+use dtof_link::{SensorRecord, StopReason};
 
-use super::Client;
 use super::monitor::array;
+use super::{Client, Stopped};
 use crate::engine::settings::Settings;
 use crate::events::aer_file::Header;
 use crate::export::LaserClock;
@@ -31,8 +31,12 @@ pub struct Setup {
     pub geometry: Geometry,
     /// Laser cycles in a thousand seconds; 0 if that is not known.
     pub laser_millihertz: u64,
-    /// What was said is not what the device says.
-    pub warning: Option<String>,
+    /// What was said is not what the device says, or the device has failed before.
+    pub warnings: Vec<String>,
+    /// Why the device was reset, if its sensor has not stopped for another reason since.
+    pub reset_before: Option<StopReason>,
+    /// Bins that the sensor measures.
+    pub measured_bins: u16,
     /// When its laser cycles began.
     pub began: SystemTime,
 }
@@ -49,7 +53,9 @@ impl Setup {
             bin_width: None,
             offset: I24F8::ZERO,
             laser_millihertz: 0,
+            bins: client.bins(),
         });
+        let report = client.report()?;
         let pixels = pixels.unwrap_or(sensor.pixels.min(client.pixels()));
         let asked = said.clone();
         let said = said.or(SettingsFile {
@@ -71,6 +77,7 @@ impl Setup {
         let own = LaserClock::from_millihertz(sensor.laser_millihertz);
         let told = said.sensor.laser_hz.map(LaserClock::new).transpose()?;
         let (clock, warning) = LaserClock::known(told, own, "the device");
+        let said = with_gate(said, sensor.bins, client.bins());
         let setup = Self {
             settings: said.settings(client.bins().into())?,
             asked,
@@ -78,7 +85,12 @@ impl Setup {
             pixels,
             geometry: array(pixels, columns),
             laser_millihertz: clock.map_or(0, |clock| clock.millihertz()),
-            warning,
+            warnings: warning
+                .into_iter()
+                .chain(Stopped::warning(&report))
+                .collect(),
+            reset_before: Stopped::reset_before(&report),
+            measured_bins: sensor.bins,
             began: SystemTime::now(),
         };
         masked::check(&setup.settings.masked, pixels.into())?;
@@ -101,5 +113,39 @@ impl Setup {
             laser_millihertz: self.laser_millihertz,
             start_us: i64::try_from(start.as_micros()).unwrap_or(0),
         }
+    }
+}
+
+/// Without a gate, that of the bins the sensor measures, if it does not measure all.
+#[must_use]
+pub fn with_gate(settings: SettingsFile, measured_bins: u16, bins: u16) -> SettingsFile {
+    let last = measured_bins
+        .checked_sub(1)
+        .filter(|_| measured_bins < bins);
+    let gate = settings.sensor.gate.or(last.map(|last| (0, last)));
+    SettingsFile {
+        sensor: Sensor {
+            gate,
+            ..settings.sensor
+        },
+        ..settings
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_gate_ends_with_the_sensor_unless_it_is_given() {
+        let gate = |given, measured| {
+            let mut settings = SettingsFile::default();
+            settings.sensor.gate = given;
+            with_gate(settings, measured, 128).sensor.gate
+        };
+        assert_eq!(gate(None, 128), None);
+        assert_eq!(gate(None, 117), Some((0, 116)));
+        assert_eq!(gate(Some((8, 127)), 117), Some((8, 127)));
+        assert_eq!(gate(None, 0), None);
     }
 }

@@ -11,7 +11,8 @@ use crate::desk::{
     photons,
 };
 use crate::{client, settings};
-use dtof::device::histograms::{Collected, collect};
+use dtof::device::HostTimeout;
+use dtof::device::histograms::{Collected, SoFar, collect};
 use dtof::engine::settings::Settings;
 use dtof::simulate::MM_PER_PS;
 use dtof_core::fixed::types::U16F16;
@@ -85,10 +86,9 @@ fn collected(name: &str, bin_width_ps: U16F16, seconds: f64) -> Collected {
         ..settings()
     };
     let length = Duration::from_secs_f64(seconds);
-    collect(&mut client(name), &settings, PIXELS, |so_far| {
-        so_far.elapsed >= length
-    })
-    .unwrap()
+    let done = |so_far: &SoFar| so_far.elapsed >= length;
+    let timeout = HostTimeout::default();
+    collect(&mut client(name), &settings, PIXELS, timeout, done).unwrap()
 }
 
 /// Photons a laser cycle of some bins of a pixel, within four standard deviations.

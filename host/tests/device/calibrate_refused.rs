@@ -107,6 +107,7 @@ impl Fake {
                             bin_width: None,
                             offset: I24F8::ZERO,
                             laser_millihertz: 20_000_000,
+                            bins: 128,
                         };
                         let sensor = SensorRecord::to_le_bytes(Some(&sensor));
                         (message::SENSOR, sensor.to_vec())

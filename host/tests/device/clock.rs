@@ -10,7 +10,7 @@ use std::time::{Duration, UNIX_EPOCH};
 
 use crate::settings;
 use dtof::device::monitor::{Outputs, Recording, Task, monitor};
-use dtof::device::{Client, Port, Setup};
+use dtof::device::{Client, HostTimeout, Port, Setup};
 use dtof::events::aer_file::Reader;
 use dtof::export::{Format, LaserClock, Options, export};
 use dtof::settings::SettingsFile;
@@ -130,6 +130,8 @@ fn recorded(path: &Path, sensor: impl Sensor + Send + 'static) {
         pixels: setup.pixels,
         columns: setup.geometry.columns,
         dynamic_depth: None,
+        // The clock of the device is the faster one.
+        host_timeout: HostTimeout::from_milliseconds(60_000).unwrap(),
     };
     let end_ms = now_ms.load(Ordering::Relaxed) + 1000 * SECONDS;
     let ended = monitor(

@@ -17,6 +17,7 @@ mod monitor;
 mod recording;
 #[cfg(target_os = "linux")]
 mod saved;
+mod stopped;
 #[path = "../../../firmware/tests/common/wire.rs"]
 mod wire;
 

@@ -12,8 +12,8 @@ use crate::common::sensed::Photons;
 use crate::common::{Scratch, names, says};
 use crate::{Closing, client, listen, serve, settings};
 use anyhow::Result;
-use dtof::device::Client;
 use dtof::device::monitor::{Outputs, Task, monitor};
+use dtof::device::{Client, HostTimeout};
 use dtof::engine::host::host_engine;
 use dtof::engine::settings::Settings;
 use dtof::events::events_csv;
@@ -158,6 +158,7 @@ pub fn watch_with(
         pixels: PIXELS,
         columns: 2,
         dynamic_depth,
+        host_timeout: HostTimeout::default(),
     };
     let mut outputs = Outputs {
         events,

@@ -14,7 +14,7 @@ use crate::common::says;
 use crate::{Closing, settings};
 use dtof::device::monitor::map::LiveMap;
 use dtof::device::monitor::{Outputs, Recording, Task, array, monitor};
-use dtof::device::{Client, Port};
+use dtof::device::{Client, HostTimeout, Port};
 use dtof::events::aer_file::{Event, Header, Reader};
 use dtof::events::events_csv;
 use dtof_core::{AER_VERSION, AerEncoder};
@@ -167,6 +167,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
         pixels: PIXELS,
         columns: 2,
         dynamic_depth: None,
+        host_timeout: HostTimeout::default(),
     };
     let ended = monitor(
         &mut client,
@@ -231,6 +232,7 @@ fn events_before_the_first_report_have_their_header() {
             pixels: PIXELS,
             columns: 2,
             dynamic_depth: None,
+            host_timeout: HostTimeout::default(),
         },
         |_| false,
         &mut Outputs {
@@ -260,7 +262,7 @@ fn a_pixel_the_device_was_not_configured_for_ends_it() {
 
 #[test]
 fn a_device_of_another_version_is_refused_by_both_versions() {
-    for versions in [[3, AER_VERSION], [LINK_VERSION, 2], [3, 2], [5, 4]] {
+    for versions in [[5, AER_VERSION], [LINK_VERSION, 2], [5, 3], [7, 5]] {
         let client = Client::new(Box::new(device(versions, 0, 1)));
         let [link, aer] = versions;
         let expected = format!(

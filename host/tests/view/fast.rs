@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use crate::common::aer::depth_event;
-use dtof::device::Port;
+use dtof::device::{HostTimeout, Port};
 use dtof::settings::SettingsFile;
 use dtof::view::live::{Device, Feed};
 use dtof_core::fixed::types::{I24F8, U16F16};
@@ -82,6 +82,7 @@ impl Fast {
                     bin_width: Some(U16F16::lit("250")),
                     offset: I24F8::ZERO,
                     laser_millihertz: 1_000_000_000,
+                    bins: 128,
                 };
                 (
                     message::SENSOR,
@@ -226,6 +227,7 @@ pub fn feed_of(make: impl Fn() -> Fast + Send + 'static) -> Feed {
         said: SettingsFile::default(),
         pixels: None,
         dynamic_depth: None,
+        host_timeout: HostTimeout::default(),
     };
     Feed::Device(Box::new(device))
 }

@@ -16,6 +16,7 @@ mod playback;
 mod recording;
 mod settings;
 mod speed;
+mod stopped;
 
 use std::path::Path;
 use std::sync::Arc;

@@ -16,6 +16,7 @@ mod transmit;
 
 use heapless::{Deque, Vec};
 
+use crate::StopReason;
 use crate::frame::PAYLOAD_BYTES;
 
 /// The most bytes a message holds.
@@ -40,14 +41,20 @@ const WINDOW_U8: u8 = 4;
 
 /// Kinds below this one are numbered; the others stand outside the sequence.
 const FIRST_UNNUMBERED: u8 = 0xf0;
-/// Carries no message.
+/// Those of a host lie below this one, those of a device from it on.
+const FIRST_OF_DEVICE: u8 = 0x80;
+/// Carries no message. A device's has another kind than a host's: where a line sends a device
+/// its own frames back, they are not taken for a host that is alive.
 const KEEP_ALIVE: u8 = 0xf0;
+const KEEP_ALIVE_OF_DEVICE: u8 = 0xf4;
 /// The host begins a session.
 const HELLO: u8 = 0xf1;
 /// The device has begun it.
 const WELCOME: u8 = 0xf2;
-/// The device knows no such session.
+/// The device knows no such session; in its body, why its sensor stopped last.
 const NO_SESSION: u8 = 0xf3;
+/// The host ends its session.
+const END: u8 = 0xf5;
 
 /// A numbered message: what it is and what it says.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -100,8 +107,15 @@ pub struct Endpoint {
     open: bool,
     /// A session began and nobody has asked yet.
     began: bool,
+    /// The host has ended the session, and nobody has asked yet.
+    ended: bool,
+    /// The host ends its session, and waits to hear that the device has forgotten it.
+    ending: bool,
     /// The device has forgotten the session.
     lost: bool,
+    /// Why the device's sensor stopped last, by its number: what a device says, or what a host
+    /// was told.
+    stop_reason: u8,
     greeting: [u8; GREETING_BYTES],
     peer_greeting: [u8; GREETING_BYTES],
     /// Not acknowledged yet; the front one has the number `first`.
@@ -157,7 +171,10 @@ impl Endpoint {
             session: 0,
             open: false,
             began: false,
+            ended: false,
+            ending: false,
             lost: false,
+            stop_reason: 0,
             greeting,
             peer_greeting: [0; GREETING_BYTES],
             outbox: Deque::new(),
@@ -204,6 +221,32 @@ impl Endpoint {
     #[must_use]
     pub const fn is_lost(&self) -> bool {
         self.lost
+    }
+
+    /// Why the device's sensor stopped last, as the device said when it had forgotten the
+    /// session.
+    #[must_use]
+    pub const fn stop_reason(&self) -> Option<StopReason> {
+        StopReason::from_number(self.stop_reason)
+    }
+
+    /// What a device tells a host whose session it has forgotten.
+    pub const fn set_stop_reason(&mut self, reason: StopReason) {
+        self.stop_reason = reason as u8;
+    }
+
+    /// Ends the host's session: the device stops its sensor. [`Self::is_lost`] tells when the
+    /// device has heard it. Nothing else is sent from now on.
+    pub const fn end(&mut self, now_ms: u32) {
+        self.ending = true;
+        // It is due at once.
+        self.spoke_ms = now_ms.wrapping_sub(KEEP_ALIVE_MS);
+    }
+
+    /// Whether the host has ended its session since this was last asked. All that belonged to
+    /// the session is gone.
+    pub const fn take_ended(&mut self) -> bool {
+        core::mem::replace(&mut self.ended, false)
     }
 
     /// The greeting of the other end.

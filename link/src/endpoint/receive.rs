@@ -3,8 +3,8 @@
 use heapless::Vec;
 
 use super::{
-    BODY_BYTES, Endpoint, FIRST_UNNUMBERED, GREETING_BYTES, HEADER_BYTES, HELLO, KEEP_ALIVE,
-    Message, NO_SESSION, PATIENCE, RETRANSMIT_MS, WELCOME,
+    BODY_BYTES, END, Endpoint, FIRST_OF_DEVICE, FIRST_UNNUMBERED, GREETING_BYTES, HEADER_BYTES,
+    HELLO, KEEP_ALIVE, KEEP_ALIVE_OF_DEVICE, Message, NO_SESSION, PATIENCE, RETRANSMIT_MS, WELCOME,
 };
 use crate::frame::FrameError;
 
@@ -55,16 +55,26 @@ impl Endpoint {
                     self.begin(session, *greeting);
                 }
             }
-            NO_SESSION if self.host && ours => self.lost = true,
-            KEEP_ALIVE if ours => self.acknowledged(expects, limit, now_ms),
-            0..FIRST_UNNUMBERED if ours => {
+            NO_SESSION if self.host && ours => {
+                self.lost = true;
+                self.stop_reason = body.first().copied().unwrap_or(0);
+            }
+            END if !self.host && ours => {
+                self.forget();
+                self.ended = true;
+                self.reply = Some((NO_SESSION, session));
+            }
+            KEEP_ALIVE if ours && !self.host => self.acknowledged(expects, limit, now_ms),
+            KEEP_ALIVE_OF_DEVICE if ours && self.host => self.acknowledged(expects, limit, now_ms),
+            0..FIRST_UNNUMBERED if ours && self.host == (kind >= FIRST_OF_DEVICE) => {
                 self.acknowledged(expects, limit, now_ms);
                 self.numbered(kind, number, body);
             }
             _ => {
                 count(&mut self.counters.foreign);
-                // Only what is known to be wrong is answered, and never an answer.
-                if !self.host && kind <= KEEP_ALIVE {
+                // Only what a host is known to have sent is answered: never an answer.
+                let is_of_host = matches!(kind, 0..FIRST_OF_DEVICE | KEEP_ALIVE | END);
+                if !self.host && is_of_host {
                     self.reply = Some((NO_SESSION, session));
                 }
                 return;
@@ -74,13 +84,19 @@ impl Endpoint {
     }
 
     fn begin(&mut self, session: u16, peer_greeting: [u8; GREETING_BYTES]) {
+        self.forget();
+        self.session = session;
+        self.open = true;
+        self.began = true;
+        self.peer_greeting = peer_greeting;
+    }
+
+    /// Back to an end without a session.
+    fn forget(&mut self) {
         *self = Self {
             host: self.host,
-            session,
-            open: true,
-            began: true,
-            peer_greeting,
             counters: self.counters,
+            stop_reason: self.stop_reason,
             ..Self::closed(self.greeting)
         };
     }

@@ -2,8 +2,8 @@
 
 use super::receive::count;
 use super::{
-    Endpoint, HEADER_BYTES, HELLO, KEEP_ALIVE, KEEP_ALIVE_MS, RETRANSMIT_MOST_MS, RETRANSMIT_MS,
-    WELCOME, WINDOW,
+    END, Endpoint, HEADER_BYTES, HELLO, KEEP_ALIVE, KEEP_ALIVE_MS, KEEP_ALIVE_OF_DEVICE,
+    NO_SESSION, RETRANSMIT_MOST_MS, RETRANSMIT_MS, WELCOME, WINDOW,
 };
 use crate::frame::{self, WIRE_BYTES};
 
@@ -20,6 +20,13 @@ impl Endpoint {
                 return self.unnumbered(HELLO, self.session, now_ms, wire);
             }
             return 0;
+        }
+        let is_quiet = now_ms.wrapping_sub(self.spoke_ms) >= KEEP_ALIVE_MS;
+        if self.ending {
+            if self.lost || !is_quiet {
+                return 0;
+            }
+            return self.unnumbered(END, self.session, now_ms, wire);
         }
         if self.sent > 0 && waited_ms >= self.wait_ms {
             self.sent = 0;
@@ -49,8 +56,13 @@ impl Endpoint {
             self.spoke_ms = now_ms;
             return length;
         }
-        if self.acknowledge || now_ms.wrapping_sub(self.spoke_ms) >= KEEP_ALIVE_MS {
-            return self.unnumbered(KEEP_ALIVE, self.session, now_ms, wire);
+        if self.acknowledge || is_quiet {
+            let kind = if self.host {
+                KEEP_ALIVE
+            } else {
+                KEEP_ALIVE_OF_DEVICE
+            };
+            return self.unnumbered(kind, self.session, now_ms, wire);
         }
         0
     }
@@ -62,17 +74,17 @@ impl Endpoint {
         now_ms: u32,
         wire: &mut [u8; WIRE_BYTES],
     ) -> usize {
-        if kind == KEEP_ALIVE {
+        if matches!(kind, KEEP_ALIVE | KEEP_ALIVE_OF_DEVICE | END) {
             self.spoke_ms = now_ms;
             self.acknowledge = false;
         }
         let header = self.header(kind, session, 0);
-        let greeting: &[u8] = if matches!(kind, HELLO | WELCOME) {
-            &self.greeting
-        } else {
-            &[]
+        let body: &[u8] = match kind {
+            HELLO | WELCOME => &self.greeting,
+            NO_SESSION => &[self.stop_reason],
+            _ => &[],
         };
-        frame::encode([&header, greeting], wire)
+        frame::encode([&header, body], wire)
     }
 
     fn header(&self, kind: u8, session: u16, number: u8) -> [u8; HEADER_BYTES] {

@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 
@@ -14,6 +16,13 @@ use crate::cargo;
 /// Pixels of both examples.
 const PIXELS: u32 = 64;
 const CYCLES: u32 = 1000;
+/// What the device prints when its sensor starts, and when it stops for a reason.
+const ON: &str = "sensor on";
+const OFF: &str = "sensor off, reason ";
+/// `DTOF_STOP_SILENCE`.
+const SILENCE: u8 = 4;
+/// For a line of the device: a host may be silent for 3 s.
+const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Runs both and compares with the program of this workspace, which it builds.
 pub fn check(root: &Path, host: &Path, target: &Path) -> Result<()> {
@@ -30,7 +39,8 @@ pub fn check(root: &Path, host: &Path, target: &Path) -> Result<()> {
     }
     fs::create_dir_all(&folder)?;
     events(&dtof, host, &folder)?;
-    monitor(&dtof, host)
+    monitor(&dtof, host)?;
+    silence(&dtof, host)
 }
 
 /// The photons of a file become the events that `dtof replay` makes of them.
@@ -94,17 +104,27 @@ fn list() -> String {
     text
 }
 
-/// A host watches the device for a second.
-fn monitor(dtof: &Path, host: &Path) -> Result<()> {
+/// A device, its port, and the lines that it prints from then on.
+fn device(host: &Path) -> Result<(Child, String, Receiver<String>)> {
     let mut device = Command::new(host.join("device"))
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .spawn()?;
     let stdout = device.stdout.take().context("no output of the device")?;
-    let mut port = String::new();
-    BufReader::new(stdout).read_line(&mut port)?;
+    let (sender, lines) = channel();
+    std::thread::spawn(move || {
+        let mut lines = BufReader::new(stdout).lines().map_while(Result::ok);
+        lines.try_for_each(|line| sender.send(line))
+    });
+    let port = lines.recv_timeout(PATIENCE).context("no port")?;
+    Ok((device, port, lines))
+}
+
+/// A host watches the device for a second. The sensor is off before and after.
+fn monitor(dtof: &Path, host: &Path) -> Result<()> {
+    let (mut device, port, lines) = device(host)?;
     let mut watch = Command::new(dtof);
-    watch.args(["monitor", "--seconds", "1", "--device", port.trim()]);
+    watch.args(["monitor", "--seconds", "1", "--device", &port]);
     let watched = watch.stdin(Stdio::null()).output()?;
     if !watched.status.success() {
         device.kill()?;
@@ -113,6 +133,11 @@ fn monitor(dtof: &Path, host: &Path) -> Result<()> {
     let why = String::from_utf8_lossy(&watched.stderr).into_owned();
     ensure!(watched.status.success(), "monitor: {}", why.trim());
     ensure!(ended.success(), "device: {ended}");
+    let lines: Vec<String> = lines.iter().collect();
+    ensure!(
+        lines.len() == 2 && lines[0] == ON && lines[1].starts_with(OFF),
+        "device: {lines:?}"
+    );
     let text = String::from_utf8(watched.stdout)?;
     let events: Vec<Vec<u32>> = text.lines().skip(1).map(numbers).collect();
     ensure!(events.len() > 100, "monitor: only {} events", events.len());
@@ -130,6 +155,33 @@ fn monitor(dtof: &Path, host: &Path) -> Result<()> {
         "device: {} events, {right} of them at their target",
         events.len()
     );
+    Ok(())
+}
+
+/// A host is stopped, as a computer does that goes to sleep. The device switches its sensor off.
+fn silence(dtof: &Path, host: &Path) -> Result<()> {
+    let (mut device, port, lines) = device(host)?;
+    let mut watch = Command::new(dtof);
+    watch.args(["monitor", "--seconds", "600", "--device", &port]);
+    watch.stdin(Stdio::null()).stdout(Stdio::null());
+    let mut watch = watch.stderr(Stdio::null()).spawn()?;
+    let lines_while_stopped = || {
+        let on = lines.recv_timeout(PATIENCE)?;
+        let stop = ["-STOP".to_owned(), watch.id().to_string()];
+        succeed(Command::new("kill").args(stop))?;
+        Ok::<_, anyhow::Error>([on, lines.recv_timeout(PATIENCE)?])
+    };
+    let lines = lines_while_stopped();
+    watch.kill()?;
+    watch.wait()?;
+    // Without a host it ends.
+    device.wait()?;
+    let lines = lines.context("the sensor of a host that is silent")?;
+    ensure!(
+        lines == [ON.to_owned(), format!("{OFF}{SILENCE}")],
+        "device: {lines:?}"
+    );
+    println!("device: off when the host is silent");
     Ok(())
 }
 

@@ -11,7 +11,7 @@ use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
 use dtof_link::{
     AdaptiveBinning, Configuration, DynamicDepth, HistogramPart, NoHistogram, Report, SensorRecord,
-    Source,
+    Source, StopReason,
 };
 
 use crate::{OK, checked, zeroed};
@@ -21,7 +21,8 @@ struct Pair {
     host: Endpoint,
     deframer: Deframer,
     device: dtof_link_t,
-    began: u32,
+    /// Each `DTOF_SESSION_...` that was told.
+    sessions: Vec<u8>,
     now_ms: u32,
 }
 
@@ -35,15 +36,13 @@ impl Pair {
             host: Endpoint::host(7, greeting(0, 0), 0),
             deframer: Deframer::new(),
             device,
-            began: 0,
+            sessions: Vec::new(),
             now_ms: 0,
         };
         pair.carry();
         assert!(pair.host.is_open());
-        assert_eq!(
-            (pair.began, pair.host.peer_greeting()),
-            (1, &greeting(128, 64))
-        );
+        assert_eq!(pair.sessions, [DTOF_SESSION_BEGAN]);
+        assert_eq!(pair.host.peer_greeting(), &greeting(128, 64));
         pair
     }
 
@@ -51,14 +50,15 @@ impl Pair {
     fn carry(&mut self) {
         for _ in 0..50 {
             self.now_ms += 10;
-            let (mut wire, mut began) = ([0; WIRE_BYTES], 0);
+            let (mut wire, mut session) = ([0; WIRE_BYTES], 9);
             let length = self.host.transmit(self.now_ms, &mut wire);
             // SAFETY: each pointer leads to what it should.
             unsafe {
                 let (device, bytes) = (&mut self.device, wire.as_ptr());
-                let status = dtof_link_receive(device, bytes, length, self.now_ms, &mut began);
+                let status = dtof_link_receive(device, bytes, length, self.now_ms, &mut session);
                 assert_eq!(status, OK);
-                self.began += u32::from(began);
+                self.sessions
+                    .extend(Some(session).filter(|&session| session != DTOF_SESSION_UNCHANGED));
                 let mut length = 0;
                 let (device, room) = (&mut self.device, wire.as_mut_ptr());
                 assert_eq!(
@@ -125,6 +125,7 @@ fn configuration() -> Configuration {
         offset_mm: I24F8::lit("-12.5"),
         source: Source::Sensor,
         dynamic_depth: None,
+        host_timeout_ms: 700,
     }
 }
 
@@ -198,6 +199,7 @@ fn the_hosts_configuration_becomes_settings() {
         bin_width_ps_q16: 97 * 65536 + 32768,
         offset_mm_q8: -3200,
         pixels: 9,
+        host_timeout_ms: 700,
         source: DTOF_SOURCE_SENSOR,
     };
     assert_eq!(config, expected);
@@ -223,6 +225,17 @@ fn what_this_library_does_not_have_is_refused() {
         read(&good.to_le_bytes()[1..]),
         Err(DTOF_ERROR_CONFIGURATION)
     );
+    for (host_timeout_ms, refused) in [(0, false), (199, true), (200, false), (60_001, true)] {
+        let changed = Configuration {
+            host_timeout_ms,
+            ..good
+        };
+        let error = read(&changed.to_le_bytes()).err();
+        assert_eq!(error, refused.then_some(DTOF_ERROR_HOST_TIMEOUT));
+    }
+    let mut reserved = good.to_le_bytes();
+    *reserved.last_mut().unwrap() = 1;
+    assert_eq!(read(&reserved), Err(DTOF_ERROR_RESERVED_FIELD));
 }
 
 #[test]
@@ -236,13 +249,17 @@ fn records_are_those_of_the_link() {
         overrun: 3,
         unknown: 4,
         sensor_errors: 5,
+        sensor_starts: 7,
+        sensor_stops: 8,
         last_sensor_error: 6,
+        stop_reason: DTOF_STOP_WATCHDOG,
     };
     let done: dtof_statistics_t = zeroed();
     // SAFETY: each pointer leads to what it should.
     unsafe {
         let room = sensor.as_mut_ptr();
-        assert_eq!(dtof_sensor_write(9, 250 << 16, 1_000_000, -256, room), OK);
+        let written = dtof_sensor_write(9, 100, 250 << 16, 1_000_000, -256, room);
+        assert_eq!(written, OK);
         let room = body.as_mut_ptr();
         assert_eq!(dtof_report_write(&report, &done, &pair.device, room), OK);
     }
@@ -251,6 +268,7 @@ fn records_are_those_of_the_link() {
         bin_width: Some(U16F16::lit("250")),
         offset: I24F8::lit("-1"),
         laser_millihertz: 1_000_000,
+        bins: 100,
     };
     assert_eq!(SensorRecord::from_le_bytes(&sensor), Some(Some(expected)));
     let read = Report::from_le_bytes(&body).unwrap();
@@ -262,7 +280,74 @@ fn records_are_those_of_the_link() {
         (read.unknown, read.sensor_errors, read.last_sensor_error),
         (4, 5, 6)
     );
+    assert_eq!((read.sensor_starts, read.sensor_stops), (7, 8));
+    let reason = StopReason::from_number(read.stop_reason);
+    assert_eq!(reason, Some(StopReason::Watchdog));
     assert_eq!(read.link.frames, pair.state().frames);
+}
+
+#[test]
+fn a_device_knows_how_long_its_host_has_been_silent() {
+    let mut pair = Pair::new();
+    let silent = |pair: &Pair, now_ms| {
+        let mut silent_ms = 9;
+        // SAFETY: both pointers lead to what they should.
+        let status = unsafe { dtof_link_silent_ms(&pair.device, now_ms, &mut silent_ms) };
+        assert_eq!(status, OK);
+        silent_ms
+    };
+    // A host with nothing to say says so every 50 ms.
+    for _ in 0..10 {
+        pair.carry();
+        assert!(silent(&pair, pair.now_ms) <= 50);
+    }
+    let first = silent(&pair, pair.now_ms);
+    assert_eq!(silent(&pair, pair.now_ms + 3000), first + 3000);
+
+    // Its own frames, which a line may send back, are not its host.
+    for _ in 0..100 {
+        pair.now_ms += 10;
+        let (mut wire, mut length, mut session) = ([0; WIRE_BYTES], 0, 9);
+        let room = wire.as_mut_ptr();
+        // SAFETY: each pointer leads to what it should.
+        unsafe {
+            let sent = dtof_link_transmit(&mut pair.device, pair.now_ms, room, &mut length);
+            assert_eq!(sent, OK);
+            let (device, bytes) = (&mut pair.device, wire.as_ptr());
+            let heard = dtof_link_receive(device, bytes, length, pair.now_ms, &mut session);
+            assert_eq!((heard, session), (OK, DTOF_SESSION_UNCHANGED));
+        }
+    }
+    assert!(silent(&pair, pair.now_ms) >= 1000);
+    assert_eq!(pair.state().is_open, 1);
+}
+
+#[test]
+fn a_host_that_ends_its_session_hears_why_the_sensor_stopped() {
+    let mut pair = Pair::new();
+    assert_eq!(pair.host.stop_reason(), None);
+    // SAFETY: the pointer leads to a link.
+    let told = unsafe { dtof_link_set_stop_reason(&mut pair.device, DTOF_STOP_END_OF_SESSION) };
+    assert_eq!(told, OK);
+    pair.host.end(pair.now_ms);
+    pair.carry();
+    assert_eq!(pair.sessions, [DTOF_SESSION_BEGAN, DTOF_SESSION_ENDED]);
+    assert!(pair.host.is_lost());
+    assert_eq!(pair.host.stop_reason(), Some(StopReason::EndOfSession));
+    assert_eq!(pair.state().is_open, 0);
+    let mut silent_ms = 0;
+    // SAFETY: both pointers lead to what they should.
+    let told = unsafe { dtof_link_silent_ms(&pair.device, pair.now_ms, &mut silent_ms) };
+    assert_eq!((told, silent_ms), (OK, u32::MAX));
+
+    // The next host.
+    pair.host = Endpoint::host(8, greeting(0, 0), pair.now_ms);
+    pair.carry();
+    assert_eq!(pair.sessions[2..], [DTOF_SESSION_BEGAN]);
+    // Another one, without a word of goodbye from the one before.
+    pair.host = Endpoint::host(9, greeting(0, 0), pair.now_ms);
+    pair.carry();
+    assert_eq!(pair.sessions[3..], [DTOF_SESSION_BEGAN]);
 }
 
 /// The counts of all parts, which begin where the one before ended.

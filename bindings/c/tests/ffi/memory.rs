@@ -37,10 +37,11 @@ fn what_a_function_writes_may_be_written_by_nobody_before() {
     let (mut scale, mut range, mut link) = (Room::new(), Room::new(), Room::new());
     let (mut encoder, mut decoder, mut record) = (Room::new(), Room::new(), Room::new());
     let (mut length, mut state, mut counts) = (Room::new(), Room::new(), Room::new());
+    let mut silent = Room::new();
     let mut wire = Room::<[u8; DTOF_WIRE_BYTES]>::new();
     let mut body = Room::<[u8; DTOF_BODY_BYTES]>::new();
     let mut events = Room::<[dtof_event_t; DTOF_ECHOES]>::new();
-    let (mut look, mut fired, mut began) = (Room::new(), Room::new(), Room::new());
+    let (mut look, mut fired, mut session) = (Room::new(), Room::new(), Room::new());
     let mut sensor = Room::<[u8; DTOF_SENSOR_BYTES]>::new();
     let mut report = Room::<[u8; DTOF_REPORT_BYTES]>::new();
     let mut done = zeroed();
@@ -98,9 +99,11 @@ fn what_a_function_writes_may_be_written_by_nobody_before() {
 
         let at = link.at();
         assert_eq!(dtof_link_init(at, DTOF_LINK_SIZE, 1), OK);
-        assert_eq!(dtof_link_receive(at, ptr::null(), 0, 0, began.at()), OK);
+        assert_eq!(dtof_link_receive(at, ptr::null(), 0, 0, session.at()), OK);
         assert_eq!(dtof_link_state(at, state.at()), OK);
-        assert_eq!((began.read(), state.read().is_open), (0, 0));
+        assert_eq!((session.read(), state.read().is_open), (0, 0));
+        assert_eq!(dtof_link_silent_ms(at, 0, silent.at()), OK);
+        assert_eq!(silent.read(), u32::MAX);
         let room = wire.at().cast::<u8>();
         let mut length = Room::new();
         assert_eq!(dtof_link_transmit(at, 0, room, length.at()), OK);
@@ -110,7 +113,7 @@ fn what_a_function_writes_may_be_written_by_nobody_before() {
         assert_eq!(dtof_link_take(at, message.at()), DTOF_ERROR_NO_MESSAGE);
 
         let room = sensor.at().cast::<u8>();
-        assert_eq!(dtof_sensor_write(1, 0, 0, 0, room), OK);
+        assert_eq!(dtof_sensor_write(1, 0, 0, 0, 0, room), OK);
         assert_eq!(sensor.read()[..2], [1, 0]);
         let room = report.at();
         let of = dtof_report_t::default();
@@ -216,8 +219,10 @@ fn no_object_is_taken_for_another() {
                 dtof_link_transmit(object.at(), 0, room, &mut length),
                 dtof_link_peek(object.at(), &mut 0),
                 dtof_link_take(object.at(), &mut message),
-                dtof_link_offer(object.at(), 1, room, 0),
+                dtof_link_offer(object.at(), DTOF_MESSAGE_EVENTS, room, 0),
                 dtof_link_state(object.at(), &mut zeroed()),
+                dtof_link_silent_ms(object.at(), 0, &mut 0),
+                dtof_link_set_stop_reason(object.at(), DTOF_STOP_RESET),
                 dtof_report_write(&zeroed(), &done, object.at(), room),
             ]
         };
@@ -227,7 +232,14 @@ fn no_object_is_taken_for_another() {
             .count();
     }
     // Those of its own.
-    assert_eq!(accepted, [7, 7, 1, 1, 0, 0]);
+    assert_eq!(accepted, [7, 9, 1, 1, 0, 0]);
+}
+
+/// A link in this memory.
+fn link_at(memory: &mut dtof_link_t) -> *const dtof_link_t {
+    // SAFETY: the pointer leads to a link.
+    assert_eq!(unsafe { dtof_link_init(memory, DTOF_LINK_SIZE, 1) }, OK);
+    memory
 }
 
 /// A function is handed a pointer to what it should have.
@@ -235,7 +247,7 @@ type Call = fn(*mut u8) -> dtof_status_t;
 
 /// Each pointer of each function, with the alignment of what lies there.
 #[rustfmt::skip]
-const POINTERS: [(usize, Call); 28] = {
+const POINTERS: [(usize, Call); 31] = {
     // SAFETY: the tests hand over null, what is misaligned, and nothing else.
     unsafe {[
         (4, |p| dtof_config_paper(p.cast())),
@@ -263,6 +275,9 @@ const POINTERS: [(usize, Call); 28] = {
         (8, |p| dtof_link_transmit(p.cast(), 0, [0; 256].as_mut_ptr(), &mut 0)),
         (8, |p| dtof_link_peek(p.cast(), &mut 0)),
         (8, |p| dtof_link_state(p.cast(), &mut zeroed())),
+        (8, |p| dtof_link_silent_ms(p.cast(), 0, &mut 0)),
+        (4, |p| dtof_link_silent_ms(link_at(&mut zeroed()), 0, p.cast())),
+        (8, |p| dtof_link_set_stop_reason(p.cast(), DTOF_STOP_RESET)),
         (8, |p| dtof_pixel_histogram_write(p.cast(), 0, 0, [0; 244].as_mut_ptr(), &mut 0)),
         (4, |p| dtof_counts_write(p.cast(), 0, 0, 0, 0, [0; 244].as_mut_ptr(), &mut 0)),
         (8, |p| dtof_report_write(p.cast(), &zeroed(), &zeroed(), [0; 256].as_mut_ptr())),
@@ -309,16 +324,17 @@ fn bytes_that_do_not_lie_anywhere_are_refused() {
             dtof_link_receive(&mut link, none, 1, 0, &mut 0),
             dtof_link_receive(&mut link, room, 1, 0, none),
             dtof_link_transmit(&mut link, 0, room, ptr::null_mut()),
-            dtof_link_offer(&mut link, 1, none, 1),
+            dtof_link_offer(&mut link, DTOF_MESSAGE_EVENTS, none, 1),
             dtof_link_state(&link, ptr::null_mut()),
-            dtof_sensor_write(1, 0, 0, 0, none),
+            dtof_link_silent_ms(&link, 0, ptr::null_mut()),
+            dtof_sensor_write(1, 0, 0, 0, 0, none),
             dtof_report_write(&zeroed(), &zeroed(), &link, none),
             dtof_device_config_read(none, 1, &mut zeroed()),
             dtof_no_histogram_write(0, 1, none, &mut length),
             dtof_no_histogram_write(0, 1, room, ptr::null_mut()),
             dtof_counts_write([0; DTOF_BINS].as_ptr(), 0, 0, 0, 0, room, ptr::null_mut()),
         ];
-        assert_eq!(refused, [DTOF_ERROR_NULL; 16]);
+        assert_eq!(refused, [DTOF_ERROR_NULL; 17]);
         // The encoder has sent no time.
         assert_eq!(dtof_aer_encode(&mut encoder, &event, room, &mut length), OK);
         assert_eq!(length, 32);

@@ -184,8 +184,15 @@ fn no_pointer_is_taken_that_is_null_or_misaligned() {
         assert_eq!(dtof_link_init(&mut link, DTOF_LINK_SIZE, 1), OK);
         let sent = dtof_link_transmit(&mut link, 0, null_mut(), &mut length);
         assert_eq!(sent, DTOF_ERROR_NULL);
-        let offer = dtof_link_offer(&mut link, 0xf0, null(), 0);
-        assert_eq!(offer, DTOF_ERROR_MESSAGE_KIND);
+        // Those of a host, and none.
+        for kind in [0, DTOF_MESSAGE_CONFIGURE, 0x7f, 0xf0, 0xff] {
+            let offer = dtof_link_offer(&mut link, kind, null(), 0);
+            assert_eq!(offer, DTOF_ERROR_MESSAGE_KIND);
+        }
+        for reason in [DTOF_STOP_NONE, DTOF_STOP_RESET + 1, u8::MAX] {
+            let told = dtof_link_set_stop_reason(&mut link, reason);
+            assert_eq!(told, DTOF_ERROR_REASON);
+        }
         let offer = dtof_link_offer(&mut link, DTOF_MESSAGE_EVENTS, word, 245);
         assert_eq!(offer, DTOF_ERROR_MESSAGE_LENGTH);
         assert_eq!(dtof_aer_end(0, 0, null_mut()), DTOF_ERROR_NULL);
@@ -212,7 +219,7 @@ fn every_status_has_a_text_of_its_own() {
     let numbers = of_enum.lines().filter_map(|line| line.split_once(" = "));
     let numbers = numbers.map(|(_, number)| number.trim_end_matches(',').parse::<u8>().unwrap());
     let numbers: BTreeSet<u8> = numbers.collect();
-    assert_eq!(numbers.len(), 41);
+    assert_eq!(numbers.len(), 43);
     let mut texts = BTreeSet::new();
     for number in 0..=u8::MAX {
         // SAFETY: all are texts of the library.
@@ -231,7 +238,7 @@ fn every_status_has_a_text_of_its_own() {
 fn every_reason_of_the_link_has_a_status_and_comes_back() {
     for number in 1..=u8::MAX {
         let Some(refusal) = Refusal::from_number(number) else {
-            assert!(number > 18);
+            assert!(number > 20);
             break;
         };
         let status = dtof_status_t::from(refusal);

@@ -91,6 +91,8 @@ pub struct SensorPort {
 /// The board, once started.
 pub struct Pico {
     watchdog: Watchdog,
+    /// When it was fed last.
+    fed_ms: u32,
     reset_reason: ResetReason,
 }
 
@@ -189,6 +191,7 @@ impl Pico {
         };
         let board = Self {
             watchdog,
+            fed_ms: 0,
             reset_reason,
         };
         (board, serial, sensor)
@@ -230,8 +233,13 @@ impl Board for Pico {
         MILLISECONDS.load(Ordering::Relaxed)
     }
 
+    /// Only while time goes on: without it no host would ever be taken for silent.
     fn feed_watchdog(&mut self) {
-        self.watchdog.feed();
+        let now_ms = self.now_ms();
+        if now_ms != self.fed_ms {
+            self.fed_ms = now_ms;
+            self.watchdog.feed();
+        }
     }
 
     fn start_sending() {
@@ -287,7 +295,10 @@ impl Port {
             match self.rx.read_raw(&mut byte) {
                 Ok(_) => {
                     self.interrupt.on_receive(byte[0]);
-                    self.over_usb = false;
+                    if self.over_usb {
+                        self.over_usb = false;
+                        self.look_at_line();
+                    }
                 }
                 Err(nb::Error::Other(_)) => self.interrupt.on_loss(),
                 Err(nb::Error::WouldBlock) => break,
@@ -301,7 +312,14 @@ impl Port {
         if self.usb.receive(&mut self.interrupt) {
             self.over_usb = true;
         }
+        self.look_at_line();
         self.send();
+    }
+
+    /// Tells the main loop whether the host's port is open. Only that of the USB can tell.
+    fn look_at_line(&mut self) {
+        let listens = !self.over_usb || self.usb.listens();
+        self.interrupt.set_listening(listens);
     }
 
     fn send(&mut self) {

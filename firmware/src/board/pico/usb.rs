@@ -7,7 +7,9 @@ use rp2040_hal::usb::UsbBus;
 use static_cell::StaticCell;
 use usb_device::UsbError;
 use usb_device::bus::UsbBusAllocator;
-use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbVidPid};
+use usb_device::device::{
+    StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbDeviceState, UsbVidPid,
+};
 use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 
 use crate::serial::SerialInterrupt;
@@ -72,6 +74,12 @@ impl Usb {
             }
         }
         received
+    }
+
+    /// Whether a program has the port open. It raises DTR then; a host takes DTR down when the
+    /// program ends, however it ends, and a cable that is pulled suspends the device.
+    pub fn listens(&self) -> bool {
+        self.device.state() == UsbDeviceState::Configured && self.class.dtr()
     }
 
     /// Hands over what there is to send, as far as the host takes it. Runs again when a packet

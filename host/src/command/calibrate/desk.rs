@@ -1,6 +1,6 @@
 //! Calibration of the sensor on the desk: the device's histograms in place of a recording.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
@@ -10,12 +10,15 @@ use dtof::cli::arguments::{MOST_WHOLE, whole};
 use dtof::cli::{complain, interrupt};
 use dtof::device::histograms::{Collected, SoFar, collect};
 use dtof::device::monitor::array;
-use dtof::device::{self, Client, Port};
+use dtof::device::{self, Client, Port, Stopped};
 use dtof::input::open::BIN_WIDTH_PS;
 use dtof::jobs::recording::Recording;
 use dtof::progress::Progress;
 use dtof::rows::{Row, grouped};
 use dtof::settings::{Sensor, SettingsFile};
+
+use crate::command::device_options::HostOptions;
+use crate::command::warn;
 
 /// How long photons are collected, unless somebody says.
 const SECONDS: u32 = 10;
@@ -35,6 +38,8 @@ pub struct Desk {
     /// End sooner, when the median pixel of the device has so many photons
     #[arg(long, value_name = "N", value_parser = whole(1..=MOST_WHOLE))]
     photons: Option<u64>,
+    #[command(flatten)]
+    host: HostOptions,
 }
 
 /// What was found, from whatever it is.
@@ -56,6 +61,7 @@ impl Desk {
             ("--image", self.image.is_some()),
             ("--seconds", self.seconds.is_some()),
             ("--photons", self.photons.is_some()),
+            ("--host-timeout", self.host.is_given()),
         ];
         for (option, is_there) in of_devices {
             ensure!(!is_there, "{option} is of --device, not of recordings");
@@ -86,7 +92,7 @@ impl Desk {
         quiet: bool,
     ) -> Result<Gathered> {
         let mut client = Client::new(port)?;
-        interrupt::listen(|| ())?;
+        interrupt::listen(device::end_sessions)?;
         let sensor = client.sensor()?.context("the device has no sensor")?;
         let pixels = sensor.pixels.min(client.pixels());
         let bins = client.bins();
@@ -122,8 +128,12 @@ impl Desk {
             ..SettingsFile::default()
         };
         let settings = settings.settings(bins.into())?;
-        let collected =
-            self.collect(quiet, |done| collect(&mut client, &settings, pixels, done))?;
+        let before = Stopped::warning(&client.report()?);
+        warn(Path::new(name), before, quiet);
+        let host_timeout = self.host.timeout();
+        let collected = self.collect(quiet, |done| {
+            collect(&mut client, &settings, pixels, host_timeout, done)
+        })?;
         drop(client);
         if collected.full > 0 && !quiet {
             let full = grouped(collected.full);

@@ -105,8 +105,8 @@ mod tests {
         // A report whose numbers are `number` in one field after the other, little-endian.
         let report = |number: fn(u64) -> u64| {
             let wide = (0..20).flat_map(|at| number(at).to_le_bytes());
-            let narrow = (20..30).flat_map(|at| u32::try_from(number(at)).unwrap().to_le_bytes());
-            let bytes: Vec<u8> = wide.chain(narrow).chain([1]).collect();
+            let narrow = (20..32).flat_map(|at| u32::try_from(number(at)).unwrap().to_le_bytes());
+            let bytes: Vec<u8> = wide.chain(narrow).chain([1, 0]).collect();
             Report::from_le_bytes(&bytes).unwrap()
         };
         let none = LinkCounters::default();
@@ -115,9 +115,9 @@ mod tests {
         assert_eq!(
             losses(&report(|at| 101 + at), &report(|_| 100), &none),
             ", saturated 105, saturated in blocks 114, rejected 106, gated out 107, unaddressed 102, \
-             deferred 227, expired 110, expired and deferred 231, lost bytes 21, corrupt frames 25, \
-             oversized frames 26, foreign frames 27, out of order 28, duplicates 29, \
-             retransmissions 30, unknown messages 22, sensor errors 23 (last: no answer)"
+             deferred 227, expired 110, expired and deferred 231, lost bytes 21, corrupt frames 27, \
+             oversized frames 28, foreign frames 29, out of order 30, duplicates 31, \
+             retransmissions 32, unknown messages 22, sensor errors 23 (last: no answer)"
         );
         // Errors of before are not this one's.
         assert_eq!(losses(&report(|_| 0), &Report::default(), &none), "");

@@ -16,8 +16,9 @@ pub use playback::Playback;
 
 use super::hub::{Hub, Kind};
 use super::outputs::{Folder, Recorded, Recorder};
+use crate::cli::complain;
 use crate::events::aer_file::Header;
-use crate::rows::grouped;
+use crate::rows::{grouped, printable};
 
 /// Where an answer goes: what was done, or why not, in a line.
 pub type Answer = oneshot::Sender<Result<String, String>>;
@@ -77,6 +78,8 @@ impl Feed {
         stop: &AtomicBool,
     ) -> Result<()> {
         let mut work = Work {
+            name: self.name(),
+            warned: Vec::new(),
             hub,
             commands,
             stop,
@@ -98,6 +101,10 @@ impl Feed {
 
 /// What a feed works with.
 struct Work<'a> {
+    /// Of the source, for people.
+    name: String,
+    /// Warnings that were told.
+    warned: Vec<String>,
     hub: &'a Hub,
     commands: &'a Receiver<Command>,
     stop: &'a AtomicBool,
@@ -110,32 +117,57 @@ impl Work<'_> {
         self.stop.load(Ordering::Relaxed)
     }
 
+    /// A line on standard error.
+    fn complain(&self, text: &str) {
+        complain(&printable(&format!("{}: {text}", self.name)));
+    }
+
+    /// Warnings on standard error, each once.
+    fn warn(&mut self, warnings: &[String]) {
+        for warning in warnings {
+            if !self.warned.contains(warning) {
+                let line = format!("warning: {}: {warning}", self.name);
+                complain(&printable(&line));
+                self.warned.push(warning.clone());
+            }
+        }
+    }
+
     /// Records events of a `header`, or stops it.
     fn wish_to_record(&mut self, on: bool, header: Option<&Header>) -> Result<String> {
-        let done = if on {
-            self.recorder.start(header, &mut self.recorded)
-        } else {
-            self.recorder.stop(&mut self.recorded)
-        };
+        let done = record(&mut self.recorder, &mut self.recorded, on, header);
         self.tell_recorded();
-        done?;
-        let recorded = &self.recorded;
-        Ok(match (on, header) {
-            (true, Some(_)) => format!("Recording into {}.", recorded.file),
-            (true, None) => "Recording begins with the device.".to_owned(),
-            (false, _) if recorded.file.is_empty() => "Nothing was recorded.".to_owned(),
-            (false, _) => format!(
-                "Saved {} events as {}.",
-                grouped(recorded.events),
-                recorded.file
-            ),
-        })
+        done
     }
 
     /// Tells pages how far the recording is.
     fn tell_recorded(&self) {
         self.hub.recorded(&self.recorded);
     }
+}
+
+/// Records events of a `header`, or stops it. The disk may take long.
+fn record(
+    recorder: &mut Recorder,
+    recorded: &mut Recorded,
+    on: bool,
+    header: Option<&Header>,
+) -> Result<String> {
+    if on {
+        recorder.start(header, recorded)?;
+    } else {
+        recorder.stop(recorded)?;
+    }
+    Ok(match (on, header) {
+        (true, Some(_)) => format!("Recording into {}.", recorded.file),
+        (true, None) => "Recording begins with the device.".to_owned(),
+        (false, _) if recorded.file.is_empty() => "Nothing was recorded.".to_owned(),
+        (false, _) => format!(
+            "Saved {} events as {}.",
+            grouped(recorded.events),
+            recorded.file
+        ),
+    })
 }
 
 /// Answers a wish. A page that has gone does not read it.

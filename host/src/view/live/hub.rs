@@ -43,7 +43,7 @@ pub enum Kind {
 /// How the source is.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Connection {
-    /// In a word: `opening`, `live`, `gone`, `playing`, `paused`, `ended`, `failed`.
+    /// In a word: `opening`, `live`, `stopped`, `gone`, `playing`, `paused`, `ended`, `failed`.
     pub state: &'static str,
     /// Why.
     pub reason: String,

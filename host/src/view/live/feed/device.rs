@@ -3,14 +3,12 @@
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
-use anyhow::{Error, Result, anyhow};
+use anyhow::{Result, anyhow};
 use dtof_link::DynamicDepth;
 
-use super::session::Session;
+use super::session::{Given, Session, starts_again};
 use super::{Command, Wish, Work, reply};
-use crate::cli::complain;
-use crate::device::{Client, Port};
-use crate::rows::printable;
+use crate::device::{Client, HostTimeout, Port, Stopped};
 use crate::settings::SettingsFile;
 
 /// A device that is gone is looked for so often.
@@ -30,6 +28,19 @@ pub struct Device {
     pub pixels: Option<u16>,
     /// It is to send changes of depth in place of depth events.
     pub dynamic_depth: Option<DynamicDepth>,
+    /// It stops its sensor once this program has been silent for so long.
+    pub host_timeout: HostTimeout,
+}
+
+/// What is known from one session to the next.
+#[derive(Default)]
+struct Sessions {
+    /// Settings that a page puts in force while there is no session.
+    wished: Option<Command>,
+    /// There was a session.
+    any: bool,
+    /// The sensor has stopped for a reason that a person has to see before it starts again.
+    is_off: bool,
 }
 
 impl Device {
@@ -39,48 +50,65 @@ impl Device {
     /// If the device does not rest then.
     pub(super) fn run(mut self, work: &mut Work) -> Result<()> {
         work.hub.said(&self.said);
-        // Settings that a page wishes for while there is no device.
-        let mut wished: Option<Command> = None;
+        let mut sessions = Sessions::default();
         let mut told = String::new();
         while !work.is_stopped() {
-            let ended = self.session(work, &mut wished);
+            let ended = self.session(work, &mut sessions);
             let kept = work.recorder.end_file(&mut work.recorded);
             work.tell_recorded();
             let Err(ended) = ended else { break };
+            let stopped = ended.downcast_ref::<Stopped>().copied();
             if work.is_stopped() {
-                let name = self.name;
-                return Err(ended.context(format!("{name}: it may still be running")));
+                let (name, timeout) = (self.name, self.host_timeout);
+                return Err(ended.context(match stopped {
+                    Some(_) => name,
+                    None => format!("{name}: its sensor may run for {timeout} more"),
+                }));
             }
+            sessions.is_off |= stopped.is_some_and(|stopped| stopped.stays());
             let reason = match kept {
                 Ok(()) => format!("{ended:#}"),
                 Err(kept) => format!("{ended:#}; {kept:#}"),
             };
-            if let Some(command) = wished.take() {
+            if let Some(command) = sessions.wished.take() {
                 reply(command.answer, Err(anyhow!("{reason}")));
             }
-            work.hub.connection("gone", &reason);
+            let (state, reason) = if sessions.is_off {
+                ("stopped", starts_again(&reason))
+            } else {
+                ("gone", reason)
+            };
+            work.hub.connection(state, &reason);
             if told != reason {
-                complain(&printable(&format!("{}: {reason}", self.name)));
+                work.complain(&reason);
                 told.clone_from(&reason);
             }
-            wished = self.wait(work, &reason);
+            sessions.wished = self.wait(work, &reason, sessions.is_off);
         }
         Ok(())
     }
 
     /// One session: until it is stopped, or the device is gone.
-    fn session(&mut self, work: &mut Work, wished: &mut Option<Command>) -> Result<()> {
-        let said = match wished {
+    fn session(&mut self, work: &mut Work, sessions: &mut Sessions) -> Result<()> {
+        let said = match &sessions.wished {
             Some(Command {
                 wish: Wish::Settings(text),
                 ..
             }) => Session::changed(&self.said, text)?,
             _ => self.said.clone(),
         };
+        let given = Given {
+            pixels: self.pixels,
+            dynamic_depth: self.dynamic_depth,
+            host_timeout: self.host_timeout,
+        };
+        // A device that comes back by itself may have been reset in the meantime.
+        let may_start = !sessions.any || sessions.wished.is_some();
         let mut client = Client::new((self.open)()?)?;
-        let mut session = Session::begin(&mut client, said, self.pixels, self.dynamic_depth, work)
+        let mut session = Session::begin(&mut client, said, given, may_start, work)
             .map_err(|error| self.said.name_origin(error))?;
-        if let Some(command) = wished.take() {
+        (sessions.any, sessions.is_off) = (true, false);
+        if let Some(command) = sessions.wished.take() {
             reply(command.answer, Ok("The settings are in force.".to_owned()));
         }
         let ended = session.run(work);
@@ -88,10 +116,11 @@ impl Device {
         ended
     }
 
-    /// Waits a while; gives settings that somebody wishes for meanwhile, which are tried at once.
-    fn wait(&self, work: &mut Work, reason: &str) -> Option<Command> {
+    /// Waits a while, or as long as the sensor `is_off`; gives settings that a page puts in force
+    /// meanwhile, which are tried at once.
+    fn wait(&self, work: &mut Work, reason: &str, is_off: bool) -> Option<Command> {
         let since = Instant::now();
-        while since.elapsed() < AGAIN && !work.is_stopped() {
+        while (is_off || since.elapsed() < AGAIN) && !work.is_stopped() {
             let command = match work.commands.recv_timeout(SOON) {
                 Err(RecvTimeoutError::Timeout) => continue,
                 Err(RecvTimeoutError::Disconnected) => {
@@ -106,13 +135,16 @@ impl Device {
                     let done = work.wish_to_record(on, None);
                     reply(command.answer, done);
                 }
-                Wish::Save | Wish::Play(_) => reply(command.answer, Err(gone(reason))),
+                Wish::Save | Wish::Play(_) => {
+                    let error = if is_off {
+                        anyhow!("{reason}")
+                    } else {
+                        anyhow!("there is no device: {reason}")
+                    };
+                    reply(command.answer, Err(error));
+                }
             }
         }
         None
     }
-}
-
-fn gone(reason: &str) -> Error {
-    anyhow!("there is no device: {reason}")
 }

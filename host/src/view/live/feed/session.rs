@@ -2,16 +2,16 @@
 
 use std::time::{Duration, Instant, SystemTime};
 
-use anyhow::{Result, anyhow, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use dtof_core::PixelAddress;
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::{Configuration, DynamicDepth, Refusal, Report, Source};
 
-use super::{Answer, Command, Wish, Work, reply};
-use crate::cli::complain;
+use super::{Answer, Command, Wish, Work, record, reply};
 use crate::device::monitor::losses::{Losses as Lost, since};
 use crate::device::monitor::{check_masked, leave_out_masked};
-use crate::device::{Client, Setup, configuration};
+use crate::device::setup::with_gate;
+use crate::device::{Client, HostTimeout, Setup, Stopped, configuration};
 use crate::input::masked;
 use crate::settings::{Rays, Run, Sensor, SettingsFile};
 use crate::view::live::hub::Losses;
@@ -21,11 +21,24 @@ const REPORTS: Duration = Duration::from_millis(500);
 /// How often it is asked for a histogram, of each pixel that is looked at in turn.
 const HISTOGRAMS: Duration = Duration::from_millis(50);
 
+/// What the command was given, and no page changes.
+#[derive(Clone, Copy, Debug)]
+pub struct Given {
+    /// Pixels of the device, as many as it says if not given.
+    pub pixels: Option<u16>,
+    /// It is to send changes of depth in place of depth events.
+    pub dynamic_depth: Option<DynamicDepth>,
+    /// It stops its sensor once this program has been silent for so long.
+    pub host_timeout: HostTimeout,
+}
+
 /// A device that sends events.
 pub struct Session<'a> {
     client: &'a mut Client,
     setup: Setup,
-    dynamic_depth: Option<DynamicDepth>,
+    given: Given,
+    /// The sensor does not run any more, until settings are put in force.
+    stopped: Option<Stopped>,
     /// The counts of both ends at the beginning.
     first: Report,
     here: LinkCounters,
@@ -38,24 +51,27 @@ pub struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// Puts settings in force; from now on events come.
+    /// Puts settings in force; from now on events come. Unless it `may_start` one that was reset,
+    /// the sensor of such a device stays off.
     pub fn begin(
         client: &'a mut Client,
         said: SettingsFile,
-        pixels: Option<u16>,
-        dynamic_depth: Option<DynamicDepth>,
+        given: Given,
+        may_start: bool,
         work: &mut Work,
     ) -> Result<Self> {
-        let setup = Setup::of(client, said, pixels)?;
+        let setup = Setup::of(client, said, given.pixels)?;
         check_masked(&setup.settings)?;
-        if let Some(warning) = &setup.warning {
-            complain(&format!("warning: {warning}"));
+        work.warn(&setup.warnings);
+        if let (false, reason @ Some(_)) = (may_start, setup.reset_before) {
+            return Err(Stopped::Restarted(reason).into());
         }
         let here = *client.counters();
         let mut session = Self {
             client,
             setup,
-            dynamic_depth,
+            given,
+            stopped: None,
             first: Report::default(),
             here,
             last: (0, Instant::now()),
@@ -67,6 +83,8 @@ impl<'a> Session<'a> {
         session.configure(session.setup.clone(), work)?;
         session.first = session.client.report()?;
         work.hub.connection("live", "");
+        let first = session.first;
+        session.check_running(&first, work);
         Ok(session)
     }
 
@@ -76,11 +94,29 @@ impl<'a> Session<'a> {
     }
 
     /// Goes on until it is stopped: the device rests then.
+    ///
+    /// # Errors
+    /// If the device is gone; says so if its sensor had stopped before.
     pub fn run(&mut self, work: &mut Work) -> Result<()> {
         let ended = self.go_on(work);
         // What has arrived before the device was gone, too.
         self.take(work);
-        ended
+        match self.stopped {
+            Some(stopped) => ended.context(stopped),
+            None => ended,
+        }
+    }
+
+    /// Tells pages that the sensor has stopped.
+    fn check_running(&mut self, report: &Report, work: &Work) {
+        let Err(stopped) = Stopped::check(report, self.given.host_timeout) else {
+            return;
+        };
+        if self.stopped.replace(stopped).is_none() {
+            let reason = starts_again(&stopped.to_string());
+            work.hub.connection("stopped", &reason);
+            work.complain(&reason);
+        }
     }
 
     fn go_on(&mut self, work: &mut Work) -> Result<()> {
@@ -158,6 +194,7 @@ impl<'a> Session<'a> {
     }
 
     fn tell(&mut self, report: &Report, work: &Work) {
+        self.check_running(report, work);
         let photons = report.statistics.photons();
         let (before, at) = self.last;
         let seconds = at.elapsed().as_secs_f64().max(1e-3);
@@ -180,10 +217,18 @@ impl<'a> Session<'a> {
             Wish::Settings(text) => return self.change(&text, command.answer, work),
             Wish::Save => {
                 let said = self.setup.said.with(&self.setup.settings);
-                let saved = work.recorder.folder().save(&said);
+                let folder = work.recorder.folder();
+                let saved = self.client.exchange_during(|| folder.save(&said));
                 saved.map(|path| format!("Saved as {}.", path.display()))
             }
-            Wish::Record(on) => work.wish_to_record(on, Some(&self.setup.header())),
+            Wish::Record(on) => {
+                let header = self.setup.header();
+                let (recorder, recorded) = (&mut work.recorder, &mut work.recorded);
+                let of = || record(recorder, recorded, on, Some(&header));
+                let done = self.client.exchange_during(of);
+                work.tell_recorded();
+                done
+            }
             Wish::Play(_) => Err(anyhow!("a device does not wait")),
         };
         reply(command.answer, done);
@@ -221,6 +266,7 @@ impl<'a> Session<'a> {
         let [asked, said] = [&self.setup.asked, &self.setup.said];
         let [asked, said] = [Self::changed(asked, text)?, Self::changed(said, text)?];
         let bins = self.client.bins();
+        let said = with_gate(said, self.setup.measured_bins, bins);
         ensure!(
             said.sensor.bins.is_none_or(|of| of == bins),
             "the device has {bins} bins"
@@ -239,8 +285,9 @@ impl<'a> Session<'a> {
 
     fn configuration(&self, setup: &Setup, source: Source) -> Result<Configuration> {
         let columns = setup.geometry.columns;
-        let depth = self.dynamic_depth;
-        configuration(&setup.settings, setup.pixels, columns, source, depth)
+        let (depth, host_timeout) = (self.given.dynamic_depth, self.given.host_timeout);
+        let (settings, pixels) = (&setup.settings, setup.pixels);
+        configuration(settings, pixels, columns, source, depth, host_timeout)
     }
 
     /// Puts a setup in force. Events from before are taken as they were; a recording goes on in
@@ -256,12 +303,16 @@ impl<'a> Session<'a> {
             self.histogram = None;
         }
         // A disk that is full is told to pages.
-        let _ = work.recorder.end_file(&mut work.recorded);
+        let (recorder, recorded) = (&mut work.recorder, &mut work.recorded);
+        let _ = self.client.exchange_during(|| recorder.end_file(recorded));
         work.hub.begin(&setup);
         work.recorder.resume(&setup.header(), &mut work.recorded);
         work.tell_recorded();
         self.last = (0, Instant::now());
         self.setup = setup;
+        if self.stopped.take().is_some() {
+            work.hub.connection("live", "");
+        }
         Ok(())
     }
 
@@ -297,4 +348,9 @@ impl<'a> Session<'a> {
             origin: None,
         })
     }
+}
+
+/// Why a sensor has stopped, and what a reader of the page can do.
+pub fn starts_again(reason: &str) -> String {
+    format!("{reason}; the button \"Put in force\" starts it again")
 }

@@ -2,8 +2,8 @@
 
 const STATES = {
   live: ["live", "good"], playing: ["playing", "good"], opening: ["opening", "still"],
-  gone: ["no device", "bad"], paused: ["paused", "still"], ended: ["at its end", "still"],
-  failed: ["failed", "bad"], lost: ["no connection", "bad"],
+  gone: ["no device", "bad"], stopped: ["sensor stopped", "bad"], paused: ["paused", "still"],
+  ended: ["at its end", "still"], failed: ["failed", "bad"], lost: ["no connection", "bad"],
 };
 
 /** Sets a text, if it is another: what is the same is not read out again. */

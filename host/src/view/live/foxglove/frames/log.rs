@@ -37,7 +37,7 @@ impl Told {
         let connection = &seen.connection;
         if is_new || self.connection.as_ref() != Some(connection) {
             let level = match connection.state {
-                "gone" | "failed" => Level::Error,
+                "gone" | "stopped" | "failed" => Level::Error,
                 _ => Level::Info,
             };
             let mut line = connection.state.to_owned();

@@ -1,0 +1,186 @@
+//! Why the sensor of a device, and with it the laser, has stopped.
+
+use std::error::Error;
+use std::fmt;
+
+use dtof_link::{Report, StopReason};
+
+use super::HostTimeout;
+
+/// The sensor that this program has configured does not run any more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stopped {
+    /// The session goes on. The device tells the reason.
+    InSession {
+        /// Why, if it is known.
+        reason: Option<StopReason>,
+        /// That of the configuration.
+        host_timeout: HostTimeout,
+    },
+    /// The device has been restarted, and may tell the reason.
+    Restarted(Option<StopReason>),
+    /// Another program has begun a session.
+    AnotherSession,
+}
+
+impl Stopped {
+    /// Checks a report of the device after it was configured to take photons from its sensor.
+    ///
+    /// # Errors
+    /// If the sensor has been started and does not run.
+    pub fn check(report: &Report, host_timeout: HostTimeout) -> Result<(), Self> {
+        let reason = StopReason::from_number(report.stop_reason);
+        // Before its first start a sensor is off for these.
+        let is_held = matches!(reason, Some(StopReason::Silence | StopReason::NotListening));
+        let runs = report.sensor_starts != report.sensor_stops;
+        if runs || (report.sensor_starts == 0 && !is_held) {
+            return Ok(());
+        }
+        Err(Self::InSession {
+            reason,
+            host_timeout,
+        })
+    }
+
+    /// Why a device has forgotten a session, by what it says of its last stop.
+    pub(super) const fn forgotten(reason: Option<StopReason>) -> Self {
+        match reason {
+            Some(reason) if !is_of_reset(reason) => Self::AnotherSession,
+            reason => Self::Restarted(reason),
+        }
+    }
+
+    /// Why the device was reset, if its sensor has not stopped for another reason since.
+    #[must_use]
+    pub fn reset_before(report: &Report) -> Option<StopReason> {
+        StopReason::from_number(report.stop_reason).filter(|&reason| is_of_reset(reason))
+    }
+
+    /// The warning about a device that has failed before this session.
+    #[must_use]
+    pub fn warning(report: &Report) -> Option<String> {
+        let reason = Self::reset_before(report).filter(|&reason| reason != StopReason::Reset)?;
+        Some(format!(
+            "the device has been restarted ({reason}) before this session"
+        ))
+    }
+
+    /// Whether a program that goes on by itself leaves the sensor off until a person starts it
+    /// again.
+    #[must_use]
+    pub const fn stays(&self) -> bool {
+        !matches!(self, Self::Restarted(None))
+    }
+}
+
+impl fmt::Display for Stopped {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::InSession {
+                reason,
+                host_timeout,
+            } => {
+                f.write_str("the sensor has stopped: ")?;
+                match reason {
+                    None => f.write_str("for a reason this program does not know"),
+                    Some(reason @ StopReason::Silence) => write!(f, "{reason} for {host_timeout}"),
+                    Some(reason) => reason.fmt(f),
+                }
+            }
+            Self::Restarted(reason) => {
+                f.write_str("the device has been restarted")?;
+                if let Some(reason) = reason {
+                    write!(f, " ({reason})")?;
+                }
+                f.write_str(" and has forgotten this session")
+            }
+            Self::AnotherSession => {
+                f.write_str("another program has begun a session with the device")
+            }
+        }
+    }
+}
+
+impl Error for Stopped {}
+
+/// Whether the device was reset for this reason.
+const fn is_of_reset(reason: StopReason) -> bool {
+    matches!(
+        reason,
+        StopReason::Panic
+            | StopReason::Fault
+            | StopReason::Watchdog
+            | StopReason::BrownOut
+            | StopReason::Reset
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sensor_has_stopped_if_it_was_started_and_does_not_run() {
+        let host_timeout = HostTimeout::from_milliseconds(250).unwrap();
+        let checked = |starts, stops, reason| {
+            let report = Report {
+                sensor_starts: starts,
+                sensor_stops: stops,
+                stop_reason: reason,
+                ..Report::default()
+            };
+            Stopped::check(&report, host_timeout).map_err(|stopped| stopped.to_string())
+        };
+        // It runs, or says nothing of itself.
+        for (starts, stops, reason) in [(1, 0, 4), (7, 6, 4), (0, 0, 0), (0, 0, 8)] {
+            assert_eq!(checked(starts, stops, reason), Ok(()));
+        }
+        assert!(checked(0, 0, 5).is_err(), "it may not start");
+        for (reason, text) in [
+            (4, "the host was silent for 0.25 s"),
+            (5, "the host closed the USB port"),
+            (99, "for a reason this program does not know"),
+        ] {
+            let expected = format!("the sensor has stopped: {text}");
+            assert_eq!(checked(7, 7, reason), Err(expected));
+        }
+    }
+
+    #[test]
+    fn a_device_that_forgets_a_session_has_been_restarted_or_has_another() {
+        let rest = "and has forgotten this session";
+        for (reason, text, stays) in [
+            (0, format!("the device has been restarted {rest}"), false),
+            (
+                8,
+                format!("the device has been restarted (the watchdog) {rest}"),
+                true,
+            ),
+            (
+                10,
+                format!("the device has been restarted (a reset) {rest}"),
+                true,
+            ),
+            (
+                2,
+                "another program has begun a session with the device".to_owned(),
+                true,
+            ),
+        ] {
+            let stopped = Stopped::forgotten(StopReason::from_number(reason));
+            assert_eq!((stopped.to_string(), stopped.stays()), (text, stays));
+        }
+    }
+
+    #[test]
+    fn a_failure_of_the_device_is_worth_a_warning() {
+        let warned = (0..=u8::MAX).filter(|&stop_reason| {
+            let report = Report {
+                stop_reason,
+                ..Report::default()
+            };
+            Stopped::warning(&report).is_some()
+        });
+        assert!(warned.eq([6, 7, 8, 9]));
+    }
+}
