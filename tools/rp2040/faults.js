@@ -3,6 +3,8 @@
 
 import { FLASH, RAM } from './chip.js';
 
+/** SYST_CSR, the control of the processor's timer. */
+const SYST_CSR = 0xe000e010;
 const UDF = 0xde00;
 const BRANCH_TO_ITSELF = 0xe7fe;
 /** `push` of two registers or more, the last of which is LR: a function begins. */
@@ -21,6 +23,11 @@ export const FAULTS = {
   /** The core stops for good; all else goes on. */
   lockup: ({ chip }) => {
     chip.isLockedUp = true;
+    return true;
+  },
+  /** The processor's timer stops: no millisecond ends any more. */
+  clock: ({ rp2040 }) => {
+    rp2040.writeUint32(SYST_CSR, 0);
     return true;
   },
   /** The core is reset, and nothing else. */

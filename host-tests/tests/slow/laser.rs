@@ -9,16 +9,22 @@
 //! ```
 
 use std::env;
+use std::io::{self, BufRead, BufReader, ErrorKind};
+use std::ops::RangeInclusive;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use dtof::device::{Client, configuration};
-use dtof_link::Source;
+use dtof::device::{Client, HostTimeout, Port, configuration};
+use dtof_link::{Report, Source, StopReason};
 
 use crate::pico::senses;
 use crate::rp2040::{Done, NODE, NPM, Rp2040, image, install};
-use crate::{root, skipped, stack, succeed, wanted};
+use crate::{dtof, root, stack, succeed, wanted};
 
 /// How long a pulse is set to be: 100 ns in whole clocks.
 const PULSE_NS: u64 = 104;
@@ -31,6 +37,11 @@ const PHASES_MS: [f64; 4] = [0.0, 0.0025, 0.005, 0.0097];
 /// Where the memory begins.
 const RAM: u64 = 0x2000_0000;
 
+/// How long the host may be silent here; the default takes a minute of emulation.
+const HOST_TIMEOUT_MS: u16 = 300;
+/// A round of the main loop in which the sensor is stopped, and that of the keep-alive before it.
+const ROUND_MS: f64 = 2.0;
+
 /// A fault, and what follows from it.
 struct Fault {
     kind: &'static str,
@@ -38,53 +49,37 @@ struct Fault {
     lit_ms: f64,
     /// The reason of the boot that follows.
     reset: &'static str,
+    /// What the device then tells its host.
+    told: StopReason,
 }
 
 /// The watchdog's second, and a period of the laser.
 const WATCHDOG_MS: f64 = 1000.0 + PERIOD_MS;
 /// The handler is entered and turns the laser off: much less than what the report and the reset
-/// take, in which there would be a pulse.
+/// take, in which there would be a pulse. The image's start resets the PIO as soon.
 const HANDLER_MS: f64 = 0.002;
 
-const FAULTS: [Fault; 7] = [
+const fn fault(kind: &'static str, lit_ms: f64, reset: &'static str, told: StopReason) -> Fault {
     Fault {
-        kind: "panic",
-        lit_ms: HANDLER_MS,
-        reset: "forced",
-    },
-    Fault {
-        kind: "fault",
-        lit_ms: HANDLER_MS,
-        reset: "forced",
-    },
-    Fault {
-        kind: "hang",
-        lit_ms: WATCHDOG_MS,
-        reset: "watchdog",
-    },
-    Fault {
-        kind: "lockup",
-        lit_ms: WATCHDOG_MS,
-        reset: "watchdog",
-    },
-    // Until the image's start resets the PIO; before it paints the stack. On the chip the boot
-    // ROM comes first.
-    Fault {
-        kind: "core-reset",
-        lit_ms: 4.0,
-        reset: "core",
-    },
-    // The registers of the hard fault find no room either: the core locks up.
-    Fault {
-        kind: "overflow",
-        lit_ms: WATCHDOG_MS,
-        reset: "watchdog",
-    },
-    Fault {
-        kind: "overflow-entered",
-        lit_ms: WATCHDOG_MS,
-        reset: "",
-    },
+        kind,
+        lit_ms,
+        reset,
+        told,
+    }
+}
+
+const FAULTS: [Fault; 8] = [
+    fault("panic", HANDLER_MS, "forced", StopReason::Panic),
+    fault("fault", HANDLER_MS, "forced", StopReason::Fault),
+    fault("hang", WATCHDOG_MS, "watchdog", StopReason::Watchdog),
+    fault("lockup", WATCHDOG_MS, "watchdog", StopReason::Watchdog),
+    fault("clock", WATCHDOG_MS, "watchdog", StopReason::Watchdog),
+    // On the chip the boot ROM comes before the image's start.
+    fault("core-reset", HANDLER_MS, "core", StopReason::Reset),
+    // The registers of the hard fault find no room: the core locks up, or the handler is entered
+    // without them.
+    fault("overflow", WATCHDOG_MS, "watchdog", StopReason::Watchdog),
+    fault("overflow-entered", HANDLER_MS, "forced", StopReason::Fault),
 ];
 
 /// How long it has to stay dark.
@@ -96,12 +91,62 @@ fn dark_ms() -> f64 {
     }
 }
 
-/// Lets the laser fire, and drops the connection.
-fn light(mut board: Rp2040) -> Result<Done> {
-    let mut client = Client::new(board.connect()?)?;
-    client.configure(&configuration(&senses(), 1, 1, Source::Sensor, None)?)?;
-    drop(client);
-    board.wait()
+/// A line that is cut, as when the program at its end is killed: nothing more goes over it.
+struct Cut {
+    port: Box<dyn Port>,
+    is_cut: Arc<AtomicBool>,
+}
+
+impl Cut {
+    fn checked(&mut self) -> io::Result<&mut dyn Port> {
+        if self.is_cut.load(Ordering::Relaxed) {
+            return Err(ErrorKind::BrokenPipe.into());
+        }
+        Ok(&mut *self.port)
+    }
+}
+
+impl Port for Cut {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.checked()?.send(bytes)
+    }
+
+    fn receive(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.checked()?.receive(bytes)
+    }
+}
+
+/// A host that has let the laser fire, and what cuts its line.
+fn light(board: &mut Rp2040) -> Result<(Client, Arc<AtomicBool>)> {
+    let is_cut = Arc::new(AtomicBool::new(false));
+    let port = board.connect()?;
+    let mut client = Client::new(Box::new(Cut {
+        port,
+        is_cut: is_cut.clone(),
+    }))?;
+    let timeout = HostTimeout::from_milliseconds(HOST_TIMEOUT_MS).context("no timeout")?;
+    client.configure(&configuration(
+        &senses(),
+        1,
+        1,
+        Source::Sensor,
+        None,
+        timeout,
+    )?)?;
+    Ok((client, is_cut))
+}
+
+/// The milliseconds for which the laser has fired after `from`, and for which it has been dark
+/// since. Its pulses were as long as they should be.
+fn dark_since(from: f64, done: &Done) -> Result<(f64, f64)> {
+    let laser = &done.laser;
+    let last = laser.last_high_ms.context("the laser has never fired")?;
+    let (lit, dark) = (last - from, done.end_ms - last);
+    ensure!(done.success, "{done:?}");
+    ensure!(laser.pulses >= 1000, "{done:?}");
+    ensure!(!laser.is_high && dark >= dark_ms(), "{done:?}");
+    ensure!(laser.longest_ns <= PULSE_NS, "a long pulse: {done:?}");
+    Ok((lit, dark))
 }
 
 #[test]
@@ -124,16 +169,9 @@ fn laser_goes_dark_and_stays_dark_after_every_fault() -> Result<()> {
     };
     install()?;
     let image = image(&["photon-timer"], None)?;
-    let is_lowest = stack::Image::read(&image)?.stack.start == RAM;
+    ensure!(stack::Image::read(&image)?.stack.start == RAM);
     println!("fault at ms: ms until the last pulse, at most; dark for ms; longest pulse; boots");
     for fault in &FAULTS {
-        if fault.kind.starts_with("overflow") && !is_lowest {
-            skipped(
-                fault.kind,
-                "an overflow does not leave the memory: the stack is not lowest in it",
-            );
-            continue;
-        }
         let phases = if fault.lit_ms < PERIOD_MS {
             &PHASES_MS[..]
         } else {
@@ -151,46 +189,192 @@ fn goes_dark(image: &Path, fault: &Fault, fault_ms: f64) -> Result<()> {
         kind,
         lit_ms,
         reset,
+        told,
     } = fault;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let for_ms = (lit_ms + dark_ms()).ceil() as u32;
-    let done = light(Rp2040::start_with_fault(image, kind, fault_ms, for_ms)?)?;
-    ensure!(done.success, "{done:?}");
-    let laser = &done.laser;
+    let mut board = Rp2040::start_with_fault(image, kind, fault_ms, for_ms)?;
+    let (mut client, is_cut) = light(&mut board)?;
+    // Until the device, which has been reset, knows nothing of the session.
+    let lost = loop {
+        if let Err(lost) = client.exchange() {
+            break format!("{lost:#}");
+        }
+    };
+    let expected = format!("the device has been restarted ({told}) and has forgotten this session");
+    ensure!(lost == expected, "{lost}");
+    is_cut.store(true, Ordering::Relaxed);
+    drop(client);
+    let done = board.wait()?;
     let planted = done.planted_ms.context("no fault is planted")?;
-    let last = laser.last_high_ms.context("the laser has never fired")?;
-    let (lit, dark) = (last - planted, done.end_ms - last);
+    let (lit, dark) = dark_since(planted, &done)?;
     let boots: Vec<_> = done.boots.iter().map(|boot| &*boot.reason).collect();
     println!(
         "{kind} at {fault_ms}: {lit:.4}, {lit_ms}; {dark:.0}; {} ns; {boots:?}",
-        laser.longest_ns
+        done.laser.longest_ns
     );
-    // It has fired until the fault.
-    ensure!(laser.pulses >= 2000, "{done:?}");
     ensure!(lit > -2.0 * PERIOD_MS, "it was dark before: {done:?}");
     ensure!(lit <= lit_ms, "{lit} ms of light: {done:?}");
-    ensure!(!laser.is_high && dark >= dark_ms(), "{done:?}");
-    ensure!(laser.longest_ns <= PULSE_NS, "a long pulse: {done:?}");
-    ensure!(boots.len() == 2, "{done:?}");
-    ensure!(reset.is_empty() || boots[1] == reset, "{done:?}");
+    ensure!(boots == ["power", reset], "{done:?}");
     ensure!(done.panicked == (kind == "panic"), "{done:?}");
     let faults = kind == "fault" || kind.starts_with("overflow");
     ensure!((done.hard_faults > 0) == faults, "{done:?}");
     Ok(())
 }
 
+/// Waits until an image has ended, which was not reset. Its laser has to have fired for so many
+/// milliseconds after `from`, or after the host's last byte, and no longer.
+fn fired_for(
+    what: &str,
+    expected: RangeInclusive<f64>,
+    from: impl Fn(&Done) -> Option<f64>,
+    board: Rp2040,
+) -> Result<()> {
+    let done = board.wait()?;
+    let from = from(&done).with_context(|| format!("{what}: {done:?}"))?;
+    let (lit, dark) = dark_since(from, &done)?;
+    println!("{what}: {lit:.3} ms of {expected:?}; dark for {dark:.0} ms");
+    ensure!(
+        expected.contains(&lit),
+        "{what}: {lit} ms of light: {done:?}"
+    );
+    ensure!(done.boots.len() == 1, "{what}: {done:?}");
+    Ok(())
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn start(image: &Path, over_usb: bool) -> Result<Rp2040> {
+    let for_ms = f64::from(HOST_TIMEOUT_MS) + dark_ms() + ROUND_MS;
+    Rp2040::start_for(image, over_usb, for_ms.ceil() as u32)
+}
+
+/// From the last byte of the host on, which ends a frame.
+const SILENCE_MS: RangeInclusive<f64> =
+    HOST_TIMEOUT_MS as f64 - ROUND_MS..=HOST_TIMEOUT_MS as f64 + ROUND_MS;
+const AT_ONCE_MS: RangeInclusive<f64> = -ROUND_MS..=ROUND_MS;
+
 #[test]
-fn laser_of_an_emulated_usb_port_knows_when_its_client_goes() -> Result<()> {
-    let Some(_alone) = wanted("DTR of the Pico in rp2040js", &[NODE, NPM]) else {
+fn laser_goes_dark_when_its_host_ends_its_session_or_is_cut_off() -> Result<()> {
+    let Some(_alone) = wanted("the laser without a host", &[NODE, NPM]) else {
         return Ok(());
     };
     install()?;
     let image = image(&["photon-timer"], None)?;
-    let done = light(Rp2040::start_with_usb_for(&image, 20)?)?;
-    println!("{done:?}");
-    let low = done.dtr_low_ms.context("DTR has not gone low")?;
-    let input = done.last_input_ms.context("no byte has come")?;
-    ensure!(done.success && low >= input, "{done:?}");
-    ensure!(done.boots.len() == 1 && done.laser.longest_ns <= PULSE_NS);
+    for over_usb in [false, true] {
+        let port = if over_usb { "USB" } else { "UART" };
+        let mut board = start(&image, over_usb)?;
+        let (mut client, _) = light(&mut board)?;
+        fires(&mut client)?;
+        drop(client);
+        let what = format!("{port}, end of the session");
+        fired_for(&what, AT_ONCE_MS, |done| done.last_input_ms, board)?;
+
+        let mut board = start(&image, over_usb)?;
+        let (mut client, is_cut) = light(&mut board)?;
+        fires(&mut client)?;
+        is_cut.store(true, Ordering::Relaxed);
+        drop(client);
+        let what = format!("{port}, cut off");
+        if over_usb {
+            fired_for(&what, AT_ONCE_MS, |done| done.dtr_low_ms, board)?;
+        } else {
+            fired_for(&what, SILENCE_MS, |done| done.last_input_ms, board)?;
+        }
+    }
+    Ok(())
+}
+
+/// Waits until the laser has fired often enough.
+fn fires(client: &mut Client) -> Result<()> {
+    let start = Instant::now();
+    while client.report()?.cycles < 1500 {
+        ensure!(
+            start.elapsed() < Duration::from_secs(60),
+            "it does not fire"
+        );
+    }
+    Ok(())
+}
+
+#[test]
+fn laser_stops_once_for_a_silent_host_which_is_told_why() -> Result<()> {
+    let Some(_alone) = wanted("the laser with a silent host", &[NODE, NPM]) else {
+        return Ok(());
+    };
+    install()?;
+    let mut board = start(&image(&["photon-timer"], None)?, false)?;
+    let (mut client, is_cut) = light(&mut board)?;
+    fires(&mut client)?;
+    // This computer's time is not that of the emulator.
+    let mut silence = Duration::from_secs(4);
+    let report: Report = loop {
+        thread::sleep(silence);
+        let report = client.report()?;
+        if report.sensor_stops > 0 {
+            break report;
+        }
+        silence *= 2;
+        ensure!(silence < Duration::from_secs(60), "{report:?}");
+    };
+    ensure!(
+        (report.sensor_starts, report.sensor_stops) == (1, 1),
+        "{report:?}"
+    );
+    ensure!(
+        report.stop_reason == StopReason::Silence as u8,
+        "{report:?}"
+    );
+    is_cut.store(true, Ordering::Relaxed);
+    drop(client);
+    let done = board.wait()?;
+    let (_, dark) = dark_since(0.0, &done)?;
+    println!("silent host: dark for {dark:.0} ms; {report:?}");
+    ensure!(done.boots.len() == 1, "{done:?}");
+    Ok(())
+}
+
+#[test]
+fn laser_goes_dark_when_the_monitor_is_interrupted_or_killed() -> Result<()> {
+    let Some(_alone) = wanted("the laser of a killed monitor", &[NODE, NPM]) else {
+        return Ok(());
+    };
+    install()?;
+    let (image, dtof) = (image(&["photon-timer"], None)?, dtof()?);
+    for (signal, over_usb) in [("INT", false), ("KILL", false), ("KILL", true)] {
+        let mut board = start(&image, over_usb)?;
+        // The emulator listens once it has been connected to.
+        drop(board.connect()?);
+        let timeout = f64::from(HOST_TIMEOUT_MS) / 1000.0;
+        let mut monitor = Command::new(&dtof);
+        monitor
+            .args(["monitor", "--device", &board.device(), "--host-timeout"])
+            .arg(timeout.to_string());
+        monitor.stdin(Stdio::null()).stdout(Stdio::piped());
+        let mut monitor = monitor.stderr(Stdio::null()).spawn()?;
+        let mut header = String::new();
+        let stdout = monitor.stdout.take().context("no output")?;
+        let mut stdout = BufReader::new(stdout);
+        // It comes once the device is configured.
+        stdout.read_line(&mut header)?;
+        ensure!(header.starts_with("cycle,"), "{header}");
+        thread::sleep(Duration::from_secs(3));
+        let pid = monitor.id().to_string();
+        succeed(Command::new("kill").args(["-s", signal, &pid]))?;
+        let ended = monitor.wait()?;
+        ensure!(ended.success() == (signal == "INT"), "{ended}");
+        let what = format!(
+            "monitor, {signal}, {}",
+            if over_usb { "USB" } else { "UART" }
+        );
+        match (signal, over_usb) {
+            // It rests before the session ends.
+            ("INT", _) => {
+                let until = f64::NEG_INFINITY..=ROUND_MS;
+                fired_for(&what, until, |done| done.last_input_ms, board)?;
+            }
+            (_, true) => fired_for(&what, AT_ONCE_MS, |done| done.dtr_low_ms, board)?,
+            (_, false) => fired_for(&what, SILENCE_MS, |done| done.last_input_ms, board)?,
+        }
+    }
     Ok(())
 }

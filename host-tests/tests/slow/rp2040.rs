@@ -125,10 +125,10 @@ impl Rp2040 {
         Self::spawn(ending_after(node, for_ms))
     }
 
-    /// The same without a fault, with the serial port of the USB.
-    pub fn start_with_usb_for(image: &Path, for_ms: u32) -> Result<Self> {
+    /// The same without a fault. The serial port is that of the USB, or the UART.
+    pub fn start_for(image: &Path, over_usb: bool, for_ms: u32) -> Result<Self> {
         let mut node = command(image);
-        node.arg("--usb");
+        node.args(over_usb.then_some("--usb"));
         Self::spawn(ending_after(node, for_ms))
     }
 
@@ -140,10 +140,15 @@ impl Rp2040 {
         Ok(Self { child, port })
     }
 
+    /// Its serial port, as `dtof` takes it.
+    pub fn device(&self) -> String {
+        format!("tcp:127.0.0.1:{}", self.port)
+    }
+
     /// Connects to its serial port.
     pub fn connect(&mut self) -> Result<Box<dyn Port>> {
-        let port = format!("tcp:127.0.0.1:{}", self.port);
-        open(&mut self.child, || device::open(&port, None))
+        let device = self.device();
+        open(&mut self.child, || device::open(&device, None))
     }
 
     /// Ends it.

@@ -102,6 +102,26 @@ pub fn laser_off() {
     control.modify(|_, w| w.outover().low());
 }
 
+/// Resets PIO0 before anything else, as a reset of the processor alone does not: its state
+/// machines would fire the laser until the memory is set up, some milliseconds.
+#[unsafe(naked)]
+#[unsafe(no_mangle)]
+#[allow(
+    unsafe_code,
+    reason = "cortex-m-rt calls it by this name, before there is memory"
+)]
+unsafe extern "C" fn __pre_init() {
+    // The alias of RESETS.RESET that sets bits, and PIO0's (RP2040 datasheet, 2.1.2 and 2.14.3).
+    core::arch::naked_asm!(
+        "ldr r0, =0x4000e000",
+        "movs r1, #1",
+        "lsls r1, r1, #10",
+        "str r1, [r0]",
+        "bx lr",
+        ".pool",
+    )
+}
+
 /// High for `y + 2` clocks, low for `osr + 2`.
 fn laser_program() -> Program<32> {
     pio::pio_asm!(
