@@ -212,11 +212,14 @@ fn a_host_ends_its_session_until_the_device_has_forgotten_it() {
 }
 
 #[test]
-fn a_host_without_a_session_has_none_to_end() {
+fn a_host_that_ends_its_session_before_it_begins_ends_it_then() {
     let mut host = Endpoint::host(SESSION, HOST, 0);
     host.end(0);
     let hello = [&[HELLO, LOW, HIGH, 0, 0, 4][..], &HOST].concat();
     assert_eq!(sent(&mut host, 0), [hello]);
+    let welcome = [&frame(WELCOME, 0, 0)[..], &DEVICE].concat();
+    host.receive(Ok(&welcome), 60);
+    assert_eq!(sent(&mut host, 60), [[END, LOW, HIGH, 0, 0, 4]]);
 }
 
 #[test]

@@ -95,6 +95,8 @@ impl Endpoint {
     fn forget(&mut self) {
         *self = Self {
             host: self.host,
+            // Also if the session begins only now.
+            ending: self.ending,
             counters: self.counters,
             stop_reason: self.stop_reason,
             ..Self::closed(self.greeting)
