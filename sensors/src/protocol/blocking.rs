@@ -78,15 +78,12 @@ where
         self.protocol.restart();
     }
 
-    /// Tells the sensor to stop. One that cannot be told, or does not acknowledge, may measure
-    /// all the same: its ENABLE goes low.
+    /// Takes the sensor's ENABLE down, and tells it to stop: no answer would say that it has, and
+    /// ENABLE may not be wired.
     fn stop(&mut self) {
-        let is_told = match self.protocol.stop() {
-            Request::Write { address, bytes } => self.i2c.write(address, bytes).is_ok(),
-            _ => false,
-        };
-        if !is_told {
-            self.switch_off();
+        let _ = self.enable.set_low();
+        if let Request::Write { address, bytes } = self.protocol.stop() {
+            let _ = self.i2c.write(address, bytes);
         }
     }
 

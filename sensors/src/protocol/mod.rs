@@ -139,12 +139,3 @@ impl<P, I2C, INT, EN> Driver<P, I2C, INT, EN> {
         (self.i2c, self.interrupt, self.enable)
     }
 }
-
-impl<P: Protocol, I2C, INT, EN: embedded_hal::digital::OutputPin> Driver<P, I2C, INT, EN> {
-    /// Takes ENABLE down, so that the sensor loses its program and rests. The next start loads it.
-    fn switch_off(&mut self) {
-        // A pin that fails has no other way.
-        let _ = self.enable.set_low();
-        self.protocol.restart();
-    }
-}
