@@ -56,6 +56,11 @@ pub trait Sampler {
 pub struct PhotonTimer<S> {
     sampler: S,
     config: Config,
+    /// The laser fires. Before it starts it rests for a whole laser cycle, so that no start makes
+    /// one shorter than was checked.
+    fires: bool,
+    /// The millisecond in which it has begun to rest, once that is known.
+    rests_since: Option<u32>,
     /// The laser cycle that is read next.
     next: u32,
     lost: u32,
@@ -86,6 +91,8 @@ impl<S: Sampler> PhotonTimer<S> {
         Self {
             sampler,
             config,
+            fires: false,
+            rests_since: None,
             next: 0,
             lost: 0,
             batch: Vec::new(),
@@ -96,6 +103,12 @@ impl<S: Sampler> PhotonTimer<S> {
     /// photons count nowhere; the laser cycles do not count either.
     pub const fn lost(&self) -> u32 {
         self.lost
+    }
+
+    /// Lets the laser rest. The next poll that comes late enough starts it.
+    fn rest(&mut self) {
+        self.sampler.stop();
+        (self.fires, self.rests_since) = (false, None);
     }
 
     /// Copies the next laser cycles that are complete. Says how many have been lost before
@@ -153,21 +166,28 @@ impl<S: Sampler> Sensor for PhotonTimer<S> {
     }
 
     fn start(&mut self, _: U16F16) {
-        self.sampler.start(&self.config);
-        self.next = 0;
+        self.rest();
     }
 
     fn stop(&mut self) {
-        self.sampler.stop();
+        self.rest();
     }
 
-    fn poll(&mut self, _: u32, sink: &mut impl PhotonSink) -> Result<Polled, Error> {
+    fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Error> {
+        if !self.fires {
+            let since = *self.rests_since.get_or_insert(now_ms);
+            // The first of these milliseconds may be nearly over.
+            if now_ms.wrapping_sub(since) <= self.config.period().div_ceil(CLOCK_HZ / 1000) {
+                return Ok(Polled::Idle);
+            }
+            self.sampler.start(&self.config);
+            (self.fires, self.next) = (true, 0);
+        }
         for round in 0..BATCHES {
             self.copy().map_err(Error::Lost)?;
             // After they were copied: those that came late are not to be looked at.
             if self.sampler.has_stalled() {
-                self.sampler.start(&self.config);
-                self.next = 0;
+                self.rest();
                 return Err(Error::Stalled);
             }
             give(&self.batch, sink);

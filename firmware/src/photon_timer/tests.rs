@@ -163,8 +163,12 @@ fn timer(cycles: Vec<Levels>, steps: Vec<u32>) -> PhotonTimer<Ring> {
     };
     let mut timer = PhotonTimer::new(ring, Config::new(SETTINGS).unwrap());
     timer.start(U16F16::from_num(BIN_PS));
+    assert_eq!(timer.poll(0, &mut Seen::default()), Ok(Polled::Idle));
     timer
 }
+
+/// When it has rested.
+const LATER_MS: u32 = 2;
 
 /// Laser cycles, of which many are dark.
 fn laser_cycles(most: usize) -> impl Strategy<Value = Vec<Levels>> {
@@ -193,7 +197,7 @@ proptest! {
         let mut timer = timer(cycles, steps.iter().map(|&step| step + 1).collect());
         let mut seen = Seen::default();
         for _ in 0..1000 {
-            prop_assert!(timer.poll(0, &mut seen).is_ok());
+            prop_assert!(timer.poll(LATER_MS, &mut seen).is_ok());
         }
         prop_assert_eq!(timer.lost(), 0);
         prop_assert_eq!(seen.ended, expected);
@@ -213,7 +217,7 @@ proptest! {
         let mut seen = Seen::default();
         for _ in 0..2000 {
             let from = timer.next;
-            let result = timer.poll(0, &mut seen);
+            let result = timer.poll(LATER_MS, &mut seen);
             let to = timer.next;
             let mut read = to - from;
             if let Err(error) = result {
@@ -236,8 +240,8 @@ fn samples_that_come_late_are_never_seen_and_it_begins_anew() {
         dark.sampler.stalls_at = Some(late_from);
         let mut seen = Seen::default();
         let mut results = Vec::new();
-        for _ in 0..20 {
-            results.push(dark.poll(0, &mut seen));
+        for now_ms in LATER_MS..40 {
+            results.push(dark.poll(now_ms, &mut seen));
         }
         assert!(results.contains(&Err(Error::Stalled)));
         assert_eq!(results.last(), Some(&Ok(Polled::Idle)));
@@ -245,6 +249,75 @@ fn samples_that_come_late_are_never_seen_and_it_begins_anew() {
         assert!(seen.ended.iter().all(Vec::is_empty), "from {late_from}");
     }
     assert_eq!(SensorFault::from(Error::Stalled), SensorFault::Data);
+}
+
+/// Memory that always takes samples too slowly.
+#[derive(Default)]
+struct Stalling {
+    fires: bool,
+    starts: u32,
+}
+
+impl Sampler for Stalling {
+    const KEPT: u32 = 40;
+
+    fn start(&mut self, _: &Config) {
+        assert!(!self.fires, "it has not rested");
+        self.fires = true;
+        self.starts += 1;
+    }
+
+    fn stop(&mut self) {
+        self.fires = false;
+    }
+
+    fn completed(&mut self) -> u32 {
+        0
+    }
+
+    fn samples(&self, _: u32) -> Samples {
+        unreachable!("none is complete")
+    }
+
+    fn has_stalled(&self) -> bool {
+        true
+    }
+}
+
+/// Stalls and configurations come again and again: each start is a pulse.
+#[test]
+fn between_two_starts_the_laser_rests_for_a_laser_cycle() {
+    for laser_hz in [1, 10, 999, 1000, 100_000] {
+        let settings = Settings {
+            laser_hz,
+            ..SETTINGS
+        };
+        let config = Config::new(settings).unwrap();
+        for configures in [false, true] {
+            let mut timer = PhotonTimer::new(Stalling::default(), config);
+            timer.start(U16F16::from_num(BIN_PS));
+            // Where the milliseconds begin anew, too.
+            let begin = u32::MAX - 1000;
+            let mut started = Vec::new();
+            for ms in 0..5000 {
+                // Several polls a millisecond, as by a busy main loop.
+                for _ in 0..3 {
+                    let before = timer.sampler.starts;
+                    let _ = timer.poll(begin.wrapping_add(ms), &mut Seen::default());
+                    if timer.sampler.starts > before {
+                        started.push(ms);
+                        if configures {
+                            timer.start(U16F16::from_num(BIN_PS));
+                        }
+                    }
+                }
+            }
+            // Within their milliseconds the first may be late and the second early.
+            let rested = started.windows(2).map(|two| two[1] - two[0] - 1);
+            let clocks = rested.map(|ms| ms * (CLOCK_HZ / 1000));
+            assert!(clocks.min().unwrap() >= config.period(), "{laser_hz} Hz");
+        }
+    }
 }
 
 #[test]
