@@ -11,7 +11,7 @@ use dtof::cli::arguments::{path, whole};
 use dtof::cli::interrupt;
 use dtof::device::monitor::map::{LiveMap, SHOW_CURSOR};
 use dtof::device::monitor::{Outputs, Recording, Task, monitor};
-use dtof::device::{self, Client, Setup, end_sessions};
+use dtof::device::{self, Client, Setup};
 use dtof::settings::SettingsFile;
 
 use super::device_options::DeviceOptions;
@@ -57,7 +57,6 @@ impl Monitor {
         let name = || self.device.clone();
         let mut client = Client::new(device::open(&self.device, image)?).with_context(name)?;
         interrupt::listen(|| {
-            end_sessions();
             if io::stderr().is_terminal() {
                 let _ = write!(io::stderr(), "{SHOW_CURSOR}");
             }

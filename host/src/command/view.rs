@@ -75,7 +75,7 @@ impl View {
                 Feed::Playback(playback)
             }
         };
-        interrupt::listen(device::end_sessions)?;
+        interrupt::listen(|| ())?;
         let foxglove = self.foxglove;
         let foxglove = foxglove.map(|port| Foxglove::bind(port, self.foxglove_origin));
         let foxglove = foxglove.transpose()?;

@@ -1,10 +1,8 @@
 //! The host's end of the link over a real port.
 
-mod ending;
 mod wait;
 
 use std::panic::resume_unwind;
-use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -19,17 +17,17 @@ use super::assembly::{Assembly, HistogramAnswer};
 use super::port::Port;
 use super::stopped::Stopped;
 use crate::events::aer_file::Event;
-pub use ending::end_sessions;
-use ending::{MOST, Shared, lock};
 use wait::Wait;
 
 /// A device that says nothing for so long is gone.
 const SILENCE: Duration = Duration::from_secs(5);
+/// A device that has not heard of the end of its session by then is left to its host timeout.
+const END: Duration = Duration::from_millis(300);
 
 /// A session with a device. It ends when this is dropped: the device stops its sensor then, and
 /// with it the laser.
 pub struct Client {
-    port: Shared,
+    port: Box<dyn Port>,
     /// The port has failed, and is not used again.
     is_gone: bool,
     endpoint: Endpoint,
@@ -63,8 +61,6 @@ impl Client {
             .unwrap_or_default();
         let session = (time.as_millis() % 65_521) as u16;
         let now = Instant::now();
-        let port = Arc::new(Mutex::new(port));
-        ending::begin(session, &port);
         let mut client = Self {
             port,
             is_gone: false,
@@ -365,21 +361,21 @@ impl Client {
 
     /// Frames to the port and from it.
     fn transfer(&mut self) -> Result<()> {
-        let mut port = lock(&self.port);
         let mut wire = [0; WIRE_BYTES];
         loop {
             let length = self.endpoint.transmit(self.now_ms(), &mut wire);
             if length == 0 {
                 break;
             }
-            port.send(&wire[..length])
+            self.port
+                .send(&wire[..length])
                 .context("the device cannot be written to")?;
         }
         let mut bytes = [0; 4096];
-        let length = port
+        let length = self
+            .port
             .receive(&mut bytes)
             .context("the device cannot be read from")?;
-        drop(port);
         let now_ms = self.now_ms();
         for &byte in &bytes[..length] {
             if let Some(frame) = self.deframer.push(byte) {
@@ -403,7 +399,7 @@ impl Drop for Client {
         }
         self.endpoint.end(self.now_ms());
         let since = Instant::now();
-        while !self.is_gone && !self.endpoint.is_lost() && since.elapsed() < MOST {
+        while !self.is_gone && !self.endpoint.is_lost() && since.elapsed() < END {
             self.is_gone = self.transfer().is_err();
         }
     }

@@ -19,7 +19,7 @@ use dtof_link::endpoint::BODY_BYTES;
 use dtof_link::{Configuration, DynamicDepth, Report, Source, Token, message};
 
 pub use assembly::{HistogramAnswer, PixelHistogram};
-pub use client::{Client, end_sessions};
+pub use client::Client;
 pub use host_timeout::HostTimeout;
 pub use open::open;
 pub use port::Port;

@@ -5,7 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::{Result, bail, ensure};
 use dtof_core::fixed::types::I24F8;
-use dtof_link::{SensorRecord, StopReason};
+use dtof_link::SensorRecord;
 
 use super::monitor::array;
 use super::{Client, Stopped};
@@ -33,8 +33,6 @@ pub struct Setup {
     pub laser_millihertz: u64,
     /// What was said is not what the device says, or the device has failed before.
     pub warnings: Vec<String>,
-    /// Why the device was reset, if its sensor has not stopped for another reason since.
-    pub reset_before: Option<StopReason>,
     /// Bins that the sensor measures.
     pub measured_bins: u16,
     /// When its laser cycles began.
@@ -89,7 +87,6 @@ impl Setup {
                 .into_iter()
                 .chain(Stopped::warning(&report))
                 .collect(),
-            reset_before: Stopped::reset_before(&report),
             measured_bins: sensor.bins,
             began: SystemTime::now(),
         };

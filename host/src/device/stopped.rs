@@ -21,6 +21,8 @@ pub enum Stopped {
     Restarted(Option<StopReason>),
     /// Another program has begun a session.
     AnotherSession,
+    /// The device has ended the session.
+    Ended(StopReason),
 }
 
 impl Stopped {
@@ -45,14 +47,15 @@ impl Stopped {
     /// Why a device has forgotten a session, by what it says of its last stop.
     pub(super) const fn forgotten(reason: Option<StopReason>) -> Self {
         match reason {
-            Some(reason) if !is_of_reset(reason) => Self::AnotherSession,
+            Some(StopReason::NewSession) => Self::AnotherSession,
+            Some(reason) if !is_of_reset(reason) => Self::Ended(reason),
             reason => Self::Restarted(reason),
         }
     }
 
     /// Why the device was reset, if its sensor has not stopped for another reason since.
     #[must_use]
-    pub fn reset_before(report: &Report) -> Option<StopReason> {
+    fn reset_before(report: &Report) -> Option<StopReason> {
         StopReason::from_number(report.stop_reason).filter(|&reason| is_of_reset(reason))
     }
 
@@ -63,13 +66,6 @@ impl Stopped {
         Some(format!(
             "the device has been restarted ({reason}) before this session"
         ))
-    }
-
-    /// Whether a program that goes on by itself leaves the sensor off until a person starts it
-    /// again.
-    #[must_use]
-    pub const fn stays(&self) -> bool {
-        !matches!(self, Self::Restarted(None))
     }
 }
 
@@ -97,6 +93,7 @@ impl fmt::Display for Stopped {
             Self::AnotherSession => {
                 f.write_str("another program has begun a session with the device")
             }
+            Self::Ended(reason) => write!(f, "the device has ended this session: {reason}"),
         }
     }
 }
@@ -149,26 +146,27 @@ mod tests {
     #[test]
     fn a_device_that_forgets_a_session_has_been_restarted_or_has_another() {
         let rest = "and has forgotten this session";
-        for (reason, text, stays) in [
-            (0, format!("the device has been restarted {rest}"), false),
+        for (reason, text) in [
+            (0, format!("the device has been restarted {rest}")),
             (
                 8,
                 format!("the device has been restarted (the watchdog) {rest}"),
-                true,
             ),
             (
                 10,
                 format!("the device has been restarted (a reset) {rest}"),
-                true,
             ),
             (
                 2,
                 "another program has begun a session with the device".to_owned(),
-                true,
+            ),
+            (
+                5,
+                "the device has ended this session: the host closed the USB port".to_owned(),
             ),
         ] {
             let stopped = Stopped::forgotten(StopReason::from_number(reason));
-            assert_eq!((stopped.to_string(), stopped.stays()), (text, stays));
+            assert_eq!(stopped.to_string(), text);
         }
     }
 

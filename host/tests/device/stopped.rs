@@ -2,7 +2,7 @@
 //! a device that fails.
 
 use std::io::Read;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -148,34 +148,6 @@ fn an_output_that_blocks_stops_the_sensor_and_ends_the_command_with_the_reason()
         ..ENDED
     };
     assert_eq!(told(&name), expected);
-}
-
-/// Its session ends, though the command cannot go on.
-#[cfg(unix)]
-#[test]
-fn ctrl_c_twice_stops_the_sensor_also_while_an_output_blocks() {
-    let scratch = Scratch::new();
-    for line in [
-        "monitor --pixels 4",
-        "monitor --pixels 4 --record events.aer",
-    ] {
-        let name = bright();
-        let mut monitor = spawned(
-            &scratch,
-            &format!("{line} --x 4 --l1 20 --host-timeout 60"),
-            &name,
-        );
-        thread::sleep(Duration::from_millis(2_000));
-        let id = monitor.id().to_string();
-        for _ in 0..2 {
-            let sent = Command::new("kill").args(["-INT", &id]).status().unwrap();
-            assert!(sent.success());
-            // Two at once are one.
-            thread::sleep(Duration::from_millis(300));
-        }
-        assert_eq!(monitor.wait().unwrap().code(), Some(130));
-        assert_eq!(told(&name), ENDED, "{line}");
-    }
 }
 
 #[test]

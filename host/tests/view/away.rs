@@ -27,6 +27,10 @@ fn a_device_that_is_unplugged_comes_back_and_so_does_the_recording() {
         frame["connection"]["reason"].as_str().unwrap(),
         "the device ",
     );
+    // It does not start by itself.
+    until("taken", || {
+        post(live.port, "/settings", "[detection]\nl1 = 40\n").status == 200
+    });
     let frame = page.until("back", |frame| frame["connection"]["returned"] == 1);
     assert_eq!(frame["connection"]["state"], "live");
     page.until("events again", |frame| {

@@ -8,11 +8,11 @@ use serde_json::{Value, json};
 use super::client::{Client, Data};
 use super::protobuf::{field, fields};
 use super::{START_US, of, play, points, recording};
-use crate::Live;
 use crate::common::aer::{depth, dynamic};
 use crate::common::{Scratch, says};
 use crate::device::{feed, plugged};
 use crate::http::{Stream, post};
+use crate::{Live, until};
 use dtof::export::{Format, Options, export};
 
 const TOPICS: [&str; 7] = [
@@ -278,5 +278,9 @@ fn a_device_tells_every_loss_and_why_it_is_gone() {
     let gone = client.until("gone", |data| is_line(data, "gone: "));
     // An error.
     assert_eq!(field(&gone.last().unwrap().bytes, 2).number(), 4);
+    // A page starts its sensor again.
+    until("taken", || {
+        post(live.port, "/settings", "[detection]\nl1 = 40\n").status == 200
+    });
     client.until("live again", |data| is_line(data, "live"));
 }

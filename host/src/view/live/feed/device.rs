@@ -37,10 +37,9 @@ pub struct Device {
 struct Sessions {
     /// Settings that a page puts in force while there is no session.
     wished: Option<Command>,
-    /// There was a session.
+    /// A device has answered. Its sensor may have run, and may have stopped since for whatever
+    /// reason: from now on only a page starts it.
     any: bool,
-    /// The sensor has stopped for a reason that a person has to see before it starts again.
-    is_off: bool,
 }
 
 impl Device {
@@ -65,7 +64,6 @@ impl Device {
                     None => format!("{name}: its sensor may run for {timeout} more"),
                 }));
             }
-            sessions.is_off |= stopped.is_some_and(|stopped| stopped.stays());
             let reason = match kept {
                 Ok(()) => format!("{ended:#}"),
                 Err(kept) => format!("{ended:#}; {kept:#}"),
@@ -73,17 +71,18 @@ impl Device {
             if let Some(command) = sessions.wished.take() {
                 reply(command.answer, Err(anyhow!("{reason}")));
             }
-            let (state, reason) = if sessions.is_off {
-                ("stopped", starts_again(&reason))
+            let state = if stopped.is_some() { "stopped" } else { "gone" };
+            let reason = if sessions.any {
+                starts_again(&reason)
             } else {
-                ("gone", reason)
+                reason
             };
             work.hub.connection(state, &reason);
             if told != reason {
                 work.complain(&reason);
                 told.clone_from(&reason);
             }
-            sessions.wished = self.wait(work, &reason, sessions.is_off);
+            sessions.wished = self.wait(work, &reason, sessions.any);
         }
         Ok(())
     }
@@ -102,12 +101,10 @@ impl Device {
             dynamic_depth: self.dynamic_depth,
             host_timeout: self.host_timeout,
         };
-        // A device that comes back by itself may have been reset in the meantime.
-        let may_start = !sessions.any || sessions.wished.is_some();
         let mut client = Client::new((self.open)()?)?;
-        let mut session = Session::begin(&mut client, said, given, may_start, work)
+        sessions.any = true;
+        let mut session = Session::begin(&mut client, said, given, work)
             .map_err(|error| self.said.name_origin(error))?;
-        (sessions.any, sessions.is_off) = (true, false);
         if let Some(command) = sessions.wished.take() {
             reply(command.answer, Ok("The settings are in force.".to_owned()));
         }

@@ -51,21 +51,16 @@ pub struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// Puts settings in force; from now on events come. Unless it `may_start` one that was reset,
-    /// the sensor of such a device stays off.
+    /// Puts settings in force; from now on events come.
     pub fn begin(
         client: &'a mut Client,
         said: SettingsFile,
         given: Given,
-        may_start: bool,
         work: &mut Work,
     ) -> Result<Self> {
         let setup = Setup::of(client, said, given.pixels)?;
         check_masked(&setup.settings)?;
         work.warn(&setup.warnings);
-        if let (false, reason @ Some(_)) = (may_start, setup.reset_before) {
-            return Err(Stopped::Restarted(reason).into());
-        }
         let here = *client.counters();
         let mut session = Self {
             client,
