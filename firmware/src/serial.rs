@@ -61,8 +61,9 @@ pub struct Buffers<const RECEIVE: usize, const TRANSMIT: usize> {
 
 /// What the port knows of the program at its other end.
 struct Line {
-    /// A program has the port open, as far as the port can tell.
-    listens: AtomicBool,
+    /// No program has the port open, as far as the port can tell. (All zero at the start: the
+    /// queues beside it take no flash.)
+    is_closed: AtomicBool,
     /// It was closed since the main loop asked last.
     was_closed: AtomicBool,
 }
@@ -76,7 +77,7 @@ impl<const RECEIVE: usize, const TRANSMIT: usize> Buffers<RECEIVE, TRANSMIT> {
             transmit: Queue::new(),
             lost: AtomicU32::new(0),
             line: Line {
-                listens: AtomicBool::new(true),
+                is_closed: AtomicBool::new(false),
                 was_closed: AtomicBool::new(false),
             },
         }
@@ -143,7 +144,7 @@ impl SerialInterrupt<'_> {
     /// never calls it.
     #[inline]
     pub fn set_listening(&mut self, listens: bool) {
-        self.line.listens.store(listens, Ordering::Relaxed);
+        self.line.is_closed.store(!listens, Ordering::Relaxed);
         if !listens {
             self.line.was_closed.store(true, Ordering::Relaxed);
         }
@@ -181,7 +182,8 @@ impl Serial<'_> {
     }
 
     /// Whether a program at the other end has had the port open since this was last asked, and
-    /// has it open now: true where the port cannot tell.
+    /// has it open now: true where the port cannot tell. What a program sent before it closed the
+    /// port is dropped.
     #[must_use]
     pub fn listens(&mut self) -> bool {
         // In two steps, as not every processor can do it in one. What is closed in between is
@@ -189,8 +191,9 @@ impl Serial<'_> {
         let was_closed = self.line.was_closed.load(Ordering::Relaxed);
         if was_closed {
             self.line.was_closed.store(false, Ordering::Relaxed);
+            while self.to_read.dequeue().is_some() {}
         }
-        self.line.listens.load(Ordering::Relaxed) && !was_closed
+        !self.line.is_closed.load(Ordering::Relaxed) && !was_closed
     }
 
     /// Whether a byte waits to be read.

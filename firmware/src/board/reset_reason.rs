@@ -26,6 +26,8 @@ pub enum ResetReason {
 
 impl From<ResetReason> for Option<StopReason> {
     /// What a host is told of it: nothing stopped when the board was switched on.
+    // Part of a large function it would become a jump that hides where it goes.
+    #[inline(never)]
     fn from(reason: ResetReason) -> Self {
         match reason {
             ResetReason::PowerOn => None,
@@ -99,6 +101,13 @@ mod word {
 
     /// Leaves word of a panic or a fault for the start after the reset that follows.
     pub fn remember(reason: ResetReason) {
+        // The first: a report of a fault may panic.
+        if WORDS
+            .iter()
+            .any(|&(_, word)| word == WORD.load(Ordering::Relaxed))
+        {
+            return;
+        }
         let entry = WORDS.iter().find(|(of, _)| *of == reason);
         WORD.store(entry.map_or(0, |&(_, word)| word), Ordering::Relaxed);
     }

@@ -131,7 +131,9 @@ pub struct Sidecar<'a> {
     listens: bool,
     /// Of the configuration in force: how long the host may be silent, 0 for ever.
     host_timeout_ms: u16,
-    /// Why the sensor is to stop: the first reason since it was polled last.
+    /// Messages that arrived before it went off: no configuration among them starts it.
+    stale: usize,
+    /// Why the sensor is to stop, since it was polled last.
     stopping: Option<StopReason>,
     /// Why it stopped last.
     stop_reason: Option<StopReason>,
@@ -195,6 +197,7 @@ impl<'a> Sidecar<'a> {
             running: false,
             started: false,
             off: false,
+            stale: 0,
             listens: true,
             host_timeout_ms: Configuration::HOST_TIMEOUT_MS,
             stopping: None,
@@ -323,10 +326,14 @@ impl<'a> Sidecar<'a> {
             let Some(message) = self.endpoint.take() else {
                 return;
             };
+            let is_stale = self.stale > 0;
+            self.stale = self.stale.saturating_sub(1);
             if next == message::HISTOGRAM_REQUEST {
                 self.histogram_of(&message.body);
             } else {
+                let was_off = self.off;
                 self.answer = self.act(message, overrun);
+                self.off |= was_off && is_stale;
             }
         }
     }
@@ -359,8 +366,11 @@ impl<'a> Sidecar<'a> {
     }
 
     /// A session has ended or begun: nothing of it, or of the one before, remains.
+    #[inline(never)]
     fn start_over(&mut self, reason: StopReason) {
         self.stopping.get_or_insert(reason);
+        // Also if no sensor runs: a host of before is told that its session is over.
+        self.endpoint.set_stop_reason(reason);
         self.pixels.clear();
         self.blocks.clear();
         self.config = None;

@@ -1,6 +1,7 @@
 //! Photons and histograms of a sensor, which does not wait.
 
 use dtof_core::{AnyRule, Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, PixelConfig};
+use dtof_link::frame::Deframer;
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
 use super::events::has_room_for_events;
@@ -31,8 +32,12 @@ impl Sidecar<'_> {
         lost: u32,
         now_ms: u32,
     ) -> Result<(), S::Error> {
-        self.poll(serial, lost, now_ms)?;
+        // What was configured last takes effect before the next message is answered, and a port
+        // that fails keeps no sensor running.
+        self.steer(sensor, now_ms);
+        let polled = self.poll(serial, lost, now_ms);
         self.poll_sensor(sensor, now_ms);
+        polled?;
         self.poll(serial, lost, now_ms)
     }
 
@@ -40,8 +45,27 @@ impl Sidecar<'_> {
     /// it has more, up to a bound. Its errors are counted in the report, which names
     /// the last.
     ///
-    /// It stops the sensor first if nobody may want it any more: see the module.
+    /// It starts or stops the sensor first: see the module.
     pub fn poll_sensor(&mut self, sensor: &mut impl Sensor, now_ms: u32) {
+        self.steer(sensor, now_ms);
+        for _ in 0..POLLS {
+            if !self.takes_sensor() {
+                return;
+            }
+            match sensor.poll(now_ms, self) {
+                Ok(Polled::Idle) => return,
+                Ok(Polled::Working | Polled::Data) => {}
+                Err(error) => {
+                    self.sensor_failed(error.into());
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Starts the sensor, or stops it.
+    #[inline(never)]
+    fn steer(&mut self, sensor: &mut impl Sensor, now_ms: u32) {
         if !self.listens {
             self.stop_sensor(StopReason::NotListening);
         } else if self.host_is_silent(now_ms) {
@@ -73,19 +97,6 @@ impl Sidecar<'_> {
             self.no_whole_histogram();
         }
         self.stopping = None;
-        for _ in 0..POLLS {
-            if !self.takes_sensor() {
-                return;
-            }
-            match sensor.poll(now_ms, self) {
-                Ok(Polled::Idle) => return,
-                Ok(Polled::Working | Polled::Data) => {}
-                Err(error) => {
-                    self.sensor_failed(error.into());
-                    return;
-                }
-            }
-        }
     }
 
     /// Asks a simulated sensor for laser cycles, not by the clock but as fast as they are
@@ -148,8 +159,20 @@ impl Sidecar<'_> {
 
     /// Whether a program has the host's port open, as far as the port can tell. While it has
     /// not, the sensor is off.
-    pub const fn set_listening(&mut self, listens: bool) {
+    pub fn set_listening(&mut self, listens: bool) {
+        if self.listens && !listens {
+            self.close();
+        }
         self.listens = listens;
+    }
+
+    /// Nothing remains of a frame that was cut off, nor of the session of a program that is gone.
+    #[cold]
+    #[inline(never)]
+    fn close(&mut self) {
+        self.deframer = Deframer::new();
+        self.endpoint.close();
+        self.start_over(StopReason::NotListening);
     }
 
     /// Why the sensor stopped last, which hosts are told: after a reset, its reason.
@@ -165,6 +188,7 @@ impl Sidecar<'_> {
         if !self.off {
             self.off = true;
             self.stopping = Some(reason);
+            self.stale = self.endpoint.waiting();
         }
     }
 

@@ -131,6 +131,8 @@ pub struct Endpoint {
     inbox: Deque<Message, WINDOW>,
     /// The number that comes next.
     expected: u8,
+    /// A message of the session has arrived.
+    has_received: bool,
     /// An unnumbered frame that is due, and the session it is about.
     reply: Option<(u8, u16)>,
     acknowledge: bool,
@@ -184,6 +186,7 @@ impl Endpoint {
             peer_limit: WINDOW_U8,
             inbox: Deque::new(),
             expected: 0,
+            has_received: false,
             reply: None,
             acknowledge: false,
             progress_ms: 0,
@@ -241,6 +244,17 @@ impl Endpoint {
         self.ending = true;
         // It is due at once.
         self.spoke_ms = now_ms.wrapping_sub(KEEP_ALIVE_MS);
+    }
+
+    /// Forgets the session, as if the host had ended it.
+    pub fn close(&mut self) {
+        self.forget();
+    }
+
+    /// Messages that have arrived and were not taken.
+    #[must_use]
+    pub fn waiting(&self) -> usize {
+        self.inbox.len()
     }
 
     /// Whether the host has ended its session since this was last asked. All that belonged to

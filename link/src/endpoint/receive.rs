@@ -45,7 +45,7 @@ impl Endpoint {
                 };
                 // After a message of the session, only from another host that has
                 // drawn the same number.
-                if !ours || self.expected != 0 {
+                if !ours || self.has_received {
                     self.begin(session, *greeting);
                 }
                 self.reply = Some((WELCOME, session));
@@ -92,7 +92,7 @@ impl Endpoint {
     }
 
     /// Back to an end without a session.
-    fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         *self = Self {
             host: self.host,
             // Also if the session begins only now.
@@ -140,5 +140,6 @@ impl Endpoint {
             return;
         }
         self.expected = self.expected.wrapping_add(1);
+        self.has_received = true;
     }
 }

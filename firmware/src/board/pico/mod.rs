@@ -70,6 +70,7 @@ struct Port {
     usb: Usb,
     /// The last byte came over USB: so does the host that is answered.
     over_usb: bool,
+    usb_was_open: bool,
 }
 
 static BUFFERS: ConstStaticCell<BoardBuffers> = ConstStaticCell::new(Buffers::new());
@@ -165,6 +166,7 @@ impl Pico {
             rx,
             usb,
             over_usb: false,
+            usb_was_open: false,
         };
         critical_section::with(|cs| PORT.replace(cs, Some(port)));
 
@@ -316,10 +318,15 @@ impl Port {
         self.send();
     }
 
-    /// Tells the main loop whether the host's port is open. Only that of the USB can tell.
+    /// Tells the main loop whether the host's port is open. Only that of the USB can tell. That it
+    /// closes counts whoever is answered, as noise at the UART may look like a host.
     fn look_at_line(&mut self) {
-        let listens = !self.over_usb || self.usb.listens();
-        self.interrupt.set_listening(listens);
+        let is_open = self.usb.listens();
+        if self.usb_was_open && !is_open {
+            self.interrupt.set_listening(false);
+        }
+        self.usb_was_open = is_open;
+        self.interrupt.set_listening(!self.over_usb || is_open);
     }
 
     fn send(&mut self) {
