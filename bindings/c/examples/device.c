@@ -52,6 +52,8 @@ static int sends_histogram;
 
 static void fail(const char *where, const char *why)
 {
+    /* A board switches its laser off here, before all else. */
+    sensor_runs = 0;
     fprintf(stderr, "error: %s: %s\n", where, why);
     exit(EXIT_FAILURE);
 }

@@ -369,7 +369,7 @@ fn laser_goes_dark_when_the_monitor_is_interrupted_or_killed() -> Result<()> {
         match (signal, over_usb) {
             // It rests before the session ends.
             ("INT", _) => {
-                let until = f64::NEG_INFINITY..=ROUND_MS;
+                let until = -f64::from(HOST_TIMEOUT_MS) / 2.0..=ROUND_MS;
                 fired_for(&what, until, |done| done.last_input_ms, board)?;
             }
             (_, true) => fired_for(&what, AT_ONCE_MS, |done| done.dtr_low_ms, board)?,
