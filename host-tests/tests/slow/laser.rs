@@ -19,7 +19,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use dtof::device::{Client, HostTimeout, Port, configuration};
+use dtof::device::{Client, HostTimeout, Port, Stopped, configuration};
 use dtof_link::{Report, Source, StopReason};
 
 use crate::pico::senses;
@@ -195,10 +195,13 @@ fn goes_dark(image: &Path, fault: &Fault, fault_ms: f64) -> Result<()> {
     let for_ms = (lit_ms + dark_ms()).ceil() as u32;
     let mut board = Rp2040::start_with_fault(image, kind, fault_ms, for_ms)?;
     let (mut client, is_cut) = light(&mut board)?;
-    // Until the device, which has been reset, knows nothing of the session.
+    // Until the device, which has been reset, knows nothing of the session. A second of the watchdog
+    // may take the emulator longer than a client waits for a sign of life.
+    let start = Instant::now();
     let lost = loop {
-        if let Err(lost) = client.exchange() {
-            break format!("{lost:#}");
+        match client.exchange() {
+            Err(lost) if lost.is::<Stopped>() => break format!("{lost:#}"),
+            _ => ensure!(start.elapsed() < Duration::from_secs(120), "no reset"),
         }
     };
     let expected = format!("the device has been restarted ({told}) and has forgotten this session");
