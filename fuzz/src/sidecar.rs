@@ -48,11 +48,17 @@ pub fn sidecar(data: &[u8]) {
                     host.exchange(&mut device, now);
                 }
                 host.speaks = true;
+                host.stale = host.configurations.len();
                 continue;
             }
             LISTENING => {
-                host.listens = length % 2 == 0;
-                device.set_listening(host.listens);
+                let listens = length % 2 == 0;
+                device.set_listening(listens);
+                if host.listens && !listens {
+                    assert!(!device.endpoint().is_open());
+                    host.begin_next(now);
+                }
+                host.listens = listens;
                 continue;
             }
             END => {
@@ -164,6 +170,10 @@ struct Host {
     listens: bool,
     speaks: bool,
     spoke_ms: u32,
+    /// Configurations that may have arrived before a silence: they start nothing after it.
+    stale: usize,
+    /// The last one was such.
+    may_be_off: bool,
 }
 
 impl Host {
@@ -184,6 +194,8 @@ impl Host {
             listens: true,
             speaks: true,
             spoke_ms: now,
+            stale: 0,
+            may_be_off: false,
         }
     }
 
@@ -199,7 +211,11 @@ impl Host {
             self.exchange(device, *now);
         }
         assert!(self.endpoint.is_lost() && !device.endpoint().is_open());
-        let next = Self::new(self.session.wrapping_add(1), *now);
+        self.begin_next(*now);
+    }
+
+    fn begin_next(&mut self, now: u32) {
+        let next = Self::new(self.session.wrapping_add(1), now);
         let before = std::mem::replace(self, next);
         (self.laser, self.listens) = (before.laser, before.listens);
     }
@@ -240,6 +256,13 @@ impl Host {
         panic!("an answer to nothing");
     }
 
+    /// The one that was answered, if a device knows it.
+    fn next_configuration(&mut self) -> Option<Configuration> {
+        self.may_be_off = self.stale > 0;
+        self.stale = self.stale.saturating_sub(1);
+        self.configurations.pop_front().flatten()
+    }
+
     fn exchange(&mut self, device: &mut Sidecar, now: u32) {
         let mut wire = [0; WIRE_BYTES];
         for rounds in 0.. {
@@ -275,7 +298,12 @@ impl Host {
             self.allowed = None;
         }
         device.poll_sensor(&mut self.laser, now);
-        assert_eq!(self.laser.is_on, self.allowed.is_some(), "the laser");
+        let may_run = self.allowed.is_some();
+        assert!(may_run || !self.laser.is_on, "the laser is on");
+        assert!(
+            self.may_be_off || self.laser.is_on == may_run,
+            "the laser is off"
+        );
         assert_eq!(self.laser.is_on, device.sensor_is_running());
     }
 
@@ -297,7 +325,7 @@ impl Host {
             message::CONFIGURED => {
                 self.answered(message::CONFIGURE);
                 (self.events, self.photons) = (0, Some(0));
-                let taken = self.configurations.pop_front().flatten();
+                let taken = self.next_configuration();
                 let taken = taken.expect("one that a device knows");
                 self.takes_link = taken.source == Source::Link;
                 let timeout = Some(u32::from(taken.host_timeout_ms));
@@ -305,7 +333,7 @@ impl Host {
             }
             message::REFUSED => {
                 self.answered(message::CONFIGURE);
-                self.configurations.pop_front();
+                self.next_configuration();
             }
             message::STATISTICS => {
                 self.answered(message::STATISTICS_REQUEST);
