@@ -73,7 +73,13 @@ const FAULTS: [Fault; 8] = [
     fault("fault", HANDLER_MS, "forced", StopReason::Fault),
     fault("hang", WATCHDOG_MS, "watchdog", StopReason::Watchdog),
     fault("lockup", WATCHDOG_MS, "watchdog", StopReason::Watchdog),
-    fault("clock", WATCHDOG_MS, "watchdog", StopReason::Watchdog),
+    // The millisecond that has just ended still feeds the watchdog in the next round.
+    fault(
+        "clock",
+        WATCHDOG_MS + ROUND_MS,
+        "watchdog",
+        StopReason::Watchdog,
+    ),
     // On the chip the boot ROM comes before the image's start.
     fault("core-reset", HANDLER_MS, "core", StopReason::Reset),
     // The registers of the hard fault find no room: the core locks up, or the handler is entered
