@@ -17,7 +17,7 @@ from browser import Report, check
 from pixels import chooses_pixels, maps_time, opened, plays_a_move, shows_a_pixel, shows_few
 
 MOST_BYTES = 5_000_000
-SCRIPTS = Path(__file__).parent.parent.parent / "host/src/view"
+SCRIPTS = Path(__file__).parent.parent.parent / "host/src/report"
 
 
 def turns(report):
@@ -173,7 +173,7 @@ def page_of(browser, data, events):
     data |= {"colours": "000000" * 256, "packed": packed(sum(numbers, ())), "count": len(events)}
     page = browser.new_page()
     page.set_content(f'<script type="application/json" id="data">{json.dumps(data)}</script>')
-    for script in ["shared/helpers.js", "report/events.js", "shared/projection.js"]:
+    for script in ["shared/helpers.js", "events.js", "shared/projection.js"]:
         page.add_script_tag(content=(SCRIPTS / script).read_text())
     return page
 

@@ -125,16 +125,74 @@ fn an_arrow_that_is_turned_round_is_found() {
     assert!(turned >= 15, "{turned} arrows");
 }
 
-#[test]
-fn no_modules_of_a_package_import_each_other_in_a_circle() {
-    let mut files = 0;
-    let mut circles = Vec::new();
-    for package in metadata()["packages"].as_array().unwrap() {
+/// Each package, and what its files import.
+fn graphs() -> Vec<(String, modules::Imports)> {
+    let metadata = metadata();
+    let of = |package: &Value| {
         let manifest = Path::new(package["manifest_path"].as_str().unwrap());
         let graph = modules::imports(&manifest.parent().unwrap().join("src"));
-        files += graph.len();
-        circles.extend(modules::circles(&graph));
-    }
+        (package["name"].as_str().unwrap().to_owned(), graph)
+    };
+    let packages = metadata["packages"].as_array().unwrap();
+    packages.iter().map(of).collect()
+}
+
+#[test]
+fn no_files_or_folders_of_a_package_import_each_other_in_a_circle() {
+    let graphs = graphs();
+    let files: usize = graphs.iter().map(|(_, graph)| graph.len()).sum();
     assert!(files > 100, "{files} files");
-    assert_eq!(circles, [[""; 0]; 0]);
+    for (package, graph) in graphs {
+        assert_eq!(modules::circles(&graph), [[""; 0]; 0], "{package}");
+    }
+}
+
+/// To each import of a file, the other way round another is added: between the same two files, and
+/// between two others of the same folders.
+#[test]
+fn a_planted_circle_of_files_or_of_folders_is_found() {
+    let (mut of_files, mut of_folders) = (0, 0);
+    for (_, graph) in graphs() {
+        for (from, to) in graph
+            .iter()
+            .flat_map(|(from, to)| to.iter().map(move |to| (from, to)))
+        {
+            let depth = from
+                .iter()
+                .zip(to)
+                .take_while(|(one, other)| one == other)
+                .count();
+            // A folder uses what is in it.
+            let (Some(one), Some(other)) = (from.get(..=depth), to.get(..=depth)) else {
+                continue;
+            };
+            let planted = |start: &[String], end: &[String]| {
+                let mut graph = graph.clone();
+                graph.get_mut(start).unwrap().insert(end.to_owned());
+                let circles = modules::circles(&graph);
+                let [one, other] = [one, other].map(|place| place.join("::"));
+                let is_there =
+                    |circle: &Vec<String>| circle.contains(&one) && circle.contains(&other);
+                assert!(
+                    circles.iter().any(is_there),
+                    "{start:?} to {end:?}: {circles:?}"
+                );
+            };
+            planted(to, from);
+            of_files += 1;
+            let beside = |folder: &[String], file| {
+                graph
+                    .keys()
+                    .find(|&module| module.starts_with(folder) && module != file)
+            };
+            if let (Some(start), Some(end)) = (beside(other, to), beside(one, from)) {
+                planted(start, end);
+                of_folders += 1;
+            }
+        }
+    }
+    assert!(
+        of_files > 500 && of_folders > 100,
+        "{of_files}, {of_folders}"
+    );
 }

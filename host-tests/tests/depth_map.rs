@@ -8,6 +8,7 @@ use dtof::engine::host::host_engine;
 use dtof::engine::settings::{AdaptiveBinning, Settings};
 use dtof::events::reports::LastReports;
 use dtof::input::source::{Geometry, PhotonSource};
+use dtof::run::truth::Comparison;
 use dtof::simulate::scene::{self, Along, DepthMap, Scene};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{BlockLevel, Count, DepthEvent, PixelAddress, RangeGate, WindowRule, z_for_levels};
@@ -72,7 +73,7 @@ fn events_lie_on_its_walls() {
     let settings = scene::settings(1);
     let mut photons = scene.photons(settings.seed, 500).unwrap();
     let mut engine = host_engine(&settings, array, &photons.addresses()).unwrap();
-    let mut comparison = scene.comparison(&settings, 500).unwrap();
+    let mut comparison = Comparison::new(&scene, &settings, 500).unwrap();
     comparison.add(&engine.run(&photons.next_slice(500).unwrap()).unwrap());
     let truth = comparison.finish();
     let all = truth.all;

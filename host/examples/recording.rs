@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use dtof::engine::host::host_engine;
-use dtof::engine::run::each_slice;
 use dtof::engine::settings::Settings;
+use dtof::engine::slices::each_slice;
 use dtof::input::open::{Opening, open};
 use dtof::simulate::scene;
 

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 use dtof::calibrate::{remarks, report};
 use dtof::input::medium::Medium;
-use dtof::jobs::calibrate::{Calibrated, Options as CalibrateOptions};
-use dtof::jobs::compare::{Compared, Input, Options as CompareOptions, Told};
-use dtof::jobs::tune::Options as TuneOptions;
 use dtof::rows::Row;
+use dtof::run::calibrate::{Calibrated, Options as CalibrateOptions};
+use dtof::run::compare::{Compared, Input, Options as CompareOptions, Told};
+use dtof::run::tune::Options as TuneOptions;
 use dtof::settings::SettingsFile;
 use pyo3::prelude::*;
 use std::sync::Mutex;

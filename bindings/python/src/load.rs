@@ -5,8 +5,8 @@ use std::ffi::OsString;
 use anyhow::Result;
 use dtof::input::medium::Medium;
 use dtof::input::open::{Counts, counts};
-use dtof::jobs::recording::{opening, warnings};
-use dtof::jobs::replay::Options;
+use dtof::run::recording::{opening, warnings};
+use dtof::run::replay::Options;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 

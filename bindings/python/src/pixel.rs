@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use dtof::cli::arguments::fixed;
 use dtof::engine::settings::Settings;
-use dtof::jobs::operation::Operation;
+use dtof::run::operation::Operation;
 use dtof::settings::{Sensor, SettingsFile};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{

@@ -6,18 +6,19 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use dtof::engine::Engine;
 use dtof::engine::host::host_engine;
-use dtof::engine::run::each_slice;
 use dtof::engine::settings::Settings;
+use dtof::engine::slices::each_slice;
 use dtof::events::aer_file::Header;
-use dtof::events::summary::Summary;
 use dtof::input::masked::Masked;
 use dtof::input::medium::Medium;
 use dtof::input::recorded::Whole;
 use dtof::input::source::PhotonSource;
-use dtof::jobs::glass::watch_glass;
-use dtof::jobs::recording::{opening, warnings};
-use dtof::jobs::replay::{Options, Replay};
-use dtof::jobs::simulate::{Options as SimulateOptions, of_scene};
+use dtof::run::glass::watch_glass;
+use dtof::run::recording::{opening, warnings};
+use dtof::run::replay::{Options, Replay};
+use dtof::run::simulate::{Options as SimulateOptions, of_scene};
+use dtof::run::summary::Summary;
+use dtof::run::truth::Comparison;
 use dtof::settings::SettingsFile;
 use dtof::simulate::scene::Scene;
 use dtof_core::DepthEvent;
@@ -148,7 +149,7 @@ fn simulated(
     let photons = photons.with_context(|| name.clone())?;
     let mut photons = Masked::new(Box::new(photons), &settings.masked)?;
     let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses())?;
-    let mut comparison = scene.comparison(&settings, cycles)?;
+    let mut comparison = Comparison::new(&scene, &settings, cycles)?;
     let mut done = run(
         &mut photons,
         engine.as_mut(),

@@ -76,10 +76,10 @@ const WRITERS: [&str; 8] = [
     "bindings/python/src/aer.rs",
     "host/src/compare/page.rs",
     "host/src/device/monitor/recording.rs",
-    "host/src/events/output.rs",
     "host/src/export/mod.rs",
     "host/src/files.rs",
-    "host/src/view/live/outputs.rs",
+    "host/src/live/outputs.rs",
+    "host/src/run/output.rs",
 ];
 
 fn root() -> PathBuf {

@@ -134,8 +134,7 @@ impl<'file> Visit<'file> for Paths {
     }
 
     fn visit_item_use(&mut self, item: &'file syn::ItemUse) {
-        // What is handed on is not used.
-        if matches!(item.vis, syn::Visibility::Inherited) && !is_test(&item.attrs) {
+        if !is_test(&item.attrs) {
             self.tree(&mut Vec::new(), &item.tree);
         }
     }
@@ -151,33 +150,59 @@ impl<'file> Visit<'file> for Paths {
     }
 }
 
-/// The modules that import each other in a circle, circle by circle.
+/// Files and folders that import each other in a circle, circle by circle. What lies side by side
+/// in a folder is compared: a folder imports what any of its files imports, so a circle of files
+/// shows where their ways part.
 pub fn circles(imports: &Imports) -> Vec<Vec<String>> {
-    let reached = |from: &Module| {
-        let (mut reached, mut next) = (BTreeSet::new(), vec![from.clone()]);
-        while let Some(module) = next.pop() {
-            for to in imports.get(&module).into_iter().flatten() {
-                if reached.insert(to.clone()) {
-                    next.push(to.clone());
-                }
-            }
+    let folders: BTreeSet<&[String]> = imports
+        .keys()
+        .flat_map(|module| (0..module.len()).map(|depth| &module[..depth]))
+        .collect();
+    let within = |folder| circles_of(&side_by_side(imports, folder));
+    folders.into_iter().flat_map(within).collect()
+}
+
+/// What each file and folder in `folder` imports of the others there.
+fn side_by_side<'a>(
+    imports: &'a Imports,
+    folder: &[String],
+) -> BTreeMap<&'a [String], BTreeSet<&'a [String]>> {
+    let here = |module: &'a Module| {
+        let is_below = module.len() > folder.len() && module.starts_with(folder);
+        is_below.then(|| &module[..=folder.len()])
+    };
+    let mut found = BTreeMap::<_, BTreeSet<_>>::new();
+    for (from, to) in imports {
+        if let Some(from) = here(from) {
+            let to = to.iter().filter_map(here).filter(|&to| to != from);
+            found.entry(from).or_default().extend(to);
+        }
+    }
+    found
+}
+
+fn circles_of(imports: &BTreeMap<&[String], BTreeSet<&[String]>>) -> Vec<Vec<String>> {
+    let reached = |from| {
+        let (mut reached, mut next) = (BTreeSet::new(), vec![from]);
+        while let Some(place) = next.pop() {
+            let to = imports.get(place).into_iter().flatten();
+            next.extend(to.filter(|&&to| reached.insert(to)));
         }
         reached
     };
-    let reached: BTreeMap<&Module, BTreeSet<Module>> = imports
+    let reached: BTreeMap<&[String], BTreeSet<&[String]>> = imports
         .keys()
-        .map(|module| (module, reached(module)))
+        .map(|&place| (place, reached(place)))
         .collect();
-    let in_circle = |module: &&Module| reached[module].contains(*module);
-    let circle = |module: &Module| -> Vec<String> {
+    let in_circle = imports
+        .keys()
+        .filter(|&place| reached[place].contains(place));
+    let circle = |place: &&[String]| -> Vec<String> {
         let back =
-            |other: &&Module| reached[module].contains(*other) && reached[other].contains(module);
-        imports
-            .keys()
-            .filter(back)
-            .map(|module| module.join("::"))
-            .collect()
+            |other: &&&[String]| reached[place].contains(*other) && reached[*other].contains(place);
+        let places = imports.keys().filter(back);
+        places.map(|place| place.join("::")).collect()
     };
-    let circles: BTreeSet<Vec<String>> = imports.keys().filter(in_circle).map(circle).collect();
+    let circles: BTreeSet<Vec<String>> = in_circle.map(circle).collect();
     circles.into_iter().collect()
 }

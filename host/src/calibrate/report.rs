@@ -5,12 +5,12 @@ use dtof_draw::chart::{Axis, Chart, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::{AVERAGE, EVENTS, PAPER, REFERENCE};
 
 use super::{Calibration, Length, Nearest, remarks};
+use crate::report::{Figure, Section, still};
 use crate::rows::{Row, grouped, significant};
 use crate::settings::SettingsFile;
-use crate::view::report::{Figure, Section, still};
 
 /// Every settings file and every report has it near its start: files that may be replaced.
-pub const MARKS: [&str; 2] = [crate::settings::MARK, crate::view::report::MARK];
+pub const MARKS: [&str; 2] = [crate::settings::MARK, crate::report::MARK];
 
 /// What was found, a row each, with its 95 % interval.
 #[must_use]

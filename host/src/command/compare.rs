@@ -8,9 +8,9 @@ use clap::Args;
 use dtof::cli::arguments::path;
 use dtof::compare::page::{self, FILES};
 use dtof::input::medium::Medium;
-use dtof::jobs::compare::{Compared, Input, Options, Told};
 use dtof::progress::Steps;
 use dtof::rows::aligned;
+use dtof::run::compare::{Compared, Input, Options, Told};
 use dtof::simulate::scene::Scene;
 
 use super::warn;

@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Parser;
 use dtof::cli::arguments::{MOST_WHOLE, path, whole};
 use dtof::input::source::Geometry;
-use dtof::jobs::simulate::{array, of_scene};
+use dtof::run::simulate::{array, of_scene};
 use dtof::settings::Run;
 use dtof::simulate::demo;
 

@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use dtof::cli::arguments::{fixed, whole};
 use dtof::device::HostTimeout;
-use dtof::jobs::operation::Operation;
+use dtof::run::operation::Operation;
 use dtof::settings::{Sensor, SettingsFile};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_link::DynamicDepth;

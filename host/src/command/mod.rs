@@ -18,8 +18,8 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use dtof::cli::complain;
-use dtof::events::summary::Summary;
 use dtof::rows::{Row, aligned, printable};
+use dtof::run::summary::Summary;
 
 /// Says on standard error what to know of `file`, a line each, unless `quiet`.
 fn warn(file: &Path, warnings: impl IntoIterator<Item = String>, quiet: bool) {

@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use dtof::cli::arguments::path;
-use dtof::engine::run::run;
 use dtof::events::echoes::Echo;
-use dtof::events::output::Output;
 use dtof::input::medium::Medium;
-use dtof::jobs::glass::watch_glass;
-use dtof::jobs::recording::warnings;
-use dtof::jobs::replay::{Options, Replay as Opened};
+use dtof::run::glass::watch_glass;
+use dtof::run::output::Output;
+use dtof::run::recording::warnings;
+use dtof::run::replay::{Options, Replay as Opened};
+use dtof::run::run;
 use dtof::settings::SettingsFile;
 
 use super::dynamic_depth::Shown;

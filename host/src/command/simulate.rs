@@ -8,19 +8,20 @@ use dtof::cli::arguments::path;
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::Engine;
 use dtof::engine::host::host_engine;
-use dtof::engine::run::run;
 use dtof::engine::settings::Settings;
 use dtof::events::echoes::Echo;
-use dtof::events::output::Output;
 use dtof::geometry::FieldOfView;
 use dtof::input::masked::Masked;
 use dtof::input::source::{Geometry, PhotonSource};
-use dtof::jobs::glass::watch_glass;
-use dtof::jobs::simulate::{Options, of_scene};
+use dtof::report::Section;
 use dtof::rows::Row;
+use dtof::run::glass::watch_glass;
+use dtof::run::output::Output;
+use dtof::run::run;
+use dtof::run::simulate::{Options, of_scene};
+use dtof::run::truth::Comparison;
 use dtof::settings::SettingsFile;
 use dtof::simulate::scene::Scene;
-use dtof::view::report::Section;
 use dtof_core::PixelAddress;
 use dtof_link::DynamicDepth;
 
@@ -153,7 +154,7 @@ impl Simulation<'_> {
             .with_changes(self.changes.as_ref())?
             .with_echo(self.echo, self.settings)
             .without_csv(self.no_csv);
-        let mut comparison = self.scene.comparison(self.settings, self.cycles)?;
+        let mut comparison = Comparison::new(self.scene, self.settings, self.cycles)?;
         let mut summary = run(
             &mut photons,
             engine.as_mut(),

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use anyhow::Result;
 use clap::Args;
-use dtof::jobs::tune::Options;
+use dtof::run::tune::Options;
 
 #[derive(Args)]
 pub struct Tune {

@@ -8,7 +8,7 @@ use clap::Args;
 use dtof::cli::arguments::{path, positive, whole};
 use dtof::cli::interrupt;
 use dtof::device;
-use dtof::view::live::{Device, Feed, Folder, Foxglove, Origin, Playback, Served};
+use dtof::live::{Device, Feed, Folder, Foxglove, Origin, Playback, Served};
 
 use super::device_options::DeviceOptions;
 

@@ -10,8 +10,8 @@ use super::tally::{Figures, Tally};
 use super::truth::Truth;
 use crate::engine::Engine;
 use crate::engine::host::host_engine;
-use crate::engine::run::each_slice;
 use crate::engine::settings::Settings;
+use crate::engine::slices::each_slice;
 use crate::input::source::PhotonSource;
 
 /// A method with its settings.

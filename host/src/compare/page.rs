@@ -10,8 +10,8 @@ use dtof_draw::svg;
 use super::Comparison;
 use super::measure::Outcome;
 use crate::files::{Marked, may_replace, write_marked};
+use crate::report::{self, Figure, Section, still};
 use crate::settings::{self, SettingsFile};
-use crate::view::report::{self, Figure, Section, still};
 
 /// The files of a comparison, and what stands near the start of each. The last makes a folder
 /// complete.

@@ -4,8 +4,8 @@ use anyhow::Result;
 use dtof_core::PixelAddress;
 
 use super::stress::Light;
-use crate::engine::run::next_cycles;
 use crate::engine::settings::Settings;
+use crate::engine::slices::next_cycles;
 use crate::input::source::PhotonSource;
 
 /// A window stands clear of the background by so many of its standard deviations, if there is

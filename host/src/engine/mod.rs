@@ -5,8 +5,8 @@ pub mod frame;
 pub mod group;
 pub mod host;
 pub mod look;
-pub mod run;
 pub mod settings;
+pub mod slices;
 
 use anyhow::Result;
 use dtof_core::{DepthEvent, PixelAddress, Statistics};

@@ -1,4 +1,4 @@
-//! The output of events: tables, words, maps, a folder of results.
+//! The output of events: tables, words, maps.
 
 pub mod aer_file;
 pub mod changes;
@@ -8,7 +8,5 @@ pub mod events_csv;
 #[cfg(test)]
 pub(crate) mod fixtures;
 pub mod maps;
-pub mod output;
 pub mod reports;
 pub mod sample;
-pub mod summary;

@@ -5,7 +5,6 @@
 //! the reflectivity and the inverse square of the range; the background is the
 //! same everywhere. `docs/scenes.md` lists all keys.
 
-mod comparison;
 mod depth_map;
 mod file;
 mod of_depth_map;
@@ -195,6 +194,26 @@ impl Scene {
         self.bin_width_ps * MM_PER_PS
     }
 
+    /// Where the last bin ends.
+    pub(crate) fn end_mm(&self) -> f64 {
+        f64::from(self.bins) * self.mm_per_bin()
+    }
+
+    /// Pixels that see a surface at the start or the end of `cycles` laser cycles too
+    /// far away for the histogram.
+    pub(crate) fn pixels_beyond(&self, surface: usize, cycles: u64) -> usize {
+        let is_beyond = |address, cycle| {
+            let views = self.views(address, cycle).into_iter().flatten();
+            let mut of_surface = views.filter(|view| view.surface == surface);
+            of_surface.any(|view| view.range_mm >= self.end_mm())
+        };
+        let pixels = (0..=u16::MAX).map(PixelAddress);
+        pixels
+            .take(self.geometry.addresses())
+            .filter(|&address| is_beyond(address, 0) || is_beyond(address, cycles))
+            .count()
+    }
+
     /// Laser cycles a second, rounded.
     #[allow(
         clippy::cast_possible_truncation,
@@ -276,7 +295,7 @@ impl Scene {
     }
 
     /// As near as a surface comes in `cycles` laser cycles.
-    fn nearest_mm(&self, surface: &Surface, cycles: u64) -> f64 {
+    pub(crate) fn nearest_mm(&self, surface: &Surface, cycles: u64) -> f64 {
         let at = |seconds| surface.nearest_mm(seconds, self.layout);
         at(0.0).min(at(self.seconds(cycles)))
     }

@@ -4,9 +4,9 @@ use std::fs;
 
 use crate::common::aer::{HEADER, events, file};
 use crate::common::{Scratch, names, says};
-use dtof::events::output::Output;
-use dtof::events::summary::Summary;
 use dtof::input::open::{Opening, open};
+use dtof::run::output::Output;
+use dtof::run::summary::Summary;
 use dtof::simulate::scene;
 
 const PHOTONS: &str = "pixel,cycle,bin\n0,0,0\n";

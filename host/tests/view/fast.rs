@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use crate::common::aer::depth_event;
 use dtof::device::{HostTimeout, Port};
+use dtof::live::{Device, Feed};
 use dtof::settings::SettingsFile;
-use dtof::view::live::{Device, Feed};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{AER_VERSION, AerEncoder, AerWord, LaserCycle, PixelAddress};
 use dtof_link::endpoint::{BODY_BYTES, Endpoint};

@@ -10,7 +10,7 @@ use crate::common::Scratch;
 use crate::common::aer::{HEADER, depth, file};
 use client::Data;
 use dtof::events::aer_file::{Event, Header};
-use dtof::view::live::{Feed, Playback};
+use dtof::live::{Feed, Playback};
 use protobuf::field;
 
 /// 2026-01-02 03:04:05 UTC, in microseconds.

@@ -24,7 +24,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use dtof::view::live::{Feed, Folder, Foxglove, Hub, Served};
+use dtof::live::{Feed, Folder, Foxglove, Hub, Served};
 
 /// A page that is served in this process until it is dropped.
 pub struct Live {

@@ -154,7 +154,7 @@ fn two_pages_look_at_different_pixels() {
 #[test]
 fn pages_are_bounded_and_a_closed_one_makes_room() {
     let live = Live::of(feed(&plugged().name, ""), None);
-    let mut pages: Vec<Stream> = (0..dtof::view::live::MOST_PAGES)
+    let mut pages: Vec<Stream> = (0..dtof::live::MOST_PAGES)
         .map(|_| Stream::open(live.port, 0))
         .collect();
     for page in &mut pages {

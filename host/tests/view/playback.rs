@@ -7,7 +7,7 @@ use crate::common::aer::{HEADER, depth, file};
 use crate::common::{Scratch, says};
 use crate::http::{Stream, post};
 use dtof::events::aer_file::Header;
-use dtof::view::live::{Feed, Playback};
+use dtof::live::{Feed, Playback};
 
 /// Ten events in a second: one laser cycle a millisecond.
 fn recording() -> Vec<u8> {

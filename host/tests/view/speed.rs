@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use crate::common::Scratch;
 use crate::http::{Stream, post};
 use crate::{Live, device, fast};
-use dtof::view::live::{MOST_EVENTS, MOST_PIXELS};
+use dtof::live::{MOST_EVENTS, MOST_PIXELS};
 
 /// Two pages and a recording for so long. Gives frames a second of each page and recorded events a
 /// second.

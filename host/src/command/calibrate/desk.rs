@@ -12,9 +12,9 @@ use dtof::device::histograms::{Collected, SoFar, collect};
 use dtof::device::monitor::array;
 use dtof::device::{self, Client, Port, Stopped};
 use dtof::input::open::BIN_WIDTH_PS;
-use dtof::jobs::recording::Recording;
 use dtof::progress::Progress;
 use dtof::rows::{Row, grouped};
+use dtof::run::recording::Recording;
 use dtof::settings::{Sensor, SettingsFile};
 
 use crate::command::device_options::HostOptions;

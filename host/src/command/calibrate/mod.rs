@@ -11,8 +11,8 @@ use dtof::calibrate::remarks;
 use dtof::calibrate::report::{self, MARKS};
 use dtof::cli::arguments::path;
 use dtof::files::{Marked, write_marked};
-use dtof::jobs::calibrate::Options;
 use dtof::rows::aligned;
+use dtof::run::calibrate::Options;
 use dtof::settings::SettingsFile;
 
 use self::desk::{Desk, Gathered};

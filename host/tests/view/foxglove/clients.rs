@@ -16,7 +16,7 @@ use crate::http::{Stream, post};
 use crate::{Live, fast, until};
 use dtof::events::aer_file::{Header, Reader};
 use dtof::input::source::Geometry;
-use dtof::view::live::MOST_CLIENTS;
+use dtof::live::MOST_CLIENTS;
 
 #[test]
 fn pages_of_other_sites_read_nothing() {

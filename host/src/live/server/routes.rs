@@ -12,10 +12,11 @@ use tokio::sync::oneshot;
 use tokio::time::timeout;
 
 use super::answer::{Content, Frames, answer, line};
-use super::{assets, guard};
+use super::assets;
+use crate::live::feed::{Command, Wish};
+use crate::live::guard;
+use crate::live::hub::Hub;
 use crate::rows::printable;
-use crate::view::live::feed::{Command, Wish};
-use crate::view::live::hub::Hub;
 
 /// Bytes of a body, at most.
 const BODY: usize = 64 * 1024;

@@ -1,14 +1,19 @@
-//! Compares the events of a run, or the readings of frames, with the scene: each with what
+//! How the events of a simulated scene, or the readings of frames, compare with it: each with what
 //! its pixel saw in its laser cycle. Memory does not grow with their number.
 
-use dtof_core::{DepthEvent, EchoNumber, PixelAddress, RangeScale};
+use std::ops::AddAssign;
 
-use super::{Scene, View};
+use anyhow::Result;
+use dtof_core::{DepthEvent, EchoNumber, RangeScale};
+use serde::Serialize;
+
 use crate::engine::settings::Settings;
 use crate::events::events_csv::range_mm;
-use crate::events::summary::truth::{
-    AgainstTruth, CoverGlass, Errors, FALSE_BEYOND_BINS, OfSurface,
-};
+use crate::rows::{Row, grouped};
+use crate::simulate::scene::{Scene, View};
+
+/// An event is a false alarm if its range lies farther from the truth than this many bins.
+pub const FALSE_BEYOND_BINS: f64 = 3.0;
 
 /// Errors are counted in so many steps from 0 to [`FALSE_BEYOND_BINS`]: 1024 a bin.
 const STEPS: usize = 3 * 1024;
@@ -23,6 +28,162 @@ const GLASS_TIMES_EVEN: u64 = 4;
 const GLASS_ENDS_SIGMA: f64 = 6.0;
 /// A range gate has so many bins at least.
 const LEAST_GATE: usize = 8;
+
+/// All events of a run against the truth.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AgainstTruth {
+    /// Pixels of the array.
+    pub pixels: usize,
+    /// Where the last bin ends.
+    pub histogram_ends_mm: f64,
+    /// [`FALSE_BEYOND_BINS`].
+    pub false_beyond_bins: f64,
+    /// Of all events.
+    #[serde(flatten)]
+    pub all: Errors,
+    /// Surface by surface, and events of pixels that see none.
+    pub surfaces: Vec<OfSurface>,
+    /// False alarms that look like the cover glass, if there are any.
+    pub cover_glass: Option<CoverGlass>,
+}
+
+/// Events of pixels that saw one surface.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfSurface {
+    /// Its name.
+    pub name: String,
+    /// Pixels with such an event.
+    pub pixels: usize,
+    /// The laser cycle of the first.
+    pub first_cycle: Option<u64>,
+    /// How they compare.
+    #[serde(flatten)]
+    pub errors: Errors,
+    /// Pixels that see it beyond the last bin, at the start or the end of the run.
+    pub pixels_beyond: usize,
+}
+
+/// How some events compare with the truth.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Errors {
+    /// How many there are.
+    pub events: u64,
+    /// Of these, false alarms. They are left out of the errors.
+    pub false_alarms: u64,
+    /// The same as a share.
+    pub false_alarm_share: Option<f64>,
+    /// Mean error: positive if events are too far away.
+    pub bias_mm: Option<f64>,
+    /// Root mean square of the error.
+    pub rms_mm: Option<f64>,
+    /// 95 % of the errors are at most so large, rounded up to 1/1024 bin: that is how fine they
+    /// are counted.
+    pub within_95_mm: Option<f64>,
+}
+
+/// False alarms in one place, nearer than every surface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CoverGlass {
+    /// First and last bin of their peaks.
+    pub bins: (u16, u16),
+    /// How many there are.
+    pub false_alarms: u64,
+    /// First and last bin of a range gate without them.
+    pub gate: (u16, u16),
+}
+
+impl AgainstTruth {
+    /// For people. The pixels' reports are `called` so: one of them, and several.
+    #[must_use]
+    pub fn rows(&self, called: [&str; 2]) -> Vec<Row> {
+        let mut rows = Vec::new();
+        if self.surfaces.len() > 1 {
+            rows.extend(self.all.rows("", called));
+        }
+        for surface in &self.surfaces {
+            rows.extend(surface.rows(self, called));
+        }
+        if let Some(glass) = &self.cover_glass {
+            let (first, last) = glass.bins;
+            let (from, to) = glass.gate;
+            rows.push((
+                "like a cover glass".to_owned(),
+                format!(
+                    "{} false alarms in bins {first} to {last}, before every surface: try \
+                     --gate {from}..{to}",
+                    grouped(glass.false_alarms)
+                ),
+            ));
+        }
+        rows
+    }
+}
+
+impl OfSurface {
+    fn rows(&self, of: &AgainstTruth, called: [&str; 2]) -> Vec<Row> {
+        let name = &self.name;
+        let first = self.first_cycle.map_or("-".to_owned(), grouped);
+        let mut rows = vec![(
+            name.clone(),
+            format!(
+                "{} {} of {} pixels, the first in laser cycle {first}",
+                grouped(self.errors.events),
+                called[1],
+                self.pixels,
+            ),
+        )];
+        if self.pixels_beyond > 0 {
+            rows.push((
+                format!("{name}, beyond the last bin"),
+                format!(
+                    "{} of {} pixels at the start or the end: no photons from {:.0} mm on",
+                    self.pixels_beyond, of.pixels, of.histogram_ends_mm
+                ),
+            ));
+        }
+        rows.extend(self.errors.rows(&format!("{name}, "), called));
+        rows
+    }
+}
+
+impl Errors {
+    /// Nothing if there are no events.
+    fn rows(&self, of: &str, [_, several]: [&str; 2]) -> Vec<Row> {
+        let Some(share) = self.false_alarm_share else {
+            return Vec::new();
+        };
+        let mut rows = vec![(
+            format!("{of}false alarms"),
+            format!(
+                "{} of {} {several} ({}), more than {FALSE_BEYOND_BINS} bins from the truth",
+                grouped(self.false_alarms),
+                grouped(self.events),
+                percent(share),
+            ),
+        )];
+        if let (Some(bias), Some(rms), Some(within)) =
+            (self.bias_mm, self.rms_mm, self.within_95_mm)
+        {
+            rows.push((
+                format!("{of}errors of the others"),
+                format!("bias {bias:+.1} mm, rms {rms:.1} mm, 95 % within {within:.1} mm"),
+            ));
+        }
+        rows
+    }
+}
+
+/// A share with two digits that count.
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    match percent {
+        0.0 => "0 %".to_owned(),
+        ..0.01 => "less than 0.01 %".to_owned(),
+        ..1.0 => format!("{percent:.2} %"),
+        ..10.0 => format!("{percent:.1} %"),
+        _ => format!("{percent:.0} %"),
+    }
+}
 
 /// Counts and sums over the events so far.
 pub struct Comparison<'a> {
@@ -55,49 +216,27 @@ struct Tally {
     sizes: Vec<u64>,
 }
 
-impl Scene {
-    /// Begins to compare the events of `cycles` laser cycles with the scene.
+impl<'a> Comparison<'a> {
+    /// Begins to compare the events of `cycles` laser cycles with `scene`.
     ///
     /// # Errors
     /// If the settings give no range.
-    pub fn comparison(&self, settings: &Settings, cycles: u64) -> anyhow::Result<Comparison<'_>> {
-        let bins = usize::from(self.bins);
-        let second_echo = self.effects.second_echo.as_ref();
+    pub fn new(scene: &'a Scene, settings: &Settings, cycles: u64) -> Result<Self> {
+        let bins = usize::from(scene.bins);
+        let second_echo = scene.effects.second_echo.as_ref();
         let behind_mm = second_echo.map(|echo| echo.behind_mm);
-        Ok(Comparison {
-            scene: self,
+        Ok(Self {
+            scene,
             scale: settings.range_scale()?,
             cycles,
             behind_mm: behind_mm.filter(|_| settings.echoes > EchoNumber::FIRST),
             first_bin: settings.gate.map_or(0, |(first, _)| first.into()),
             last_bin: settings.gate.map_or(bins - 1, |(_, last)| last.into()),
-            tallies: vec![Tally::new(self.geometry.addresses()); self.surfaces.len() + 1],
+            tallies: vec![Tally::new(scene.geometry.addresses()); scene.surfaces.len() + 1],
             false_peaks: vec![0; bins],
         })
     }
 
-    /// Where the last bin ends.
-    pub(super) fn end_mm(&self) -> f64 {
-        f64::from(self.bins) * self.mm_per_bin()
-    }
-
-    /// Pixels that see a surface at the start or the end of `cycles` laser cycles too
-    /// far away for the histogram.
-    fn pixels_beyond(&self, surface: usize, cycles: u64) -> usize {
-        let is_beyond = |address, cycle| {
-            let views = self.views(address, cycle).into_iter().flatten();
-            let mut of_surface = views.filter(|view| view.surface == surface);
-            of_surface.any(|view| view.range_mm >= self.end_mm())
-        };
-        let pixels = (0..=u16::MAX).map(PixelAddress);
-        pixels
-            .take(self.geometry.addresses())
-            .filter(|&address| is_beyond(address, 0) || is_beyond(address, cycles))
-            .count()
-    }
-}
-
-impl Comparison<'_> {
     /// Takes events into account.
     pub fn add(&mut self, events: &[DepthEvent]) {
         for event in events {
@@ -260,7 +399,7 @@ impl Tally {
     }
 }
 
-impl std::ops::AddAssign<&Self> for Tally {
+impl AddAssign<&Self> for Tally {
     /// But for pixels and times, which nobody asks of all.
     fn add_assign(&mut self, other: &Self) {
         self.events += other.events;

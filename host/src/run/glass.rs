@@ -1,7 +1,7 @@
 //! Whether the cover glass has become brighter than the settings say.
 
 use crate::calibrate::{Change, RunPhotons, glass_change};
-use crate::events::summary::Summary;
+use crate::run::summary::Summary;
 use crate::settings::{Sensor, SettingsFile};
 
 /// Notes it in the summary of a run that was set by `said`, if `bins` has all its photons bin by

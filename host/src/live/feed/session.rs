@@ -13,8 +13,8 @@ use crate::device::monitor::{check_masked, leave_out_masked};
 use crate::device::setup::with_gate;
 use crate::device::{Client, HostTimeout, Setup, Stopped, configuration};
 use crate::input::masked;
+use crate::live::hub::Losses;
 use crate::settings::{Rays, Run, Sensor, SettingsFile};
-use crate::view::live::hub::Losses;
 
 /// How often the device is asked what it does.
 const REPORTS: Duration = Duration::from_millis(500);

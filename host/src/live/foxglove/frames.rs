@@ -15,7 +15,7 @@ use crate::export::Optics;
 use crate::export::foxglove::{Time, cloud};
 use crate::export::points::record;
 use crate::export::projection::Projection;
-use crate::view::live::hub::{Hub, Seen, Wanted};
+use crate::live::hub::{Hub, Seen, Wanted};
 use images::Images;
 use log::Told;
 use timing::Timing;

@@ -1,15 +1,8 @@
-//! One run: photons through an engine into an output folder.
+//! Photons in slices: those of the next are made while an engine decides on one.
 
 use anyhow::{Context, Result};
-use dtof_core::DepthEvent;
 
-use crate::engine::Engine;
-use crate::engine::decisions::Kept;
-use crate::engine::settings::Settings;
-use crate::events::output::Output;
-use crate::events::summary::Summary;
 use crate::input::source::{PhotonSource, Slice};
-use crate::progress::Progress;
 
 /// Laser cycles produced and decided at a time, at most. Changes nothing in the events.
 const SLICE: u16 = 256;
@@ -18,47 +11,6 @@ const SLICE: u16 = 256;
 const PHOTONS_A_PIXEL: f64 = 128.0;
 const FEWEST_PHOTONS: f64 = 5e5;
 const MOST_PHOTONS: f64 = 1e7;
-
-/// Runs all of `source` and writes its events into `output`. A progress bar
-/// shows after a second, unless `quiet`, and only on a terminal. `watch` is given all
-/// events, too.
-///
-/// # Errors
-/// What is wrong with the recording, the engine or the folder.
-pub fn run(
-    source: &mut dyn PhotonSource,
-    engine: &mut dyn Engine,
-    output: &mut Output,
-    settings: &Settings,
-    quiet: bool,
-    mut watch: impl FnMut(&[DepthEvent]),
-) -> Result<Summary> {
-    let progress = Progress::new(source.cycles(), "laser cycles", quiet);
-    let pixels = source.addresses();
-    let kept = Kept::of(source.geometry(), settings.bins);
-    engine.keep_decisions(&|pixel| kept.holds(pixel));
-    each_slice(
-        source,
-        |slice| engine.run(slice),
-        |slice, events, done| {
-            output.count(&pixels, slice);
-            output.write(&events)?;
-            watch(&events);
-            progress.at(done);
-            Ok(())
-        },
-    )?;
-    progress.finish();
-    output.end_events();
-    output.keep(kept, engine.decisions());
-    let reporting = output.maps().reporting();
-    Ok(Summary::new(
-        engine.statistics(),
-        source,
-        reporting,
-        settings,
-    ))
-}
 
 /// Gives all of `source` to `decide`, slice by slice, and makes the photons of the next slice
 /// meanwhile. `see` is given each slice, what was decided, and how many laser cycles are done.

@@ -1,15 +1,13 @@
 //! The summary of a run: `summary.json`, and the same on the terminal and in
 //! the report.
 
-pub mod truth;
-
 use dtof_core::{AnyRule, DepthEstimator, EchoNumber, Statistics, Threshold};
 use serde::{Serialize, Serializer};
 
 use crate::engine::settings::Settings;
 use crate::input::source::PhotonSource;
 use crate::rows::{Row, grouped};
-use truth::AgainstTruth;
+use crate::run::truth::AgainstTruth;
 
 /// Every `summary.json` begins with it, less the version.
 pub(crate) const MARK: &str = "\"program\": \"dtof ";

@@ -4,7 +4,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::events::aer_file::Header;
 use crate::export::LaserClock;
-use crate::view::live::hub::Seen;
+use crate::live::hub::Seen;
 
 /// Seconds from which on a message cannot tell the time.
 const END_S: u64 = 1 << 32;

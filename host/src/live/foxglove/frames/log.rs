@@ -6,9 +6,9 @@ use foxglove::messages::log::Level;
 
 use super::Message;
 use crate::export::foxglove::{Time, encoded};
+use crate::live::foxglove::topics::Topic;
+use crate::live::hub::{Connection, Seen};
 use crate::rows::printable;
-use crate::view::live::foxglove::topics::Topic;
-use crate::view::live::hub::{Connection, Seen};
 
 /// What was told.
 #[derive(Default)]

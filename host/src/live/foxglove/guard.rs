@@ -8,7 +8,7 @@ use std::str::FromStr;
 use hyper::Uri;
 use hyper::header::{HOST, HeaderMap, HeaderValue, ORIGIN};
 
-use crate::view::live::server::guard::{HERE, NOT_HERE, one};
+use crate::live::guard::{HERE, NOT_HERE, one};
 
 /// Foxglove in a browser, and as a program of its own whose pages are files.
 const KNOWN: [&str; 2] = ["https://app.foxglove.dev", "file://"];

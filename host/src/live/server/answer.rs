@@ -14,7 +14,7 @@ use hyper::header::{
 use hyper::{Response, StatusCode};
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
-use crate::view::live::hub::{Hub, Page};
+use crate::live::hub::{Hub, Page};
 
 /// Between two frames of a page.
 const FRAMES: Duration = Duration::from_millis(100);

@@ -11,6 +11,7 @@
 
 mod feed;
 mod foxglove;
+mod guard;
 mod hub;
 mod outputs;
 mod server;

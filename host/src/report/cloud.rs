@@ -1,10 +1,12 @@
 //! The events of a run, to turn and to look at in time: what the script of the page
 //! is given, and the script.
 
+use std::sync::LazyLock;
+
 use serde_json::{Value, json};
 
 use super::histograms::Decisions;
-use super::{FEW, events};
+use super::{FEW, events, shared};
 use crate::events::sample::Sample;
 use crate::export::LaserClock;
 use crate::input::source::Geometry;
@@ -40,30 +42,18 @@ pub struct Cloud<'a> {
 }
 
 /// The only script of the page, between its tags. A module: it has names of its own.
-pub(super) const SCRIPT: &str = concat!(
-    "\n",
-    include_str!("../shared/helpers.js"),
-    "\n",
-    include_str!("events.js"),
-    "\n",
-    include_str!("../shared/projection.js"),
-    "\n",
-    include_str!("../shared/cloud.js"),
-    "\n",
-    include_str!("../shared/turn.js"),
-    "\n",
-    include_str!("../shared/maps.js"),
-    "\n",
-    include_str!("../shared/histogram.js"),
-    "\n",
-    include_str!("../shared/ranges.js"),
-    "\n",
-    include_str!("spikes.js"),
-    "\n",
-    include_str!("pixel.js"),
-    "\n",
-    include_str!("controls.js"),
-);
+pub(super) static SCRIPT: LazyLock<String> = LazyLock::new(|| {
+    let own = [
+        include_str!("spikes.js"),
+        include_str!("pixel.js"),
+        include_str!("controls.js"),
+    ];
+    format!(
+        "
+{}",
+        shared::script(include_str!("events.js"), &own)
+    )
+});
 
 /// The elements of the script, hidden until it runs.
 const CARDS: &str = include_str!("cloud.html");
@@ -88,7 +78,7 @@ impl Cloud<'_> {
         }
         let data = self.data(&packed.base64(), histograms.as_ref());
         let note = self.note();
-        let [_, events] = self.called;
+        let ([_, events], script) = (self.called, &*SCRIPT);
         let instead = match self.is_few() {
             true => "the table below has each pixel",
             false => "the maps below show them pixel by pixel",
@@ -97,7 +87,7 @@ impl Cloud<'_> {
             "<p class=\"notice\" id=\"unscripted\">Without scripting the {events} cannot be \
              turned; {instead}.</p>\n\
              {}<script type=\"application/json\" id=\"data\">{data}</script>\n\
-             <script type=\"module\">{SCRIPT}</script>\n",
+             <script type=\"module\">{script}</script>\n",
             CARDS
                 .replace("{{how many}}", &note)
                 .replace("{{laser}}", &self.laser())

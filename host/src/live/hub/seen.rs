@@ -45,7 +45,7 @@ pub struct Seen {
 
 impl Hub {
     /// What is known now. Events are kept for the next time as long as they are wanted.
-    pub(in crate::view::live) fn seen(&self, wanted: Wanted) -> Seen {
+    pub(in crate::live) fn seen(&self, wanted: Wanted) -> Seen {
         let mut state = self.state();
         let state = &mut *state;
         let (events, statistics, left_out) = match &mut state.slice {

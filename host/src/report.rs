@@ -4,6 +4,7 @@ mod cloud;
 mod events;
 mod histograms;
 mod packed;
+pub(crate) mod shared;
 #[cfg(test)]
 mod tests;
 
@@ -15,6 +16,8 @@ pub use cloud::Cloud;
 pub use histograms::Decisions;
 
 use dtof_draw::svg::{escape, one_line};
+
+use self::shared::STYLE;
 
 /// A picture of the report.
 #[derive(Clone, Copy, Debug)]
@@ -38,18 +41,14 @@ pub struct Section<'a> {
 /// Every page has it near its start.
 pub(crate) const MARK: &str = "<meta name=\"generator\" content=\"dtof\">";
 
+const OWN_STYLE: &str = include_str!("report/report.css");
+
 /// Bytes of a page. Larger ones are slow to open, and to send.
 const PAGE: usize = 5_000_000;
 /// Bytes of a page for all but events and figures, at most.
 const ALL_ELSE: usize = 200_000;
 /// So many pixels, at most, are shown as plots, not as maps.
 pub const FEW: usize = 16;
-
-/// Colours follow the reader's scheme, the columns the width of the window.
-const STYLE: &str = concat!(
-    include_str!("shared/page.css"),
-    include_str!("report/report.css")
-);
 
 /// A page with `title` and the paragraph `lead`, the events to turn and look at, then
 /// all `figures`, then all `sections`. Events and histograms are thinned until the page has
@@ -66,7 +65,7 @@ pub fn html(
     figures: &[Figure],
     events: Cloud,
 ) -> String {
-    let hash = BASE64.encode(Sha256::digest(cloud::SCRIPT));
+    let hash = BASE64.encode(Sha256::digest(&*cloud::SCRIPT));
     let script = format!("script-src 'sha256-{hash}'; ");
     let taken: usize = figures.iter().map(|figure| figure.svg.len()).sum();
     let interactive = events.html(PAGE.saturating_sub(ALL_ELSE + taken));
@@ -96,7 +95,7 @@ fn page(
          <meta http-equiv=\"Content-Security-Policy\" \
          content=\"default-src 'none'; {script}\
          style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'\">\n\
-         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n\
+         <title>{title}</title>\n<style>\n{STYLE}{OWN_STYLE}</style>\n</head>\n\
          <body>\n<main>\n<header>\n<h1>{title}</h1>\n<p>{lead}</p>\n</header>\n"
     );
     page += interactive;

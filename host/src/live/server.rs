@@ -5,7 +5,6 @@
 
 mod answer;
 mod assets;
-pub(super) mod guard;
 mod routes;
 
 use std::net::TcpListener as Listener;

@@ -7,8 +7,8 @@ use foxglove::messages::RawImage;
 
 use crate::export::foxglove::{FRAME, Time, encoded};
 use crate::input::source::Geometry;
-use crate::view::live::foxglove::topics::Topic;
-use crate::view::live::hub::Pixel;
+use crate::live::foxglove::topics::Topic;
+use crate::live::hub::Pixel;
 
 /// Rates are those of so long.
 const RATE: Duration = Duration::from_secs(1);

@@ -1,4 +1,0 @@
-//! Pages to look at.
-
-pub mod live;
-pub mod report;
