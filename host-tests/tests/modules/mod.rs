@@ -1,7 +1,7 @@
 //! Which files of a package import which, read from their syntax.
 //!
 //! Only a path that begins with `crate`, `self` or `super` is an import, and it leads
-//! to the deepest module on it. A module and what lies in its own folder are one room:
+//! to the deepest module on it: a name that is handed on with `pub use` is not followed. A module and what lies in its own folder are one room:
 //! what a child takes from its parent is no import. Tests are left out.
 
 mod doors;

@@ -48,11 +48,8 @@ pub(super) static SCRIPT: LazyLock<String> = LazyLock::new(|| {
         include_str!("pixel.js"),
         include_str!("controls.js"),
     ];
-    format!(
-        "
-{}",
-        shared::script(include_str!("events.js"), &own)
-    )
+    let script = shared::script(include_str!("events.js"), &own);
+    format!("\n{script}")
 });
 
 /// The elements of the script, hidden until it runs.

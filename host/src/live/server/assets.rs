@@ -25,10 +25,7 @@ static SCRIPT: LazyLock<String> = LazyLock::new(|| {
         include_str!("../page/controls.js"),
     ];
     let script = shared::script(include_str!("../page/state.js"), &own);
-    format!(
-        "const HEX = \"{colours}\";
-{script}"
-    )
+    format!("const HEX = \"{colours}\";\n{script}")
 });
 
 /// The kind and the text of what is at `path`.
