@@ -196,3 +196,22 @@ fn a_planted_circle_of_files_or_of_folders_is_found() {
         "{of_files}, {of_folders}"
     );
 }
+
+/// The library `dtof` and Python read options by key and text; flags are the program's.
+#[test]
+fn only_the_program_knows_the_parser_of_flags() {
+    let source = root().join("host/src");
+    let mut with_parser = modules::files(&source);
+    with_parser.extend(modules::files(&root().join("bindings/python/src")));
+    let all = with_parser.len();
+    with_parser.retain(|(_, text)| text.contains("clap::"));
+    assert!(all > 200 && !with_parser.is_empty(), "{all} files");
+    for (path, _) in with_parser {
+        let of_program = ["command", "cli", "main.rs"].map(|place| source.join(place));
+        assert!(
+            of_program.iter().any(|place| path.starts_with(place)),
+            "{}",
+            path.display()
+        );
+    }
+}

@@ -25,6 +25,8 @@ pub mod files;
 pub mod geometry;
 pub mod input;
 pub mod live;
+pub mod numbers;
+pub mod options;
 pub mod progress;
 pub mod report;
 pub mod rows;

@@ -22,7 +22,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::thread;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
+
+use crate::options::Refused;
 
 pub use feed::{Device, Feed, Playback};
 pub use foxglove::{Foxglove, MOST_CLIENTS, Origin};
@@ -51,7 +53,7 @@ impl Served {
     /// If the port is taken.
     pub fn begin(feed: Feed, port: u16, folder: Folder) -> Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
-            .with_context(|| format!("--port {port}"))?;
+            .map_err(|error| Refused::value("port", port, error.to_string()))?;
         let address = format!("http://{}/", listener.local_addr()?);
         let hub = Arc::new(Hub::new(feed.name(), feed.kind()));
         Ok(Self {

@@ -3,8 +3,8 @@
 
 pub mod calibrate;
 pub mod compare;
+pub mod given;
 pub mod glass;
-pub mod operation;
 pub mod output;
 pub mod recording;
 pub mod replay;

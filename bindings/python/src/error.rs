@@ -1,8 +1,9 @@
-//! Every error is one line, as the program prints it.
+//! Every error is one line, as the program prints it, with keywords in place of flags.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use dtof::options::{self, Options, option_name};
 use pyo3::exceptions::PyValueError;
 use pyo3::{PyErr, PyResult};
 
@@ -10,12 +11,14 @@ pyo3::create_exception!(
     dtof,
     Error,
     PyValueError,
-    "What is wrong with a recording or an option, in the line that the program prints."
+    "What is wrong with a recording or an option, in one line."
 );
 
 /// The exception for an error.
 pub fn raised(error: &anyhow::Error) -> PyErr {
-    let line: Vec<String> = format!("{error:#}").lines().map(str::to_owned).collect();
+    let keyword = |key: &str| option_name(key).to_owned();
+    let line = options::line(error, &keyword);
+    let line: Vec<&str> = line.lines().collect();
     Error::new_err(line.join(" "))
 }
 
@@ -23,6 +26,14 @@ pub fn raised(error: &anyhow::Error) -> PyErr {
 pub fn guarded<T>(job: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
     catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| Err(of_panic(panic.as_ref())))
 }
+
+/// The options of a job, from keywords and their values as texts.
+pub fn options<O: Options>(keywords: Keywords) -> PyResult<O> {
+    checked(|| Ok(options::read(keywords)?))
+}
+
+/// Keywords and their values as texts.
+pub type Keywords = Vec<(String, String)>;
 
 /// The same, as an exception.
 pub fn checked<T>(job: impl FnOnce() -> anyhow::Result<T>) -> PyResult<T> {

@@ -1,10 +1,10 @@
 //! Depth events as records of an array, and back.
 
 use anyhow::{Context, Error, Result, ensure};
-use dtof::cli::arguments::bins_of;
 use dtof::events::aer_file::{Event, Header};
 use dtof::events::events_csv::range_mm;
 use dtof::input::source::Geometry;
+use dtof::numbers::bins_of;
 use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{

@@ -1,6 +1,5 @@
 //! Settings that suit a recording, a scene or a wanted rate of false alarms.
 
-use std::ffi::OsString;
 use std::path::PathBuf;
 
 use dtof::calibrate::{remarks, report};
@@ -13,9 +12,8 @@ use dtof::settings::SettingsFile;
 use pyo3::prelude::*;
 use std::sync::Mutex;
 
-use crate::error::checked;
+use crate::error::{Keywords, options};
 use crate::medium::Given;
-use crate::options::parse;
 use crate::run::SceneGiven;
 use crate::work::work;
 
@@ -38,9 +36,9 @@ pub fn calibrate(
     py: Python,
     input: Given,
     older: Option<PathBuf>,
-    arguments: Vec<OsString>,
+    keywords: Keywords,
 ) -> PyResult<Found> {
-    let options = checked(|| parse::<CalibrateOptions>(arguments))?;
+    let options: CalibrateOptions = options(keywords)?;
     let input = Medium::from(input);
     work(py, None, move |_| {
         let older = older.as_deref().map(SettingsFile::read).transpose()?;
@@ -50,7 +48,7 @@ pub fn calibrate(
             found,
             settings,
             warnings,
-        } = calibrated.map_err(|error| said.name_origin(error))?;
+        } = calibrated.map_err(|error| said.blame(error))?;
         let changes = older.map_or(Vec::new(), |older| report::changes(&settings, &older));
         Ok(Found {
             toml: settings.to_toml()?,
@@ -92,10 +90,10 @@ pub struct Photons {
 pub fn compare(
     py: Python,
     photons: Photons,
-    arguments: Vec<OsString>,
+    keywords: Keywords,
     progress: Option<Bound<PyAny>>,
 ) -> PyResult<Answer> {
-    let options = checked(|| parse::<CompareOptions>(arguments))?;
+    let options: CompareOptions = options(keywords)?;
     work(py, progress, move |watch| {
         let said = options.said(photons.scene.is_some())?;
         let input = match (photons.recording, &photons.scene) {
@@ -134,8 +132,8 @@ pub fn compare(
 
 /// The threshold and L1 for a wanted rate of false alarms, as JSON, and the options that say so.
 #[pyfunction]
-pub fn tune(py: Python, arguments: Vec<OsString>) -> PyResult<(String, String)> {
-    let options = checked(|| parse::<TuneOptions>(arguments))?;
+pub fn tune(py: Python, keywords: Keywords) -> PyResult<(String, String)> {
+    let options: TuneOptions = options(keywords)?;
     work(py, None, move |_| {
         let tuned = options.tune()?;
         Ok((tuned.json().to_string(), tuned.options().to_owned()))

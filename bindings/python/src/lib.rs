@@ -10,7 +10,6 @@ mod find;
 mod load;
 mod maps;
 mod medium;
-mod options;
 mod part;
 mod pixel;
 mod run;

@@ -1,7 +1,5 @@
 //! Recordings of every format as arrays.
 
-use std::ffi::OsString;
-
 use anyhow::Result;
 use dtof::input::medium::Medium;
 use dtof::input::open::{Counts, counts};
@@ -10,9 +8,8 @@ use dtof::run::replay::Options;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
-use crate::error::checked;
+use crate::error::{Keywords, checked, options};
 use crate::medium::Given;
-use crate::options::parse;
 use crate::work::work;
 
 /// A recording.
@@ -34,8 +31,8 @@ pub struct Loaded<'py> {
 
 /// Reads a recording. Photon lists are summed over their laser cycles.
 #[pyfunction]
-pub fn load<'py>(py: Python<'py>, input: Given, arguments: Vec<OsString>) -> PyResult<Loaded<'py>> {
-    let options = checked(|| parse::<Options>(arguments))?;
+pub fn load<'py>(py: Python<'py>, input: Given, keywords: Keywords) -> PyResult<Loaded<'py>> {
+    let options: Options = options(keywords)?;
     let input = Medium::from(input);
     let counts = work(py, None, move |_| {
         let said = options.said()?;
@@ -43,7 +40,7 @@ pub fn load<'py>(py: Python<'py>, input: Given, arguments: Vec<OsString>) -> PyR
         if said.run.cycles.is_none() {
             opening.cycles = u64::MAX;
         }
-        counts(&input, &opening).map_err(|error| said.name_origin(error))
+        counts(&input, &opening).map_err(|error| said.blame(error))
     })?;
     let shape = checked(|| shape(&counts))?;
     let all = counts.captures.iter().flatten().flatten();

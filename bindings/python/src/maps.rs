@@ -1,41 +1,18 @@
 //! What events say of each pixel, and where they are in space.
 
-use std::ffi::OsString;
-use std::path::PathBuf;
-
-use clap::Args;
-use dtof::cli::arguments::{MOST_WHOLE, path, whole};
 use dtof::events::aer_file::Event;
 use dtof::events::echoes::{Echo, Selection};
 use dtof::events::maps::Maps;
-use dtof::export::{self, LaserClock, Optics};
-use dtof::geometry::FieldOfView;
+use dtof::export::{self, Projected};
+use dtof::settings::SettingsFile;
 use dtof_core::{EchoNumber, RangeScale};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyByteArray;
 
-use crate::error::checked;
+use crate::error::{Keywords, options};
 use crate::events::{Array, events};
-use crate::options::parse;
 use crate::work::work;
-
-/// Options of maps and points.
-#[derive(Args)]
-struct Options {
-    /// Which echo of each exposure
-    #[arg(long, value_enum)]
-    echo: Option<Echo>,
-    /// The field of view in degrees from edge to edge
-    #[arg(long, value_name = "HxV", conflicts_with = "calibration")]
-    fov: Option<FieldOfView>,
-    /// A direction and a range bias for each pixel, a TOML file
-    #[arg(long, value_name = "FILE", value_parser = path())]
-    calibration: Option<PathBuf>,
-    /// Laser cycles a second
-    #[arg(long, value_name = "HZ", value_parser = whole(1..=MOST_WHOLE))]
-    laser_hz: Option<u64>,
-}
 
 /// Numbers of each pixel, row by row; NaN where there is none.
 #[derive(IntoPyObject)]
@@ -53,9 +30,9 @@ pub fn maps(
     py: Python,
     records: PyBackedBytes,
     array: Array,
-    arguments: Vec<OsString>,
+    keywords: Keywords,
 ) -> PyResult<OfPixels> {
-    let options = checked(|| parse::<Options>(arguments))?;
+    let options: Projected = options(keywords)?;
     work(py, None, move |_| {
         let header = array.header()?;
         let scale = RangeScale::new(header.bin_width_ps, header.offset_mm)?;
@@ -89,21 +66,13 @@ pub fn points<'py>(
     py: Python<'py>,
     records: PyBackedBytes,
     array: Array,
-    arguments: Vec<OsString>,
+    keywords: Keywords,
 ) -> PyResult<Bound<'py, PyByteArray>> {
-    let options = checked(|| parse::<Options>(arguments))?;
+    let options: Projected = options(keywords)?;
     let points = work(py, None, move |_| {
         let header = array.header()?;
         let events = chosen(events(&records, &header)?, options.echo.or(Some(Echo::All)));
-        let optics = match options.calibration {
-            Some(file) => Optics::Calibration(file),
-            None => Optics::Pinhole(options.fov),
-        };
-        let options = export::Options {
-            optics,
-            clock: options.laser_hz.map(LaserClock::new).transpose()?,
-            ..export::Options::default()
-        };
+        let options = options.options(&SettingsFile::default())?;
         export::points(&events, &header, &options)
     })?;
     Ok(PyByteArray::new(py, &points))

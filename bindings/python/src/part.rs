@@ -1,7 +1,5 @@
 //! Parts of a recording, replayed on several machines.
 
-use std::ffi::OsString;
-
 use anyhow::{Result, ensure};
 use dtof::calibrate::RunPhotons;
 use dtof::input::recorded::Whole;
@@ -12,8 +10,7 @@ use dtof::settings::SettingsFile;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 
-use crate::error::checked;
-use crate::options::parse;
+use crate::error::{Keywords, checked, options};
 use crate::work;
 
 /// The recording that a part is of: rows and columns of all captures, how many captures, the
@@ -42,8 +39,8 @@ impl WholeGiven {
 
 /// Whether these are options of a replay.
 #[pyfunction]
-pub fn check_options(arguments: Vec<OsString>) -> PyResult<()> {
-    checked(|| parse::<Options>(arguments)).map(drop)
+pub fn check_options(keywords: Keywords) -> PyResult<()> {
+    options::<Options>(keywords).map(drop)
 }
 
 /// How many times as bright as `settings` say the cover glass is, and at least, if that is surely

@@ -1,36 +1,17 @@
 //! One pixel, step by step.
 
-use std::ffi::OsString;
-
 use anyhow::{Context, Result, bail, ensure};
-use clap::Args;
-use dtof::cli::arguments::fixed;
 use dtof::engine::settings::Settings;
-use dtof::run::operation::Operation;
-use dtof::settings::{Sensor, SettingsFile};
-use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof::options::{self, Refused};
+use dtof::run::given::Operation;
 use dtof_core::{
     AnyRule, AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig, RangeScale, Statistics,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
-use crate::error::checked;
+use crate::error::{Keywords, checked};
 use crate::events::push;
-use crate::options::parse;
-
-/// What a pixel is.
-#[derive(Args)]
-struct Options {
-    #[command(flatten)]
-    operation: Operation,
-    /// Picoseconds a bin
-    #[arg(long, value_name = "PS", value_parser = fixed::<U16F16>)]
-    bin_width_ps: Option<U16F16>,
-    /// Millimetres added to every range
-    #[arg(long, value_name = "MM", value_parser = fixed::<I24F8>)]
-    offset_mm: Option<I24F8>,
-}
 
 /// A pixel of any number of bins.
 trait Steps: Send + Sync {
@@ -100,8 +81,8 @@ pub struct Pixel {
 #[pymethods]
 impl Pixel {
     #[new]
-    fn new(bins: usize, address: u16, arguments: Vec<OsString>) -> PyResult<Self> {
-        checked(|| Self::of(bins, address, arguments))
+    fn new(bins: usize, address: u16, keywords: Keywords) -> PyResult<Self> {
+        checked(|| Self::of(bins, address, keywords))
     }
 
     /// Counts photons by their bins.
@@ -166,28 +147,27 @@ impl Pixel {
 }
 
 impl Pixel {
-    fn of(bins: usize, address: u16, arguments: Vec<OsString>) -> Result<Self> {
-        let options: Options = parse(arguments)?;
-        let said = options.operation.said(SettingsFile {
-            sensor: Sensor {
-                bin_width_ps: options.bin_width_ps,
-                offset_mm: options.offset_mm,
-                ..Sensor::default()
-            },
-            ..SettingsFile::default()
-        })?;
+    fn of(bins: usize, address: u16, keywords: Keywords) -> Result<Self> {
+        let options: Operation = options::read(keywords)?;
+        let said = options.given.merged()?;
         let made = || {
             let settings = said.settings(bins)?;
             ensure!(
                 settings.binning.is_none(),
-                "--binning is for arrays of pixels"
+                Refused::new("binning", "is for arrays of pixels")
             );
-            ensure!(settings.frame.is_none(), "--frame is for arrays of pixels");
-            ensure!(settings.masked.is_empty(), "--mask is for arrays of pixels");
+            ensure!(
+                settings.frame.is_none(),
+                Refused::new("frame", "is for arrays of pixels")
+            );
+            ensure!(
+                settings.masked.is_empty(),
+                Refused::new("masked", "is for arrays of pixels")
+            );
             let steps = steps(&settings, PixelAddress(address))?;
             Ok((steps, settings))
         };
-        let (steps, settings) = made().map_err(|error| said.name_origin(error))?;
+        let (steps, settings) = made().map_err(|error| said.blame(error))?;
         Ok(Self {
             steps,
             scale: settings.range_scale()?,

@@ -1,6 +1,5 @@
 //! Photons through the engine, into memory.
 
-use std::ffi::OsString;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
@@ -25,10 +24,9 @@ use dtof_core::DepthEvent;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
-use crate::error::checked;
+use crate::error::{Keywords, checked, options};
 use crate::events::{Array, RECORD, push};
 use crate::medium::Given;
-use crate::options::parse;
 use crate::part::WholeGiven;
 use crate::work::{Watch, work};
 
@@ -62,16 +60,16 @@ struct Done {
 /// Replays a recording, a file or an array; one that is a part as it is replayed in the whole.
 /// `cycles` are those of a recording that is replayed to its end unless said otherwise.
 #[pyfunction]
-#[pyo3(signature = (input, arguments, progress, whole, cycles=None))]
+#[pyo3(signature = (input, keywords, progress, whole, cycles=None))]
 pub fn replay<'py>(
     py: Python<'py>,
     input: Given,
-    arguments: Vec<OsString>,
+    keywords: Keywords,
     progress: Option<Bound<'py, PyAny>>,
     whole: Option<WholeGiven>,
     cycles: Option<u64>,
 ) -> PyResult<Ran<'py>> {
-    let options = checked(|| parse::<Options>(arguments))?;
+    let options: Options = options(keywords)?;
     let input = Medium::from(input);
     let done = work(py, progress, move |watch| {
         let mut said = options.said()?;
@@ -79,7 +77,7 @@ pub fn replay<'py>(
         let cycles = cycles.filter(|&cycles| cycles > opening(&said).cycles);
         said.run.cycles = said.run.cycles.or(cycles);
         let whole = whole.map(WholeGiven::read).transpose()?;
-        replayed(&options, &input, &said, whole, watch).map_err(|error| said.name_origin(error))
+        replayed(&options, &input, &said, whole, watch).map_err(|error| said.blame(error))
     })?;
     done.into_python(py)
 }
@@ -119,14 +117,14 @@ fn replayed(
 pub fn simulate<'py>(
     py: Python<'py>,
     scene: SceneGiven,
-    arguments: Vec<OsString>,
+    keywords: Keywords,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Ran<'py>> {
-    let options = checked(|| parse::<SimulateOptions>(arguments))?;
+    let options: SimulateOptions = options(keywords)?;
     let done = work(py, progress, move |watch| {
         let said = options.said()?;
         let simulated = simulated(&options, &scene, said.clone(), watch);
-        simulated.map_err(|error| said.name_origin(error))
+        simulated.map_err(|error| said.blame(error))
     })?;
     done.into_python(py)
 }
@@ -140,7 +138,7 @@ fn simulated(
     let name = scene.name();
     let scene = options.seen(scene.read()?);
     let said = of_scene(said, &scene).with_context(|| {
-        let file = options.operation.known.settings.as_deref();
+        let file = options.given.file.as_deref();
         file.map_or("the scene".to_owned(), |file| file.display().to_string())
     })?;
     let settings = said.settings(scene.bins.into())?;

@@ -63,7 +63,7 @@ def test_what_are_no_seeds(client):
     refused(lambda: seeds(client, SCENE, [1, 2, 1]), "seed 1", "twice")
     refused(lambda: seeds(client, SCENE, [1.5]), "whole numbers")
     refused(lambda: seeds(client, SCENE, 3), "whole numbers")
-    refused(lambda: seeds(client, SCENE, [-1]), "--seed")
+    refused(lambda: seeds(client, SCENE, [-1]), "seed -1: ")
     refused(lambda: seeds(client, SCENE, [1], seed=3), "say seeds")
     refused(lambda: seeds(client, "none.toml", [1]), "none.toml")
     refused(lambda: seeds(client, "columns = x\n", [1]), "the scene")

@@ -152,7 +152,7 @@ def test_what_is_no_recording_in_parts(client, tmp_path):
     bad = array.copy()
     bad[5, 2, 7] = -1
     refused(lambda: replay(client, chunked(4, -1, -1, of=bad)), "the array[4:8, :, :]", "[1, 2, 7]", "negative")
-    refused(lambda: replay(client, chunked(4, -1, -1), alpha=300), "--alpha")
+    refused(lambda: replay(client, chunked(4, -1, -1), alpha=300), "alpha 300: ")
     file = saved(tmp_path, "counts.npy", array)
     for rows in (0, -1, 1.5, "2", True):
         refused(lambda: replay(client, file, rows=rows), "rows", "whole number")

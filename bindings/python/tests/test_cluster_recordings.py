@@ -262,8 +262,8 @@ def test_what_is_no_list_of_recordings(client, tmp_path):
     refused(lambda: recordings(client, [file], names=["a"]), "say out")
     refused(lambda: recordings(client, [file], out=tmp_path / "none"), "none", "no such folder")
     refused(lambda: recordings(client, [file], events="csv"), "'csv'", "aer, npy")
-    refused(lambda: recordings(client, [file], alpha=300), "--alpha")
-    refused(lambda: recordings(client, [file], nonsense=1), "--nonsense")
+    refused(lambda: recordings(client, [file], alpha=300), "alpha 300: ")
+    refused(lambda: recordings(client, [file], nonsense=1), "nonsense is unknown")
     refused(lambda: recordings(None, [file]), "must be a distributed.Client")
     assert "no.toml" in recordings(client, [file], settings="no.toml").results[0].error
     both = recordings(client, [file, other], out=tmp_path, names=["x/1", "x/2"])

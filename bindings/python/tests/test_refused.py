@@ -75,54 +75,73 @@ def test_arrays_that_are_none(array):
 
 
 @pytest.mark.parametrize("options,words", [
-    ({"alpha": 300}, ["--alpha", "must be a number from 0 to 255.996"]),
-    ({"alpha": numpy.nan}, ["--alpha"]),
-    ({"alpha": "many"}, ["--alpha"]),
-    ({"alpha": []}, ["--alpha"]),
-    ({"alpha": None, "nonsense": 3}, ["--nonsense"]),
-    ({"z": 4, "false_alarm": 0.01, "rule": "window", "sigma_bins": 1}, ["--z", "--false-alarm"]),
+    ({"alpha": 300}, ["alpha 300: must be a number from 0 to 255.996"]),
+    ({"alpha": numpy.nan}, ["alpha nan: "]),
+    ({"alpha": "many"}, ["alpha many: "]),
+    ({"alpha": []}, ["alpha : "]),
+    ({"alpha": None, "nonsense": 3}, ["nonsense is unknown"]),
+    ({"z": 4, "false_alarm": 0.01, "rule": "window", "sigma_bins": 1}, ["z cannot be used with false_alarm"]),
     ({"rule": "best"}, ["best", "paper"]),
-    ({"l1": 50, "l2": 20}, ["--l1 50 --l2 20"]),
-    ({"gate": (3, 99)}, ["--gate 3..99"]),
-    ({"gate": 3}, ["--gate"]),
-    ({"gate": (1, 2, 3)}, ["--gate"]),
-    ({"mask": [6]}, ["--mask 6: there are 6 pixels"]),
-    ({"mask": [-1]}, ["--mask"]),
+    ({"l1": 50, "l2": 20}, ["l2 20: must be greater than l1 50"]),
+    ({"gate": (3, 99)}, ["gate 3..99: with 16 bins"]),
+    ({"gate": 3}, ["gate 3: must be FIRST..LAST"]),
+    ({"gate": (1, 2, 3)}, ["gate 1..2..3: "]),
+    ({"mask": [6]}, ["mask 6: there are 6 pixels"]),
+    ({"mask": [-1]}, ["mask -1: "]),
     ({"bins": 12}, ["must be a power of two"]),
-    ({"cycles": 0}, ["--cycles"]),
-    ({"cycles": 2**70}, ["--cycles"]),
-    ({"seed": -1}, ["--seed"]),
+    ({"cycles": 0}, ["cycles 0: "]),
+    ({"cycles": 2**70}, ["cycles 1180591620717411303424: "]),
+    ({"seed": -1}, ["seed -1: "]),
     ({"axes": "rows,columns"}, ["one axis must be the bins"]),
-    ({"axes": "bins"}, ["--axes bins has 1 names"]),
+    ({"axes": "bins"}, ["axes bins: has 1 names, but the array"]),
     ({"axis": 3}, ["axis 3"]),
     ({"axis": 0, "axes": "rows,columns,bins"}, ["give one of them"]),
-    ({"array": "counts"}, ["--array is for .npz files"]),
+    ({"array": "counts"}, ["array is for .npz files"]),
     ({"settings": "no.toml"}, ["no.toml"]),
     ({"settings": {"alpha": 4}}, ["settings: must be the name of a file"]),
     ({"settings": "[sensor]\nbins = 8\n"}, ["settings: must be the name of a file"]),
     ({"mask": numpy.array([True, False])}, ["numpy.flatnonzero"]),
-    ({"photons_per_cycle": 0}, ["--photons-per-cycle"]),
-    ({"photons_per_cycle": 1, "recorded_cycles": 9}, ["cannot be used with"]),
-    ({"echo_wait": 3}, ["--echo-wait is for --echoes of 2 or more"]),
-    ({"tracking": True}, ["--tracking is for --rule window"]),
-    ({"help": True}, ["--help"]),
-    ({"input": "x.npy"}, ["--input"]),
-    ({"quiet": True}, ["--quiet"]),
-    ({"half_widths": (9, 9)}, ["--half-widths"]),
-    ({"columns": 4}, ["--columns"]),
+    ({"photons_per_cycle": 0}, ["photons_per_cycle 0: "]),
+    ({"photons_per_cycle": 1, "recorded_cycles": 9}, ["photons_per_cycle cannot be used with recorded_cycles"]),
+    ({"echo_wait": 3}, ["echo_wait is for echoes of 2 or more"]),
+    ({"tracking": True}, ["tracking is for rule window"]),
+    ({"help": True}, ["help is unknown"]),
+    ({"input": "x.npy"}, ["input is unknown"]),
+    ({"quiet": True}, ["quiet is unknown"]),
+    ({"half_widths": (9, 9)}, ["half_widths 9,9: "]),
+    ({"columns": 4}, ["columns 4: "]),
 ])
 def test_options_that_cannot_be(options, words):
     refused(lambda: dtof.replay(GOOD, **options), *words)
 
 
 def test_the_line_is_that_of_the_program(program, tmp_path):
+    """With keywords where that has flags."""
     numpy.save(tmp_path / "counts.npy", counts_with(-1.0))
-    for options in [{}, {"alpha": 300}, {"l1": 50, "l2": 20}, {"rule": "best"}, {"gate": "3"}]:
-        texts = [f"--{key}={value}" for key, value in options.items()]
+    for options in [{}, {"alpha": 300}, {"l1": 50, "l2": 20}, {"rule": "best"}, {"gate": "3"},
+                    {"echo_wait": 3}, {"false_alarm": 0.01, "z": 4}]:
+        flag = {name: "--" + name.replace("_", "-") for name in options}
+        texts = [f"{flag[name]}={value}" for name, value in options.items()]
         line = program("replay", "--input", tmp_path / "counts.npy", "--out", tmp_path / "out",
                        *texts, check=False)
         text = refused(lambda: dtof.replay(tmp_path / "counts.npy", **options))
-        assert line.replace(" For more information, try '--help'.", "") == f"error: {text}\n"
+        for name in ["l1", "echoes"]:
+            flag.setdefault(name, f"--{name}")
+        for name, of_program in flag.items():
+            line = line.replace(of_program, name)
+        assert line == f"error: {text}\n"
+
+
+@pytest.mark.parametrize("options,line", [
+    ({"rule": "window", "window": 9}, "window 9: must be a whole number from 1 to 7"),
+    ({"rule": "window", "z": 4, "false_alarm": 0.01}, "z cannot be used with false_alarm"),
+    ({"alfa": 4}, "alfa is unknown; is it alpha?"),
+    ({"rule": "window"}, "rule window needs window or sigma_bins"),
+    ({"bin_width_ps": "0.25ns"}, "bin_width_ps 0.25ns: must be a number from 0 to 65535.99998"),
+])
+def test_a_mistake_is_the_line_of_the_program_with_keywords(options, line):
+    """The test of the program's flags and files, `mistakes`, has the same."""
+    assert refused(lambda: dtof.replay(GOOD, **options)) == line
 
 
 @pytest.mark.parametrize("photons,words", [
@@ -159,7 +178,7 @@ def test_files_that_cannot_be(tmp_path):
     refused(lambda: dtof.simulate("surfaces = 3\n\n"), "the scene")
     refused(lambda: dtof.compare(), "a recording or a scene is needed")
     refused(lambda: dtof.compare(GOOD, scene="x.toml"))
-    refused(lambda: dtof.tune(), "--background")
+    refused(lambda: dtof.tune(), "background is needed")
 
 
 def test_events_that_cannot_be(tmp_path):
@@ -194,8 +213,8 @@ def test_events_that_cannot_be(tmp_path):
     refused(lambda: dtof.write_events(tmp_path, run.events, run.array))
     for events in [numpy.zeros(3), numpy.zeros(3, [("cycle", "u8")]), run.events.reshape(1, -1), None]:
         refused(lambda: dtof.write_events(path, events, run.array), "events")
-    refused(lambda: dtof.points(run.events, run.array, fov=(0, 40)), "--fov")
-    refused(lambda: dtof.points(run.events, run.array, echo="best"), "--echo")
+    refused(lambda: dtof.points(run.events, run.array, fov=(0, 40)), "fov 0x40: ")
+    refused(lambda: dtof.points(run.events, run.array, echo="best"), "echo best: must be first, last, strongest or all")
     refused(lambda: dtof.reflectivity(run.events, run.array, of="nothing"))
     assert os.listdir(tmp_path) == []
 

@@ -13,6 +13,8 @@ use dtof_theory::random::trial_rng;
 use dtof_theory::rates::Rates;
 use rayon::prelude::*;
 
+use crate::options::Refused;
+
 /// Photons that are drawn, about, and exposures.
 const PHOTONS: f64 = 1.5e9;
 const EXPOSURES: (f64, f64) = (6_000.0, 20_000.0);
@@ -61,9 +63,14 @@ pub fn z(asked: &Asked) -> Result<(U4F12, u64)> {
     let wanted = asked.share * all;
     ensure!(
         wanted >= 10.0,
-        "--false-alarm {}: {all} simulated exposures do not show so few; ask for {} or more",
-        asked.share,
-        10.0 / all
+        Refused::value(
+            "false_alarm",
+            asked.share,
+            format!(
+                "{all} simulated exposures do not show so few; ask for {} or more",
+                10.0 / all
+            )
+        )
     );
     // From the highest on; the square of z.
     let square = |rank: usize| highest[rank].to_num::<f64>().powi(2);

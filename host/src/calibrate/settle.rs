@@ -11,6 +11,8 @@ use super::find::pixels::Pixels;
 use super::find::pulse::Pulse;
 use super::spend::Spent;
 
+use crate::options::Refused;
+
 /// Laser cycles of an exposure, if the counters hold the background of so many.
 const L2: u16 = 2000;
 /// Laser cycles between looks.
@@ -87,8 +89,10 @@ pub fn gate(last: usize, first: usize) -> Result<(u16, u16)> {
     let (first, last) = (u16::try_from(first)?, u16::try_from(last)?);
     ensure!(
         first + 7 <= last,
-        "the cover glass reaches up to bin {first}, the last bin is {last}: no gate leaves it out; say \
-         --glass no if it is none"
+        Refused::input(format!(
+            "the cover glass reaches up to bin {first}, the last bin is {last}: no gate leaves it \
+             out; say `glass` no if it is none"
+        ))
     );
     Ok((first, last))
 }

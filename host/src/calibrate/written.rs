@@ -63,7 +63,7 @@ impl Calibration {
             detection: detection.unwrap_or_default().or(older),
             rays: before.rays,
             run: before.run,
-            origin: before.origin,
+            file: before.file,
         };
         Ok(found.of_any_file())
     }

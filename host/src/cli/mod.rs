@@ -1,15 +1,18 @@
 //! Command lines, alike in every program of this project: help is printed whole, an
 //! error is one line and a failure.
 
-pub mod arguments;
 pub mod interrupt;
 
 use std::io::{self, Write};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Parser;
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 
+use crate::options::{self, Refused, option_name};
 use crate::rows::printable;
 
 /// Parses the command line and runs it.
@@ -24,7 +27,7 @@ pub fn run<C: Parser>(run: impl FnOnce(C) -> Result<()>) -> ExitCode {
         // The reader of the output has seen enough.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            complain(&format!("error: {error:#}"));
+            complain(&format!("error: {}", options::line(&error, &flag)));
             ExitCode::FAILURE
         }
     }
@@ -41,16 +44,95 @@ fn refuse(error: &clap::Error) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Why options are refused, with hints, as one line.
+/// The flag that sets a key. What is no key, as `<FILE>`, stays as it is.
 #[must_use]
-pub fn reason(error: &clap::Error) -> String {
+pub fn flag(key: &str) -> String {
+    if !key.starts_with(char::is_alphabetic) {
+        return key.to_owned();
+    }
+    format!("--{}", option_name(key).replace('_', "-"))
+}
+
+/// Why options are refused, as one line.
+fn reason(error: &clap::Error) -> String {
+    if let Some(refused) = refused(error) {
+        return refused.line(&flag);
+    }
     let text = error.to_string();
     let lines = text.lines().map(str::trim);
+    let is_hint =
+        |line: &str| line.starts_with("Usage:") || line.starts_with("For more information");
     let reason: Vec<&str> = lines
-        .filter(|line| !line.is_empty() && !line.starts_with("Usage:"))
+        .filter(|line| !line.is_empty() && !is_hint(line))
         .collect();
     let reason = reason.join(" ");
     reason.strip_prefix("error: ").unwrap_or(&reason).to_owned()
+}
+
+/// The same error as of an option that is read from a settings file, or a keyword.
+fn refused(error: &clap::Error) -> Option<Refused> {
+    let all = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => vec![key(text)],
+        Some(ContextValue::Strings(texts)) => texts.iter().map(|text| key(text)).collect(),
+        _ => Vec::new(),
+    };
+    let value = match error.get(ContextKind::InvalidValue) {
+        Some(ContextValue::String(value)) => Some(value),
+        _ => None,
+    };
+    let names = all(ContextKind::InvalidArg);
+    let (first, rest) = names.split_first()?;
+    let quoted = |names: &[String]| {
+        let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+        names.join(", ")
+    };
+    Some(match error.kind() {
+        ErrorKind::ValueValidation => {
+            Refused::value(first, value?, std::error::Error::source(error)?.to_string())
+        }
+        ErrorKind::InvalidValue if value?.is_empty() => Refused::new(first, "needs a value"),
+        ErrorKind::InvalidValue => {
+            let reason = format!("must be one of {}", all(ContextKind::ValidValue).join(", "));
+            Refused::value(first, value?, reason)
+        }
+        ErrorKind::UnknownArgument => Refused::unknown(
+            first,
+            all(ContextKind::SuggestedArg).iter().map(String::as_str),
+        ),
+        ErrorKind::ArgumentConflict => Refused::new(
+            first,
+            format!(
+                "cannot be used with {}",
+                quoted(&all(ContextKind::PriorArg))
+            ),
+        ),
+        ErrorKind::MissingRequiredArgument if rest.is_empty() => Refused::new(first, "is needed"),
+        ErrorKind::MissingRequiredArgument => {
+            Refused::input(format!("{} are needed", quoted(&names)))
+        }
+        _ => return None,
+    })
+}
+
+/// The key of an argument as clap writes it: `--l1 <N>`, `<FILE>`.
+fn key(arg: &str) -> String {
+    let name = arg.split([' ', '=']).next().unwrap_or_default();
+    match name.strip_prefix("--") {
+        Some(name) => name.replace('-', "_"),
+        None if name.starts_with(char::is_alphabetic) => format!("'{name}'"),
+        None => name.to_owned(),
+    }
+}
+
+/// Reads the name of a file or a folder. `-`, elsewhere standard input or output, is none.
+#[must_use]
+pub fn path() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| {
+        if path.as_os_str() == "-" {
+            return Err("standard input and output are not supported here; give a name");
+        }
+        Ok(path)
+    })
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

@@ -3,16 +3,18 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
-use dtof::cli::arguments::path;
+use dtof::cli::path;
 use dtof::compare::page::{self, FILES};
 use dtof::input::medium::Medium;
+use dtof::options::Refused;
 use dtof::progress::Steps;
 use dtof::rows::aligned;
 use dtof::run::compare::{Compared, Input, Options, Told};
 use dtof::simulate::scene::Scene;
 
+use super::flags::Flags;
 use super::warn;
 
 #[derive(Args)]
@@ -31,7 +33,7 @@ pub struct Compare {
     #[arg(long, value_name = "DIR", value_parser = path())]
     out: PathBuf,
     #[command(flatten)]
-    options: Options,
+    options: Flags<Options>,
     /// Print nothing but errors
     #[arg(long)]
     quiet: bool,
@@ -40,15 +42,15 @@ pub struct Compare {
 impl Compare {
     pub fn run(&self) -> Result<()> {
         let name = self.input.as_deref().or(self.scene.as_deref());
-        let name = name.context("--input or --scene is needed")?;
+        let name = name.ok_or_else(|| Refused::new("input", "is needed, or `scene`"))?;
         page::may_write(&self.out, &self.inputs())?;
-        let said = self.options.said(self.scene.is_some())?;
+        let said = self.options.0.said(self.scene.is_some())?;
         let input = match &self.scene {
             Some(file) => Input::Scene(Box::new(Scene::read(file)?), file.display().to_string()),
             None => Input::Recording(name.into(), self.truth.as_deref().map(Medium::from)),
         };
         let steps = Steps::new(self.quiet);
-        let compared = self.options.compare(
+        let compared = self.options.0.compare(
             input,
             said,
             &Told {
@@ -88,7 +90,7 @@ impl Compare {
             &self.input,
             &self.scene,
             &self.truth,
-            &self.options.known.settings,
+            &self.options.0.given.file,
         ];
         files.into_iter().flatten().map(PathBuf::as_path).collect()
     }

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Parser;
-use dtof::cli::arguments::{MOST_WHOLE, path, whole};
+use dtof::cli::path;
 use dtof::input::source::Geometry;
+use dtof::numbers::{MOST_WHOLE, whole};
 use dtof::run::simulate::{array, of_scene};
 use dtof::settings::Run;
 use dtof::simulate::demo;

@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use dtof::cli::arguments::{fixed, whole};
 use dtof::device::HostTimeout;
-use dtof::run::operation::Operation;
-use dtof::settings::{Sensor, SettingsFile};
-use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof::numbers::whole;
+use dtof::run::given::Operation;
+use dtof::settings::SettingsFile;
 use dtof_link::DynamicDepth;
 
 use super::dynamic_depth;
+use super::flags::Flags;
 
 /// How long a device goes on without this program.
 #[derive(Args)]
@@ -44,12 +44,6 @@ pub struct DeviceOptions {
     /// Pixels of the sensor, with addresses from 0 [default: as the device says]
     #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX))]
     pub pixels: Option<u16>,
-    /// Picoseconds a bin, rounded to 1/65536 [default: as the device says, 250 if any will do]
-    #[arg(long, value_name = "PS", value_parser = fixed::<U16F16>, allow_hyphen_values = true)]
-    bin_width_ps: Option<U16F16>,
-    /// Millimetres added to every range, rounded to 1/256 [default: as the device says]
-    #[arg(long, value_name = "MM", value_parser = fixed::<I24F8>, allow_hyphen_values = true)]
-    offset_mm: Option<I24F8>,
     /// Columns of the array that is drawn or recorded or has blocks, pixel = row × columns + column
     /// [default: as high as wide]
     #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX))]
@@ -62,7 +56,7 @@ pub struct DeviceOptions {
     #[command(flatten)]
     of_dynamic_depth: dynamic_depth::Options,
     #[command(flatten)]
-    operation: Operation,
+    operation: Flags<Operation>,
 }
 
 impl DeviceOptions {
@@ -71,15 +65,9 @@ impl DeviceOptions {
     /// # Errors
     /// What is wrong with the file.
     pub fn said(&self) -> Result<SettingsFile> {
-        self.operation.said(SettingsFile {
-            sensor: Sensor {
-                columns: self.columns.map(u32::from),
-                bin_width_ps: self.bin_width_ps,
-                offset_mm: self.offset_mm,
-                ..Sensor::default()
-            },
-            ..SettingsFile::default()
-        })
+        let mut given = self.operation.0.given.clone();
+        given.options.sensor.columns = self.columns.map(u32::from);
+        given.merged()
     }
 
     /// Whether any was given.

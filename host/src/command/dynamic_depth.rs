@@ -1,8 +1,9 @@
 //! The options of dynamic depth, the same for every command.
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use dtof::cli::arguments::fixed;
+use dtof::numbers::fixed;
+use dtof::options::Refused;
 use dtof_core::fixed::types::U24F8;
 use dtof_link::DynamicDepth;
 
@@ -50,16 +51,16 @@ impl Options {
     /// # Errors
     /// Options without it.
     pub fn wanted(&self, is_asked: bool) -> Result<Option<DynamicDepth>> {
-        ensure!(
-            is_asked || !self.are_given(),
-            "--threshold-mm and --reference are of --dynamic-depth"
-        );
+        if let Some(key) = self.given().filter(|_| !is_asked) {
+            bail!(Refused::new(key, "is of `dynamic_depth`"));
+        }
         Ok(is_asked.then(|| self.dynamic_depth()))
     }
 
-    /// Whether any was given.
-    pub fn are_given(&self) -> bool {
-        self.threshold_mm.is_some() || self.reference.is_some()
+    /// The first that was given.
+    pub fn given(&self) -> Option<&'static str> {
+        let threshold = self.threshold_mm.map(|_| "threshold_mm");
+        threshold.or(self.reference.map(|_| "reference"))
     }
 
     pub fn dynamic_depth(&self) -> DynamicDepth {

@@ -7,6 +7,7 @@ pub mod demo;
 mod device_options;
 mod dynamic_depth;
 pub mod export;
+pub mod flags;
 pub mod monitor;
 pub mod replay;
 mod seen;

@@ -7,11 +7,12 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use console::Term;
-use dtof::cli::arguments::{path, whole};
-use dtof::cli::interrupt;
+use dtof::cli::{interrupt, path};
 use dtof::device::monitor::map::{LiveMap, SHOW_CURSOR};
 use dtof::device::monitor::{Outputs, Recording, Task, monitor};
 use dtof::device::{self, Client, Setup};
+use dtof::numbers::whole;
+use dtof::options::Refused;
 use dtof::settings::SettingsFile;
 
 use super::device_options::DeviceOptions;
@@ -39,19 +40,19 @@ impl Monitor {
     pub fn run(&self) -> Result<()> {
         let said = self.options.said()?;
         let watched = self.watch(said.clone());
-        watched.map_err(|error| said.name_origin(error))
+        watched.map_err(|error| said.blame(error))
     }
 
     fn watch(&self, said: SettingsFile) -> Result<()> {
         let dynamic_depth = self.options.changes()?;
         ensure!(
             !self.map || io::stderr().is_terminal(),
-            "--map draws on standard error, which is no terminal here"
+            Refused::new("map", "draws on standard error, which is no terminal here")
         );
         let has_blocks = said.detection.binning.is_some_and(|levels| levels > 0);
         ensure!(
             self.options.columns.is_none() || self.map || self.record.is_some() || has_blocks,
-            "--columns is of --map, --record and --binning"
+            Refused::new("columns", "is of `map`, `record` and `binning`")
         );
         let image = self.options.image.as_deref();
         let name = || self.device.clone();

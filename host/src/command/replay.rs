@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use dtof::cli::arguments::path;
+use dtof::cli::path;
 use dtof::events::echoes::Echo;
 use dtof::input::medium::Medium;
 use dtof::run::glass::watch_glass;
@@ -15,6 +15,7 @@ use dtof::run::run;
 use dtof::settings::SettingsFile;
 
 use super::dynamic_depth::Shown;
+use super::flags::{Flags, name};
 use super::{print_summary, warn};
 
 #[derive(Args)]
@@ -27,12 +28,12 @@ pub struct Replay {
     #[arg(long, value_name = "DIR", value_parser = path())]
     out: PathBuf,
     #[command(flatten)]
-    options: Options,
+    options: Flags<Options>,
     #[command(flatten)]
     changes: Shown,
     /// The echo of each exposure that maps and report show; the files of events hold all
     /// [default: the strongest in the maps, all in the report]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = name::<Echo>())]
     echo: Option<Echo>,
     /// Do not write events.csv
     #[arg(long)]
@@ -44,8 +45,8 @@ pub struct Replay {
 
 impl Replay {
     pub fn run(&self) -> Result<()> {
-        let said = self.options.said()?;
-        self.replay(&said).map_err(|error| said.name_origin(error))
+        let said = self.options.0.said()?;
+        self.replay(&said).map_err(|error| said.blame(error))
     }
 
     fn replay(&self, said: &SettingsFile) -> Result<()> {
@@ -56,12 +57,9 @@ impl Replay {
             settings,
             said,
             known,
-        } = self.options.open(&Medium::from(&self.input), said)?;
+        } = self.options.0.open(&Medium::from(&self.input), said)?;
         let mut output = Output::create(&self.out, &settings, &photons, Some(&self.input))?
-            .with_settings(
-                said.with(&settings),
-                self.options.operation.known.settings.as_deref(),
-            )?
+            .with_settings(said.with(&settings), self.options.0.given.file.as_deref())?
             .with_changes(changes.as_ref())?
             .with_echo(self.echo, &settings)
             .without_csv(self.no_csv);

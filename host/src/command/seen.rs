@@ -4,10 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
-use dtof::cli::arguments::{path, real};
+use dtof::cli::path;
 use dtof::geometry::FieldOfView;
+use dtof::numbers::within;
 use dtof::rows::Row;
 use dtof::simulate::scene::{Along, DepthMap, Scene};
+
+use super::flags::name;
 
 /// Photons a bin and laser cycle in a scene without a file.
 const BACKGROUND: f64 = 0.02;
@@ -20,7 +23,7 @@ pub struct View {
     #[arg(long, value_name = "FILE", value_parser = path())]
     pub depth: Option<PathBuf>,
     /// What the depth map holds
-    #[arg(long, value_enum, default_value_t = Along::Axis, requires = "depth")]
+    #[arg(long, value_parser = name::<Along>(), default_value = "axis", requires = "depth")]
     depth_along: Along,
     /// The reflectivity of the depth map: an .npy picture as large, grey or of three colours,
     /// bytes from 0 to 255 or floats, white being 1 [default: white]
@@ -32,13 +35,13 @@ pub struct View {
     fov: Option<FieldOfView>,
     /// Signal photons a laser cycle from a white surface at one metre [default: the scene file's,
     /// or 4]
-    #[arg(long, value_name = "PHOTONS", value_parser = within::<1_000_000>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "PHOTONS", value_parser = within(0.0..=1_000_000.0), allow_hyphen_values = true)]
     signal_at_one_metre: Option<f64>,
     /// Background photons a bin and laser cycle [default: the scene file's, or 0.02]
-    #[arg(long, value_name = "PHOTONS", value_parser = within::<100>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "PHOTONS", value_parser = within(0.0..=100.0), allow_hyphen_values = true)]
     background: Option<f64>,
     /// Standard deviation of the simulated pulse in bins [default: the scene file's, or 1]
-    #[arg(long, value_name = "BINS", value_parser = within::<1000>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "BINS", value_parser = within(0.0..=1000.0), allow_hyphen_values = true)]
     pulse_sigma_bins: Option<f64>,
 }
 
@@ -114,10 +117,4 @@ impl View {
             ),
         ]
     }
-}
-
-/// Reads a number from 0 to `MOST`.
-fn within<const MOST: u32>(text: &str) -> Result<f64, String> {
-    let number = real(text).filter(|number| (0.0..=f64::from(MOST)).contains(number));
-    number.ok_or_else(|| format!("must be a number from 0 to {MOST}"))
 }

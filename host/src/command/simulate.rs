@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof::cli::arguments::path;
+use dtof::cli::path;
 use dtof::device::{self, Client, DeviceEngine};
 use dtof::engine::Engine;
 use dtof::engine::host::host_engine;
@@ -13,6 +13,7 @@ use dtof::events::echoes::Echo;
 use dtof::geometry::FieldOfView;
 use dtof::input::masked::Masked;
 use dtof::input::source::{Geometry, PhotonSource};
+use dtof::options::Refused;
 use dtof::report::Section;
 use dtof::rows::Row;
 use dtof::run::glass::watch_glass;
@@ -26,6 +27,7 @@ use dtof_core::PixelAddress;
 use dtof_link::DynamicDepth;
 
 use super::dynamic_depth::Shown;
+use super::flags::{Flags, name};
 use super::print_summary;
 use super::seen::View;
 
@@ -40,12 +42,12 @@ pub struct Simulate {
     #[arg(long, value_name = "DIR", value_parser = path())]
     out: PathBuf,
     #[command(flatten)]
-    options: Options,
+    options: Flags<Options>,
     #[command(flatten)]
     changes: Shown,
     /// The echo of each exposure that maps and report show; the files of events hold all
     /// [default: the strongest in the maps, all in the report]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = name::<Echo>())]
     echo: Option<Echo>,
     /// Decide on a device: tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated
     /// device [default: this computer]
@@ -64,23 +66,21 @@ pub struct Simulate {
 
 impl Simulate {
     pub fn run(&self) -> Result<()> {
-        let said = self.options.said()?;
+        let said = self.options.0.said()?;
         let simulated = self.simulate(said.clone());
-        simulated.map_err(|error| said.name_origin(error))
+        simulated.map_err(|error| said.blame(error))
     }
 
     fn simulate(&self, said: SettingsFile) -> Result<()> {
-        let scene = self.options.seen(self.view.scene(self.scene.as_deref())?);
-        let said = of_scene(said, &scene).with_context(|| {
-            match &self.options.operation.known.settings {
-                Some(file) => file.display().to_string(),
-                None => "the scene".to_owned(),
-            }
+        let scene = self.options.0.seen(self.view.scene(self.scene.as_deref())?);
+        let said = of_scene(said, &scene).with_context(|| match &self.options.0.given.file {
+            Some(file) => file.display().to_string(),
+            None => "the scene".to_owned(),
         })?;
         let settings = said.settings(scene.bins.into())?;
         let file = self.view.input(self.scene.as_deref());
         let Geometry { columns, rows } = scene.geometry;
-        let laser = if self.options.laser_off {
+        let laser = if self.options.0.laser_off {
             ", the laser off"
         } else {
             ""
@@ -93,7 +93,7 @@ impl Simulate {
             cycles: said.run.cycles.unwrap_or(scene.cycles),
             settings: &settings,
             said: &said,
-            file: self.options.operation.known.settings.as_deref(),
+            file: self.options.0.given.file.as_deref(),
             changes: self.changes.wanted()?,
             echo: self.echo,
             device: self.device.as_deref(),
@@ -203,7 +203,7 @@ fn engine(
     };
     ensure!(
         settings.frame.is_none(),
-        "--frame is not for --device: a device reports events"
+        Refused::new("frame", "is not for a device, which reports events")
     );
     let client = Client::new(device::open(device, image)?).with_context(|| device.to_owned())?;
     Ok(Box::new(DeviceEngine::new(

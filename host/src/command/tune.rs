@@ -6,10 +6,12 @@ use anyhow::Result;
 use clap::Args;
 use dtof::run::tune::Options;
 
+use super::flags::Flags;
+
 #[derive(Args)]
 pub struct Tune {
     #[command(flatten)]
-    options: Options,
+    options: Flags<Options>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -17,7 +19,7 @@ pub struct Tune {
 
 impl Tune {
     pub fn run(&self) -> Result<()> {
-        let tuned = self.options.tune()?;
+        let tuned = self.options.0.tune()?;
         let mut out = io::stdout().lock();
         if self.json {
             writeln!(out, "{}", serde_json::to_string_pretty(&tuned.json())?)?;

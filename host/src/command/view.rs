@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 use anyhow::{Result, ensure};
 use clap::Args;
-use dtof::cli::arguments::{path, positive, whole};
-use dtof::cli::interrupt;
+use dtof::cli::{interrupt, path};
 use dtof::device;
 use dtof::live::{Device, Feed, Folder, Foxglove, Origin, Playback, Served};
+use dtof::numbers::{positive, whole};
 
 use super::device_options::DeviceOptions;
 

@@ -21,12 +21,13 @@ mod text;
 pub mod thresholds;
 pub mod truth;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use dtof_core::{BlockLevel, PixelAddress};
 
 use crate::engine::host::host_engine;
 use crate::engine::settings::Settings;
 use crate::input::source::{Geometry, PhotonSource, has_only_neighbours};
+use crate::options::Refused;
 use answer::{Answer, answer, of_longest_frame};
 use bound::Bound;
 use measure::{Outcome, Trial, measure};
@@ -271,8 +272,11 @@ fn choose(
     if let Some(within_mm) = task.within_mm {
         return Ok(answer(methods, outcomes, within_mm));
     }
-    let frame_mm = frame_mm.with_context(|| {
-        format!("frames of L2 give fewer than {LEAST_REPORTS} reports here; say --within, or take more laser cycles")
+    let frame_mm = frame_mm.ok_or_else(|| {
+        Refused::input(format!(
+            "frames of L2 give fewer than {LEAST_REPORTS} reports here; say `within`, or take more \
+             laser cycles"
+        ))
     })?;
     let mut found = answer(methods, outcomes, frame_mm);
     let widest = WRONG_BEYOND_BINS * mm_per_bin(task.settings);

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::method::Rule;
 use crate::engine::settings::Settings;
+use crate::options::Refused;
 use dtof_theory::random::pixel_rng;
 
 /// Exposures, unless their photons would be more than [`MOST_PHOTONS`].
@@ -67,9 +68,15 @@ impl Thresholds {
         let wanted = share * f64::from(self.exposures);
         ensure!(
             wanted >= LEAST_EVENTS,
-            "--false-alarm {share}: {} exposures show shares from {} on",
-            self.exposures,
-            LEAST_EVENTS / f64::from(self.exposures)
+            Refused::value(
+                "false_alarm",
+                share,
+                format!(
+                    "{} exposures show shares from {} on",
+                    self.exposures,
+                    LEAST_EVENTS / f64::from(self.exposures)
+                )
+            )
         );
         let mut firing = self.exposures;
         for (number, &here) in counts.iter().enumerate() {

@@ -17,6 +17,7 @@ use super::assembly::{Assembly, HistogramAnswer};
 use super::port::Port;
 use super::stopped::Stopped;
 use crate::events::aer_file::Event;
+use crate::options::Refused;
 use wait::Wait;
 
 /// A device that says nothing for so long is gone.
@@ -134,13 +135,12 @@ impl Client {
                     .first()
                     .and_then(|&number| Refusal::from_number(number));
                 let refusal = refusal.context("for a reason this program does not know")?;
-                let refused =
-                    if configuration.host_timeout_ms == 0 && refusal == Refusal::HostTimeout {
-                        "--host-timeout 0 is for firmware that was built with laser-on-without-host"
-                    } else {
-                        "the device refuses the configuration"
-                    };
-                Err(refusal).context(refused)
+                if configuration.host_timeout_ms == 0 && refusal == Refusal::HostTimeout {
+                    let reason =
+                        format!("is for firmware built with laser-on-without-host: {refusal}");
+                    return Err(Refused::value("host_timeout", 0, reason).into());
+                }
+                Err(refusal).context("the device refuses the configuration")
             }
             kind => bail!("the device answers with message {kind:#04x}"),
         }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use dtof_link::Configuration;
 
-use crate::cli::arguments::real;
+use crate::numbers::real;
 
 /// A device stops its sensor, and with it the laser, once its host has been silent for so long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

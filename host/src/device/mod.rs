@@ -30,6 +30,7 @@ use crate::engine::Engine;
 use crate::engine::settings::Settings;
 use crate::events::aer_file::Event;
 use crate::input::source::{Geometry, Slice};
+use crate::options::Refused;
 
 /// Photons into a device, events out.
 pub struct DeviceEngine {
@@ -103,7 +104,7 @@ pub fn configuration(
 ) -> Result<Configuration> {
     ensure!(
         settings.frame.is_none(),
-        "a device reports events: it has no --frame"
+        Refused::new("frame", "is not for a device, which reports events")
     );
     let last_bin = u16::try_from(settings.bins)? - 1;
     Ok(Configuration {

@@ -18,6 +18,7 @@ use crate::engine::settings::Settings;
 use crate::events::aer_file::Event;
 use crate::events::events_csv;
 use crate::input::source::Geometry;
+use crate::options::Refused;
 use losses::{Losses, since};
 use map::LiveMap;
 pub use recording::Recording;
@@ -64,7 +65,9 @@ pub fn array(pixels: u16, columns: Option<u32>) -> Geometry {
 pub fn check_masked(settings: &Settings) -> Result<()> {
     ensure!(
         settings.masked.is_empty() || settings.binning.is_none(),
-        "the blocks of a device count masked pixels, too; leave out --mask or --binning"
+        Refused::input(
+            "the blocks of a device count masked pixels, too; leave out `masked` or `binning`"
+        )
     );
     Ok(())
 }

@@ -9,6 +9,8 @@ use anyhow::{Context, Result, bail, ensure};
 use super::port::{PATIENCE, Port, STUCK, prompt};
 use super::qemu::Emulator;
 
+use crate::options::Refused;
+
 /// The speed of the boards' serial ports.
 const BAUD: u32 = 1_000_000;
 
@@ -21,7 +23,10 @@ pub fn open(name: &str, image: Option<&Path>) -> Result<Box<dyn Port>> {
     if name == "qemu" {
         return Ok(Box::new(Emulator::start(image)?));
     }
-    ensure!(image.is_none(), "--image is for --device qemu");
+    ensure!(
+        image.is_none(),
+        Refused::new("image", "is for `device` qemu")
+    );
     if let Some(address) = name.strip_prefix("tcp:") {
         return Ok(Box::new(tcp(address).with_context(|| name.to_owned())?));
     }

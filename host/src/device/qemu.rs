@@ -12,6 +12,8 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::port::{self, Port};
 
+use crate::options::Refused;
+
 const QEMU: &str = "qemu-system-arm";
 
 /// What `cargo xtask image mps2-an386` builds, in the folder that cargo builds in.
@@ -48,9 +50,11 @@ impl Emulator {
         let image = image.map_or_else(built, |image| Ok(image.to_owned()))?;
         ensure!(
             image.is_file(),
-            "no image at {}: run `cargo xtask image mps2-an386` in a clone of dtof; --image takes the path \
-             that it prints",
-            image.display()
+            Refused::input(format!(
+                "no image at {}: run `cargo xtask image mps2-an386` in a clone of dtof; `image` takes \
+                 the path that it prints",
+                image.display()
+            ))
         );
         let mut start = [0; 4];
         let read = File::open(&image).and_then(|mut file| file.read_exact(&mut start));

@@ -14,6 +14,7 @@ use crate::events::aer_file::Header;
 use crate::export::LaserClock;
 use crate::input::masked;
 use crate::input::source::Geometry;
+use crate::options::Refused;
 use crate::settings::{Sensor, SettingsFile};
 
 /// How a device operates.
@@ -92,7 +93,11 @@ impl Setup {
         };
         masked::check(&setup.settings.masked, pixels.into())?;
         if let Some(columns) = columns.filter(|&columns| columns > u32::from(pixels)) {
-            bail!("--columns {columns}: there are {pixels} pixels");
+            bail!(Refused::value(
+                "columns",
+                columns,
+                format!("there are {pixels} pixels")
+            ));
         }
         Ok(setup)
     }

@@ -13,6 +13,7 @@ use super::decisions::{Decision, LastDecision};
 use crate::engine::Engine;
 use crate::engine::settings::Settings;
 use crate::input::source::Slice;
+use crate::options::Refused;
 
 /// Whatever stands above the background.
 pub const ANY: PaperRule = PaperRule::new(U8F8::ZERO, Count::saturating(1));
@@ -115,7 +116,7 @@ impl<const BINS: usize> FrameEngine<BINS> {
     pub fn new(settings: &Settings, length: u16, addresses: &[PixelAddress]) -> Result<Self> {
         ensure!(
             length > 0,
-            "--frame 0: a frame has at least one laser cycle"
+            Refused::value("frame", 0, "a frame has at least one laser cycle")
         );
         let pixels = addresses.iter();
         Ok(Self {

@@ -1,15 +1,17 @@
 //! How the pixels operate, in the units the command line uses.
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
-    AnyRule, BlockLevel, CentredWindow, DepthEstimator, EchoNumber, PixelConfig, RangeGate,
-    RangeScale, Threshold,
+    AnyRule, BlockLevel, CentredWindow, ConfigError, DepthEstimator, EchoNumber, GateError,
+    PixelConfig, RangeGate, RangeScale, Threshold,
 };
 pub use dtof_link::AdaptiveBinning;
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
+
+use crate::options::Refused;
 
 /// Everything an engine and the output need beside the photons.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -155,7 +157,7 @@ impl Settings {
         let tracking = rule.tracking(&gate).filter(|_| self.tracking);
         ensure!(
             tracking.is_some() == self.tracking,
-            "--tracking is for --rule window"
+            Refused::new("tracking", "is for `rule` window")
         );
         PixelConfig::with_rule(rule)
             .x(self.x)
@@ -168,7 +170,25 @@ impl Settings {
             .echoes(self.echoes, self.peel_reach())
             .echo_wait(self.echo_wait_times())
             .build()
-            .with_context(|| format!("--x {} --l1 {} --l2 {}", self.x, self.l1, self.l2))
+            .map_err(|error| self.refused(error).into())
+    }
+
+    fn refused(&self, error: ConfigError) -> Refused {
+        let Self { x, l1, l2, .. } = self;
+        match error {
+            ConfigError::ZeroX => Refused::value("x", x, "must be at least 1"),
+            ConfigError::XAboveL1 => {
+                Refused::value("x", x, format!("must not be greater than `l1` {l1}"))
+            }
+            ConfigError::L2NotAboveL1 => {
+                Refused::value("l2", l2, format!("must be greater than `l1` {l1}"))
+            }
+            ConfigError::NoLook => Refused::value(
+                "x",
+                x,
+                format!("no multiple of it lies strictly between `l1` {l1} and `l2` {l2}"),
+            ),
+        }
     }
 
     /// [`Self::echo_wait`] as pixels know it: without it the most, which is until L2.
@@ -203,8 +223,9 @@ impl Settings {
     pub fn range_gate<const BINS: usize>(&self) -> Result<RangeGate<BINS>> {
         Ok(match self.gate {
             None => RangeGate::full(),
-            Some((first, last)) => RangeGate::new(first, last)
-                .with_context(|| format!("--gate {first}..{last} with {BINS} bins"))?,
+            Some((first, last)) => {
+                RangeGate::new(first, last).map_err(|error| no_gate((first, last), BINS, &error))?
+            }
         })
     }
 
@@ -213,11 +234,15 @@ impl Settings {
     /// # Errors
     /// The constraint the settings break.
     pub fn range_scale(&self) -> Result<RangeScale> {
-        RangeScale::new(self.bin_width_ps, self.offset_mm).with_context(|| {
-            format!(
-                "--bin-width-ps {} --offset-mm {}",
-                self.bin_width_ps, self.offset_mm
-            )
+        RangeScale::new(self.bin_width_ps, self.offset_mm).map_err(|error| {
+            let reason = format!("with `offset_mm` {}: {error}", self.offset_mm);
+            Refused::value("bin_width_ps", self.bin_width_ps, reason).into()
         })
     }
+}
+
+/// There is no such gate in histograms of `bins` bins.
+pub(crate) fn no_gate((first, last): (u16, u16), bins: usize, error: &GateError) -> Refused {
+    let reason = format!("with {bins} bins: {error}");
+    Refused::value("gate", format_args!("{first}..{last}"), reason)
 }

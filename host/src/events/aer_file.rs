@@ -16,6 +16,8 @@ pub use header::Header;
 pub(crate) use header::MAGIC;
 use header::{HEADER_BYTES, header_length};
 
+use crate::options::Named;
+
 /// Of 16 bytes at a time, as long as a word.
 type Checksum = Table<16>;
 static CRC_32: Crc<u32, Checksum> = Crc::<u32, Checksum>::new(&CRC_32_ISO_HDLC);
@@ -30,12 +32,19 @@ pub enum Event {
 }
 
 /// Which kind of event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventKind {
     /// Depth events.
     Depth,
     /// Dynamic depth events.
     DynamicDepth,
+}
+
+impl Named for EventKind {
+    const NAMES: &'static [(&'static str, Self, &'static str)] = &[
+        ("depth", Self::Depth, "Depth events"),
+        ("dynamic-depth", Self::DynamicDepth, "Dynamic depth events"),
+    ];
 }
 
 impl Event {

@@ -3,7 +3,7 @@
 //! The events are those of depth; what a pixel would send in their place (section III-E of
 //! the paper) is drawn over time, as in its Fig. 17 and 18.
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use dtof_core::{DepthEvent, Polarity, RangeScale};
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::{Colour, Mark, Pen};
@@ -12,6 +12,7 @@ use dtof_link::DynamicDepth;
 use crate::events::dynamic::DepthChanges;
 use crate::events::echoes::Echo;
 use crate::events::sample::Sample;
+use crate::options::Refused;
 use crate::rows::grouped;
 
 /// Changes of one side that are drawn, at most.
@@ -44,7 +45,9 @@ impl Changes {
     /// If the threshold is too low.
     pub fn new(options: &DynamicDepth, scale: RangeScale) -> Result<Self> {
         let config = options.config(&scale);
-        let config = config.with_context(|| format!("--threshold-mm {}", options.threshold_mm))?;
+        let config = config.map_err(|error| {
+            Refused::value("threshold_mm", options.threshold_mm, error.to_string())
+        })?;
         Ok(Self {
             found: DepthChanges::new(config, Echo::All),
             scale,

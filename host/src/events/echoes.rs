@@ -5,11 +5,12 @@
 
 use std::collections::{HashMap, VecDeque};
 
-use clap::ValueEnum;
 use dtof_core::{BlockLevel, DepthEvent, EchoNumber, LaserCycle, PixelAddress};
 
+use crate::options::Named;
+
 /// Which echo of an exposure of a pixel or a block.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Echo {
     /// The nearest
     First,
@@ -19,6 +20,19 @@ pub enum Echo {
     Strongest,
     /// Every one
     All,
+}
+
+impl Named for Echo {
+    const NAMES: &'static [(&'static str, Self, &'static str)] = &[
+        ("first", Self::First, "The nearest"),
+        ("last", Self::Last, "The farthest"),
+        (
+            "strongest",
+            Self::Strongest,
+            "The one with the most photons a laser cycle in its peak, less the background",
+        ),
+        ("all", Self::All, "Every one"),
+    ];
 }
 
 impl Echo {

@@ -6,6 +6,7 @@ use anyhow::{Result, ensure};
 
 use super::{Format, evt2};
 use crate::events::aer_file::Header;
+use crate::options::Refused;
 
 /// How many laser cycles a second has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,10 +115,13 @@ impl LaserClock {
         let name = format.name();
         ensure!(
             time < end_ns,
-            "laser cycle {cycle} lies beyond, {} s after the start: {name} holds {} s of time (--laser-hz {})",
-            time / 1_000_000_000,
-            end_ns / 1_000_000_000,
-            self.millihertz as f64 / 1e3
+            Refused::input(format!(
+                "laser cycle {cycle} lies beyond, {} s after the start: {name} holds {} s of time \
+                 (`laser_hz` {})",
+                time / 1_000_000_000,
+                end_ns / 1_000_000_000,
+                self.millihertz as f64 / 1e3
+            ))
         );
         Ok(())
     }

@@ -10,6 +10,7 @@ use dtof_core::EchoNumber;
 use super::{Format, LaserClock};
 use crate::events::aer_file::{Event, EventKind, Header, Reader};
 use crate::events::echoes::{Echo, Selection};
+use crate::options::Refused;
 use crate::progress::Progress;
 
 /// The events of a file.
@@ -144,10 +145,10 @@ impl Survey {
         match self.counts {
             [_, 0] => Ok(EventKind::Depth),
             [0, _] => Ok(EventKind::DynamicDepth),
-            [depth, dynamic_depth] => bail!(
-                "{depth} depth events and {dynamic_depth} dynamic depth events: --events says \
+            [depth, dynamic_depth] => bail!(Refused::input(format!(
+                "{depth} depth events and {dynamic_depth} dynamic depth events: `events` says \
                  which, depth or dynamic-depth"
-            ),
+            ))),
         }
     }
 }

@@ -23,7 +23,6 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
-use clap::ValueEnum;
 use dtof_core::RangeScale;
 use dtof_link::DynamicDepth;
 use tempfile::NamedTempFile;
@@ -31,10 +30,12 @@ use tempfile::NamedTempFile;
 use crate::events::aer_file::{Event, EventKind, Header};
 use crate::events::echoes::Echo;
 use crate::files::{aside, flushed, place_of};
-use crate::geometry::{FieldOfView, Rays};
+use crate::geometry::{FieldOfView, FieldOfViewError, Rays};
 use crate::input::source::Geometry;
+use crate::numbers::{MOST_WHOLE, whole};
+use crate::options::{self, Named, Refused, named, path};
 use crate::progress::Progress;
-use crate::settings::Rays as SaidRays;
+use crate::settings::{Rays as SaidRays, SettingsFile};
 
 pub use clock::LaserClock;
 use clock::Span;
@@ -44,7 +45,7 @@ use points::Points;
 use projection::Projection;
 
 /// The format of an exported file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Comma-separated values
     Csv,
@@ -58,6 +59,29 @@ pub enum Format {
     Ros2,
     /// Changes of depth as an event camera's RAW file (EVT2)
     Evt2,
+}
+
+impl Named for Format {
+    const NAMES: &'static [(&'static str, Self, &'static str)] = &[
+        ("csv", Self::Csv, "Comma-separated values"),
+        ("pcd", Self::Pcd, "Points, in the format of PCL"),
+        ("ply", Self::Ply, "Points, as vertices of a mesh"),
+        (
+            "mcap",
+            Self::Mcap,
+            "Points slice by slice and statistics, for Foxglove",
+        ),
+        (
+            "ros2",
+            Self::Ros2,
+            "Points slice by slice as a bag of ROS 2 (MCAP)",
+        ),
+        (
+            "evt2",
+            Self::Evt2,
+            "Changes of depth as an event camera's RAW file (EVT2)",
+        ),
+    ];
 }
 
 /// Where the rays of the pixels come from.
@@ -127,6 +151,67 @@ impl Default for Options {
     }
 }
 
+/// How events become points, as options give it. What is not given is as in the settings file.
+#[derive(Clone, Debug, Default)]
+pub struct Projected {
+    /// Which echo of each exposure.
+    pub echo: Option<Echo>,
+    /// The field of view of a pinhole camera.
+    pub fov: Option<FieldOfView>,
+    /// A calibration file.
+    pub calibration: Option<PathBuf>,
+    /// Laser cycles a second.
+    pub laser_hz: Option<u64>,
+}
+
+impl options::Options for Projected {
+    const KEYS: &'static [&'static [&'static str]] =
+        &[&["field_of_view_degrees", "calibration", "laser_hz", "echo"]];
+
+    fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
+        match key {
+            "field_of_view_degrees" => {
+                let view = text
+                    .parse()
+                    .map_err(|error: FieldOfViewError| error.to_string());
+                self.fov = Some(view?);
+            }
+            "calibration" => self.calibration = Some(path(text)?),
+            "laser_hz" => self.laser_hz = Some(whole(1..=MOST_WHOLE)(text)?),
+            _ => self.echo = Some(named(text)?),
+        }
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), Refused> {
+        if self.fov.is_some() && self.calibration.is_some() {
+            let reason = "cannot be used with `calibration`";
+            return Err(Refused::new("field_of_view_degrees", reason));
+        }
+        Ok(())
+    }
+}
+
+impl Projected {
+    /// These, and of `file` what these do not say.
+    ///
+    /// # Errors
+    /// If the file has no field of view or laser rate that can be.
+    pub fn options(self, file: &SettingsFile) -> Result<Options> {
+        let laser_hz = self.laser_hz.or(file.sensor.laser_hz);
+        Ok(Options {
+            optics: match (self.calibration, self.fov) {
+                (Some(file), _) => Optics::Calibration(file),
+                (None, Some(view)) => Optics::Pinhole(Some(view)),
+                (None, None) => Optics::of(&file.rays)?,
+            },
+            clock: laser_hz.map(LaserClock::new).transpose()?,
+            echo: self.echo.unwrap_or(Echo::All),
+            ..Options::default()
+        })
+    }
+}
+
 /// The result of an export.
 #[derive(Debug)]
 pub struct Exported {
@@ -182,7 +267,7 @@ pub fn export(
     let kind = survey.kind(options.kind).with_context(name)?;
     ensure!(
         kind == EventKind::Depth || options.echo == Echo::All,
-        "--echo: only for depth events"
+        Refused::new("echo", "is only for depth events")
     );
     let (header, clock) = (survey.header, survey.clock);
     let array = header.geometry;
@@ -215,9 +300,9 @@ pub fn export(
         }
         Format::Evt2 => {
             let changes = &options.dynamic_depth;
-            let config = changes
-                .config(&projection.scale)
-                .with_context(|| format!("--threshold-mm {}", changes.threshold_mm))?;
+            let config = changes.config(&projection.scale).map_err(|error| {
+                Refused::value("threshold_mm", changes.threshold_mm, error.to_string())
+            })?;
             evt2::Evt2::new(file, array, clock, config, options.echo).map(boxed)
         }
     };

@@ -18,8 +18,8 @@ use std::str::FromStr;
 
 use dtof_core::{BlockLevel, PixelAddress};
 
-use crate::cli::arguments::real;
 use crate::input::source::Geometry;
+use crate::numbers::real;
 
 /// Degrees across the longer side of an array unless said otherwise.
 const LONGER_SIDE_DEGREES: f64 = 60.0;

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::input::source::Geometry;
+use crate::options::Refused;
 
 /// What an axis counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,9 +113,15 @@ impl Layout {
         };
         ensure!(
             axes.0.len() == placed.len(),
-            "--axes {axes} has {} names, but the array {shape:?} has {} axes",
-            axes.0.len(),
-            placed.len()
+            Refused::value(
+                "axes",
+                axes,
+                format!(
+                    "has {} names, but the array {shape:?} has {} axes",
+                    axes.0.len(),
+                    placed.len()
+                )
+            )
         );
         let place = |wanted: Axis| {
             let place = axes.0.iter().position(|&axis| axis == wanted);
@@ -189,7 +196,9 @@ fn pixels_of(axes: &[(usize, usize)]) -> Result<usize> {
     let pixels = pixels.context("more pixels than can be counted")?;
     ensure!(
         pixels <= 65_536,
-        "{pixels} pixels; there are 65,536 addresses (see --axes if one axis is the bins)"
+        Refused::input(format!(
+            "{pixels} pixels; there are 65,536 addresses (see `axes` if one axis is the bins)"
+        ))
     );
     Ok(pixels)
 }

@@ -7,6 +7,7 @@ use std::iter::repeat_n;
 
 use anyhow::{Result, ensure};
 
+use crate::options::Refused;
 use crate::rows::{Row, grouped};
 
 /// Most bins of a recording.
@@ -43,16 +44,20 @@ impl Fit {
     ) -> Result<Self> {
         ensure!(
             (FEWEST..=MOST_BINS).contains(&recorded),
-            "{recorded} bins: must be from {FEWEST} to {MOST_BINS} (--axes says which axis they \
-             are)"
+            Refused::input(format!(
+                "{recorded} bins: must be from {FEWEST} to {MOST_BINS} (`axes` says which axis they \
+                 are)"
+            ))
         );
         let summed = recorded.div_ceil(rebin.max(1));
         let run = wanted.map_or(summed.next_power_of_two(), usize::from);
         ensure!(
             run <= MOST_OF_A_RUN,
-            "{summed} bins are more than {MOST_OF_A_RUN}: add up neighbours with --rebin {}, or \
-             cut off the last with --bins {MOST_OF_A_RUN}",
-            recorded.div_ceil(MOST_OF_A_RUN)
+            Refused::input(format!(
+                "{summed} bins are more than {MOST_OF_A_RUN}: add up neighbours with `rebin` {}, or \
+                 cut off the last with `bins` {MOST_OF_A_RUN}",
+                recorded.div_ceil(MOST_OF_A_RUN)
+            ))
         );
         let fit = Self {
             recorded,
@@ -62,8 +67,14 @@ impl Fit {
         };
         ensure!(
             fit.whole() >= FEWEST,
-            "--rebin {rebin} makes {} whole bins of {measured}: must be at least {FEWEST}",
-            fit.whole()
+            Refused::value(
+                "rebin",
+                rebin,
+                format!(
+                    "makes {} whole bins of {measured}: must be at least {FEWEST}",
+                    fit.whole()
+                )
+            )
         );
         Ok(fit)
     }

@@ -6,6 +6,8 @@ use dtof_core::PixelAddress;
 
 use super::source::{Geometry, PhotonSource, Slice};
 
+use crate::options::Refused;
+
 /// A source whose masked pixels have no photons. What they had is counted.
 pub struct Masked {
     source: Box<dyn PhotonSource>,
@@ -22,7 +24,11 @@ pub struct Masked {
 pub fn check(masked: &[u16], pixels: usize) -> Result<()> {
     let past = masked.iter().find(|&&masked| usize::from(masked) >= pixels);
     past.map_or(Ok(()), |past| {
-        bail!("--mask {past}: there are {pixels} pixels")
+        bail!(Refused::value(
+            "masked",
+            past,
+            format!("there are {pixels} pixels")
+        ))
     })
 }
 
@@ -112,6 +118,6 @@ mod tests {
         }
         assert_eq!(masked.masked(), lost);
         let refused = Masked::new(photons(), &[8]).err().unwrap();
-        assert_eq!(refused.to_string(), "--mask 8: there are 8 pixels");
+        assert_eq!(refused.to_string(), "masked 8: there are 8 pixels");
     }
 }

@@ -17,6 +17,7 @@ use crate::input::photon_list::{Listed, PhotonList, Rows, Shape};
 use crate::input::recorded::{Capture, RecordedHistograms, RecordingLength, Whole};
 use crate::input::source::{Geometry, PhotonSource};
 use crate::input::{tmf8820, tmf8829, warnings};
+use crate::options::Refused;
 use crate::rows::Row;
 
 /// Picoseconds a bin, if neither the user nor the file says.
@@ -222,7 +223,11 @@ fn read(medium: &Medium, opening: &Opening) -> Result<Content> {
         let has = counts.geometry.columns;
         ensure!(
             columns == has,
-            "{medium} has {has} columns, not {columns}; --columns is for photon lists"
+            Refused::value(
+                "columns",
+                columns,
+                format!("{medium} has {has}; this is for photon lists")
+            )
         );
     }
     Ok(content)
@@ -253,11 +258,14 @@ fn kind(path: &Path) -> Result<Kind> {
 fn suits(medium: &Medium, opening: &Opening, kind: Kind, is_list: bool) -> Result<()> {
     ensure!(
         opening.axes.is_none() || (matches!(kind, Kind::Array | Kind::Archive) && !is_list),
-        "--axes is for arrays of histograms; {medium} is none"
+        Refused::new(
+            "axes",
+            format!("is for arrays of histograms; {medium} is none")
+        )
     );
     ensure!(
         opening.array.is_none() || kind == Kind::Archive,
-        "--array is for .npz files; {medium} is none"
+        Refused::new("array", format!("is for .npz files; {medium} is none"))
     );
     Ok(())
 }
@@ -379,8 +387,10 @@ fn known(bins: usize, width_ps: Option<U16F16>, opening: &Opening) -> Result<Kno
     let width = said.checked_mul_int(opening.rebin.max(1).into());
     Ok(Known {
         bins,
-        bin_width_ps: width
-            .with_context(|| format!("--rebin {} of bins of {said} ps: too wide", opening.rebin))?,
+        bin_width_ps: width.ok_or_else(|| {
+            let reason = format!("makes bins of {said} ps too wide");
+            Refused::value("rebin", opening.rebin, reason)
+        })?,
         offset_mm: None,
         gate: None,
         is_list: false,

@@ -9,6 +9,7 @@ use dtof_core::PixelAddress;
 
 use crate::input::medium::Medium;
 use crate::input::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
+use crate::options::Refused;
 
 /// A photon as a file has it: the numbers of its pixel, laser cycle and bin.
 pub type Row = [u64; 3];
@@ -129,7 +130,9 @@ impl<R: Rows> Checks<R> {
         }
         let Shape { bins, rebin, .. } = self.shape;
         let bins = u32::from(bins) * u32::from(rebin);
-        bail!("bin {bin} is past the last of {bins} bins (see --bins and --rebin)")
+        bail!(Refused::input(format!(
+            "bin {bin} is past the last of {bins} bins (see `bins` and `rebin`)"
+        )))
     }
 }
 

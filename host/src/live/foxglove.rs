@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::sync::broadcast;
 use tokio::time::{MissedTickBehavior, interval};
@@ -29,6 +29,8 @@ use frames::{Frame, Frames};
 pub use guard::Origin;
 use guard::Origins;
 use topics::Topic;
+
+use crate::options::Refused;
 
 /// Between two frames.
 const EVERY: Duration = Duration::from_millis(100);
@@ -53,7 +55,7 @@ impl Foxglove {
     /// If the port is taken.
     pub fn bind(port: u16, origins: Vec<Origin>) -> Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
-            .with_context(|| format!("--foxglove={port}"))?;
+            .map_err(|error| Refused::value("foxglove", port, error.to_string()))?;
         Ok(Self {
             address: format!("ws://{}", listener.local_addr()?),
             listener,

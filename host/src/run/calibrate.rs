@@ -1,43 +1,71 @@
 //! The settings of a sensor from a recording.
 
 use anyhow::{Context, Result};
-use clap::{Args, ValueEnum};
 
-use super::recording::{Recording, of_file, opening, warning_of_width, warnings};
+use super::given::Given;
+use super::recording::{RECORDING, of_file, opening, warning_of_width, warnings};
 use crate::calibrate::{Asked, Calibration, Length, Observed, calibrate};
-use crate::cli::arguments::{MOST_WHOLE, real, whole};
 use crate::input::medium::Medium;
 use crate::input::open::{Counts, counts};
 use crate::input::recorded::RecordingLength;
 use crate::input::source::Geometry;
+use crate::numbers::{MOST_WHOLE, whole, within};
+use crate::options::{self, Refused};
 use crate::settings::{SettingsFile, share};
 
 /// What is calibrated by.
-#[derive(Args)]
-#[group(skip)]
+#[derive(Clone, Debug)]
 pub struct Options {
     /// What the recording is.
-    #[command(flatten)]
-    pub recording: Recording,
-    /// Distance of a flat target that most of the pixels see, in millimetres
-    #[arg(long, value_name = "MM", value_parser = distance, allow_hyphen_values = true)]
-    target_mm: Option<f64>,
-    /// Whether the nearest surface, where all pixels have it at the same bin, is a cover glass
-    #[arg(long, value_enum)]
-    glass: Option<Answer>,
-    /// The share of exposures without a target that may end with an event, at most 0.1
-    #[arg(long, value_name = "SHARE", default_value_t = 0.01, value_parser = share)]
-    false_alarm: f64,
-    /// Seed of what is simulated
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=MOST_WHOLE))]
-    seed: u64,
+    pub given: Given,
+    /// The distance of a flat target that most of the pixels see, in millimetres.
+    pub target_mm: Option<f64>,
+    /// Whether the nearest surface, where all pixels have it at the same bin, is a cover glass.
+    pub glass: Option<bool>,
+    /// The share of exposures without a target that may end with an event.
+    pub false_alarm: f64,
+    /// Of what is simulated.
+    pub seed: u64,
 }
 
-/// An answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Answer {
-    Yes,
-    No,
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            given: Given::default(),
+            target_mm: None,
+            glass: None,
+            false_alarm: 0.01,
+            seed: 1,
+        }
+    }
+}
+
+impl options::Options for Options {
+    const KEYS: &'static [&'static [&'static str]] =
+        &[RECORDING, &["target_mm", "glass", "false_alarm", "seed"]];
+
+    fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
+        match key {
+            "target_mm" => self.target_mm = Some(within(0.0..=1e6)(text)?),
+            "glass" => self.glass = Some(yes_or_no(text)?),
+            "false_alarm" => self.false_alarm = share(text)?,
+            "seed" => self.seed = whole(0..=MOST_WHOLE)(text)?,
+            key => self.given.set(key, text)?,
+        }
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), Refused> {
+        self.given.check()
+    }
+}
+
+fn yes_or_no(text: &str) -> Result<bool, String> {
+    match text {
+        "yes" => Ok(true),
+        "no" => Ok(false),
+        _ => Err("must be yes or no".to_owned()),
+    }
 }
 
 /// A calibrated sensor.
@@ -56,15 +84,15 @@ impl Options {
     /// # Errors
     /// What is wrong with them.
     pub fn said(&self, older: Option<&SettingsFile>) -> Result<SettingsFile> {
-        let before = older.cloned().unwrap_or_default();
-        self.recording.said(|options| Ok(options.or(before)))
+        let said = self.given.merged_for_recording()?;
+        Ok(said.or(older.cloned().unwrap_or_default()))
     }
 
     /// What is asked for.
     #[must_use]
     pub fn asked(&self) -> Asked {
         Asked {
-            glass: self.glass.map(|answer| answer == Answer::Yes),
+            glass: self.glass,
             target_mm: self.target_mm,
             false_alarm: self.false_alarm,
             seed: self.seed,
@@ -79,7 +107,7 @@ impl Options {
         let mut opening = opening(&said);
         opening.cycles = u64::MAX;
         let counts = counts(input, &opening)?;
-        self.recording.suits(input, &counts.known)?;
+        self.given.suits(input, &counts.known)?;
         let found = look(&said, &counts, &self.asked());
         let found = found.with_context(|| input.to_string())?;
         let of_width = warning_of_width(&counts.known, &said);
@@ -116,9 +144,4 @@ pub(super) fn look(said: &SettingsFile, counts: &Counts, asked: &Asked) -> Resul
         truth_mm: counts.truth_mm.as_deref(),
     };
     calibrate(&observed, asked)
-}
-
-fn distance(text: &str) -> Result<f64, String> {
-    let distance = real(text).filter(|distance| (0.0..=1e6).contains(distance));
-    distance.ok_or("must be a number from 0 to 1000000".to_owned())
 }

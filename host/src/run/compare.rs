@@ -1,47 +1,58 @@
 //! All methods on the photons of a recording or a scene.
 
 use anyhow::{Context, Result};
-use clap::Args;
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
 
 use super::calibrate::look;
-use super::operation::Known;
-use super::recording::{Recording, of_file, opening, warning_of_width, warnings};
+use super::given::{Given, SENSOR};
+use super::recording::{RECORDING, of_file, opening, warning_of_width, warnings};
 use super::simulate::of_scene;
 use crate::calibrate::Asked;
-use crate::cli::arguments::{MOST_WHOLE, positive, whole};
 use crate::compare::truth::Truth;
 use crate::compare::{Comparison, Task, compare};
 use crate::input::masked::Masked;
 use crate::input::medium::Medium;
 use crate::input::open::{Counts, Opening, counts, open};
 use crate::input::source::PhotonSource;
-use crate::settings::{Run, SettingsFile, share};
+use crate::numbers::{MOST_WHOLE, positive, whole};
+use crate::options::{self, Refused};
+use crate::settings::{SettingsFile, share};
 use crate::simulate::scene::Scene;
 
 /// What is compared, and how exact it has to be.
-#[derive(Args)]
-#[group(skip)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Millimetres that 68 % of the reports may be off at most [default: as frames of L2]
-    #[arg(long, value_name = "MM", value_parser = positive)]
-    within: Option<f64>,
-    /// The share of exposures without a target that may end with an event, at most 0.1
-    /// [default: 0.01]
-    #[arg(long, value_name = "SHARE", value_parser = share)]
-    false_alarm: Option<f64>,
-    #[command(flatten)]
-    recording: Recording,
-    /// What is known of the sensor.
-    #[command(flatten)]
-    pub known: Known,
-    /// Laser cycles to use at most [default: 10000; the scene's]
-    #[arg(long, value_name = "N", value_parser = whole(1..=MOST_WHOLE))]
-    cycles: Option<u64>,
-    /// Seed of every random number [default: 1]
-    #[arg(long, value_name = "N", value_parser = whole(0..=MOST_WHOLE - 1))]
-    seed: Option<u64>,
+    /// Millimetres that 68 % of the reports may be off at most; as frames of L2 unless given.
+    pub within: Option<f64>,
+    /// The share of exposures without a target that may end with an event; 0.01 unless given.
+    pub false_alarm: Option<f64>,
+    /// What the recording is, and what is known of the sensor.
+    pub given: Given,
+}
+
+impl options::Options for Options {
+    const KEYS: &'static [&'static [&'static str]] = &[
+        &["within", "false_alarm"],
+        RECORDING,
+        SENSOR,
+        &["cycles", "seed"],
+    ];
+
+    fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
+        match key {
+            "within" => self.within = Some(positive(text)?),
+            "false_alarm" => self.false_alarm = Some(share(text)?),
+            // One more is the seed of a second run.
+            "seed" => self.given.options.run.seed = Some(whole(0..=MOST_WHOLE - 1)(text)?),
+            key => self.given.set(key, text)?,
+        }
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), Refused> {
+        self.given.check()
+    }
 }
 
 /// Where photons come from.
@@ -101,17 +112,9 @@ impl Options {
     /// # Errors
     /// What is wrong with them.
     pub fn said(&self, is_scene: bool) -> Result<SettingsFile> {
-        let run = Run {
-            cycles: self.cycles,
-            seed: self.seed,
-            ..Run::default()
-        };
-        let run = SettingsFile::from(run);
         match is_scene {
-            true => self.known.said(run),
-            false => self
-                .recording
-                .said(|options| self.known.said(options.or(run))),
+            true => self.given.merged(),
+            false => self.given.merged_for_recording(),
         }
     }
 
@@ -120,10 +123,8 @@ impl Options {
     /// # Errors
     /// What is wrong with it, its name first, or with what is said.
     pub fn compare(&self, input: Input, said: SettingsFile, told: &Told) -> Result<Compared> {
-        let mut asked = said.clone();
-        asked.detection.false_alarm = Some(self.share(&said));
-        let compared = self.compare_as_said(input, said, told);
-        compared.map_err(|error| asked.name_origin(error))
+        let compared = self.compare_as_said(input, said.clone(), told);
+        compared.map_err(|error| said.blame(error))
     }
 
     fn compare_as_said(&self, input: Input, said: SettingsFile, told: &Told) -> Result<Compared> {
@@ -140,8 +141,9 @@ impl Options {
             photons,
         } = subject;
         let false_alarm = self.share(&said);
-        let sigma = said.sensor.sigma_bins.with_context(|| {
-            format!("{name}: no peak tells how wide the pulse is; --sigma-bins is needed")
+        let sigma = said.sensor.sigma_bins.ok_or_else(|| {
+            let reason = format!("is needed: no peak of {name} tells how wide the pulse is");
+            Refused::new("sigma_bins", reason)
         })?;
         let settings = said.settings(said.sensor.bins.unwrap_or(128).into())?;
         let photons = |seed: u64| -> Result<Box<dyn PhotonSource>> {
@@ -191,7 +193,7 @@ impl Options {
         told: &Told,
     ) -> Result<Subject> {
         let counts = counts(&medium, &opening(&said))?;
-        self.recording.suits(&medium, &counts.known)?;
+        self.given.suits(&medium, &counts.known)?;
         let of_width = warning_of_width(&counts.known, &said);
         warnings(&counts.known)
             .chain(of_width)

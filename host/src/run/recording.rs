@@ -1,141 +1,106 @@
-//! The options that say what a recording is, the same for every command.
+//! The options that say what a recording is, the same for every job.
 
-use crate::cli::arguments::{MOST_WHOLE, bins, fixed, positive, whole};
-use crate::input::axes::Axes;
+use anyhow::{Result, ensure};
+use dtof_core::fixed::types::U16F16;
+
+use super::given::Given;
 use crate::input::medium::Medium;
 use crate::input::open::{BIN_WIDTH_PS, Known, Opening};
 use crate::input::recorded::RecordingLength;
 use crate::input::source::Geometry;
+use crate::options::Refused;
 use crate::rows::grouped;
 use crate::settings::{Run, Sensor, SettingsFile};
-use anyhow::{Result, ensure};
-use clap::Args;
-use dtof_core::fixed::types::{I24F8, U16F16};
 
 /// What a recording is.
-#[derive(Args)]
-pub struct Recording {
-    /// Arrays of histograms: what each axis is, of captures, rows, columns and bins
-    /// [default: the last is bins, the one before columns, all others are rows]
-    #[arg(long, value_name = "AXIS,AXIS,...")]
-    axes: Option<Axes>,
-    /// .npz: the array to read [default: the only one]
-    #[arg(long, value_name = "NAME")]
-    array: Option<String>,
-    /// Photon lists: columns of the array, pixel = row × columns + column [default: one row]
-    #[arg(long, value_name = "N", value_parser = whole(1..=65_536_u32))]
-    columns: Option<u32>,
-    /// Add up so many neighbouring bins [default: 1]
-    #[arg(long, value_name = "K", value_parser = whole(1..=512_u16))]
-    rebin: Option<u16>,
-    /// Bins to use, after --rebin, a power of two from 8 to 1024. Of histograms with more the
-    /// last are cut off [default: as many as there are, or the next power of two; 128 of
-    /// photon lists]
-    #[arg(long, value_name = "N", value_parser = bins)]
-    bins: Option<u16>,
-    /// Picoseconds a bin of the file, rounded to 1/65536 [default: 250; of logs that of the
-    /// sensor]
-    #[arg(long, value_name = "PS", value_parser = fixed::<U16F16>, allow_hyphen_values = true)]
-    bin_width_ps: Option<U16F16>,
-    /// Millimetres added to every range, rounded to 1/256 [default: 0; of logs that of the
-    /// sensor]
-    #[arg(long, value_name = "MM", value_parser = fixed::<I24F8>, allow_hyphen_values = true)]
-    offset_mm: Option<I24F8>,
-    /// Histograms: photons a laser cycle in the brightest pixel of each capture that is not
-    /// masked [default: 1]
-    #[arg(long, value_name = "R", value_parser = positive, conflicts_with = "recorded_cycles")]
-    photons_per_cycle: Option<f64>,
-    /// Histograms: laser cycles that each capture lasted
-    #[arg(long, value_name = "N", value_parser = whole(1..=MOST_WHOLE))]
-    recorded_cycles: Option<u64>,
-    /// Laser cycles a second [default: not known]
-    #[arg(long, value_name = "HZ", value_parser = whole(1..=1_000_000_000_000_u64))]
-    laser_hz: Option<u64>,
-}
+pub const RECORDING: &[&str] = &[
+    "axes",
+    "array",
+    "columns",
+    "rebin",
+    "bins",
+    "bin_width_ps",
+    "offset_mm",
+    "photons_per_cycle",
+    "recorded_cycles",
+    "laser_hz",
+];
 
-impl Recording {
-    /// What these options say, to which `more` adds the others and the settings file.
+impl Given {
+    /// The options, of which the width is that of a bin of the recording, then the file, of which it
+    /// is that of a bin that is used.
     ///
     /// # Errors
     /// What is wrong with these.
-    pub fn said(
-        &self,
-        more: impl FnOnce(SettingsFile) -> Result<SettingsFile>,
-    ) -> Result<SettingsFile> {
-        let options = SettingsFile {
-            sensor: Sensor {
-                laser_hz: self.laser_hz,
-                columns: self.columns,
-                bins: self.bins,
-                offset_mm: self.offset_mm,
-                ..Sensor::default()
-            },
-            run: Run {
-                photons_per_cycle: self.photons_per_cycle,
-                recorded_cycles: self.recorded_cycles,
-                axes: self.axes.clone(),
-                array: self.array.clone(),
-                rebin: self.rebin,
-                ..Run::default()
-            },
-            ..SettingsFile::default()
-        };
-        let mut said = more(options)?;
+    pub fn merged_for_recording(&self) -> Result<SettingsFile> {
+        let mut options = self.options.clone();
+        let width = options.sensor.bin_width_ps.take();
+        let mut merged = self.over_file(options)?;
         ensure!(
-            self.rebin.is_none()
-                || self.bin_width_ps.is_some()
-                || said.sensor.bin_width_ps.is_none(),
-            "--rebin: the bins of the settings file are others; leave one of them out"
+            self.options.run.rebin.is_none()
+                || width.is_some()
+                || merged.sensor.bin_width_ps.is_none(),
+            Refused::new(
+                "rebin",
+                "is for other bins than those of the settings file; leave one of them out"
+            )
         );
-        if let Some(width) = self.bin_width_ps {
-            // Settings are of the bins that are used.
-            let used = width.checked_mul_int(said.run.rebin.unwrap_or(1).into());
-            ensure!(
-                used.is_some(),
-                "--bin-width-ps {width}: too much for --rebin"
-            );
-            said.sensor.bin_width_ps = used;
+        if let Some(width) = width {
+            let used = width.checked_mul_int(merged.run.rebin.unwrap_or(1).into());
+            let refused = || Refused::value("bin_width_ps", width, "is too much for `rebin`");
+            merged.sensor.bin_width_ps = Some(used.ok_or_else(refused)?);
         }
-        Ok(said)
+        Ok(merged)
     }
 
     /// Options that say nothing about a device are refused.
     ///
     /// # Errors
     /// If there are any.
-    pub fn suits_device(&self) -> Result<()> {
+    pub fn suits_device(&self) -> Result<(), Refused> {
+        let Run {
+            axes, array, rebin, ..
+        } = &self.options.run;
         let of_files = [
-            ("--axes", self.axes.is_some()),
-            ("--array", self.array.is_some()),
-            ("--rebin", self.rebin.is_some()),
-            ("--bins", self.bins.is_some()),
+            ("axes", axes.is_some()),
+            ("array", array.is_some()),
+            ("rebin", rebin.is_some()),
+            ("bins", self.options.sensor.bins.is_some()),
         ];
-        for (option, is_there) in of_files {
-            ensure!(!is_there, "{option} is of recordings, not of a device");
+        if let Some((key, _)) = of_files.iter().find(|(_, is_there)| *is_there) {
+            return Err(Refused::new(*key, "is of recordings, not of a device"));
         }
-        ensure!(
-            !self.has_length(),
-            "--recorded-cycles and --photons-per-cycle: this device counts its laser cycles"
-        );
-        Ok(())
+        match self.length() {
+            Some(key) => Err(Refused::new(
+                key,
+                "is of recordings: this device counts its laser cycles",
+            )),
+            None => Ok(()),
+        }
     }
 
-    /// Whether they say how long a recording is.
-    #[must_use]
-    pub fn has_length(&self) -> bool {
-        self.photons_per_cycle.is_some() || self.recorded_cycles.is_some()
+    /// The option that says how long a recording is.
+    fn length(&self) -> Option<&'static str> {
+        let run = &self.options.run;
+        match (run.photons_per_cycle, run.recorded_cycles) {
+            (Some(_), _) => Some("photons_per_cycle"),
+            (None, Some(_)) => Some("recorded_cycles"),
+            (None, None) => None,
+        }
     }
 
     /// Options that say nothing about a list of photons are refused.
     ///
     /// # Errors
     /// If there are any, and it is one.
-    pub fn suits(&self, input: &Medium, known: &Known) -> Result<()> {
-        ensure!(
-            !(known.is_list && self.has_length()),
-            "--photons-per-cycle and --recorded-cycles are for histograms; {input} holds photons"
-        );
-        Ok(())
+    pub fn suits(&self, input: &Medium, known: &Known) -> Result<(), Refused> {
+        match self.length().filter(|_| known.is_list) {
+            Some(key) => Err(Refused::new(
+                key,
+                format!("is for histograms; {input} holds photons"),
+            )),
+            None => Ok(()),
+        }
     }
 }
 

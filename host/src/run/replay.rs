@@ -1,11 +1,9 @@
 //! Recorded photons or histograms, ready for the engine.
 
 use anyhow::{Context, Result, ensure};
-use clap::Args;
 
-use super::operation::{Frames, Operation};
-use super::recording::{Recording, of_file, opening};
-use crate::cli::arguments::{MOST_WHOLE, whole};
+use super::given::{FRAME, Given, SENSOR};
+use super::recording::{RECORDING, of_file, opening};
 use crate::engine::Engine;
 use crate::engine::host::host_engine;
 use crate::engine::settings::Settings;
@@ -14,25 +12,32 @@ use crate::input::medium::Medium;
 use crate::input::open::{Known, Opening, open};
 use crate::input::recorded::Whole;
 use crate::input::source::{PhotonSource, has_only_neighbours};
-use crate::settings::{Run, SettingsFile};
+use crate::options::{self, Refused};
+use crate::settings::{Detection, SettingsFile};
 
 /// What is replayed, and how.
-#[derive(Args)]
-#[group(skip)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
-    #[command(flatten)]
-    recording: Recording,
-    /// How pixels operate.
-    #[command(flatten)]
-    pub operation: Operation,
-    #[command(flatten)]
-    frames: Frames,
-    /// Replay only the first N laser cycles [default: 10000]
-    #[arg(long, value_name = "N", value_parser = whole(1..=MOST_WHOLE))]
-    cycles: Option<u64>,
-    /// Seed of the laser cycles that recorded photons are given [default: 1]
-    #[arg(long, value_name = "N", value_parser = whole(0..=MOST_WHOLE))]
-    seed: Option<u64>,
+    /// The settings.
+    pub given: Given,
+}
+
+impl options::Options for Options {
+    const KEYS: &'static [&'static [&'static str]] = &[
+        RECORDING,
+        SENSOR,
+        Detection::KEYS,
+        FRAME,
+        &["cycles", "seed"],
+    ];
+
+    fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
+        self.given.set(key, text)
+    }
+
+    fn check(&self) -> Result<(), Refused> {
+        self.given.check()
+    }
 }
 
 /// A replay that can begin.
@@ -55,14 +60,7 @@ impl Options {
     /// # Errors
     /// What is wrong with them.
     pub fn said(&self) -> Result<SettingsFile> {
-        let options = Run {
-            cycles: self.cycles,
-            seed: self.seed,
-            frame: self.frames.frame,
-            ..Run::default()
-        };
-        self.recording
-            .said(|recording| self.operation.said(recording.or(options.into())))
+        self.given.merged_for_recording()
     }
 
     /// Opens `input` as is `said`.
@@ -89,24 +87,33 @@ impl Options {
         };
         let recording = open(input, &opening)?;
         let (photons, known) = (recording.photons, recording.known);
-        self.recording.suits(input, &known)?;
+        self.given.suits(input, &known)?;
         ensure!(
             opening.whole.is_none() || !known.is_list,
             "{input} holds photons: only histograms are replayed in parts"
         );
         let said = said.clone().or(of_file(&known, photons.geometry()));
         let settings = said.settings(known.bins)?;
+        let refused = |refused: Refused| anyhow::Error::from(refused).context(input.to_string());
         ensure!(
             known.has_shape || settings.binning.is_none(),
-            "{input}: --binning needs to know the array: say --columns"
+            refused(Refused::new(
+                "binning",
+                "needs to know the array: say `columns`"
+            ))
         );
         if let Some(binning) = settings.binning {
             let ([column, row], side) = (photons.sides(), 1 << binning.levels.raw());
             ensure!(
                 has_only_neighbours(photons.as_ref(), binning.levels),
-                "{input}: --binning {}: blocks of {side}x{side} pixels would reach across \
-                 captures; a {column} and a {row} are no neighbours there",
-                binning.levels.raw()
+                refused(Refused::value(
+                    "binning",
+                    binning.levels.raw(),
+                    format!(
+                        "blocks of {side}x{side} pixels would reach across captures; a {column} and \
+                         a {row} are no neighbours there"
+                    )
+                ))
             );
             if let Some(whole) = &opening.whole {
                 let pixels = photons.addresses().len();

@@ -1,36 +1,47 @@
 //! A scene on an array, ready to be simulated.
 
 use anyhow::{Result, ensure};
-use clap::Args;
 use dtof_core::fixed::types::U16F16;
 
-use super::operation::{Frames, Operation};
-use crate::cli::arguments::{MOST_WHOLE, whole};
+use super::given::{FRAME, Given, SENSOR};
 use crate::input::source::Geometry;
-use crate::settings::{Rays, Run, Sensor, SettingsFile};
+use crate::numbers::{truth, whole};
+use crate::options::{self, Refused};
+use crate::settings::{Detection, Rays, Run, Sensor, SettingsFile};
 use crate::simulate::scene::Scene;
 
 /// What is simulated beside the scene, and how.
-#[derive(Args)]
-#[group(skip)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Macropixels of the array that looks at the scene [default: the file's]
-    #[arg(long, value_name = "COLUMNSxROWS", value_parser = array)]
-    array: Option<Geometry>,
-    /// Without signal: photon-counts.svg is then a passive image
-    #[arg(long)]
+    /// The array that looks at the scene.
+    pub array: Option<Geometry>,
+    /// Without signal: the picture of photon counts is then a passive image.
     pub laser_off: bool,
-    /// How pixels operate.
-    #[command(flatten)]
-    pub operation: Operation,
-    #[command(flatten)]
-    frames: Frames,
-    /// Laser cycles [default: the file's]
-    #[arg(long, value_name = "N", value_parser = whole(1..=MOST_WHOLE))]
-    cycles: Option<u64>,
-    /// Seed of the simulated photons [default: 1]
-    #[arg(long, value_name = "N", value_parser = whole(0..=MOST_WHOLE))]
-    seed: Option<u64>,
+    /// The settings.
+    pub given: Given,
+}
+
+impl options::Options for Options {
+    const KEYS: &'static [&'static [&'static str]] = &[
+        &["array", "laser_off"],
+        SENSOR,
+        Detection::KEYS,
+        FRAME,
+        &["cycles", "seed"],
+    ];
+
+    fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
+        match key {
+            "array" => self.array = Some(array(text)?),
+            "laser_off" => self.laser_off = truth(text)?,
+            key => self.given.set(key, text)?,
+        }
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), Refused> {
+        self.given.check()
+    }
 }
 
 impl Options {
@@ -39,13 +50,7 @@ impl Options {
     /// # Errors
     /// What is wrong with it.
     pub fn said(&self) -> Result<SettingsFile> {
-        let run = Run {
-            cycles: self.cycles,
-            seed: self.seed,
-            frame: self.frames.frame,
-            ..Run::default()
-        };
-        self.operation.said(run.into())
+        self.given.merged()
     }
 
     /// The scene as the array sees it.

@@ -5,12 +5,12 @@ mod window;
 
 use std::fmt::Write as _;
 
-use crate::cli::arguments::{MOST_WHOLE, bins, positive, shortest, whole};
+use crate::numbers::{MOST_WHOLE, bins, positive, shortest, whole};
+use crate::options::{self, Refused, named};
 use crate::rows::significant;
 use crate::settings::RuleName;
 use crate::simulate::MM_PER_PS;
-use anyhow::{Context, Result, ensure};
-use clap::Args;
+use anyhow::{Result, ensure};
 use dtof_core::BlockLevel;
 use dtof_theory::gaussian;
 use dtof_theory::looks::detections::Detections;
@@ -20,62 +20,158 @@ use dtof_theory::tune::{Request, Source, Wanted, tune};
 use serde_json::json;
 
 /// What settings are for.
-#[derive(Args)]
-#[group(skip)]
+#[derive(Clone, Debug)]
 pub struct Options {
     /// The rule to find settings for
-    #[arg(long, value_enum, default_value_t = RuleName::Paper)]
-    rule: RuleName,
+    pub rule: RuleName,
     /// Background photons a bin and laser cycle (B)
-    #[arg(long, value_name = "B", value_parser = positive)]
-    background: f64,
+    pub background: Option<f64>,
     /// Signal photons a laser cycle (A)
-    #[arg(long, value_name = "A", value_parser = positive, required_unless_present = "snr")]
-    signal: Option<f64>,
+    pub signal: Option<f64>,
     /// Instead: the SNR of the whole exposure, N·A / √(N·B) with N = L2
-    #[arg(long, value_name = "SNR", value_parser = positive, conflicts_with = "signal")]
-    snr: Option<f64>,
+    pub snr: Option<f64>,
     /// Standard deviation of the pulse in bins
-    #[arg(long, value_name = "BINS", value_parser = positive, required_unless_present = "sigma_ps")]
-    sigma_bins: Option<f64>,
+    pub sigma_bins: Option<f64>,
     /// Instead: in picoseconds
-    #[arg(long, value_name = "PS", value_parser = positive, conflicts_with = "sigma_bins")]
-    sigma_ps: Option<f64>,
+    pub sigma_ps: Option<f64>,
     /// Bins of a histogram, a power of two from 8 to 1024
-    #[arg(long, value_name = "N", default_value_t = 128, value_parser = bins)]
-    bins: u16,
+    pub bins: u16,
     /// Picoseconds a bin
-    #[arg(long, value_name = "PS", default_value_t = 250.0, value_parser = positive)]
-    bin_width_ps: f64,
+    pub bin_width_ps: f64,
     /// The share of exposures without a target that may end with an event [default: 0.01]
-    #[arg(long, value_name = "SHARE", value_parser = positive, conflicts_with = "false_alarms_per_second")]
-    false_alarm: Option<f64>,
+    pub false_alarm: Option<f64>,
     /// Instead: the false alarms of a pixel a second
-    #[arg(long, value_name = "RATE", value_parser = positive, requires = "laser_hz")]
-    false_alarms_per_second: Option<f64>,
+    pub false_alarms_per_second: Option<f64>,
     /// Laser cycles a second
-    #[arg(long, value_name = "HZ", value_parser = positive)]
-    laser_hz: Option<f64>,
+    pub laser_hz: Option<f64>,
     /// The exposure a decision must exceed, in laser cycles [default: the one with the shortest
     /// time to an event]
-    #[arg(long, value_name = "N", value_parser = whole(0..=u16::MAX))]
-    l1: Option<u16>,
+    pub l1: Option<u16>,
     /// The exposure at which a pixel starts over without an event, in laser cycles
-    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = whole(1..=u16::MAX))]
-    l2: u16,
+    pub l2: u16,
     /// Laser cycles between looks
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = whole(1..=u16::MAX))]
-    x: u16,
+    pub x: u16,
     /// Photons a reported peak holds at least
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = whole(1..=1023_u16))]
-    min_count: u16,
+    pub min_count: u16,
     /// Window rule: the largest blocks of adaptive binning, which share the false alarms with the
     /// pixels
-    #[arg(long, value_name = "LEVELS", default_value_t = 0, value_parser = whole(0..=BlockLevel::MAX.raw()))]
-    binning: u8,
+    pub binning: u8,
     /// Seed of the simulated exposures
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0..=MOST_WHOLE))]
-    seed: u64,
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            rule: RuleName::Paper,
+            background: None,
+            signal: None,
+            snr: None,
+            sigma_bins: None,
+            sigma_ps: None,
+            bins: 128,
+            bin_width_ps: 250.0,
+            false_alarm: None,
+            false_alarms_per_second: None,
+            laser_hz: None,
+            l1: None,
+            l2: 2000,
+            x: 4,
+            min_count: 5,
+            binning: 0,
+            seed: 1,
+        }
+    }
+}
+
+impl options::Options for Options {
+    const KEYS: &'static [&'static [&'static str]] = &[&[
+        "rule",
+        "background",
+        "signal",
+        "snr",
+        "sigma_bins",
+        "sigma_ps",
+        "bins",
+        "bin_width_ps",
+        "false_alarm",
+        "false_alarms_per_second",
+        "laser_hz",
+        "l1",
+        "l2",
+        "x",
+        "min_count",
+        "binning",
+        "seed",
+    ]];
+
+    fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
+        match key {
+            "rule" => self.rule = named(text)?,
+            "background" => self.background = Some(positive(text)?),
+            "signal" => self.signal = Some(positive(text)?),
+            "snr" => self.snr = Some(positive(text)?),
+            "sigma_bins" => self.sigma_bins = Some(positive(text)?),
+            "sigma_ps" => self.sigma_ps = Some(positive(text)?),
+            "bins" => self.bins = bins(text)?,
+            "bin_width_ps" => self.bin_width_ps = positive(text)?,
+            "false_alarm" => self.false_alarm = Some(positive(text)?),
+            "false_alarms_per_second" => self.false_alarms_per_second = Some(positive(text)?),
+            "laser_hz" => self.laser_hz = Some(positive(text)?),
+            "l1" => self.l1 = Some(whole(0..=u16::MAX)(text)?),
+            "l2" => self.l2 = whole(1..=u16::MAX)(text)?,
+            "x" => self.x = whole(1..=u16::MAX)(text)?,
+            "min_count" => self.min_count = whole(1..=1023)(text)?,
+            "binning" => self.binning = whole(0..=BlockLevel::MAX.raw())(text)?,
+            _ => self.seed = whole(0..=MOST_WHOLE)(text)?,
+        }
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), Refused> {
+        let (signal, sigma) = (self.signal.is_some(), self.sigma_bins.is_some());
+        let (per_second, is_share) = (
+            self.false_alarms_per_second.is_some(),
+            self.false_alarm.is_some(),
+        );
+        let refused = [
+            (self.background.is_none(), "background", "is needed"),
+            (
+                !signal && self.snr.is_none(),
+                "signal",
+                "is needed, or `snr`",
+            ),
+            (
+                signal && self.snr.is_some(),
+                "snr",
+                "cannot be used with `signal`",
+            ),
+            (
+                !sigma && self.sigma_ps.is_none(),
+                "sigma_bins",
+                "is needed, or `sigma_ps`",
+            ),
+            (
+                sigma && self.sigma_ps.is_some(),
+                "sigma_ps",
+                "cannot be used with `sigma_bins`",
+            ),
+            (
+                is_share && per_second,
+                "false_alarm",
+                "cannot be used with `false_alarms_per_second`",
+            ),
+            (
+                per_second && self.laser_hz.is_none(),
+                "false_alarms_per_second",
+                "needs `laser_hz`",
+            ),
+        ];
+        match refused.into_iter().find(|(is_wrong, ..)| *is_wrong) {
+            Some((_, key, reason)) => Err(Refused::new(key, reason)),
+            None => Ok(()),
+        }
+    }
 }
 
 /// One result: its name in JSON, its value and where that comes from.
@@ -140,18 +236,14 @@ impl Options {
     }
 
     fn request(&self) -> Result<Request> {
-        let signal = match (self.signal, self.snr) {
-            (Some(signal), _) => signal,
-            (None, snr) => signal_for_snr(
-                snr.context("--signal or --snr is needed")?,
-                self.background,
-                self.l2.into(),
-            ),
-        };
-        let sigma = match (self.sigma_bins, self.sigma_ps) {
-            (Some(bins), _) => bins,
-            (None, ps) => ps.context("--sigma-bins or --sigma-ps is needed")? / self.bin_width_ps,
-        };
+        let needed = |key: &'static str| move || Refused::new(key, "is needed");
+        let background = self.background.ok_or_else(needed("background"))?;
+        let by_snr = |snr| signal_for_snr(snr, background, self.l2.into());
+        let signal = self.signal.or(self.snr.map(by_snr));
+        let signal = signal.ok_or_else(needed("signal"))?;
+        let by_ps = self.sigma_ps.map(|ps| ps / self.bin_width_ps);
+        let sigma = self.sigma_bins.or(by_ps);
+        let sigma = sigma.ok_or_else(needed("sigma_bins"))?;
         ensure!(
             sigma <= f64::from(self.bins) / 4.0,
             "a pulse of σ = {} bins does not fit {} bins",
@@ -160,14 +252,17 @@ impl Options {
         );
         ensure!(
             self.binning == 0 || self.rule == RuleName::Window,
-            "--binning needs --rule window here: only its z is shared with blocks"
+            Refused::new(
+                "binning",
+                "needs `rule` window here: only its z is shared with blocks"
+            )
         );
         let wanted = match (self.false_alarms_per_second, self.laser_hz) {
             (Some(per_second), Some(laser_hz)) => Wanted::PerCycle(per_second / laser_hz),
             _ => Wanted::PerExposure(self.false_alarm.unwrap_or(0.01)),
         };
         Ok(Request {
-            background: self.background,
+            background,
             signal,
             sigma,
             bins: self.bins,

@@ -1,19 +1,22 @@
 //! Reading and writing the file.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow};
-use serde::{Deserialize, Serialize};
+use anyhow::{Context, Error, Result, anyhow};
+use serde::Serialize;
+use toml::{Table, Value};
 
-use super::{Detection, Origin, Rays, Run, Sensor};
+use super::{Detection, Rays, Run, Sensor};
+use crate::options::{self, GivenByFile, Refused};
 
 /// The first line of every file that this program writes.
 pub(crate) const MARK: &str = "# dtof settings";
 
-/// What each key is, in the order in which keys are written.
-const COMMENTS: [(&str, &[(&str, &str)]); 4] = [
+/// The keys of each section and what they are, in the order in which they are written.
+const SECTIONS: [(&str, &[(&str, &str)]); 4] = [
     (
         "sensor",
         &[
@@ -90,8 +93,7 @@ const COMMENTS: [(&str, &[(&str, &str)]); 4] = [
 ];
 
 /// A settings file, or what the command line says of the same. All of it may be missing.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SettingsFile {
     /// What is known of the sensor.
     pub sensor: Sensor,
@@ -101,9 +103,9 @@ pub struct SettingsFile {
     pub rays: Rays,
     /// What is replayed or simulated.
     pub run: Run,
-    /// The file that some of it comes from.
+    /// The file that gave some of it.
     #[serde(skip)]
-    pub origin: Option<Origin>,
+    pub file: Option<GivenByFile>,
 }
 
 impl SettingsFile {
@@ -114,30 +116,103 @@ impl SettingsFile {
     pub fn read(path: &Path) -> Result<Self> {
         let name = || path.display().to_string();
         let text = fs::read_to_string(path).with_context(name)?;
-        let mut file = Self::parse(&text).with_context(name)?;
+        let mut file = Self::parse(&text).map_err(|error| match error.downcast_ref() {
+            Some(Refused { key: Some(key), .. }) => {
+                let keys = SECTIONS.iter().flat_map(|(_, keys)| *keys);
+                let keys = keys.map(|(key, _)| (*key).to_owned());
+                let keys = keys.chain([key.clone()]).collect();
+                let path = path.to_owned();
+                options::blamed(error, Some(&GivenByFile { path, keys }))
+            }
+            _ => error.context(name()),
+        })?;
         // A path of the file is meant from where the file is.
         if let (Some(rays), Some(folder)) = (&mut file.rays.calibration, path.parent()) {
             let whole = std::path::absolute(folder.join(&rays)).with_context(name)?;
             *rays = whole.display().to_string();
         }
-        file.with_origin(path)
+        let (path, keys) = (path.to_owned(), file.keys()?);
+        file.file = Some(GivenByFile { path, keys });
+        Ok(file)
     }
 
     /// The text of a file.
     ///
     /// # Errors
-    /// The line or the key that is wrong.
+    /// The line that is no TOML, or the key that is wrong.
     pub fn parse(text: &str) -> Result<Self> {
-        let file: Self = toml::from_str(text).map_err(|error| {
+        let sections: Table = toml::from_str(text).map_err(|error| {
             let before = error.span().and_then(|span| text.get(..span.start));
             let line = before.map_or(1, |text| text.matches('\n').count() + 1);
             anyhow!("line {line}: {}", error.message())
         })?;
-        file.sensor.check()?;
-        file.detection.check()?;
-        file.rays.check()?;
-        file.run.check()?;
+        let mut file = Self::default();
+        for (section, values) in &sections {
+            let Some((_, keys)) = SECTIONS.iter().find(|(known, _)| known == section) else {
+                return Err(match section_of(section) {
+                    Some(known) => Refused::new(section, format!("stands in [{known}]")),
+                    None => Refused::unknown(section, SECTIONS.map(|(section, _)| section)),
+                }
+                .into());
+            };
+            let Value::Table(values) = values else {
+                let reason = format!("is a section: [{section}]");
+                return Err(Refused::new(section, reason).into());
+            };
+            for (key, value) in values {
+                if !keys.iter().any(|(known, _)| known == key) {
+                    return Err(match section_of(key) {
+                        Some(known) => Refused::new(key, format!("stands in [{known}]")),
+                        None => Refused::unknown(key, keys.iter().map(|(key, _)| *key)),
+                    }
+                    .into());
+                }
+                let value = text_of(value);
+                let set = file.set(key, &value);
+                set.map_err(|reason| Refused::value(key, &value, reason))?;
+            }
+        }
+        file.check()?;
         Ok(file)
+    }
+
+    /// Sets a key of any section.
+    ///
+    /// # Errors
+    /// Why it cannot be so.
+    pub fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
+        match section_of(key) {
+            Some("sensor") => self.sensor.set(key, text),
+            Some("detection") => self.detection.set(key, text),
+            Some("rays") => self.rays.set(key, text),
+            _ => self.run.set(key, text),
+        }
+    }
+
+    /// Are there two options of which only one can be given?
+    ///
+    /// # Errors
+    /// Which.
+    pub fn check(&self) -> Result<(), Refused> {
+        self.detection.check()?;
+        self.rays.check()?;
+        self.run.check()
+    }
+
+    /// The keys that are given.
+    ///
+    /// # Errors
+    /// If a number is none.
+    pub fn keys(&self) -> Result<BTreeSet<String>> {
+        let sections = Table::try_from(self)?;
+        let tables = sections.values().filter_map(Value::as_table);
+        Ok(tables.flat_map(Table::keys).cloned().collect())
+    }
+
+    /// `error`, which names the file where it is about a key that the file gave.
+    #[must_use]
+    pub fn blame(&self, error: Error) -> Error {
+        options::blamed(error, self.file.as_ref())
     }
 
     /// These, and of `other` what these do not say.
@@ -148,7 +223,12 @@ impl SettingsFile {
         if sigma.is_some() && sigma != other.sensor.sigma_bins {
             other.detection.half_widths = None;
         }
-        let origin = self.origin_of_rest(&other);
+        // A number that is none, and so no key, has no text either.
+        let own = self.keys().unwrap_or_default();
+        let file = other.file.map(|file| GivenByFile {
+            keys: &file.keys - &own,
+            ..file
+        });
         // A field of view replaces a calibration, and the other way round.
         let rays = if self.rays == Rays::default() {
             other.rays
@@ -160,7 +240,7 @@ impl SettingsFile {
             detection: self.detection.or(other.detection),
             rays,
             run: self.run.or(other.run),
-            origin: self.origin.or(origin),
+            file: self.file.or(file),
         }
     }
 
@@ -176,10 +256,10 @@ impl SettingsFile {
     /// # Errors
     /// If a number is none.
     pub fn to_toml(&self) -> Result<String> {
-        let all = toml::Table::try_from(self)?;
+        let all = Table::try_from(self)?;
         let mut text = format!("{MARK}: `--settings FILE` takes them, options override them.\n");
-        for (section, keys) in COMMENTS {
-            let said = all.get(section).and_then(toml::Value::as_table);
+        for (section, keys) in SECTIONS {
+            let said = all.get(section).and_then(Value::as_table);
             let lines = keys.iter().filter_map(|(key, comment)| {
                 let value = said?.get(*key)?;
                 Some((format!("{key} = {value}"), comment))
@@ -194,6 +274,25 @@ impl SettingsFile {
             }
         }
         Ok(text)
+    }
+}
+
+/// The section in which a key stands.
+fn section_of(key: &str) -> Option<&'static str> {
+    let has_key = |(_, keys): &&(_, &[(&str, _)])| keys.iter().any(|(known, _)| *known == key);
+    SECTIONS.iter().find(has_key).map(|(section, _)| *section)
+}
+
+/// A value of a file as an option has it: the elements of a list after each other.
+fn text_of(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Float(number) => number.to_string(),
+        Value::Array(values) => {
+            let texts: Vec<String> = values.iter().map(text_of).collect();
+            texts.join(",")
+        }
+        value => value.to_string(),
     }
 }
 
@@ -251,7 +350,7 @@ rebin = 2
         assert!(text.contains("sigma_bins = 0.8 "), "{text}");
         // Each key is there, with its comment; those of other rules and choices are not.
         let others = ["alpha", "false_alarm", "calibration", "photons_per_cycle"];
-        for (_, keys) in COMMENTS {
+        for (_, keys) in SECTIONS {
             for (key, comment) in keys {
                 let line = text
                     .lines()
@@ -311,39 +410,86 @@ rebin = 2
     #[test]
     fn what_is_wrong_is_named() {
         for (text, reason) in [
-            ("l1 = 4", "line 1: unknown field `l1`"),
+            ("l1 = 4", "l1 stands in [detection]"),
+            (
+                "[detections]\nl1 = 4",
+                "detections is unknown; is it detection?",
+            ),
+            ("sensor = 4", "sensor is a section: [sensor]"),
+            ("[sensor", "line 1: "),
             ("[sensor]\nbins = 100", "bins 100: must be a power of two"),
-            ("[sensor]\nbins = 'x'", "line 2: invalid type"),
+            ("[sensor]\nbins = 'x'", "bins x: must be a power of two"),
             (
                 "[sensor]\nsigma_bins = 0.001",
-                "line 2: 0.001: is less than half",
+                "sigma_bins 0.001: is less than half",
             ),
             ("[sensor]\nsigma_bins = 2", "sigma_bins 2: must be above 0"),
-            ("[sensor]\nlaser_hz = 0", "laser_hz 0: must be from 1"),
-            ("[sensor]\nglass = -1.0", "glass -1: must be from 0"),
-            ("[sensor]\nmasked = [70000]", "line 2: invalid value"),
+            (
+                "[sensor]\nlaser_hz = 0",
+                "laser_hz 0: must be a whole number from 1 to 1000000000000",
+            ),
+            (
+                "[sensor]\nglass = -1.0",
+                "glass -1: must be a number from 0 to 1000000",
+            ),
+            (
+                "[sensor]\nmasked = [70000]",
+                "masked 70000: must be a whole number from 0 to 65535",
+            ),
             (
                 "[detection]\nrule = 'best'",
-                "line 2: unknown variant `best`",
+                "rule best: must be paper, average or window",
             ),
-            ("[detection]\nz = 99", "line 2: 99: must be a number from 0"),
-            ("[detection]\nz = 4\nfalse_alarm = 0.01", "give one of them"),
+            ("[detection]\nz = 99", "z 99: must be a number from 0"),
+            (
+                "[detection]\nz = 4\nfalse_alarm = 0.01",
+                "z cannot be used with false_alarm",
+            ),
             (
                 "[detection]\nfalse_alarm = 0.5",
                 "false_alarm 0.5: must be a number above 0, at most 0.1",
             ),
-            ("[detection]\nwindow = 8", "window 8: must be from 1 to 7"),
-            ("[detection]\nechoes = 0", "echoes 0: must be from 1 to 4"),
-            ("[detection]\nalpha = nan", "line 2: NaN: must be a number"),
+            (
+                "[detection]\nwindow = 8",
+                "window 8: must be a whole number from 1 to 7",
+            ),
+            (
+                "[detection]\nechoes = 0",
+                "echoes 0: must be a whole number from 1 to 4",
+            ),
+            ("[detection]\nalpha = nan", "alpha NaN: must be a number"),
             (
                 "[rays]\nfield_of_view_degrees = [0, 40]",
-                "field_of_view_degrees",
+                "field_of_view_degrees 0,40: must be HORIZONTALxVERTICAL",
+            ),
+            (
+                "[rays]\nfield_of_view_degrees = [60]",
+                "field_of_view_degrees 60: must be HORIZONTALxVERTICAL",
+            ),
+            (
+                "[rays]\nfield_of_view_degrees = [60, 40]\ncalibration = 'rays.toml'",
+                "field_of_view_degrees cannot be used with calibration",
+            ),
+            (
+                "[run]\nrecorded_cycles = 9\nphotons_per_cycle = 1",
+                "photons_per_cycle cannot be used with recorded_cycles",
+            ),
+            (
+                "[sensor]\none_hit_tdc = 1",
+                "one_hit_tdc 1: must be true or false",
+            ),
+            (
+                "[sensor]\nglass_bins = [[1]]\ngate = 3",
+                "gate 3: must be FIRST..LAST",
             ),
             (
                 "[run]\naxes = 'rows'",
-                "line 2: rows: one axis must be the bins",
+                "axes rows: one axis must be the bins",
             ),
-            ("[run]\ncycles = 0", "cycles 0: must be at least 1"),
+            (
+                "[run]\ncycles = 0",
+                "cycles 0: must be a whole number from 1",
+            ),
             ("[run]\nphotons_per_cycle = inf", "must be a number above 0"),
         ] {
             let error = format!("{:#}", SettingsFile::parse(text).unwrap_err());

@@ -1,18 +1,16 @@
 //! The settings file: what is known of a sensor, how its pixels decide, where they look, and
 //! what a run was. `docs/settings.md` lists the keys.
 //!
-//! A key of the file is an option of the command line with `_` for `-`. An option overrides the
-//! file. What neither says has a default. An error names the option, or the file and the key.
+//! A key of the file is an option of the command line with `_` for `-`, and a keyword of Python. An
+//! option overrides the file. What neither says has a default. An error names the option, or the
+//! file and the key.
 
 mod detection;
 mod file;
-mod half_widths;
-mod origin;
 mod resolve;
 mod sections;
 
 pub use detection::{Detection, EstimatorName, RuleName, share};
 pub(crate) use file::MARK;
 pub use file::SettingsFile;
-pub use origin::Origin;
-pub use sections::{Rays, Run, Sensor, pulse};
+pub use sections::{Rays, Run, Sensor};

@@ -1,12 +1,13 @@
 //! From what is said to what holds: defaults, and the thresholds of rules.
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{AnyRule, EchoNumber, HIGHEST_Z, RangeGate, z_for_levels};
 use dtof_theory::tune::window::one_in;
 
 use super::{Detection, EstimatorName, RuleName, Run, Sensor, SettingsFile};
-use crate::engine::settings::Settings;
+use crate::engine::settings::{Settings, no_gate};
+use crate::options::Refused;
 
 impl SettingsFile {
     /// What holds for histograms of `bins` bins.
@@ -14,7 +15,7 @@ impl SettingsFile {
     /// # Errors
     /// What contradicts itself, by the names of options, or of a file and its keys.
     pub fn settings(&self, bins: usize) -> Result<Settings> {
-        self.resolved(bins).map_err(|error| self.name_origin(error))
+        self.resolved(bins).map_err(|error| self.blame(error))
     }
 
     fn resolved(&self, bins: usize) -> Result<Settings> {
@@ -31,11 +32,15 @@ impl SettingsFile {
             let last_bin = bins.clamp(8, 1024) as u16 - 1;
             let (first, last) = sensor.gate.unwrap_or((0, last_bin));
             let gate = RangeGate::<1024>::new(first, last)
-                .with_context(|| format!("--gate {first}..{last} with {bins} bins"))?;
+                .map_err(|error| no_gate((first, last), bins, &error))?;
             let z = z_for_levels(one_in(share), &gate, x, l1, l2, detection.levels());
             ensure!(
                 z < HIGHEST_Z,
-                "--false-alarm {share}: there is no z for so few; --z may be up to 15.9998"
+                Refused::value(
+                    "false_alarm",
+                    share,
+                    "there is no z for so few; `z` may be up to 15.9998"
+                )
             );
             Ok(z)
         };
@@ -43,12 +48,12 @@ impl SettingsFile {
         let has_window = sensor.sigma_bins.is_some() || detection.half_widths.is_some();
         ensure!(
             detection.estimator != Some(EstimatorName::Window) || has_window,
-            "--estimator window needs --sigma-bins or --half-widths"
+            Refused::new("estimator", "window needs `sigma_bins` or `half_widths`")
         );
         let centroid = detection.estimator == Some(EstimatorName::Centroid);
         ensure!(
             !centroid || detection.half_widths.is_none(),
-            "--half-widths is for --estimator window"
+            Refused::new("half_widths", "is for `estimator` window")
         );
         Ok(Settings {
             bins,
@@ -95,7 +100,7 @@ impl SettingsFile {
                 frame: settings.frame,
                 ..self.run.clone()
             },
-            origin: self.origin.clone(),
+            file: self.file.clone(),
         }
     }
 }

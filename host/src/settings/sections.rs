@@ -1,14 +1,20 @@
-//! The other sections of a settings file.
+//! The other sections of a settings file: sensor, rays and run.
 
-use anyhow::{Result, anyhow, ensure};
+use std::fmt::Display;
+use std::str::FromStr;
+
 use dtof_core::CentredWindow;
+use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
+use serde::ser::{Error as _, Serializer};
 
-use crate::cli::arguments::bins_of;
-use crate::geometry::FieldOfView;
+use crate::geometry::{FieldOfView, FieldOfViewError};
 use crate::input::axes::Axes;
-use crate::input::range::within;
+use crate::numbers::{
+    MOST_WHOLE, bins, fixed, list, positive, real, shortest, truth, whole, within,
+};
+use crate::options::Refused;
 
 /// Each field of `$these`, or that of `$others`.
 macro_rules! first_of {
@@ -19,8 +25,7 @@ macro_rules! first_of {
 pub(super) use first_of;
 
 /// `[sensor]`: what is known of a sensor.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Sensor {
     /// Laser cycles a second.
     pub laser_hz: Option<u64>,
@@ -29,17 +34,17 @@ pub struct Sensor {
     /// Bins of a histogram.
     pub bins: Option<u16>,
     /// Picoseconds a bin.
-    #[serde(with = "decimal")]
+    #[serde(serialize_with = "decimal")]
     pub bin_width_ps: Option<U16F16>,
     /// Millimetres added to every range.
-    #[serde(with = "decimal")]
+    #[serde(serialize_with = "decimal")]
     pub offset_mm: Option<I24F8>,
     /// First and last bin that may hold the peak, both inclusive.
     pub gate: Option<(u16, u16)>,
     /// Addresses of hot and dead pixels. They neither decide nor count in a block.
     pub masked: Option<Vec<u16>>,
     /// Standard deviation of the pulse in bins.
-    #[serde(with = "decimal")]
+    #[serde(serialize_with = "decimal")]
     pub sigma_bins: Option<U8F8>,
     /// Whether the TDC takes one photon a laser cycle, so that events say when it piles up.
     pub one_hit_tdc: Option<bool>,
@@ -52,8 +57,7 @@ pub struct Sensor {
 }
 
 /// `[rays]`: where pixels look.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Rays {
     /// Horizontal and vertical angle from edge to edge of the array.
     pub field_of_view_degrees: Option<[f64; 2]>,
@@ -62,8 +66,7 @@ pub struct Rays {
 }
 
 /// `[run]`: what is replayed or simulated.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Run {
     /// Laser cycles.
     pub cycles: Option<u64>,
@@ -76,7 +79,7 @@ pub struct Run {
     /// Laser cycles of a frame, if it is a frame-based sensor.
     pub frame: Option<u16>,
     /// Of recorded arrays: what each axis is.
-    #[serde(with = "as_text")]
+    #[serde(serialize_with = "as_text")]
     pub axes: Option<Axes>,
     /// Of archives: the name of the array.
     pub array: Option<String>,
@@ -94,36 +97,62 @@ impl Sensor {
         )
     }
 
-    pub(super) fn check(&self) -> Result<()> {
-        if let Some(hz) = self.laser_hz {
-            within("laser_hz", hz as f64, 1.0..=1e12)?;
-        }
-        if let Some(columns) = self.columns {
-            within("columns", columns.into(), 1.0..=65_536.0)?;
-        }
-        if let Some(bins) = self.bins {
-            bins_of(bins).map_err(|reason| anyhow!("bins {bins}: {reason}"))?;
-        }
-        if let Some(sigma) = self.sigma_bins {
-            pulse(sigma).map_err(|reason| anyhow!("sigma_bins {sigma}: {reason}"))?;
-        }
-        for (key, value) in [("background", self.background), ("glass", self.glass)] {
-            if let Some(value) = value {
-                within(key, value, 0.0..=1e6)?;
-            }
-        }
-        for &rate in self.glass_bins.iter().flatten() {
-            within("glass_bins", rate, 0.0..=1e6)?;
+    /// The keys of the section.
+    pub const KEYS: &'static [&'static str] = &[
+        "laser_hz",
+        "columns",
+        "bins",
+        "bin_width_ps",
+        "offset_mm",
+        "gate",
+        "masked",
+        "sigma_bins",
+        "one_hit_tdc",
+        "background",
+        "glass",
+        "glass_bins",
+    ];
+
+    /// Sets one of [`Self::KEYS`].
+    ///
+    /// # Errors
+    /// Why it cannot be so.
+    pub(super) fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
+        let rate = within(0.0..=1e6);
+        match key {
+            "laser_hz" => self.laser_hz = Some(whole(1..=1_000_000_000_000)(text)?),
+            "columns" => self.columns = Some(whole(1..=65_536)(text)?),
+            "bins" => self.bins = Some(bins(text)?),
+            "bin_width_ps" => self.bin_width_ps = Some(fixed(text)?),
+            "offset_mm" => self.offset_mm = Some(fixed(text)?),
+            "gate" => self.gate = Some(gate(text)?),
+            "masked" => self.masked = Some(list(text, &[','], whole(0..=u16::MAX))?),
+            "sigma_bins" => self.sigma_bins = Some(pulse(fixed(text)?)?),
+            "one_hit_tdc" => self.one_hit_tdc = Some(truth(text)?),
+            "background" => self.background = Some(rate(text)?),
+            "glass" => self.glass = Some(rate(text)?),
+            "glass_bins" => self.glass_bins = Some(list(text, &[','], rate)?),
+            _ => return Err("no option of a sensor".to_owned()),
         }
         Ok(())
     }
+}
+
+/// Reads the first and the last bin of a gate, as `20..119` or `20,119`.
+fn gate(text: &str) -> Result<(u16, u16), String> {
+    let ends = text.split_once("..").or_else(|| text.split_once(','));
+    let ends = ends.and_then(|(first, last)| {
+        let bin = whole(0..=u16::MAX);
+        Some((bin(first).ok()?, bin(last).ok()?))
+    });
+    ends.ok_or("must be FIRST..LAST, as 20..119".to_owned())
 }
 
 /// `sigma`, if a pulse can be so wide: its standard deviation in bins.
 ///
 /// # Errors
 /// If there is no such pulse.
-pub fn pulse(sigma: U8F8) -> Result<U8F8, String> {
+fn pulse(sigma: U8F8) -> Result<U8F8, String> {
     const WIDEST: U8F8 = CentredWindow::WIDEST_PULSE;
     if sigma == U8F8::ZERO || sigma > WIDEST {
         return Err(format!("must be above 0 and at most {WIDEST}"));
@@ -132,15 +161,34 @@ pub fn pulse(sigma: U8F8) -> Result<U8F8, String> {
 }
 
 impl Rays {
-    pub(super) fn check(&self) -> Result<()> {
-        let both = self.field_of_view_degrees.is_some() && self.calibration.is_some();
-        ensure!(
-            !both,
-            "field_of_view_degrees and calibration: give one of them"
-        );
-        if let Some(degrees) = self.field_of_view_degrees {
-            FieldOfView::new(degrees)
-                .map_err(|error| anyhow!("field_of_view_degrees {degrees:?}: {error}"))?;
+    /// The keys of the section.
+    pub const KEYS: &'static [&'static str] = &["field_of_view_degrees", "calibration"];
+
+    /// Sets one of [`Self::KEYS`].
+    ///
+    /// # Errors
+    /// Why it cannot be so.
+    pub(super) fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
+        match key {
+            "field_of_view_degrees" => {
+                let none = || FieldOfViewError.to_string();
+                let angles = list(text, &['x', ','], |angle| real(angle).ok_or_else(none))?;
+                let angles = <[f64; 2]>::try_from(angles).map_err(|_| none())?;
+                FieldOfView::new(angles).map_err(|error| error.to_string())?;
+                self.field_of_view_degrees = Some(angles);
+            }
+            "calibration" => self.calibration = Some(text.to_owned()),
+            _ => return Err("no option of rays".to_owned()),
+        }
+        Ok(())
+    }
+
+    pub(super) fn check(&self) -> Result<(), Refused> {
+        if self.field_of_view_degrees.is_some() && self.calibration.is_some() {
+            return Err(Refused::new(
+                "field_of_view_degrees",
+                "cannot be used with `calibration`",
+            ));
         }
         Ok(())
     }
@@ -158,93 +206,67 @@ impl Run {
         )
     }
 
-    pub(super) fn check(&self) -> Result<()> {
-        if let Some(rate) = self.photons_per_cycle {
-            ensure!(
-                rate > 0.0 && rate.is_finite(),
-                "photons_per_cycle {rate}: must be a number above 0"
-            );
+    /// The keys of the section.
+    pub const KEYS: &'static [&'static str] = &[
+        "cycles",
+        "seed",
+        "photons_per_cycle",
+        "recorded_cycles",
+        "frame",
+        "axes",
+        "array",
+        "rebin",
+    ];
+
+    /// Sets one of [`Self::KEYS`].
+    ///
+    /// # Errors
+    /// Why it cannot be so.
+    pub(super) fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
+        match key {
+            "cycles" => self.cycles = Some(whole(1..=MOST_WHOLE)(text)?),
+            "seed" => self.seed = Some(whole(0..=MOST_WHOLE)(text)?),
+            "photons_per_cycle" => self.photons_per_cycle = Some(positive(text)?),
+            "recorded_cycles" => self.recorded_cycles = Some(whole(1..=MOST_WHOLE)(text)?),
+            "frame" => self.frame = Some(whole(1..=u16::MAX)(text)?),
+            "axes" => self.axes = Some(text.parse()?),
+            "array" => self.array = Some(text.to_owned()),
+            "rebin" => self.rebin = Some(whole(1..=512)(text)?),
+            _ => return Err("no option of a run".to_owned()),
         }
-        for (key, value) in [
-            ("cycles", self.cycles),
-            ("recorded_cycles", self.recorded_cycles),
-            ("frame", self.frame.map(u64::from)),
-            ("rebin", self.rebin.map(u64::from)),
-        ] {
-            ensure!(value != Some(0), "{key} 0: must be at least 1");
+        Ok(())
+    }
+
+    pub(super) fn check(&self) -> Result<(), Refused> {
+        if self.photons_per_cycle.is_some() && self.recorded_cycles.is_some() {
+            return Err(Refused::new(
+                "photons_per_cycle",
+                "cannot be used with `recorded_cycles`",
+            ));
         }
-        let both = self.photons_per_cycle.is_some() && self.recorded_cycles.is_some();
-        ensure!(
-            !both,
-            "photons_per_cycle and recorded_cycles: give one of them"
-        );
         Ok(())
     }
 }
 
-/// What is written as a text, as on the command line.
-mod as_text {
-    use std::fmt::Display;
-    use std::str::FromStr;
-
-    use serde::de::{Deserialize, Deserializer, Error as _};
-    use serde::ser::Serializer;
-
-    pub fn serialize<T: Display, S: Serializer>(
-        value: &Option<T>,
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        match value {
-            None => serializer.serialize_none(),
-            Some(value) => serializer.collect_str(value),
-        }
-    }
-
-    pub fn deserialize<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Option<T>, D::Error> {
-        let text = Option::<String>::deserialize(deserializer)?;
-        let value = text.map(|text| {
-            let read = text.parse();
-            read.map_err(|error| D::Error::custom(format!("{text}: {error}")))
-        });
-        value.transpose()
+/// As a text, as an option has it.
+fn as_text<T: Display, S: Serializer>(value: &Option<T>, serializer: S) -> Result<S::Ok, S::Error> {
+    match value {
+        None => serializer.serialize_none(),
+        Some(value) => serializer.collect_str(value),
     }
 }
 
-/// A fixed-point number as a decimal one, rounded to the nearest when it is read.
-pub(super) mod decimal {
-    use std::str::FromStr;
-
-    use dtof_core::fixed::traits::Fixed;
-    use serde::de::{Deserialize, Deserializer, Error as _};
-    use serde::ser::{Error as _, Serializer};
-
-    use crate::cli::arguments::{fixed, shortest};
-
-    /// With as few digits as name it.
-    pub fn serialize<T: Fixed + FromStr, S: Serializer>(
-        number: &Option<T>,
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        match number {
-            None => serializer.serialize_none(),
-            Some(number) => {
-                let shortest = shortest(*number).parse().map_err(S::Error::custom)?;
-                serializer.serialize_f64(shortest)
-            }
+/// A fixed-point number as a decimal one, with as few digits as name it.
+pub(super) fn decimal<T: Fixed + FromStr, S: Serializer>(
+    number: &Option<T>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    match number {
+        None => serializer.serialize_none(),
+        Some(number) => {
+            let shortest = shortest(*number).parse().map_err(S::Error::custom)?;
+            serializer.serialize_f64(shortest)
         }
-    }
-
-    pub fn deserialize<'de, T: Fixed + FromStr, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Option<T>, D::Error> {
-        let number = Option::<f64>::deserialize(deserializer)?;
-        let number = number.map(|number| {
-            fixed(&number.to_string())
-                .map_err(|error| D::Error::custom(format!("{number}: {error}")))
-        });
-        number.transpose()
     }
 }
 

@@ -4,6 +4,7 @@
 mod common;
 
 mod kept;
+mod mistakes;
 mod numbers;
 mod rule;
 mod settings;

@@ -66,7 +66,7 @@ fn standard_input_and_output_are_no_files_of_that_name() {
             --scene | simulate --scene - --out out
             --out | simulate --scene scene.toml --out -
             --out | demo --out -
-            '< | export - --format csv --out x
+            <FILE> | export - --format csv --out x
             --out | export events.aer --format csv --out -
             --calibration | export events.aer --format csv --out x --calibration -
             --record | monitor --device tcp:localhost:1 --record -
@@ -126,5 +126,5 @@ fn a_serial_port_that_is_not_there_is_answered_with_those_that_are() {
 fn a_calibration_of_nothing_says_what_it_takes() {
     let scratch = Scratch::new();
     let output = scratch.run("calibrate --out dtof.toml");
-    scratch.refused(&output, &["--input FILE or --device DEVICE is needed"]);
+    scratch.refused(&output, &["error: --input is needed, or --device\n"]);
 }

@@ -100,7 +100,7 @@ fn what_contradicts_the_file_is_refused() {
     scratch.all_refused(
         "replay --input photons.csv --out out",
         "--settings missing.toml | missing.toml: No such file
-        --settings key.toml | key.toml: line 2: unknown field `l_1`
+        --settings key.toml | error: key.toml: l_1 is unknown
         --settings z.toml | error: z.toml: rule window needs --window or --sigma-bins
         --mask 4 | --mask 4: there are 4 pixels
         --mask x | must be a whole number from 0 to 65535
@@ -127,18 +127,18 @@ fn what_contradicts_the_file_is_refused() {
     scratch.all_refused(
         "replay --input photons.csv --out out",
         &format!(
-            "--settings gate.toml | error: gate.toml: gate 100..200 with 128 bins
-            --settings gate.toml --gate 9..200 | error: --gate 9..200 with 128 bins
+            "--settings gate.toml | error: gate.toml: gate 100..200: with 128 bins
+            --settings gate.toml --gate 9..200 | error: --gate 9..200: with 128 bins
             --settings mask.toml | error: mask.toml: masked 4: there are 4 pixels
             --settings l2.toml --alpha 3 | error: l2.toml: false_alarm is for --rule window
             {window} --false-alarm 1e-9 | error: --false-alarm 0.000000001: there is no z
-            --settings l2.toml --rule window --window 3 | error: l2.toml: --x 4 --l1 40 l2 20:
-            {window} --l1 3000 | error: --x 4 --l1 3000 --l2 2000:
+            --settings l2.toml --rule window --window 3 | error: l2.toml: l2 20: must be greater than --l1 40
+            {window} --l1 3000 | error: --l2 2000: must be greater than --l1 3000
             --settings list.toml | error: list.toml: axes is for arrays of histograms"
         ),
     );
     scratch.all_refused(
         "compare --scene scene.toml --out out --cycles 100",
-        "--settings gate.toml | error: gate.toml: scene.toml: gate 100..200 with 128 bins",
+        "--settings gate.toml | error: scene.toml: gate.toml: gate 100..200: with 128 bins",
     );
 }

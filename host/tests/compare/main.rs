@@ -134,12 +134,12 @@ fn what_cannot_be_compared_is_refused() {
     scratch.all_refused(
         "compare --out out",
         &format!(
-            "--within 4 | required
+            "--within 4 | error: --input is needed
             --input photons.csv --scene scene.toml | cannot be used with
             --scene scene.toml --truth three.npy | cannot be used with
             --scene scene.toml --within 0 | must be a number above 0
             --scene scene.toml --false-alarm 0.5 | at most 0.1
-            --scene scene.toml --settings key.toml | key.toml: line 2: unknown field
+            --scene scene.toml --settings key.toml | key.toml: rules is unknown; is it rule?
             --scene missing.toml | missing.toml: No such file
             --scene dark.toml | dark.toml: no pixel has a target: there is nothing to compare
             {recording} --truth three.npy | three.npy: 3 ranges, but there are 4 pixels

@@ -44,9 +44,5 @@ fn events_of_masked_pixels_are_left_out_and_counted() {
     };
     let outputs: [&mut dyn Write; 2] = [&mut Vec::new(), &mut Vec::new()];
     let refused = watch_with(&blocks, &mut client, None, length, outputs).unwrap_err();
-    assert!(
-        refused
-            .to_string()
-            .contains("leave out --mask or --binning")
-    );
+    assert!(refused.to_string().contains("leave out masked or binning"));
 }

@@ -280,7 +280,7 @@ fn host_timeouts_that_no_device_takes_are_refused() {
             scratch.refused(
                 &output,
                 &[
-                    "--host-timeout <SECONDS>",
+                    &format!("--host-timeout {seconds}: "),
                     "must be seconds from 0.2 to 60 with at most three decimals, or 0",
                 ],
             );

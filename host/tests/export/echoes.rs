@@ -105,7 +105,7 @@ fn changes_of_depth_have_no_echoes_to_choose_from() {
         scratch.refused(&output, &[part]);
         assert!(!scratch.path("e.csv").exists());
     };
-    refused("--echo strongest", "--echo: only for depth events");
+    refused("--echo strongest", "--echo is only for depth events");
     refused("--echo second", "--echo");
     scratch.printed("export events.aer --format csv --out e.csv --echo all");
 }

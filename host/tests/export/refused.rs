@@ -39,12 +39,12 @@ fn options_that_cannot_be_are_refused_in_one_line() {
             events.aer --format csv --out x --fov 0x10 | HORIZONTALxVERTICAL
             events.aer --format csv --out x --laser-hz 0 | --laser-hz
             late.aer --format ply --out x | PLY holds 9007199 s of time
-            events.aer --format csv --out x --slice-us 5 | --slice-us: only for mcap
+            events.aer --format csv --out x --slice-us 5 | --slice-us is only for mcap
             events.aer --format mcap --out x --slice-us 0 | --slice-us
-            events.aer --format ply --out x --threshold-mm 3 | --threshold-mm and --reference: only for evt2
-            events.aer --format mcap --out x --reference reported | --threshold-mm and --reference: only for evt2
-            events.aer --format evt2 --out x --fov 60x40 | --fov: only for points
-            events.aer --format evt2 --out x --calibration none.toml | --calibration: only for points
+            events.aer --format ply --out x --threshold-mm 3 | --threshold-mm is only for evt2
+            events.aer --format mcap --out x --reference reported | --reference is only for evt2
+            events.aer --format evt2 --out x --fov 60x40 | --fov is only for points
+            events.aer --format evt2 --out x --calibration none.toml | --calibration is only for points
             events.aer --format csv --out x --events dynamic-depth | 12 events, none of them a dynamic depth event
             events.aer --format csv --out x --calibration none.toml | none.toml: No such file
             events.aer --format csv --out x --calibration calibration.toml | calibration.toml: line 1: 0 pixels, should be 2048

@@ -207,7 +207,7 @@ fn arrays_that_hold_no_counts_are_refused() {
             plain.npy --axes rows,rows,bins | rows is there twice
             plain.npy --axes x,bins | captures, rows, columns, bins
             plain.npy --axes bins,captures,rows,columns | 2 bins: must be from 8 to 4096
-            plain.npy --columns 3 | --columns is for photon lists
+            plain.npy --columns 3 | --columns 3: plain.npy has 2; this is for photon lists
             plain.npy --rebin 2 | makes 4 whole bins of 8
             plain.npy --rebin 0 | --rebin
             list.npy --axes bins | --axes is for arrays of histograms

@@ -180,17 +180,17 @@ fn settings_that_cannot_be_are_refused() {
     scratch.all_refused(
         "replay --out out --input photons.csv",
         r#"
-            --l1 100 --l2 100 | L2 must be greater than L1
-            --x 0 | X must be at least 1
-            --x 50 | X must not be greater than L1
-            --x 30 --l2 50 | no multiple of X
+            --l1 100 --l2 100 | --l2 100: must be greater than --l1 100
+            --x 0 | --x 0: must be at least 1
+            --x 50 | --x 50: must not be greater than --l1 40
+            --x 30 --l2 50 | --x 30: no multiple of it lies strictly between --l1 40 and --l2 50
             --l2 65536 | 65536
             --alpha 256 | --alpha
             --alpha -1 | must be a number from 0 to
             --alpha NaN | --alpha
             --alpha 0.001 | less than half
             --bins 100 | power of two
-            --threshold-mm 50 | are of --dynamic-depth
+            --threshold-mm 50 | --threshold-mm is of --dynamic-depth
             --dynamic-depth --threshold-mm 0.01 | --threshold-mm 0.01: | less than 1/512 bin
             --bins 4 | power of two
             --bins 2048 | power of two
@@ -207,10 +207,10 @@ fn settings_that_cannot_be_are_refused() {
             --bin-width-ps wide | --bin-width-ps
             --offset-mm 9e9 | --offset-mm
             --cycles 0 | --cycles
-            --photons-per-cycle 1 | are for histograms
+            --photons-per-cycle 1 | --photons-per-cycle is for histograms
             --recorded-cycles 0 | --recorded-cycles
             --nonsense | --nonsense
-            --apha 4 | a similar argument exists: '--alpha'
+            --apha 4 | --apha is unknown; is it --alpha?
         "#,
     );
     scratch.file("h.npy", npy(&described("<u1", "False", "(8,)"), &[1; 8]));

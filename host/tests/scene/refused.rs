@@ -131,7 +131,7 @@ fn scenes_that_are_not_there_and_options_that_cannot_be_are_refused() {
             --scene scene.toml --cycles 0 | --cycles
             --scene scene.toml --array 0x5 | --array
             --scene scene.toml --array 65535x2 | 131070 pixels: more than 65,536
-            --scene scene.toml --x 50 | X must not be greater than L1
+            --scene scene.toml --x 50 | --x 50: must not be greater than --l1 40
             --scene scene.toml --gate 0..128 | past the last bin
             --scene scene.toml --scen x | --scen
         ",

@@ -103,7 +103,7 @@ fn the_command_says_what_is_wrong() {
         "slow.aer | slow.aer: does not say how fast its laser was; say --laser-hz
          none.aer | none.aer: not an AER file
          gone.aer | gone.aer: 
-         --out x | required
+         --out x | <FILE.aer> is needed
          slow.aer --device qemu | cannot be used with
          slow.aer --laser-hz 5 --alpha 4 | slow.aer: is what it was recorded with
          slow.aer --laser-hz 5 --pixels 4 | leave out the options of a device

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use dtof::cli::arguments::{path, whole};
+use dtof::cli::path;
+use dtof::numbers::whole;
 use dtof::rows::grouped;
 use dtof_lab::studies;
 use dtof_lab::sweep::{self, Part};

@@ -1,4 +1,4 @@
-"""Keyword arguments as options of the command line, so that names, ranges and errors are its own."""
+"""Keyword arguments as texts, which the native part reads as the program reads its flags."""
 
 from __future__ import annotations
 
@@ -11,23 +11,19 @@ import numpy
 from ._native import Error
 
 
-def arguments(options: dict[str, Any], flags: Iterable[str] = ()) -> list[str]:
-    """Each option that is given as ``--name=value``; one of ``flags`` as ``--name``."""
-    said = []
-    for key, value in options.items():
-        name = "--" + key.replace("_", "-")
-        if value is None or _is_no_pixel(key, value):
-            continue
-        if key not in flags:
-            said.append(f"{name}={_text(key, value)}")
-        elif value:
-            said.append(name)
-    return said
+#: The name and the value of each option that is given.
+Given = list[tuple[str, str]]
 
 
-def _is_no_pixel(key: str, value: Any) -> bool:
-    """Whether it is an empty mask, as of ``numpy.flatnonzero``."""
-    return key == "mask" and not isinstance(value, (str, os.PathLike)) and not _text(key, value)
+def arguments(options: dict[str, Any]) -> Given:
+    """Options as texts, less those that are ``None``."""
+    return [(key, _text(key, value)) for key, value in options.items() if value is not None]
+
+
+def flags(given: Given) -> list[str]:
+    """The same for the command line, less the settings file, in order."""
+    others = [(key.replace("_", "-"), text) for key, text in given if key != "settings"]
+    return sorted(f"--{name}={text}" for name, text in others)
 
 
 def settings_file(value: Any) -> str:

@@ -71,7 +71,7 @@ def replay(
     ``progress(done, total)`` is called about 20 times a second with laser cycles. What it raises
     ends the work, as Ctrl-C does.
 
-    Raises :class:`dtof.Error` with the line that the program prints.
+    Raises :class:`dtof.Error` with the line that the program prints, keywords in place of flags.
     """
     if axis != -1:
         recorded = _bins_last(recorded, axis, options)
@@ -107,7 +107,7 @@ def simulate(scene: Any, *, progress: Progress = None, **options: Any) -> Replay
     simulate``, further options those of :func:`replay`. ``statistics["against_truth"]`` compares
     the events with the scene.
     """
-    given = arguments(options, flags=("laser_off",))
+    given = arguments(options)
     return ran(_native.simulate(scene_of(scene), given, progress))
 
 

@@ -6,15 +6,16 @@ use std::time::Duration;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::calibrate::{Asked, Calibration, Length, Observed, calibrate};
-use dtof::cli::arguments::{MOST_WHOLE, whole};
 use dtof::cli::{complain, interrupt};
 use dtof::device::histograms::{Collected, SoFar, collect};
 use dtof::device::monitor::array;
 use dtof::device::{self, Client, Port, Stopped};
 use dtof::input::open::BIN_WIDTH_PS;
+use dtof::numbers::{MOST_WHOLE, whole};
+use dtof::options::Refused;
 use dtof::progress::Progress;
 use dtof::rows::{Row, grouped};
-use dtof::run::recording::Recording;
+use dtof::run::given::Given;
 use dtof::settings::{Sensor, SettingsFile};
 
 use crate::command::device_options::HostOptions;
@@ -58,13 +59,16 @@ impl Desk {
     /// If there are any.
     pub fn suits_file(&self) -> Result<()> {
         let of_devices = [
-            ("--image", self.image.is_some()),
-            ("--seconds", self.seconds.is_some()),
-            ("--photons", self.photons.is_some()),
-            ("--host-timeout", self.host.is_given()),
+            ("image", self.image.is_some()),
+            ("seconds", self.seconds.is_some()),
+            ("photons", self.photons.is_some()),
+            ("host_timeout", self.host.is_given()),
         ];
-        for (option, is_there) in of_devices {
-            ensure!(!is_there, "{option} is of --device, not of recordings");
+        for (key, is_there) in of_devices {
+            ensure!(
+                !is_there,
+                Refused::new(key, "is of `device`, not of recordings")
+            );
         }
         Ok(())
     }
@@ -72,11 +76,11 @@ impl Desk {
     /// Opens the device.
     ///
     /// # Errors
-    /// If none is named, there is none, or options of `recording` do not suit it.
-    pub fn open(&self, recording: &Recording) -> Result<Box<dyn Port>> {
+    /// If none is named, there is none, or options that are given do not suit it.
+    pub fn open(&self, given: &Given) -> Result<Box<dyn Port>> {
         let name = self.device.as_deref();
-        let name = name.context("--input FILE or --device DEVICE is needed")?;
-        recording.suits_device()?;
+        let name = name.ok_or_else(|| Refused::new("input", "is needed, or `device`"))?;
+        given.suits_device()?;
         device::open(name, self.image.as_deref())
     }
 
@@ -104,8 +108,11 @@ impl Desk {
         let geometry = array(pixels, said.sensor.columns);
         ensure!(
             geometry.addresses() == usize::from(pixels),
-            "--columns {}: the device has {pixels} pixels, which do not fill such rows",
-            geometry.columns
+            Refused::value(
+                "columns",
+                geometry.columns,
+                format!("the device has {pixels} pixels, which do not fill such rows")
+            )
         );
         let known = SettingsFile {
             sensor: Sensor {

@@ -9,13 +9,14 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::calibrate::remarks;
 use dtof::calibrate::report::{self, MARKS};
-use dtof::cli::arguments::path;
+use dtof::cli::path;
 use dtof::files::{Marked, write_marked};
 use dtof::rows::aligned;
 use dtof::run::calibrate::Options;
 use dtof::settings::SettingsFile;
 
 use self::desk::{Desk, Gathered};
+use super::flags::Flags;
 use super::warn;
 
 #[derive(Args)]
@@ -36,7 +37,7 @@ pub struct Calibrate {
     #[arg(long, value_name = "FILE", value_parser = path())]
     settings: Option<PathBuf>,
     #[command(flatten)]
-    options: Options,
+    options: Flags<Options>,
     /// Print nothing but errors
     #[arg(long)]
     quiet: bool,
@@ -46,9 +47,9 @@ impl Calibrate {
     pub fn run(&self) -> Result<()> {
         let older = self.settings.as_deref().map(SettingsFile::read);
         let older = older.transpose()?;
-        let said = self.options.said(older.as_ref())?;
+        let said = self.options.0.said(older.as_ref())?;
         let calibrated = self.calibrate(&said, older);
-        calibrated.map_err(|error| said.name_origin(error))
+        calibrated.map_err(|error| said.blame(error))
     }
 
     fn calibrate(&self, said: &SettingsFile, older: Option<SettingsFile>) -> Result<()> {
@@ -57,13 +58,13 @@ impl Calibrate {
         let (found, settings, collected) = match &self.input {
             Some(input) => {
                 self.desk.suits_file()?;
-                let of_file = self.options.calibrate(&input.into(), said.clone())?;
+                let of_file = self.options.0.calibrate(&input.into(), said.clone())?;
                 warn(input, of_file.warnings, self.quiet);
                 (of_file.found, of_file.settings, Vec::new())
             }
             None => {
-                let (recording, asked) = (&self.options.recording, self.options.asked());
-                let port = self.desk.open(recording)?;
+                let (given, asked) = (&self.options.0.given, self.options.0.asked());
+                let port = self.desk.open(given)?;
                 let desk = &self.desk;
                 let gathered = desk.calibrate((&name, port), said, &asked, self.quiet);
                 let Gathered { found, known, rows } = gathered.with_context(|| name.clone())?;

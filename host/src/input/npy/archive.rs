@@ -11,6 +11,7 @@ use zip::ZipArchive;
 use super::header::Array;
 use super::histograms::{Histograms, of_array};
 use crate::input::axes::Axes;
+use crate::options::Refused;
 
 /// Reads the histograms of the array `name`; a single array needs no name.
 ///
@@ -38,7 +39,9 @@ fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histogr
         (None, []) => None,
         (None, several) => {
             let several = several.len();
-            bail!("{several} arrays: choose one with --array: {list}");
+            bail!(Refused::input(format!(
+                "{several} arrays: choose one with `array`: {list}"
+            )));
         }
     };
     ensure!(!arrays.is_empty(), "no arrays");

@@ -9,6 +9,7 @@ use super::header::Array;
 use crate::input::axes::{Axes, Layout, index_of};
 use crate::input::bins::MOST_BINS;
 use crate::input::medium::Medium;
+use crate::options::Refused;
 
 /// The histograms of one array.
 #[derive(Clone, Debug)]
@@ -42,8 +43,10 @@ pub(super) fn of_array<R: Read>(array: Array<R>, axes: Option<&Axes>) -> Result<
     let layout = Layout::new(&shape, fortran, axes)?;
     ensure!(
         layout.bins() <= MOST_BINS,
-        "{} bins: must be at most {MOST_BINS} (--axes says which axis they are)",
-        layout.bins()
+        Refused::input(format!(
+            "{} bins: must be at most {MOST_BINS} (`axes` says which axis they are)",
+            layout.bins()
+        ))
     );
     let counts = match (element.type_char(), element.size_field()) {
         (TypeChar::Uint, 1) => all(npy, |count: u8| Ok(count.into())),

@@ -23,6 +23,7 @@ use rayon::prelude::*;
 use self::remaining::Remaining;
 pub use self::whole::Whole;
 use crate::input::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
+use crate::options::Refused;
 use dtof_theory::random::pixel_rng;
 
 /// Photons of a histogram and laser cycles of a recording, at most: within it
@@ -204,7 +205,7 @@ fn recorded_cycles(length: RecordingLength, brightest: u64, wanted: u64) -> Resu
         RecordingLength::Cycles(cycles) => {
             ensure!(
                 cycles <= MOST,
-                "--recorded-cycles {cycles} is more than 2^40"
+                Refused::value("recorded_cycles", cycles, "must be at most 2^40")
             );
             Ok(cycles)
         }
@@ -214,7 +215,11 @@ fn recorded_cycles(length: RecordingLength, brightest: u64, wanted: u64) -> Resu
             let cycles = (brightest as f64 / rate).round().max(1.0);
             ensure!(
                 cycles <= MOST as f64,
-                "--photons-per-cycle {rate} makes the recording longer than 2^40 laser cycles"
+                Refused::value(
+                    "photons_per_cycle",
+                    rate,
+                    "makes the recording longer than 2^40 laser cycles"
+                )
             );
             Ok(cycles as u64)
         }

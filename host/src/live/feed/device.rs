@@ -104,7 +104,7 @@ impl Device {
         let mut client = Client::new((self.open)()?)?;
         sessions.any = true;
         let mut session = Session::begin(&mut client, said, given, work)
-            .map_err(|error| self.said.name_origin(error))?;
+            .map_err(|error| self.said.blame(error))?;
         if let Some(command) = sessions.wished.take() {
             reply(command.answer, Ok("The settings are in force.".to_owned()));
         }

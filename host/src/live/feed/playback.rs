@@ -11,6 +11,7 @@ use dtof_core::RangeScale;
 use super::{Command, Wish, Work, reply};
 use crate::events::aer_file::{Event, Header, Reader};
 use crate::export::LaserClock;
+use crate::options::Refused;
 
 /// How often events are handed on.
 const EVERY: Duration = Duration::from_millis(20);
@@ -48,12 +49,9 @@ impl Playback {
         RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?;
         let said = laser_hz.map(LaserClock::new).transpose()?;
         let (clock, warning) = LaserClock::known(said, LaserClock::of(&header), "the file");
-        let unknown = || {
-            let name = name();
-            format!("{name}: does not say how fast its laser was; say --laser-hz")
-        };
+        let unknown = || Refused::input("does not say how fast its laser was; say `laser_hz`");
         Ok(Self {
-            clock: clock.with_context(unknown)?,
+            clock: clock.ok_or_else(unknown).with_context(name)?,
             warning,
             file,
             speed,

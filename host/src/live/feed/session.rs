@@ -340,7 +340,7 @@ impl<'a> Session<'a> {
             detection: new.detection,
             rays: before.rays.clone(),
             run: before.run.clone(),
-            origin: None,
+            file: None,
         })
     }
 }

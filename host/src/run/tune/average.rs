@@ -1,6 +1,6 @@
 //! The average rule.
 
-use crate::cli::arguments::shortest;
+use crate::numbers::shortest;
 use anyhow::Result;
 use dtof_theory::tune::{Request, average};
 

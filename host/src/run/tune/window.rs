@@ -1,6 +1,7 @@
 //! The window rule.
 
-use crate::cli::arguments::shortest;
+use crate::numbers::shortest;
+use crate::options::Refused;
 use anyhow::{Result, ensure};
 use dtof_core::{CentredWindow, DepthEstimator};
 use dtof_theory::tune::{Request, window};
@@ -13,9 +14,11 @@ impl Options {
         let widest = CentredWindow::WIDEST_PULSE;
         ensure!(
             request.sigma <= widest.to_num::<f64>(),
-            "a pulse of σ = {} bins is too wide for a window, which suits up to {widest}; take \
-             wider bins, or --rule paper",
-            number(request.sigma)
+            Refused::input(format!(
+                "a pulse of σ = {} bins is too wide for a window, which suits up to {widest}; take \
+                 wider bins, or `rule` paper",
+                number(request.sigma)
+            ))
         );
         let tuned = window::tune(request)?;
         let z = format!(

@@ -10,18 +10,30 @@ use anyhow::{Context, Result, ensure};
 use super::sight::Sight;
 use crate::input::npy::numbers::{self, Element, Numbers};
 use crate::input::source::Geometry;
+use crate::options::Named;
 
 /// The highest reflectivity of a sample, as of other surfaces.
 const MOST_REFLECTIVITY: f64 = 100.0;
 
 /// What the values of a depth map are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Along {
     /// Depth along the optical axis, as of depth cameras and renderers (z)
     #[default]
     Axis,
     /// Range along the ray of each sample
     Ray,
+}
+
+impl Named for Along {
+    const NAMES: &'static [(&'static str, Self, &'static str)] = &[
+        (
+            "axis",
+            Self::Axis,
+            "Depth along the optical axis, as of depth cameras and renderers (z)",
+        ),
+        ("ray", Self::Ray, "Range along the ray of each sample"),
+    ];
 }
 
 /// How far away what each sample shows is, and how bright.

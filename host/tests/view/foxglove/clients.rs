@@ -255,7 +255,7 @@ fn the_command_says_where_foxglove_connects_and_what_is_wrong() {
     let holder = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let taken = holder.local_addr().unwrap().port();
     let output = scratch.run(&format!("view events.aer --foxglove={taken}"));
-    scratch.refused(&output, &[format!("--foxglove={taken}: ")]);
+    scratch.refused(&output, &[format!("--foxglove {taken}: ")]);
     scratch.all_refused(
         "view",
         "events.aer --foxglove=65536 | --foxglove

@@ -14,6 +14,7 @@ import numpy
 from .. import _native
 from .._arrays import EVENT
 from .._files import write_events
+from .._options import Given, flags
 from .._run import Replay
 
 #: Kinds of files of events.
@@ -31,7 +32,7 @@ class Folder:
     ``summary.json`` is written last and removed first, so that a folder that has it is complete.
     """
 
-    def __init__(self, folder: str, events: str, file: str, said: list[str]) -> None:
+    def __init__(self, folder: str, events: str, file: str, said: Given) -> None:
         self._folder = folder
         self._events = f"events.{events}"
         self._request = _request(file, said)
@@ -115,12 +116,11 @@ class Folder:
             raise
 
 
-def _settings(said: list[str]) -> list[str]:
-    prefix = "--settings="
-    return [text[len(prefix) :] for text in said if text.startswith(prefix)]
+def _settings(said: Given) -> list[str]:
+    return [text for key, text in said if key == "settings"]
 
 
-def _request(file: str, said: list[str]) -> dict[str, Any]:
+def _request(file: str, said: Given) -> dict[str, Any]:
     """All that the results depend on."""
     try:
         known = os.stat(file)
@@ -132,7 +132,7 @@ def _request(file: str, said: list[str]) -> dict[str, Any]:
         "file": file,
         "bytes": known.st_size,
         "modified_ns": known.st_mtime_ns,
-        "options": sorted(set(said) - {f"--settings={name}" for name in settings}),
+        "options": flags(said),
         "settings_sha256": [_hash(name) for name in settings],
     }
 

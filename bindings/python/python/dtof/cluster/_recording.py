@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Optional
 
 from .. import _native
+from .._options import Given
 from .._run import quietly
 from ._client import line
 from ._folder import Folder
@@ -20,7 +21,7 @@ class Task:
     file: str
     folder: Optional[str]
     events: str
-    said: list[str]
+    said: Given
 
 
 class Done(NamedTuple):

@@ -11,7 +11,7 @@ from distributed import Client
 
 from .. import _native
 from .._arrays import EVENT, Array, recording
-from .._options import arguments
+from .._options import Given, arguments
 from .._run import Replay, quietly, warn
 from ._client import Progress, look_at, totals, wait_for
 from ._split import Split, blocks_of_file, split
@@ -83,7 +83,7 @@ def _on_all(
     job: Any,
     whole: Split,
     version: str,
-    said: list[str],
+    said: Given,
     more: list[Any],
     progress: Progress,
     before: int,
@@ -101,7 +101,7 @@ def _on_all(
     return wait_for(client, futures, told)
 
 
-def _count(version: str, name: str, block: Any, said: list[str]) -> tuple[numpy.ndarray, int]:
+def _count(version: str, name: str, block: Any, said: Given) -> tuple[numpy.ndarray, int]:
     """The photons of each pixel, in the order of addresses, and those that were cut off."""
     begin(version)
     loaded = _native.load(recording(block, name), said)
@@ -113,7 +113,7 @@ def _replay(
     version: str,
     name: str,
     block: Any,
-    said: list[str],
+    said: Given,
     array: tuple[int, int, int],
     of_all: bytes,
     cut_off: int,

@@ -14,7 +14,7 @@ from typing import Any, Optional
 from distributed import Client
 
 from .. import _native
-from .._options import arguments
+from .._options import Given, arguments, flags
 from .._run import quietly
 from ._client import Progress, look_at, totals, wait_for
 from ._worker import begin
@@ -109,7 +109,7 @@ def seeds(
     if not given or len(ordered) != len(given):
         twice = next((seed for seed in ordered if given.count(seed) > 1), None)
         raise _native.Error("seeds: there are none" if twice is None else f"seed {twice}: is twice there")
-    said = arguments(options, flags=("laser_off",))
+    said = arguments(options)
     text = _text(scene)
     parts = [ordered[at : at + _PART] for at in range(0, len(ordered), _PART)]
     version = _native.__version__
@@ -121,10 +121,10 @@ def seeds(
 
 
 def _simulate(
-    version: str, scene: tuple[str, str], seeds: list[int], said: list[str]
+    version: str, scene: tuple[str, str], seeds: list[int], said: Given
 ) -> list[dict[str, Any]]:
     begin(version)
-    runs = (_native.simulate(scene, [*said, f"--seed={seed}"], None) for seed in seeds)
+    runs = (_native.simulate(scene, [*said, ("seed", str(seed))], None) for seed in seeds)
     return [quietly(run).statistics for run in runs]
 
 
@@ -141,10 +141,9 @@ def _text(scene: Any) -> tuple[str, str]:
         raise _native.Error(f"{name}: {reason}") from error
 
 
-def _hash(scene: str, said: list[str]) -> str:
+def _hash(scene: str, said: Given) -> str:
     """What tells runs apart. Those of a settings file are in their statistics."""
-    options = sorted(text for text in said if not text.startswith("--settings="))
-    return hashlib.sha256(json.dumps([scene, options]).encode()).hexdigest()
+    return hashlib.sha256(json.dumps([scene, flags(said)]).encode()).hexdigest()
 
 
 def _fixed(statistics: dict[str, Any]) -> dict[str, Any]:

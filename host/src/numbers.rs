@@ -1,14 +1,12 @@
-//! How numbers and paths are read from the command line, the same for every option.
+//! How numbers are read from texts, the same for every option.
 //!
 //! A number is decimal, with or without an exponent: `0.5`, `10e6`. A whole number may have an
 //! exponent, too: `1e5`.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
-use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::builder::{PathBufValueParser, TypedValueParser};
 use dtof_core::fixed::traits::Fixed;
 
 /// Exponents go so far either way, somewhat farther than those of any `f64`.
@@ -100,15 +98,36 @@ pub fn real(text: &str) -> Option<f64> {
     number.is_finite().then_some(number)
 }
 
-/// Reads the name of a file or a folder. `-`, elsewhere standard input or output, is none.
-#[must_use]
-pub fn path() -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().try_map(|path| {
-        if path.as_os_str() == "-" {
-            return Err("standard input and output are not supported here; give a name");
-        }
-        Ok(path)
-    })
+/// Reads a number in `range`.
+pub fn within(
+    range: RangeInclusive<f64>,
+) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let number = real(text).filter(|number| range.contains(number));
+        let (least, most) = (range.start(), range.end());
+        number.ok_or_else(|| format!("must be a number from {least} to {most}"))
+    }
+}
+
+/// Reads `true` or `false`.
+///
+/// # Errors
+/// If it is neither.
+pub fn truth(text: &str) -> Result<bool, String> {
+    text.parse().map_err(|_| "must be true or false".to_owned())
+}
+
+/// Reads numbers that stand one after the other, separated by `separators`; none of an empty text.
+///
+/// # Errors
+/// That of the first that is none.
+pub fn list<T>(
+    text: &str,
+    separators: &[char],
+    number: impl Fn(&str) -> Result<T, String>,
+) -> Result<Vec<T>, String> {
+    let texts = text.split(separators).filter(|_| !text.is_empty());
+    texts.map(|text| number(text.trim())).collect()
 }
 
 /// A number without an exponent, and without zeros that say nothing: `2.50e3` as `2500`.
