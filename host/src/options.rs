@@ -133,11 +133,12 @@ pub fn line(error: &anyhow::Error, name: &dyn Fn(&str) -> String) -> String {
     texts.collect::<Vec<_>>().join(": ")
 }
 
-/// `error`, which names `file` where it is about a key that the file gave.
+/// `error`, which names `file` where it is about a key that the file gave, unless it names one
+/// already.
 #[must_use]
 pub fn blamed(mut error: anyhow::Error, file: Option<&GivenByFile>) -> anyhow::Error {
     if let Some(refused) = error.downcast_mut::<Refused>() {
-        refused.file = file.cloned();
+        refused.file = refused.file.take().or(file.cloned());
     }
     error
 }

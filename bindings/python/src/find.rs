@@ -115,7 +115,7 @@ pub fn compare(
         let Compared {
             comparison,
             settings,
-        } = options.compare(input, said, &told)?;
+        } = options.compare(input, &said, &told)?;
         let toml = settings.as_ref().map(SettingsFile::to_toml).transpose()?;
         Ok(Answer {
             toml,

@@ -99,13 +99,14 @@ fn refused(error: &clap::Error) -> Option<Refused> {
             first,
             all(ContextKind::SuggestedArg).iter().map(String::as_str),
         ),
-        ErrorKind::ArgumentConflict => Refused::new(
-            first,
-            format!(
-                "cannot be used with {}",
-                quoted(&all(ContextKind::PriorArg))
-            ),
-        ),
+        ErrorKind::ArgumentConflict => {
+            let others = all(ContextKind::PriorArg);
+            let reason = match others.iter().all(|other| other == first) {
+                true => "is given twice".to_owned(),
+                false => format!("cannot be used with {}", quoted(&others)),
+            };
+            Refused::new(first, reason)
+        }
         ErrorKind::MissingRequiredArgument if rest.is_empty() => Refused::new(first, "is needed"),
         ErrorKind::MissingRequiredArgument => {
             Refused::input(format!("{} are needed", quoted(&names)))

@@ -52,7 +52,7 @@ impl Compare {
         let steps = Steps::new(self.quiet);
         let compared = self.options.0.compare(
             input,
-            said,
+            &said,
             &Told {
                 warning: &|warning| warn(name, [warning], self.quiet),
                 step: &|step| {

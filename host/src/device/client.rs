@@ -136,9 +136,10 @@ impl Client {
                     .and_then(|&number| Refusal::from_number(number));
                 let refusal = refusal.context("for a reason this program does not know")?;
                 if configuration.host_timeout_ms == 0 && refusal == Refusal::HostTimeout {
-                    let reason =
-                        format!("is for firmware built with laser-on-without-host: {refusal}");
-                    return Err(Refused::value("host_timeout", 0, reason).into());
+                    let reason = format!(
+                        "0 is for firmware that was built with laser-on-without-host: {refusal}"
+                    );
+                    return Err(Refused::new("host_timeout", reason).into());
                 }
                 Err(refusal).context("the device refuses the configuration")
             }

@@ -85,7 +85,11 @@ impl Options {
     /// What is wrong with them.
     pub fn said(&self, older: Option<&SettingsFile>) -> Result<SettingsFile> {
         let said = self.given.merged_for_recording()?;
-        Ok(said.or(older.cloned().unwrap_or_default()))
+        let mut said = said.or(older.cloned().unwrap_or_default());
+        for key in ["false_alarm", "seed"] {
+            said.override_key(key);
+        }
+        Ok(said)
     }
 
     /// What is asked for.

@@ -112,17 +112,21 @@ impl Options {
     /// # Errors
     /// What is wrong with them.
     pub fn said(&self, is_scene: bool) -> Result<SettingsFile> {
-        match is_scene {
+        let mut said = match is_scene {
             true => self.given.merged(),
             false => self.given.merged_for_recording(),
+        }?;
+        if self.false_alarm.is_some() {
+            said.override_key("false_alarm");
         }
+        Ok(said)
     }
 
     /// Compares all methods on `input`, of which so much is `said`.
     ///
     /// # Errors
     /// What is wrong with it, its name first, or with what is said.
-    pub fn compare(&self, input: Input, said: SettingsFile, told: &Told) -> Result<Compared> {
+    pub fn compare(&self, input: Input, said: &SettingsFile, told: &Told) -> Result<Compared> {
         let compared = self.compare_as_said(input, said.clone(), told);
         compared.map_err(|error| said.blame(error))
     }

@@ -49,6 +49,7 @@ impl Given {
             let used = width.checked_mul_int(merged.run.rebin.unwrap_or(1).into());
             let refused = || Refused::value("bin_width_ps", width, "is too much for `rebin`");
             merged.sensor.bin_width_ps = Some(used.ok_or_else(refused)?);
+            merged.override_key("bin_width_ps");
         }
         Ok(merged)
     }

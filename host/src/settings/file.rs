@@ -209,6 +209,13 @@ impl SettingsFile {
         Ok(tables.flat_map(Table::keys).cloned().collect())
     }
 
+    /// The option `key` is given by itself: the file has no part in it.
+    pub fn override_key(&mut self, key: &str) {
+        if let Some(file) = &mut self.file {
+            file.keys.remove(key);
+        }
+    }
+
     /// `error`, which names the file where it is about a key that the file gave.
     #[must_use]
     pub fn blame(&self, error: Error) -> Error {

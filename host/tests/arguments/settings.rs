@@ -123,6 +123,7 @@ fn what_contradicts_the_file_is_refused() {
     scratch.file("mask.toml", "[sensor]\nmasked = [4]\n");
     scratch.file("l2.toml", "[detection]\nl2 = 20\nfalse_alarm = 1e-5\n");
     scratch.file("list.toml", "[run]\naxes = 'rows,bins'\n");
+    scratch.file("width.toml", "[sensor]\nbin_width_ps = 100.0\n");
     let window = "--settings l2.toml --l2 2000 --rule window --window 3";
     scratch.all_refused(
         "replay --input photons.csv --out out",
@@ -134,6 +135,8 @@ fn what_contradicts_the_file_is_refused() {
             {window} --false-alarm 1e-9 | error: --false-alarm 0.000000001: there is no z
             --settings l2.toml --rule window --window 3 | error: l2.toml: l2 20: must be greater than --l1 40
             {window} --l1 3000 | error: --l2 2000: must be greater than --l1 3000
+            --settings width.toml --bin-width-ps 0 | error: --bin-width-ps 0: with --offset-mm 0:
+            --l1 4 --l1 5 | error: --l1 is given twice
             --settings list.toml | error: list.toml: axes is for arrays of histograms"
         ),
     );

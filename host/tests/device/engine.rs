@@ -207,7 +207,7 @@ fn an_emulated_device_runs_an_image_and_no_other_takes_one() {
     let other = refused("qemu", "Cargo.toml");
     assert_eq!(other, "Cargo.toml: no ELF file, as an image is");
     let other = refused("tcp:127.0.0.1:1", "Cargo.toml");
-    assert_eq!(other, "--image is for --device qemu");
+    assert_eq!(other, "image is for device qemu");
 }
 
 #[test]

@@ -211,7 +211,7 @@ fn arrays_that_hold_no_counts_are_refused() {
             plain.npy --rebin 2 | makes 4 whole bins of 8
             plain.npy --rebin 0 | --rebin
             list.npy --axes bins | --axes is for arrays of histograms
-            list.npy --recorded-cycles 5 | are for histograms
+            list.npy --recorded-cycles 5 | is for histograms
             list.npy --bins 32 | list.npy: record 0: bin 40 is past the last of 32 bins
             list.npy --binning 1 | list.npy: --binning needs to know the array: say --columns
             list.csv --binning 1 | list.csv: --binning needs to know the array: say --columns
