@@ -218,7 +218,7 @@ fn arrays_that_hold_no_counts_are_refused() {
             wide.npy | 5000 bins: must be at most 4096
             long.npy | 1500 bins are more than 1024: add up neighbours with --rebin 2
             plain.npy --rebin 400 | makes 0 whole bins of 8
-            list.npy --rebin 400 | list.npy: --rebin 400 of bins of 250 ps: too wide
+            list.npy --rebin 400 | list.npy: --rebin 400: makes bins of 250 ps too wide
         ",
     );
 }
