@@ -117,17 +117,23 @@ pub fn truth(text: &str) -> Result<bool, String> {
     text.parse().map_err(|_| "must be true or false".to_owned())
 }
 
-/// Reads numbers that stand one after the other, separated by `separators`; none of an empty text.
+/// Reads numbers that stand one after the other, separated by `separators`.
 ///
 /// # Errors
-/// That of the first that is none.
+/// That of the first that is none, which it names.
 pub fn list<T>(
     text: &str,
     separators: &[char],
     number: impl Fn(&str) -> Result<T, String>,
 ) -> Result<Vec<T>, String> {
-    let texts = text.split(separators).filter(|_| !text.is_empty());
-    texts.map(|text| number(text.trim())).collect()
+    let is_list = text.contains(separators);
+    let read = |element: &str| {
+        number(element.trim()).map_err(|reason| match is_list {
+            true => format!("{element} {reason}"),
+            false => reason,
+        })
+    };
+    text.split(separators).map(read).collect()
 }
 
 /// A number without an exponent, and without zeros that say nothing: `2.50e3` as `2500`.

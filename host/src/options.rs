@@ -18,8 +18,9 @@
 
 use std::collections::BTreeSet;
 use std::error::Error;
+use std::ffi::OsStr;
 use std::fmt::{self, Display, Formatter};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Why an option is refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,8 +31,10 @@ pub struct Refused {
     pub value: Option<String>,
     /// The reason. Other options stand in backticks.
     pub reason: String,
+    /// The key is a name as its user wrote it.
+    is_unknown: bool,
     /// The settings file that gave some of the options.
-    file: Option<GivenByFile>,
+    file: Option<Box<GivenByFile>>,
 }
 
 /// The keys that a settings file gave.
@@ -58,6 +61,7 @@ impl Refused {
             key: None,
             value: None,
             reason: reason.into(),
+            is_unknown: false,
             file: None,
         }
     }
@@ -70,14 +74,17 @@ impl Refused {
         }
     }
 
-    /// There is no such option among `keys`.
+    /// There is no option of this `name`, which is as its user wrote it; there are `keys`.
     #[must_use]
-    pub fn unknown<'a>(key: &str, keys: impl IntoIterator<Item = &'a str>) -> Self {
-        let likeness = |known: &&str| strsim::jaro(known, key);
+    pub fn unknown<'a>(name: &str, keys: impl IntoIterator<Item = &'a str>) -> Self {
+        let likeness = |known: &&str| strsim::jaro(known, name.trim_start_matches('-'));
         let alike = keys.into_iter().filter(|known| likeness(known) > 0.75);
         let nearest = alike.max_by(|one, other| likeness(one).total_cmp(&likeness(other)));
         let hint = nearest.map_or(String::new(), |known| format!("; is it `{known}`?"));
-        Self::new(key, format!("is unknown{hint}"))
+        Self {
+            is_unknown: true,
+            ..Self::new(name, format!("is unknown{hint}"))
+        }
     }
 
     /// In one line, with every option as `name` has it, or as the settings file that gave it.
@@ -85,14 +92,18 @@ impl Refused {
     pub fn line(&self, name: &dyn Fn(&str) -> String) -> String {
         let mut from_file = None;
         let mut named = |key: &str| {
-            let file = self.file.as_ref().filter(|file| file.keys.contains(key));
+            let file = self.file.as_deref().filter(|file| file.keys.contains(key));
             from_file = from_file.or(file);
             file.map_or_else(|| name(key), |_| key.to_owned())
         };
         let mut text = match (&self.key, &self.value) {
             (None, _) => String::new(),
+            (Some(name), _) if self.is_unknown => {
+                named(name);
+                format!("{name} ")
+            }
             (Some(key), None) => format!("{} ", named(key)),
-            (Some(key), Some(value)) => format!("{} {value}: ", named(key)),
+            (Some(key), Some(value)) => format!("{} {}: ", named(key), shortened(value)),
         };
         for (at, part) in self.reason.split('`').enumerate() {
             match at % 2 {
@@ -117,6 +128,21 @@ impl Display for Refused {
 
 impl Error for Refused {}
 
+/// A list of many values is not printed whole.
+fn shortened(value: &str) -> String {
+    const MOST: usize = 60;
+    match value.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}…", &value[..end]),
+        None => value.to_owned(),
+    }
+}
+
+/// A name from outside for a reason: its backticks are none of a key.
+#[must_use]
+pub fn plain(name: impl Display) -> String {
+    name.to_string().replace('`', "'")
+}
+
 fn is_key(text: &str) -> bool {
     let of_keys =
         |letter: char| letter.is_ascii_lowercase() || letter.is_ascii_digit() || letter == '_';
@@ -138,7 +164,8 @@ pub fn line(error: &anyhow::Error, name: &dyn Fn(&str) -> String) -> String {
 #[must_use]
 pub fn blamed(mut error: anyhow::Error, file: Option<&GivenByFile>) -> anyhow::Error {
     if let Some(refused) = error.downcast_mut::<Refused>() {
-        refused.file = refused.file.take().or(file.cloned());
+        let file = file.cloned().map(Box::new);
+        refused.file = refused.file.take().or(file);
     }
     error
 }
@@ -164,6 +191,11 @@ pub trait Options: Default {
     /// Why it cannot be so.
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String>;
 
+    /// The place of a key that names a file, whose name need not be text.
+    fn file(&mut self, _key: &str) -> Option<&mut Option<PathBuf>> {
+        None
+    }
+
     /// Is called once all are set.
     ///
     /// # Errors
@@ -178,11 +210,11 @@ pub trait Options: Default {
 /// # Errors
 /// The first that is wrong.
 pub fn read<O: Options>(
-    given: impl IntoIterator<Item = (impl AsRef<str>, impl AsRef<str>)>,
+    given: impl IntoIterator<Item = (impl AsRef<str>, impl AsRef<OsStr>)>,
 ) -> Result<O, Refused> {
     let mut options = O::default();
-    for (name, text) in given {
-        let (name, text) = (name.as_ref(), text.as_ref());
+    for (name, value) in given {
+        let (name, value) = (name.as_ref(), value.as_ref());
         let mut keys = O::KEYS.iter().copied().flatten().copied();
         let key = keys.find(|key| option_name(key) == name);
         let keys = O::KEYS
@@ -191,8 +223,17 @@ pub fn read<O: Options>(
             .flatten()
             .map(|key| option_name(key));
         let key = key.ok_or_else(|| Refused::unknown(name, keys))?;
-        let set = options.set(key, text);
-        set.map_err(|reason| Refused::value(key, text, reason))?;
+        if value.is_empty() {
+            return Err(Refused::new(key, "needs a value"));
+        }
+        let refused = |reason| Refused::value(key, value.display(), reason);
+        if let Some(file) = options.file(key) {
+            *file = Some(path(value).map_err(refused)?);
+            continue;
+        }
+        let text = value.to_str().ok_or("must be UTF-8".to_owned());
+        text.and_then(|text| options.set(key, text))
+            .map_err(refused)?;
     }
     options.check()?;
     Ok(options)
@@ -222,11 +263,13 @@ pub fn named<T: Named>(text: &str) -> Result<T, String> {
 /// Reads the name of a file or a folder. `-`, elsewhere standard input or output, is none.
 ///
 /// # Errors
-/// If it is `-` or empty.
-pub fn path(text: &str) -> Result<PathBuf, String> {
-    match text {
-        "-" => Err("standard input and output are not supported here; give a name".to_owned()),
-        "" => Err("must be the name of a file".to_owned()),
-        text => Ok(Path::new(text).to_owned()),
+/// If it is `-`.
+pub fn path(name: &OsStr) -> Result<PathBuf, String> {
+    if name == "-" {
+        return Err("standard input and output are not supported here; give a name".to_owned());
     }
+    Ok(name.into())
 }
+
+/// Why [`Options::set`] refuses what is none of its keys.
+pub const NO_OPTION: &str = "is no option here";

@@ -1,6 +1,7 @@
 //! Every error is one line, as the program prints it, with keywords in place of flags.
 
 use std::any::Any;
+use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use dtof::options::{self, Options, option_name};
@@ -33,7 +34,7 @@ pub fn options<O: Options>(keywords: Keywords) -> PyResult<O> {
 }
 
 /// Keywords and their values as texts.
-pub type Keywords = Vec<(String, String)>;
+pub type Keywords = Vec<(String, OsString)>;
 
 /// The same, as an exception.
 pub fn checked<T>(job: impl FnOnce() -> anyhow::Result<T>) -> PyResult<T> {

@@ -91,6 +91,14 @@ def test_a_mask_may_be_empty(mask):
     assert run.events.tobytes() == dtof.replay(counts()).events.tobytes()
 
 
+def test_an_empty_mask_leaves_that_of_the_settings(tmp_path):
+    (tmp_path / "hot.toml").write_text("[sensor]\nmasked = [1]\n")
+    masked = [dtof.replay(counts(), settings=tmp_path / "hot.toml", **more).statistics["masked"]
+              for more in [{}, {"mask": []}, {"mask": None}, {"mask": [0]}]]
+    assert masked[0] == masked[1] == masked[2] > 0
+    assert dtof.replay(counts(), mask=[0]).statistics["masked"] == masked[3]
+
+
 def test_the_bins_may_be_any_axis():
     array = counts()
     expected = dtof.replay(array).events.tobytes()

@@ -1,8 +1,9 @@
 //! Which files of a package import which, read from their syntax.
 //!
 //! Only a path that begins with `crate`, `self` or `super` is an import, and it leads
-//! to the deepest module on it: a name that is handed on with `pub use` is not followed. A module and what lies in its own folder are one room:
-//! what a child takes from its parent is no import. Tests are left out.
+//! to the deepest module on it, or to where that has what it hands on with `pub use`. A module and
+//! what lies in its own folder are one room: what a child takes from its parent is no import. Tests
+//! are left out.
 
 mod doors;
 
@@ -22,18 +23,43 @@ pub fn imports(source: &Path) -> Imports {
     let mut files = BTreeMap::new();
     read(source, &mut Vec::new(), &mut files);
     let modules: BTreeSet<&Module> = files.keys().collect();
-    let of = |(module, items): (&Module, &Vec<syn::Item>)| {
+    let paths = |module: &Module, items: &Vec<syn::Item>| {
         let mut paths = Paths {
             module: module.clone(),
             found: Vec::new(),
+            handed_on: Vec::new(),
         };
         items.iter().for_each(|item| paths.visit_item(item));
-        let led = paths.found.iter().filter_map(|path| {
-            (1..=path.len())
-                .rev()
-                .map(|length| path[..length].to_vec())
-                .find(|path| modules.contains(path))
-        });
+        paths
+    };
+    let mut handed_on = BTreeMap::new();
+    for (module, items) in &files {
+        for (name, path) in paths(module, items).handed_on {
+            handed_on.insert([&module[..], &[name]].concat(), path);
+        }
+    }
+    let deepest = |path: &Module| {
+        let lengths = (0..=path.len()).rev();
+        lengths
+            .map(|length| path[..length].to_vec())
+            .find(|path| path.is_empty() || modules.contains(path))
+    };
+    let leads = |path: &Module| {
+        let mut path = path.clone();
+        // What is handed on may be handed on again.
+        for _ in 0..4 {
+            let module = deepest(&path)?;
+            let next = path
+                .get(..=module.len())
+                .and_then(|name| handed_on.get(name));
+            let Some(next) = next else { break };
+            path = [&next[..], &path[module.len() + 1..]].concat();
+        }
+        deepest(&path).filter(|module| !module.is_empty())
+    };
+    let of = |(module, items): (&Module, &Vec<syn::Item>)| {
+        let paths = paths(module, items);
+        let led = paths.found.iter().filter_map(leads);
         (
             module.clone(),
             led.filter(|to| !module.starts_with(to)).collect(),
@@ -87,11 +113,17 @@ fn read(folder: &Path, module: &mut Module, files: &mut BTreeMap<Module, Vec<syn
 struct Paths {
     module: Module,
     found: Vec<Module>,
+    /// Names of `pub use`, and what they lead to.
+    handed_on: Vec<(String, Module)>,
 }
 
 impl Paths {
     /// Notes a path, if it begins within the package.
     fn note(&mut self, path: &[String]) {
+        self.found.extend(self.absolute(path));
+    }
+
+    fn absolute(&self, path: &[String]) -> Option<Module> {
         let mut from = self.module.clone();
         let mut rest = path;
         match path.first().map(String::as_str) {
@@ -100,32 +132,46 @@ impl Paths {
             Some("super") => {
                 from.pop();
             }
-            _ => return,
+            _ => return None,
         }
         rest = &rest[1..];
         while rest.first().is_some_and(|first| first == "super") {
             from.pop();
             rest = &rest[1..];
         }
-        self.found.push([&from, rest].concat());
+        Some([&from, rest].concat())
     }
 
-    fn tree(&mut self, before: &mut Module, tree: &syn::UseTree) {
+    /// Notes a name that is handed on. Its path may begin with a module of this one.
+    fn hand_on(&mut self, name: &syn::Ident, path: &[String]) {
+        let of_child = || [&self.module[..], path].concat();
+        let path = self.absolute(path).unwrap_or_else(of_child);
+        self.handed_on.push((name.to_string(), path));
+    }
+
+    fn tree(&mut self, before: &mut Module, tree: &syn::UseTree, is_public: bool) {
         match tree {
             syn::UseTree::Path(path) => {
                 before.push(path.ident.to_string());
-                self.tree(before, &path.tree);
+                self.tree(before, &path.tree, is_public);
                 before.pop();
             }
             syn::UseTree::Group(group) => {
                 for tree in &group.items {
-                    self.tree(before, tree);
+                    self.tree(before, tree, is_public);
                 }
             }
             syn::UseTree::Name(syn::UseName { ident })
             | syn::UseTree::Rename(syn::UseRename { ident, .. }) => {
                 before.push(ident.to_string());
                 self.note(before);
+                if is_public {
+                    let name = match tree {
+                        syn::UseTree::Rename(renamed) => &renamed.rename,
+                        _ => ident,
+                    };
+                    self.hand_on(name, before);
+                }
                 before.pop();
             }
             syn::UseTree::Glob(_) => self.note(before),
@@ -152,7 +198,8 @@ impl<'file> Visit<'file> for Paths {
 
     fn visit_item_use(&mut self, item: &'file syn::ItemUse) {
         if !is_test(&item.attrs) {
-            self.tree(&mut Vec::new(), &item.tree);
+            let is_public = !matches!(item.vis, syn::Visibility::Inherited);
+            self.tree(&mut Vec::new(), &item.tree, is_public);
         }
     }
 

@@ -19,6 +19,7 @@ mod written;
 
 use anyhow::Result;
 use dtof_core::CentredWindow;
+use dtof_core::fixed::types::U8F8;
 
 pub use find::glass::{Glass, Nearest};
 pub use find::observed::{Length, Observed};
@@ -27,7 +28,6 @@ pub use find::pile_up::Tdc;
 pub use find::pixels::Pixels;
 pub use find::pulse::Pulse;
 pub use remarks::remarks;
-pub use settle::Detection;
 pub use spend::Spent;
 pub use watch::{Change, RunPhotons, glass_change};
 
@@ -38,6 +38,34 @@ use find::observed::Trace;
 use find::shape::Window;
 use find::{glass, offset, peaks, pile_up, pulse};
 use spend::Replay;
+
+/// How pixels are to decide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Detection {
+    /// Bins in the window.
+    pub window: u8,
+    /// Standard deviations of the background, for so many false alarms; `None` where rates are
+    /// not known.
+    pub z: Option<f64>,
+    /// Whether a lower one would do: the fewest photons alone keep false alarms down.
+    pub is_by_count: bool,
+    /// Exposures that were simulated for it.
+    pub exposures: u64,
+    /// The share of exposures without a target that may end with an event.
+    pub false_alarm: f64,
+    /// Photons in the window, at least.
+    pub min_count: u16,
+    /// L1.
+    pub l1: u16,
+    /// L2.
+    pub l2: u16,
+    /// X.
+    pub x: u16,
+    /// Standard deviation of the pulse that the depth is found with.
+    pub sigma_bins: U8F8,
+    /// How far the window that finds it reaches to either side, where that differs.
+    pub half_widths: Option<CentredWindow>,
+}
 
 /// What the user says beside the recording.
 #[derive(Clone, Copy, Debug, PartialEq)]

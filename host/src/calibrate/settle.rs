@@ -5,12 +5,11 @@ use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{BlockLevel, CentredWindow, WindowRule};
 use dtof_theory::tune::{Request, Wanted, window};
 
-use super::Asked;
 use super::false_alarms;
 use super::find::pixels::Pixels;
 use super::find::pulse::Pulse;
 use super::spend::Spent;
-
+use super::{Asked, Detection};
 use crate::options::Refused;
 
 /// Laser cycles of an exposure, if the counters hold the background of so many.
@@ -25,34 +24,6 @@ const LEAST_Z: U4F12 = U4F12::lit("3");
 pub const MIN_COUNT: u16 = 5;
 /// A background of so many leaves counters of 10 bits room for what it varies by.
 const FULL: f64 = 860.0;
-
-/// How pixels are to decide.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Detection {
-    /// Bins in the window.
-    pub window: u8,
-    /// Standard deviations of the background, for so many false alarms; `None` where rates are
-    /// not known.
-    pub z: Option<f64>,
-    /// Whether a lower one would do: the fewest photons alone keep false alarms down.
-    pub is_by_count: bool,
-    /// Exposures that were simulated for it.
-    pub exposures: u64,
-    /// The share of exposures without a target that may end with an event.
-    pub false_alarm: f64,
-    /// Photons in the window, at least.
-    pub min_count: u16,
-    /// L1.
-    pub l1: u16,
-    /// L2.
-    pub l2: u16,
-    /// X.
-    pub x: u16,
-    /// Standard deviation of the pulse that the depth is found with.
-    pub sigma_bins: U8F8,
-    /// How far the window that finds it reaches to either side, where that differs.
-    pub half_widths: Option<CentredWindow>,
-}
 
 /// What there is to decide by.
 pub struct Known<'a> {

@@ -83,8 +83,11 @@ fn refused(error: &clap::Error) -> Option<Refused> {
     let names = all(ContextKind::InvalidArg);
     let (first, rest) = names.split_first()?;
     let quoted = |names: &[String]| {
-        let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
-        names.join(", ")
+        let quoted = |name: &String| match name.starts_with(char::is_alphabetic) {
+            true => format!("`{name}`"),
+            false => name.clone(),
+        };
+        names.iter().map(quoted).collect::<Vec<_>>().join(", ")
     };
     Some(match error.kind() {
         ErrorKind::ValueValidation => {
@@ -95,10 +98,13 @@ fn refused(error: &clap::Error) -> Option<Refused> {
             let reason = format!("must be one of {}", all(ContextKind::ValidValue).join(", "));
             Refused::value(first, value?, reason)
         }
-        ErrorKind::UnknownArgument => Refused::unknown(
-            first,
-            all(ContextKind::SuggestedArg).iter().map(String::as_str),
-        ),
+        ErrorKind::UnknownArgument => {
+            let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidArg) else {
+                return None;
+            };
+            let alike = all(ContextKind::SuggestedArg);
+            Refused::unknown(name, alike.iter().map(String::as_str))
+        }
         ErrorKind::ArgumentConflict => {
             let others = all(ContextKind::PriorArg);
             let reason = match others.iter().all(|other| other == first) {

@@ -1,8 +1,8 @@
 //! The flags of jobs: the only place where an option of the library gets a name, a value's name and help.
 
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 
-use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
+use clap::builder::{OsStringValueParser, PossibleValue, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use dtof::cli::flag;
@@ -35,6 +35,8 @@ pub struct Flag {
 enum Value {
     /// A text, called so in the help.
     Called(&'static str),
+    /// The same, which may begin with a hyphen.
+    Signed(&'static str),
     /// One of these names.
     Named(fn() -> Vec<PossibleValue>),
     /// Nothing.
@@ -43,7 +45,7 @@ enum Value {
     Yes(&'static str),
 }
 
-use Value::{Called, Switch, Yes};
+use Value::{Called, Signed, Switch, Yes};
 
 const fn is(key: &'static str, value: Value, help: &'static str) -> Flag {
     Flag { key, value, help }
@@ -57,6 +59,10 @@ fn names<T: Named>() -> Vec<PossibleValue> {
         .collect()
 }
 
+fn true_or_false() -> Vec<PossibleValue> {
+    ["true", "false"].map(PossibleValue::new).into()
+}
+
 fn yes_or_no() -> Vec<PossibleValue> {
     ["yes", "no"].map(PossibleValue::new).into()
 }
@@ -67,7 +73,14 @@ impl Flag {
             .long(flag(self.key)[2..].to_owned())
             .help(self.help);
         match self.value {
-            Called(name) => arg.value_name(name).allow_negative_numbers(true),
+            Called(name) => arg
+                .value_name(name)
+                .value_parser(OsStringValueParser::new())
+                .allow_negative_numbers(true),
+            Signed(name) => arg
+                .value_name(name)
+                .value_parser(OsStringValueParser::new())
+                .allow_hyphen_values(true),
             Value::Named(names) => arg
                 .value_name(self.key.to_ascii_uppercase())
                 .value_parser(Hinted(names)),
@@ -76,13 +89,14 @@ impl Flag {
                 .value_name(name)
                 .num_args(0..=1)
                 .require_equals(true)
-                .default_missing_value("true"),
+                .default_missing_value("true")
+                .value_parser(Hinted(true_or_false)),
         }
     }
 
-    fn text(self, matches: &ArgMatches) -> Option<String> {
+    fn text(self, matches: &ArgMatches) -> Option<OsString> {
         match self.value {
-            Switch => matches.get_flag(self.key).then(|| "true".to_owned()),
+            Switch => matches.get_flag(self.key).then(|| "true".into()),
             _ => matches.get_one(self.key).cloned(),
         }
     }
@@ -93,15 +107,10 @@ impl Flag {
 struct Hinted(fn() -> Vec<PossibleValue>);
 
 impl TypedValueParser for Hinted {
-    type Value = String;
+    type Value = OsString;
 
-    fn parse_ref(
-        &self,
-        command: &Command,
-        arg: Option<&Arg>,
-        value: &OsStr,
-    ) -> Result<String, Error> {
-        StringValueParser::new().parse_ref(command, arg, value)
+    fn parse_ref(&self, _: &Command, _: Option<&Arg>, value: &OsStr) -> Result<OsString, Error> {
+        Ok(value.to_owned())
     }
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
@@ -138,7 +147,7 @@ impl<O: HasFlags> FromArgMatches for Flags<O> {
 
 /// A value of the program that is chosen by a name.
 pub fn name<T: Named + Send + Sync>() -> impl TypedValueParser<Value = T> {
-    Hinted(names::<T>).try_map(|text| named(&text))
+    Hinted(names::<T>).try_map(|text| named(&text.to_string_lossy()))
 }
 
 const RECORDING: [Flag; 10] = [
@@ -173,13 +182,13 @@ const RECORDING: [Flag; 10] = [
     ),
     is(
         "bin_width_ps",
-        Called("PS"),
+        Signed("PS"),
         "Picoseconds a bin of the file, rounded to 1/65536 [default: 250; of logs that of the \
          sensor]",
     ),
     is(
         "offset_mm",
-        Called("MM"),
+        Signed("MM"),
         "Millimetres added to every range, rounded to 1/256 [default: 0; of logs that of the \
          sensor]",
     ),
@@ -220,7 +229,7 @@ const SENSOR: [Flag; 4] = [
     ),
     is(
         "sigma_bins",
-        Called("S"),
+        Signed("S"),
         "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. The depth \
          then comes from a window that suits it [default: the centroid of three bins]",
     ),
@@ -234,18 +243,18 @@ const DETECTION: [Flag; 16] = [
     ),
     is(
         "alpha",
-        Called("ALPHA"),
+        Signed("ALPHA"),
         "Rules paper and average: standard deviations of the background a peak must exceed it \
          by, 0 to 255.996, rounded to 1/256 [default: 4]",
     ),
     is(
         "window",
-        Called("BINS"),
+        Signed("BINS"),
         "Window rule: bins in the window, 1 to 7 [default: as suits --sigma-bins]",
     ),
     is(
         "z",
-        Called("Z"),
+        Signed("Z"),
         "Window rule: standard deviations of the background the photons in the window must \
          exceed it by, 0 to 15.9998, rounded to 1/4096",
     ),
@@ -362,7 +371,7 @@ const SIMULATE: [Flag; 2] = [
 const CALIBRATE: [Flag; 4] = [
     is(
         "target_mm",
-        Called("MM"),
+        Signed("MM"),
         "Distance of a flat target that most of the pixels see, in millimetres",
     ),
     is(
@@ -430,7 +439,7 @@ const TUNE: [Flag; 17] = [
     ),
     is(
         "sigma_bins",
-        Called("BINS"),
+        Signed("BINS"),
         "Standard deviation of the pulse in bins",
     ),
     is("sigma_ps", Called("PS"), "Instead: in picoseconds"),
@@ -441,7 +450,7 @@ const TUNE: [Flag; 17] = [
     ),
     is(
         "bin_width_ps",
-        Called("PS"),
+        Signed("PS"),
         "Picoseconds a bin [default: 250]",
     ),
     is(
@@ -489,12 +498,12 @@ const TUNE: [Flag; 17] = [
 const DEVICE: [Flag; 2] = [
     is(
         "bin_width_ps",
-        Called("PS"),
+        Signed("PS"),
         "Picoseconds a bin, rounded to 1/65536 [default: as the device says, 250 if any will do]",
     ),
     is(
         "offset_mm",
-        Called("MM"),
+        Signed("MM"),
         "Millimetres added to every range, rounded to 1/256 [default: as the device says]",
     ),
 ];
@@ -502,7 +511,7 @@ const DEVICE: [Flag; 2] = [
 const PROJECTED: [Flag; 4] = [
     is(
         "field_of_view_degrees",
-        Called("HxV"),
+        Signed("HxV"),
         "The field of view in degrees from edge to edge [default: 60 across the longer side, \
          square pixels]",
     ),
@@ -569,10 +578,17 @@ impl HasFlags for tune::Options {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use dtof::options::NO_OPTION;
 
     fn keys_of<O: HasFlags>() {
         let mut flags: Vec<&str> = O::flags().iter().map(|flag| flag.key).collect();
         let mut keys = O::KEYS.concat();
+        for &key in &keys {
+            let set = O::default().set(key, "\0");
+            let is_file = O::default().file(key).is_some();
+            assert!(is_file || set != Err(NO_OPTION.to_owned()), "{key}");
+        }
+        assert_eq!(O::default().set("sed", "5"), Err(NO_OPTION.to_owned()));
         flags.sort_unstable();
         keys.sort_unstable();
         assert_eq!(flags, keys);

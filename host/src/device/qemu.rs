@@ -12,7 +12,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::port::{self, Port};
 
-use crate::options::Refused;
+use crate::options::{Refused, plain};
 
 const QEMU: &str = "qemu-system-arm";
 
@@ -53,7 +53,7 @@ impl Emulator {
             Refused::input(format!(
                 "no image at {}: run `cargo xtask image mps2-an386` in a clone of dtof; `image` takes \
                  the path that it prints",
-                image.display()
+                plain(image.display())
             ))
         );
         let mut start = [0; 4];

@@ -4,9 +4,12 @@ use std::fmt;
 
 use anyhow::{Result, ensure};
 
-use super::{Format, evt2};
+use super::Format;
 use crate::events::aer_file::Header;
 use crate::options::Refused;
+
+/// Bits of a time of EVT2, in microseconds.
+pub(super) const EVT2_BITS: u32 = 34;
 
 /// How many laser cycles a second has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -193,7 +196,7 @@ impl Format {
             // Whole numbers in a double.
             Self::Pcd | Self::Ply | Self::Mcap | Self::Ros2 => Some(1 << 53),
             // Readers differ in what they take time for that has wrapped.
-            Self::Evt2 => Some(1000 << evt2::TIME_BITS),
+            Self::Evt2 => Some(1000 << EVT2_BITS),
         }
     }
 }

@@ -27,8 +27,6 @@ use crate::input::source::Geometry;
 
 /// Columns and rows are sent in 11 bits.
 const MOST_SIDE: u32 = 1 << 11;
-/// Bits of a time, in microseconds.
-pub const TIME_BITS: u32 = 34;
 
 const OFF: u32 = 0;
 const ON: u32 = 1;
@@ -66,7 +64,7 @@ impl<W: Write> Encoder<W> {
         })
     }
 
-    /// Times have [`TIME_BITS`] bits, and do not go back.
+    /// Times have 34 bits (`clock::EVT2_BITS`), and do not go back.
     #[allow(clippy::cast_possible_truncation, reason = "28 and 6 bits")]
     fn write(&mut self, change: &Change) -> io::Result<()> {
         let high = (change.time >> 6) as u32 & ((1 << 28) - 1);

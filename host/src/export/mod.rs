@@ -33,7 +33,7 @@ use crate::files::{aside, flushed, place_of};
 use crate::geometry::{FieldOfView, FieldOfViewError, Rays};
 use crate::input::source::Geometry;
 use crate::numbers::{MOST_WHOLE, whole};
-use crate::options::{self, Named, Refused, named, path};
+use crate::options::{self, NO_OPTION, Named, Refused, named};
 use crate::progress::Progress;
 use crate::settings::{Rays as SaidRays, SettingsFile};
 
@@ -176,11 +176,15 @@ impl options::Options for Projected {
                     .map_err(|error: FieldOfViewError| error.to_string());
                 self.fov = Some(view?);
             }
-            "calibration" => self.calibration = Some(path(text)?),
             "laser_hz" => self.laser_hz = Some(whole(1..=MOST_WHOLE)(text)?),
-            _ => self.echo = Some(named(text)?),
+            "echo" => self.echo = Some(named(text)?),
+            _ => return Err(NO_OPTION.to_owned()),
         }
         Ok(())
+    }
+
+    fn file(&mut self, key: &str) -> Option<&mut Option<PathBuf>> {
+        (key == "calibration").then_some(&mut self.calibration)
     }
 
     fn check(&self) -> Result<(), Refused> {

@@ -17,7 +17,7 @@ use crate::input::photon_list::{Listed, PhotonList, Rows, Shape};
 use crate::input::recorded::{Capture, RecordedHistograms, RecordingLength, Whole};
 use crate::input::source::{Geometry, PhotonSource};
 use crate::input::{tmf8820, tmf8829, warnings};
-use crate::options::Refused;
+use crate::options::{Refused, plain};
 use crate::rows::Row;
 
 /// Picoseconds a bin, if neither the user nor the file says.
@@ -226,7 +226,7 @@ fn read(medium: &Medium, opening: &Opening) -> Result<Content> {
             Refused::value(
                 "columns",
                 columns,
-                format!("{medium} has {has}; this is for photon lists")
+                format!("{} has {has}; this is for photon lists", plain(medium))
             )
         );
     }
@@ -260,12 +260,15 @@ fn suits(medium: &Medium, opening: &Opening, kind: Kind, is_list: bool) -> Resul
         opening.axes.is_none() || (matches!(kind, Kind::Array | Kind::Archive) && !is_list),
         Refused::new(
             "axes",
-            format!("is for arrays of histograms; {medium} is none")
+            format!("is for arrays of histograms; {} is none", plain(medium))
         )
     );
     ensure!(
         opening.array.is_none() || kind == Kind::Archive,
-        Refused::new("array", format!("is for .npz files; {medium} is none"))
+        Refused::new(
+            "array",
+            format!("is for .npz files; {} is none", plain(medium))
+        )
     );
     Ok(())
 }

@@ -13,6 +13,9 @@ use crate::numbers::{MOST_WHOLE, whole, within};
 use crate::options::{self, Refused};
 use crate::settings::{SettingsFile, share};
 
+/// The options that are not of settings files, whose keys of these names are others.
+const OWN: &[&str] = &["target_mm", "glass", "false_alarm", "seed"];
+
 /// What is calibrated by.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -41,8 +44,7 @@ impl Default for Options {
 }
 
 impl options::Options for Options {
-    const KEYS: &'static [&'static [&'static str]] =
-        &[RECORDING, &["target_mm", "glass", "false_alarm", "seed"]];
+    const KEYS: &'static [&'static [&'static str]] = &[RECORDING, OWN];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
@@ -84,9 +86,9 @@ impl Options {
     /// # Errors
     /// What is wrong with them.
     pub fn said(&self, older: Option<&SettingsFile>) -> Result<SettingsFile> {
-        let said = self.given.merged_for_recording()?;
-        let mut said = said.or(older.cloned().unwrap_or_default());
-        for key in ["false_alarm", "seed"] {
+        let older = older.cloned().unwrap_or_default();
+        let mut said = self.given.for_recording_over(older)?;
+        for key in OWN {
             said.override_key(key);
         }
         Ok(said)

@@ -1,5 +1,7 @@
 //! All methods on the photons of a recording or a scene.
 
+use std::path::PathBuf;
+
 use anyhow::{Context, Result};
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
@@ -16,8 +18,8 @@ use crate::input::medium::Medium;
 use crate::input::open::{Counts, Opening, counts, open};
 use crate::input::source::PhotonSource;
 use crate::numbers::{MOST_WHOLE, positive, whole};
-use crate::options::{self, Refused};
-use crate::settings::{SettingsFile, share};
+use crate::options::{self, Refused, plain};
+use crate::settings::{Run, Sensor, SettingsFile, share};
 use crate::simulate::scene::Scene;
 
 /// What is compared, and how exact it has to be.
@@ -48,6 +50,10 @@ impl options::Options for Options {
             key => self.given.set(key, text)?,
         }
         Ok(())
+    }
+
+    fn file(&mut self, key: &str) -> Option<&mut Option<PathBuf>> {
+        self.given.file(key)
     }
 
     fn check(&self) -> Result<(), Refused> {
@@ -113,13 +119,34 @@ impl Options {
     /// What is wrong with them.
     pub fn said(&self, is_scene: bool) -> Result<SettingsFile> {
         let mut said = match is_scene {
-            true => self.given.merged(),
+            true => self.of_scene().merged(),
             false => self.given.merged_for_recording(),
         }?;
         if self.false_alarm.is_some() {
             said.override_key("false_alarm");
         }
         Ok(said)
+    }
+
+    /// Without what says what a recording is: a scene knows.
+    fn of_scene(&self) -> Given {
+        let Given { file, options } = self.given.clone();
+        let SettingsFile { sensor, run, .. } = options;
+        let options = SettingsFile {
+            sensor: Sensor {
+                gate: sensor.gate,
+                masked: sensor.masked,
+                sigma_bins: sensor.sigma_bins,
+                ..Sensor::default()
+            },
+            run: Run {
+                cycles: run.cycles,
+                seed: run.seed,
+                ..Run::default()
+            },
+            ..SettingsFile::default()
+        };
+        Given { file, options }
     }
 
     /// Compares all methods on `input`, of which so much is `said`.
@@ -146,7 +173,10 @@ impl Options {
         } = subject;
         let false_alarm = self.share(&said);
         let sigma = said.sensor.sigma_bins.ok_or_else(|| {
-            let reason = format!("is needed: no peak of {name} tells how wide the pulse is");
+            let reason = format!(
+                "is needed: no peak of {} tells how wide the pulse is",
+                plain(&name)
+            );
             Refused::new("sigma_bins", reason)
         })?;
         let settings = said.settings(said.sensor.bins.unwrap_or(128).into())?;

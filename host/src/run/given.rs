@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 
-use crate::options::{Options, Refused, path};
+use crate::options::{Options, Refused};
 use crate::settings::{Detection, SettingsFile};
 
 /// The settings file, and what options say of the sensor beside a recording.
@@ -22,16 +22,17 @@ pub struct Given {
 }
 
 impl Given {
-    /// Sets a key of a settings file, or the file.
+    /// Sets a key of a settings file.
     ///
     /// # Errors
     /// Why it cannot be so.
     pub fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
-        match key {
-            "settings" => self.file = Some(path(text)?),
-            key => self.options.set(key, text)?,
-        }
-        Ok(())
+        self.options.set(key, text)
+    }
+
+    /// The place of the settings file's name.
+    pub fn file(&mut self, key: &str) -> Option<&mut Option<PathBuf>> {
+        (key == "settings").then_some(&mut self.file)
     }
 
     /// Are there two options of which only one can be given?
@@ -64,17 +65,17 @@ impl Given {
     /// # Errors
     /// What is wrong with the file.
     pub fn merged(&self) -> Result<SettingsFile> {
-        self.over_file(self.options.clone())
+        Ok(self.options.clone().or(self.read()?))
     }
 
-    /// `options`, which these are, then the file.
-    pub(super) fn over_file(&self, options: SettingsFile) -> Result<SettingsFile> {
+    /// The file, less what the options leave no room for.
+    pub(super) fn read(&self) -> Result<SettingsFile> {
         let file = self.file.as_deref().map(SettingsFile::read);
         let mut file = file.transpose()?.unwrap_or_default();
         if self.decides().is_some() {
             file.run.frame = None;
         }
-        Ok(options.or(file))
+        Ok(file)
     }
 }
 
@@ -91,6 +92,10 @@ impl Options for Operation {
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         self.given.set(key, text)
+    }
+
+    fn file(&mut self, key: &str) -> Option<&mut Option<PathBuf>> {
+        self.given.file(key)
     }
 
     fn check(&self) -> Result<(), Refused> {

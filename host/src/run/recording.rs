@@ -8,7 +8,7 @@ use crate::input::medium::Medium;
 use crate::input::open::{BIN_WIDTH_PS, Known, Opening};
 use crate::input::recorded::RecordingLength;
 use crate::input::source::Geometry;
-use crate::options::Refused;
+use crate::options::{Refused, plain};
 use crate::rows::grouped;
 use crate::settings::{Run, Sensor, SettingsFile};
 
@@ -27,15 +27,20 @@ pub const RECORDING: &[&str] = &[
 ];
 
 impl Given {
-    /// The options, of which the width is that of a bin of the recording, then the file, of which it
-    /// is that of a bin that is used.
+    /// What holds for a recording: the options, then the file.
     ///
     /// # Errors
     /// What is wrong with these.
     pub fn merged_for_recording(&self) -> Result<SettingsFile> {
+        self.for_recording_over(self.read()?)
+    }
+
+    /// The options, of which the width is that of a bin of the recording, then `file`, of which it
+    /// is that of a bin that is used.
+    pub(super) fn for_recording_over(&self, file: SettingsFile) -> Result<SettingsFile> {
         let mut options = self.options.clone();
         let width = options.sensor.bin_width_ps.take();
-        let mut merged = self.over_file(options)?;
+        let mut merged = options.or(file);
         ensure!(
             self.options.run.rebin.is_none()
                 || width.is_some()
@@ -98,7 +103,7 @@ impl Given {
         match self.length().filter(|_| known.is_list) {
             Some(key) => Err(Refused::new(
                 key,
-                format!("is for histograms; {input} holds photons"),
+                format!("is for histograms; {} holds photons", plain(input)),
             )),
             None => Ok(()),
         }

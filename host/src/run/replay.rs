@@ -1,5 +1,7 @@
 //! Recorded photons or histograms, ready for the engine.
 
+use std::path::PathBuf;
+
 use anyhow::{Context, Result, ensure};
 
 use super::given::{FRAME, Given, SENSOR};
@@ -33,6 +35,10 @@ impl options::Options for Options {
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         self.given.set(key, text)
+    }
+
+    fn file(&mut self, key: &str) -> Option<&mut Option<PathBuf>> {
+        self.given.file(key)
     }
 
     fn check(&self) -> Result<(), Refused> {

@@ -1,5 +1,7 @@
 //! A scene on an array, ready to be simulated.
 
+use std::path::PathBuf;
+
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::U16F16;
 
@@ -37,6 +39,10 @@ impl options::Options for Options {
             key => self.given.set(key, text)?,
         }
         Ok(())
+    }
+
+    fn file(&mut self, key: &str) -> Option<&mut Option<PathBuf>> {
+        self.given.file(key)
     }
 
     fn check(&self) -> Result<(), Refused> {

@@ -6,7 +6,7 @@ mod window;
 use std::fmt::Write as _;
 
 use crate::numbers::{MOST_WHOLE, bins, positive, shortest, whole};
-use crate::options::{self, Refused, named};
+use crate::options::{self, NO_OPTION, Refused, named};
 use crate::rows::significant;
 use crate::settings::RuleName;
 use crate::simulate::MM_PER_PS;
@@ -123,7 +123,8 @@ impl options::Options for Options {
             "x" => self.x = whole(1..=u16::MAX)(text)?,
             "min_count" => self.min_count = whole(1..=1023)(text)?,
             "binning" => self.binning = whole(0..=BlockLevel::MAX.raw())(text)?,
-            _ => self.seed = whole(0..=MOST_WHOLE)(text)?,
+            "seed" => self.seed = whole(0..=MOST_WHOLE)(text)?,
+            _ => return Err(NO_OPTION.to_owned()),
         }
         Ok(())
     }
@@ -134,6 +135,20 @@ impl options::Options for Options {
             self.false_alarms_per_second.is_some(),
             self.false_alarm.is_some(),
         );
+        let missing = [
+            (self.background.is_none(), "`background`"),
+            (!signal && self.snr.is_none(), "`signal` or `snr`"),
+            (
+                !sigma && self.sigma_ps.is_none(),
+                "`sigma_bins` or `sigma_ps`",
+            ),
+        ];
+        let missing = missing.iter().filter(|(is_missing, _)| *is_missing);
+        let missing: Vec<&str> = missing.map(|(_, keys)| *keys).collect();
+        if missing.len() > 1 {
+            let reason = format!("{} are needed", missing.join(", "));
+            return Err(Refused::input(reason));
+        }
         let refused = [
             (self.background.is_none(), "background", "is needed"),
             (

@@ -12,7 +12,7 @@ use serde::ser::{Error as _, Serializer};
 
 use super::sections::{decimal, first_of};
 use crate::numbers::{fixed, real, shortest, truth, whole};
-use crate::options::{Named, Refused, named};
+use crate::options::{NO_OPTION, Named, Refused, named};
 
 /// What is not given has its default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -160,7 +160,7 @@ impl Detection {
             "tracking" => self.tracking = Some(truth(text)?),
             "echoes" => self.echoes = Some(whole(1..=EchoNumber::LAST.raw())(text)?),
             "echo_wait" => self.echo_wait = Some(whole(2..=u8::MAX - 1)(text)?),
-            _ => return Err("no option of detection".to_owned()),
+            _ => return Err(NO_OPTION.to_owned()),
         }
         Ok(())
     }

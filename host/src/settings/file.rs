@@ -10,7 +10,7 @@ use serde::Serialize;
 use toml::{Table, Value};
 
 use super::{Detection, Rays, Run, Sensor};
-use crate::options::{self, GivenByFile, Refused};
+use crate::options::{self, GivenByFile, NO_OPTION, Refused};
 
 /// The first line of every file that this program writes.
 pub(crate) const MARK: &str = "# dtof settings";
@@ -92,6 +92,18 @@ const SECTIONS: [(&str, &[(&str, &str)]); 4] = [
     ),
 ];
 
+/// The keys whose values are lists.
+const LISTS: [&str; 5] = [
+    "gate",
+    "masked",
+    "glass_bins",
+    "half_widths",
+    "field_of_view_degrees",
+];
+
+/// The keys whose values are texts.
+const TEXTS: [&str; 5] = ["rule", "estimator", "calibration", "axes", "array"];
+
 /// A settings file, or what the command line says of the same. All of it may be missing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SettingsFile {
@@ -167,13 +179,33 @@ impl SettingsFile {
                     }
                     .into());
                 }
-                let value = text_of(value);
-                let set = file.set(key, &value);
-                set.map_err(|reason| Refused::value(key, &value, reason))?;
+                // Lists that are empty give nothing.
+                if value.as_array().is_none_or(|list| !list.is_empty()) {
+                    file.set_value(key, value)?;
+                }
             }
         }
         file.check()?;
         Ok(file)
+    }
+
+    /// Sets a key to a value of a file.
+    fn set_value(&mut self, key: &str, value: &Value) -> Result<(), Refused> {
+        let text = text_of(value);
+        let refused = |reason| Refused::value(key, &text, reason);
+        let list = value.as_array();
+        let is_text = value.is_str() || list.is_some_and(|list| list.iter().any(Value::is_str));
+        match (LISTS.contains(&key), list) {
+            (true, None) => return Err(refused("must be a list".to_owned())),
+            (false, Some(_)) => return Err(refused("must be one value".to_owned())),
+            _ => {}
+        }
+        self.set(key, &text).map_err(refused)?;
+        match (TEXTS.contains(&key), is_text) {
+            (true, false) => Err(refused("must stand in quotes".to_owned())),
+            (false, true) => Err(refused("must not stand in quotes".to_owned())),
+            _ => Ok(()),
+        }
     }
 
     /// Sets a key of any section.
@@ -185,7 +217,8 @@ impl SettingsFile {
             Some("sensor") => self.sensor.set(key, text),
             Some("detection") => self.detection.set(key, text),
             Some("rays") => self.rays.set(key, text),
-            _ => self.run.set(key, text),
+            Some(_) => self.run.set(key, text),
+            None => Err(NO_OPTION.to_owned()),
         }
     }
 
@@ -230,25 +263,27 @@ impl SettingsFile {
         if sigma.is_some() && sigma != other.sensor.sigma_bins {
             other.detection.half_widths = None;
         }
-        // A number that is none, and so no key, has no text either.
-        let own = self.keys().unwrap_or_default();
-        let file = other.file.map(|file| GivenByFile {
-            keys: &file.keys - &own,
-            ..file
-        });
+        let (file, own) = (other.file.take(), self.keys());
         // A field of view replaces a calibration, and the other way round.
         let rays = if self.rays == Rays::default() {
             other.rays
         } else {
             self.rays
         };
-        Self {
+        let mut merged = Self {
             sensor: self.sensor.or(other.sensor),
             detection: self.detection.or(other.detection),
             rays,
             run: self.run.or(other.run),
-            file: self.file.or(file),
+            file: self.file,
+        };
+        // Of the file are keys that no option has set, nor dropped.
+        if let (None, Some(mut file), Ok(own), Ok(all)) = (&merged.file, file, own, merged.keys()) {
+            file.keys
+                .retain(|key| all.contains(key) && !own.contains(key));
+            merged.file = Some(file);
         }
+        merged
     }
 
     /// Without what holds for one recording alone.
@@ -284,6 +319,15 @@ impl SettingsFile {
     }
 }
 
+impl From<Run> for SettingsFile {
+    fn from(run: Run) -> Self {
+        Self {
+            run,
+            ..Self::default()
+        }
+    }
+}
+
 /// The section in which a key stands.
 fn section_of(key: &str) -> Option<&'static str> {
     let has_key = |(_, keys): &&(_, &[(&str, _)])| keys.iter().any(|(known, _)| *known == key);
@@ -296,7 +340,11 @@ fn text_of(value: &Value) -> String {
         Value::String(text) => text.clone(),
         Value::Float(number) => number.to_string(),
         Value::Array(values) => {
-            let texts: Vec<String> = values.iter().map(text_of).collect();
+            let element = |value: &Value| match value {
+                Value::Array(_) => value.to_string(),
+                value => text_of(value),
+            };
+            let texts: Vec<String> = values.iter().map(element).collect();
             texts.join(",")
         }
         value => value.to_string(),
@@ -485,10 +533,26 @@ rebin = 2
                 "[sensor]\none_hit_tdc = 1",
                 "one_hit_tdc 1: must be true or false",
             ),
+            ("[sensor]\ngate = 3", "gate 3: must be a list"),
+            ("[sensor]\ngate = [3]", "gate 3: must be FIRST..LAST"),
             (
-                "[sensor]\nglass_bins = [[1]]\ngate = 3",
-                "gate 3: must be FIRST..LAST",
+                "[sensor]\ngate = [[3], [9]]",
+                "gate [3],[9]: must be FIRST..LAST",
             ),
+            ("[sensor]\nmasked = 3", "masked 3: must be a list"),
+            ("[sensor]\nmasked = ['']", "masked : must be a whole number"),
+            (
+                "[sensor]\nmasked = ['3']",
+                "masked 3: must not stand in quotes",
+            ),
+            (
+                "[sensor]\nmasked = [1, 70000, 3]",
+                "masked 1,70000,3: 70000 must be a whole number from 0 to 65535",
+            ),
+            ("[sensor]\nbins = [8]", "bins 8: must be one value"),
+            ("[detection]\nl1 = '40'", "l1 40: must not stand in quotes"),
+            ("[detection]\nrule = true", "rule true: must be paper"),
+            ("[run]\narray = 5", "array 5: must stand in quotes"),
             (
                 "[run]\naxes = 'rows'",
                 "axes rows: one axis must be the bins",

@@ -14,7 +14,7 @@ use crate::input::axes::Axes;
 use crate::numbers::{
     MOST_WHOLE, bins, fixed, list, positive, real, shortest, truth, whole, within,
 };
-use crate::options::Refused;
+use crate::options::{NO_OPTION, Refused};
 
 /// Each field of `$these`, or that of `$others`.
 macro_rules! first_of {
@@ -97,23 +97,7 @@ impl Sensor {
         )
     }
 
-    /// The keys of the section.
-    pub const KEYS: &'static [&'static str] = &[
-        "laser_hz",
-        "columns",
-        "bins",
-        "bin_width_ps",
-        "offset_mm",
-        "gate",
-        "masked",
-        "sigma_bins",
-        "one_hit_tdc",
-        "background",
-        "glass",
-        "glass_bins",
-    ];
-
-    /// Sets one of [`Self::KEYS`].
+    /// Sets a key of the section.
     ///
     /// # Errors
     /// Why it cannot be so.
@@ -132,7 +116,7 @@ impl Sensor {
             "background" => self.background = Some(rate(text)?),
             "glass" => self.glass = Some(rate(text)?),
             "glass_bins" => self.glass_bins = Some(list(text, &[','], rate)?),
-            _ => return Err("no option of a sensor".to_owned()),
+            _ => return Err(NO_OPTION.to_owned()),
         }
         Ok(())
     }
@@ -161,10 +145,7 @@ fn pulse(sigma: U8F8) -> Result<U8F8, String> {
 }
 
 impl Rays {
-    /// The keys of the section.
-    pub const KEYS: &'static [&'static str] = &["field_of_view_degrees", "calibration"];
-
-    /// Sets one of [`Self::KEYS`].
+    /// Sets a key of the section.
     ///
     /// # Errors
     /// Why it cannot be so.
@@ -178,7 +159,7 @@ impl Rays {
                 self.field_of_view_degrees = Some(angles);
             }
             "calibration" => self.calibration = Some(text.to_owned()),
-            _ => return Err("no option of rays".to_owned()),
+            _ => return Err(NO_OPTION.to_owned()),
         }
         Ok(())
     }
@@ -206,19 +187,7 @@ impl Run {
         )
     }
 
-    /// The keys of the section.
-    pub const KEYS: &'static [&'static str] = &[
-        "cycles",
-        "seed",
-        "photons_per_cycle",
-        "recorded_cycles",
-        "frame",
-        "axes",
-        "array",
-        "rebin",
-    ];
-
-    /// Sets one of [`Self::KEYS`].
+    /// Sets a key of the section.
     ///
     /// # Errors
     /// Why it cannot be so.
@@ -232,7 +201,7 @@ impl Run {
             "axes" => self.axes = Some(text.parse()?),
             "array" => self.array = Some(text.to_owned()),
             "rebin" => self.rebin = Some(whole(1..=512)(text)?),
-            _ => return Err("no option of a run".to_owned()),
+            _ => return Err(NO_OPTION.to_owned()),
         }
         Ok(())
     }
@@ -266,15 +235,6 @@ pub(super) fn decimal<T: Fixed + FromStr, S: Serializer>(
         Some(number) => {
             let shortest = shortest(*number).parse().map_err(S::Error::custom)?;
             serializer.serialize_f64(shortest)
-        }
-    }
-}
-
-impl From<Run> for super::SettingsFile {
-    fn from(run: Run) -> Self {
-        Self {
-            run,
-            ..Self::default()
         }
     }
 }

@@ -123,6 +123,10 @@ fn what_contradicts_the_file_is_refused() {
     scratch.file("mask.toml", "[sensor]\nmasked = [4]\n");
     scratch.file("l2.toml", "[detection]\nl2 = 20\nfalse_alarm = 1e-5\n");
     scratch.file("list.toml", "[run]\naxes = 'rows,bins'\n");
+    scratch.file(
+        "z4.toml",
+        "[detection]\nrule = 'window'\nwindow = 3\nz = 4.0\n",
+    );
     scratch.file("width.toml", "[sensor]\nbin_width_ps = 100.0\n");
     let window = "--settings l2.toml --l2 2000 --rule window --window 3";
     scratch.all_refused(
@@ -137,6 +141,11 @@ fn what_contradicts_the_file_is_refused() {
             {window} --l1 3000 | error: --l2 2000: must be greater than --l1 3000
             --settings width.toml --bin-width-ps 0 | error: --bin-width-ps 0: with --offset-mm 0:
             --l1 4 --l1 5 | error: --l1 is given twice
+            --masked 3 | error: --masked is unknown; is it --mask?
+            --mask 1,2,x,4 | error: --mask 1,2,x,4: x must be a whole number from 0 to 65535
+            --rule= | error: --rule needs a value
+            --alpha -x | error: --alpha -x: must be a number from 0 to 255.996
+            --settings z4.toml --false-alarm 1e-30 | error: --false-alarm 0.000000000000000000000000000001: there is no z
             --settings list.toml | error: list.toml: axes is for arrays of histograms"
         ),
     );
@@ -144,4 +153,40 @@ fn what_contradicts_the_file_is_refused() {
         "compare --scene scene.toml --out out --cycles 100",
         "--settings gate.toml | error: scene.toml: gate.toml: gate 100..200: with 128 bins",
     );
+}
+
+/// The width of an option is that of a bin of the recording, that of a file of a bin that is used.
+#[test]
+fn a_width_and_rebin_are_those_of_one_place_for_every_command() {
+    let scratch = Scratch::new();
+    photons(&scratch);
+    scratch.file("width.toml", "[sensor]\nbin_width_ps = 100.0\n");
+    scratch.file("rebin.toml", "[run]\nrebin = 2\n");
+    let replay = "replay --input photons.csv --columns 2 --cycles 100 --out out";
+    let calibrate = "calibrate --input photons.csv --columns 2 --out found.toml";
+    for command in [replay, calibrate] {
+        let refused = "error: --rebin is for other bins than those of the settings file";
+        scratch.all_refused(
+            command,
+            &format!("--settings width.toml --rebin 2 | {refused}"),
+        );
+    }
+    for command in [replay, calibrate] {
+        scratch.printed(&format!(
+            "{command} --settings rebin.toml --bin-width-ps 100 --offset-mm -.5"
+        ));
+    }
+    for file in ["out/dtof.toml", "found.toml"] {
+        let settings = dtof::settings::SettingsFile::read(&scratch.path(file)).unwrap();
+        assert_eq!(
+            settings.sensor.bin_width_ps.map(f64::from),
+            Some(200.0),
+            "{file}"
+        );
+        assert_eq!(
+            settings.sensor.offset_mm.map(f64::from),
+            Some(-0.5),
+            "{file}"
+        );
+    }
 }

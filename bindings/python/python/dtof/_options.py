@@ -16,14 +16,15 @@ Given = list[tuple[str, str]]
 
 
 def arguments(options: dict[str, Any]) -> Given:
-    """Options as texts, less those that are ``None``."""
-    return [(key, _text(key, value)) for key, value in options.items() if value is not None]
+    """Options as texts, less those that are ``None`` and an empty mask."""
+    given = [(key, _text(key, value)) for key, value in options.items() if value is not None]
+    return [(key, text) for key, text in given if text or key not in ("mask", "laser_off")]
 
 
 def flags(given: Given) -> list[str]:
     """The same for the command line, less the settings file, in order."""
     others = [(key.replace("_", "-"), text) for key, text in given if key != "settings"]
-    return sorted(f"--{name}={text}" for name, text in others)
+    return sorted("--laser-off" if name == "laser-off" else f"--{name}={text}" for name, text in others)
 
 
 def settings_file(value: Any) -> str:
@@ -38,6 +39,8 @@ def _text(key: str, value: Any) -> str:
         return settings_file(value)
     if key == "mask" and getattr(value, "dtype", None) == bool:
         raise Error("mask: must be addresses of pixels, as numpy.flatnonzero gives them")
+    if key == "laser_off":
+        return "true" if value else ""
     if key == "glass" and isinstance(value, (bool, numpy.bool_)):
         return "yes" if value else "no"
     if isinstance(value, (bool, numpy.bool_)):

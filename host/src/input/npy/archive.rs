@@ -11,7 +11,7 @@ use zip::ZipArchive;
 use super::header::Array;
 use super::histograms::{Histograms, of_array};
 use crate::input::axes::Axes;
-use crate::options::Refused;
+use crate::options::{Refused, plain};
 
 /// Reads the histograms of the array `name`; a single array needs no name.
 ///
@@ -40,7 +40,8 @@ fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histogr
         (None, several) => {
             let several = several.len();
             bail!(Refused::input(format!(
-                "{several} arrays: choose one with `array`: {list}"
+                "{several} arrays: choose one with `array`: {}",
+                plain(list)
             )));
         }
     };

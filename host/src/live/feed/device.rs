@@ -8,7 +8,9 @@ use dtof_link::DynamicDepth;
 
 use super::session::{Given, Session, starts_again};
 use super::{Command, Wish, Work, reply};
+use crate::cli;
 use crate::device::{Client, HostTimeout, Port, Stopped};
+use crate::options;
 use crate::settings::SettingsFile;
 
 /// A device that is gone is looked for so often.
@@ -64,23 +66,26 @@ impl Device {
                     None => format!("{name}: its sensor may run for {timeout} more"),
                 }));
             }
-            let reason = match kept {
-                Ok(()) => format!("{ended:#}"),
-                Err(kept) => format!("{ended:#}; {kept:#}"),
+            let of = |ended: String| match &kept {
+                Ok(()) => ended,
+                Err(kept) => format!("{ended}; {kept:#}"),
             };
+            // The page shows keys, the terminal flags.
+            let on_terminal = of(options::line(&ended, &cli::flag));
+            let reason = of(format!("{ended:#}"));
             if let Some(command) = sessions.wished.take() {
                 reply(command.answer, Err(anyhow!("{reason}")));
             }
             let state = if stopped.is_some() { "stopped" } else { "gone" };
-            let reason = if sessions.any {
-                starts_again(&reason)
-            } else {
-                reason
+            let hint = |reason: String| match sessions.any {
+                true => starts_again(&reason),
+                false => reason,
             };
+            let (reason, on_terminal) = (hint(reason), hint(on_terminal));
             work.hub.connection(state, &reason);
-            if told != reason {
-                work.complain(&reason);
-                told.clone_from(&reason);
+            if told != on_terminal {
+                work.complain(&on_terminal);
+                told = on_terminal;
             }
             sessions.wished = self.wait(work, &reason, sessions.any);
         }
