@@ -78,7 +78,7 @@ def test_arrays_that_are_none(array):
     ({"alpha": 300}, ["alpha 300: must be a number from 0 to 255.996"]),
     ({"alpha": numpy.nan}, ["alpha nan: "]),
     ({"alpha": "many"}, ["alpha many: "]),
-    ({"alpha": []}, ["alpha : "]),
+    ({"alpha": []}, ["alpha needs a value"]),
     ({"alpha": None, "nonsense": 3}, ["nonsense is unknown"]),
     ({"z": 4, "false_alarm": 0.01, "rule": "window", "sigma_bins": 1}, ["z cannot be used with false_alarm"]),
     ({"rule": "best"}, ["best", "paper"]),
@@ -178,7 +178,7 @@ def test_files_that_cannot_be(tmp_path):
     refused(lambda: dtof.simulate("surfaces = 3\n\n"), "the scene")
     refused(lambda: dtof.compare(), "a recording or a scene is needed")
     refused(lambda: dtof.compare(GOOD, scene="x.toml"))
-    refused(lambda: dtof.tune(), "background is needed")
+    refused(lambda: dtof.tune(), "background, signal or snr, sigma_bins or sigma_ps are needed")
 
 
 def test_events_that_cannot_be(tmp_path):
