@@ -3,8 +3,8 @@
 use std::fs;
 use std::io::Cursor;
 
-use dtof::events::aer_file::{Reader, Writer};
-use dtof::export::{Format, Options, export};
+use dtof_events::aer_file::{Reader, Writer};
+use dtof_export::{Format, Options, export};
 
 use crate::{folder, is_one_line};
 

@@ -2,8 +2,8 @@
 
 use std::fs;
 
-use dtof::input::medium::Medium;
-use dtof::input::open::{Opening, counts, open};
+use dtof_photons::medium::Medium;
+use dtof_photons::open::{Opening, counts, open};
 
 use crate::{Input, folder, is_one_line};
 

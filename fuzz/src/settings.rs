@@ -2,10 +2,10 @@
 
 use std::fs;
 
-use dtof::geometry::Rays;
-use dtof::input::source::Geometry;
-use dtof::settings::SettingsFile;
-use dtof::simulate::scene::Scene;
+use dtof_photons::geometry::Rays;
+use dtof_photons::source::Geometry;
+use dtof_engine::settings::SettingsFile;
+use dtof_simulate::scene::Scene;
 
 use crate::{folder, is_one_line};
 

@@ -17,7 +17,7 @@ from browser import Report, check
 from pixels import chooses_pixels, maps_time, opened, plays_a_move, shows_a_pixel, shows_few
 
 MOST_BYTES = 5_000_000
-SCRIPTS = Path(__file__).parent.parent.parent / "host/src/report"
+SCRIPTS = Path(__file__).parent.parent.parent / "host/report/src"
 
 
 def turns(report):

@@ -197,21 +197,38 @@ fn a_planted_circle_of_files_or_of_folders_is_found() {
     );
 }
 
-/// The library `dtof` and Python read options by key and text; flags are the program's.
+/// All packages that `package` is built with on this computer, and itself.
+fn built_with(package: &str) -> BTreeSet<String> {
+    let output = Command::new(env!("CARGO"))
+        .current_dir(root())
+        .args(["tree", "--locked", "--edges", "normal", "--prefix", "none"])
+        .args(["--format", "{p}", "--package", package])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "cargo tree: {output:?}");
+    let lines = String::from_utf8(output.stdout).unwrap();
+    let names = lines.lines().filter_map(|line| line.split(' ').next());
+    names.map(str::to_owned).collect()
+}
+
+/// What belongs to the program or to the live page. Libraries and Python read options by key and
+/// text, and are installed without them.
+const OF_THE_PROGRAM: [&str; 5] = ["clap", "hyper", "indicatif", "serialport", "tungstenite"];
+
 #[test]
-fn only_the_program_knows_the_parser_of_flags() {
-    let source = root().join("host/src");
-    let mut with_parser = modules::files(&source);
-    with_parser.extend(modules::files(&root().join("bindings/python/src")));
-    let all = with_parser.len();
-    with_parser.retain(|(_, text)| text.contains("clap::"));
-    assert!(all > 200 && !with_parser.is_empty(), "{all} files");
-    for (path, _) in with_parser {
-        let of_program = ["command", "cli", "main.rs"].map(|place| source.join(place));
-        assert!(
-            of_program.iter().any(|place| path.starts_with(place)),
-            "{}",
-            path.display()
-        );
+fn libraries_and_python_do_without_what_only_the_program_needs() {
+    let of_program = OF_THE_PROGRAM.map(str::to_owned);
+    let used = |package| {
+        let all = built_with(package);
+        let used = of_program.iter().filter(|name| all.contains(*name));
+        used.cloned().collect::<Vec<_>>()
+    };
+    for package in ["dtof-python", "dtof-run", "dtof-calibrate", "dtof-compare"] {
+        assert_eq!(used(package), [""; 0], "{package}");
     }
+    assert_eq!(used("dtof-device"), ["serialport"]);
+    assert_eq!(used("dtof-live"), ["hyper", "serialport"]);
+    let mut with_foxglove = used("dtof");
+    with_foxglove.retain(|name| name != "tungstenite");
+    assert_eq!(with_foxglove, ["clap", "hyper", "indicatif", "serialport"]);
 }

@@ -4,14 +4,14 @@
 mod calibration;
 
 use calibration::{recorded, slices};
-use dtof::calibrate::{
+use dtof_calibrate::{
     Asked, Calibration, Change, Length, Nearest, Observed, RunPhotons, calibrate, glass_change,
 };
-use dtof::engine::host::host_engine;
-use dtof::input::recorded::Capture;
-use dtof::input::source::PhotonSource;
-use dtof::settings::SettingsFile;
-use dtof::simulate::scene::Scene;
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::SettingsFile;
+use dtof_photons::recorded::Capture;
+use dtof_photons::source::PhotonSource;
+use dtof_simulate::scene::Scene;
 
 /// A wall 37.5 mm a bin away, two nearer surfaces, and the glass.
 fn scene(background: f64, glass: f64, more: &str) -> Scene {
@@ -195,10 +195,10 @@ fn a_glass_that_got_brighter_is_flagged_and_nothing_else_is() {
     // A hundred laser cycles of one pixel's share say nothing.
     let dim = scene(0.2, 0.05, "");
     let settings = SettingsFile {
-        sensor: dtof::settings::Sensor {
+        sensor: dtof_engine::settings::Sensor {
             glass_bins: Some(vec![0.0, 0.0, 0.001, 0.01, 0.02, 0.015, 0.004]),
             gate: Some((8, 127)),
-            ..dtof::settings::Sensor::default()
+            ..dtof_engine::settings::Sensor::default()
         },
         ..SettingsFile::default()
     };

@@ -4,8 +4,8 @@
 mod calibration;
 
 use calibration::recorded;
-use dtof::calibrate::{Asked, Calibration, Length, Observed, Tdc, calibrate};
-use dtof::simulate::scene::Scene;
+use dtof_calibrate::{Asked, Calibration, Length, Observed, Tdc, calibrate};
+use dtof_simulate::scene::Scene;
 
 fn found(background: f64, more: &str, length: impl Fn(u64) -> Length) -> Calibration {
     let text = format!(

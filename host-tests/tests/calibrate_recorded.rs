@@ -4,14 +4,14 @@
 mod capture_log;
 
 use capture_log::{ground_truth, log, tell};
-use dtof::calibrate::{Asked, Calibration, Length, Nearest, Observed, calibrate};
-use dtof::engine::host::host_engine;
-use dtof::input::open::{Opening, counts};
-use dtof::input::recorded::{Capture, RecordedHistograms, RecordingLength};
-use dtof::input::source::{Geometry, PhotonSource, Slice};
-use dtof::settings::SettingsFile;
+use dtof_calibrate::{Asked, Calibration, Length, Nearest, Observed, calibrate};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U8F8;
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::SettingsFile;
+use dtof_photons::open::{Opening, counts};
+use dtof_photons::recorded::{Capture, RecordedHistograms, RecordingLength};
+use dtof_photons::source::{Geometry, PhotonSource, Slice};
 
 const ZONES: usize = 9;
 const CENTRE: usize = 4;
@@ -155,7 +155,7 @@ fn a_recording_with_distances_calibrates_itself() {
         assert!(photons <= 13.1, "{photons}");
         assert!(error <= 3.0, "{error}");
     }
-    let mm_per_bin = found.bin_width_ps * dtof::simulate::MM_PER_PS;
+    let mm_per_bin = found.bin_width_ps * dtof_simulate::MM_PER_PS;
     let ideal = ideal_error(&counts.captures, &truth, mm_per_bin);
     tell(&format!(
         "an ideal estimator: {ideal:.2} mm from 13 photons"

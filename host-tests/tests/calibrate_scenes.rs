@@ -5,7 +5,7 @@
 mod calibration;
 
 use calibration::{Drawn, false_alarms};
-use dtof::calibrate::{Asked, Length, Nearest, Observed, calibrate};
+use dtof_calibrate::{Asked, Length, Nearest, Observed, calibrate};
 use rayon::prelude::*;
 
 const SCENES: u64 = 20;

@@ -3,20 +3,20 @@
 
 use std::path::Path;
 
-use dtof::compare::Figures;
-use dtof::compare::answer::answer;
-use dtof::compare::bound::Bound;
-use dtof::compare::cost;
-use dtof::compare::measure::{Outcome, Trial};
-use dtof::compare::method::{Kind, Method, Rule};
-use dtof::compare::stress::{Light, Stress, Stressed};
-use dtof::compare::thresholds::Thresholds;
-use dtof::engine::host::host_engine;
-use dtof::engine::settings::Settings;
-use dtof::input::source::PhotonSource;
-use dtof::settings::SettingsFile;
-use dtof::simulate::scene::Scene;
+use dtof_compare::Figures;
+use dtof_compare::answer::answer;
+use dtof_compare::bound::Bound;
+use dtof_compare::cost;
+use dtof_compare::measure::{Outcome, Trial};
+use dtof_compare::method::{Kind, Method, Rule};
+use dtof_compare::stress::{Light, Stress, Stressed};
+use dtof_compare::thresholds::Thresholds;
 use dtof_core::fixed::types::U8F8;
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::Settings;
+use dtof_engine::settings::SettingsFile;
+use dtof_photons::source::PhotonSource;
+use dtof_simulate::scene::Scene;
 use dtof_theory::bounds::likelihood_ratio::information;
 
 /// The count of an operation of a table of instructions at opt-level 3.

@@ -1,11 +1,11 @@
 //! Twenty scenes drawn at random: the method that a comparison names is within a tenth of the
 //! fastest on other photons of the same scene, too.
 
-use dtof::compare::truth::Truth;
-use dtof::compare::{Comparison, Task, compare};
-use dtof::input::source::PhotonSource;
-use dtof::settings::SettingsFile;
-use dtof::simulate::scene::Scene;
+use dtof_compare::truth::Truth;
+use dtof_compare::{Comparison, Task, compare};
+use dtof_engine::settings::SettingsFile;
+use dtof_photons::source::PhotonSource;
+use dtof_simulate::scene::Scene;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;

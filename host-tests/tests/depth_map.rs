@@ -4,14 +4,14 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use dtof::engine::host::host_engine;
-use dtof::engine::settings::{AdaptiveBinning, Settings};
-use dtof::events::reports::LastReports;
-use dtof::input::source::{Geometry, PhotonSource};
-use dtof::run::truth::Comparison;
-use dtof::simulate::scene::{self, Along, DepthMap, Scene};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{BlockLevel, Count, DepthEvent, PixelAddress, RangeGate, WindowRule, z_for_levels};
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::{AdaptiveBinning, Settings};
+use dtof_events::reports::LastReports;
+use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_run::truth::Comparison;
+use dtof_simulate::scene::{self, Along, DepthMap, Scene};
 
 /// Where it is; says so if it is nowhere.
 fn vgroove() -> Option<PathBuf> {

@@ -7,17 +7,17 @@
 
 use std::collections::BTreeMap;
 
-use dtof::engine::host::host_engine;
-use dtof::engine::settings::Settings;
-use dtof::input::source::PhotonSource as _;
-use dtof::simulate::scene::{self, Scene};
 use dtof_core::fixed::types::U4F12;
 use dtof_core::{
     AnyRule, BlockLevel, Count, DepthEvent, EchoNumber, Flags, PixelConfig, RangeGate, WindowRule,
     z_for_levels,
 };
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::Settings;
 use dtof_host_tests::reference::{BinnedArray, EchoConfig, Reporter, Window};
 use dtof_link::AdaptiveBinning;
+use dtof_photons::source::PhotonSource as _;
+use dtof_simulate::scene::{self, Scene};
 
 const BINS: usize = 128;
 

@@ -9,17 +9,34 @@ use std::process::Command;
 use serde_json::Value;
 
 /// In the order in which they are published.
-const PUBLISHED: [&str; 6] = [
+const PUBLISHED: [&str; 18] = [
     "dtof-core",
     "dtof-draw",
     "dtof-link",
     "dtof-sensors",
     "dtof-theory",
+    "dtof-options",
+    "dtof-photons",
+    "dtof-engine",
+    "dtof-simulate",
+    "dtof-events",
+    "dtof-export",
+    "dtof-report",
+    "dtof-calibrate",
+    "dtof-compare",
+    "dtof-device",
+    "dtof-run",
+    "dtof-live",
     "dtof",
 ];
 
+/// Crates of the host have an example in their README alone.
+fn is_of_host(package: &Value) -> bool {
+    folder(package).parent().unwrap().ends_with("host")
+}
+
 /// The most that a package may hold, in bytes before it is compressed.
-const MOST_BYTES: u64 = 1_250_000;
+const MOST_BYTES: u64 = 500_000;
 
 fn root() -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
@@ -76,10 +93,10 @@ fn lacking(package: &Value) -> Vec<&'static str> {
         ("categories", (1..=5).contains(&count("categories"))),
         ("keywords", (1..=5).contains(&count("keywords"))),
         ("library", builds("lib")),
-        ("example", builds("example")),
+        ("example", is_of_host(package) || builds("example")),
         (
-            "README of 150 to 350 words",
-            (150..=350).contains(&readme.split_whitespace().count()),
+            "README of 100 to 350 words",
+            (100..=350).contains(&readme.split_whitespace().count()),
         ),
         ("compiled example in it", readme.contains("\n```rust\n")),
         ("README without ways out of it", !readme.contains("](")),
@@ -209,7 +226,7 @@ fn a_package_is_small_and_compiles_in_what_is_packed_only() {
             );
         }
         let has_example = files.iter().any(|file| file.starts_with("examples"));
-        assert!(has_example, "{}", package["name"]);
+        assert!(has_example || is_of_host(package), "{}", package["name"]);
         // Cargo makes some files itself.
         let there = files
             .iter()

@@ -7,13 +7,13 @@
 //! the two thresholds fires in integers alone. Wherever that is claimed the test
 //! proves it from the counts. With the average there is no root, and no difference.
 
-use dtof::simulate::SimulatedPixel;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AnyRule, AsyncPixel, AverageRule, Count, LaserCycle, Look, PaperRule, PixelAddress,
     PixelConfig, RangeGate, Statistics,
 };
 use dtof_host_tests::reference::{self, Background};
+use dtof_simulate::SimulatedPixel;
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 use rand_core::Rng;

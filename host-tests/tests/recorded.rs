@@ -6,15 +6,15 @@ mod capture_log;
 use std::path::PathBuf;
 
 use capture_log::{ground_truth, log, tell};
-use dtof::engine::host::host_engine;
-use dtof::engine::settings::Settings;
-use dtof::input::open::{Opening, counts};
-use dtof::input::recorded::{RecordedHistograms, RecordingLength};
-use dtof::input::source::PhotonSource;
-use dtof::input::tmf8820;
-use dtof::simulate::scene;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, PaperRule};
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::Settings;
+use dtof_photons::open::{Opening, counts};
+use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
+use dtof_photons::source::PhotonSource;
+use dtof_photons::tmf8820;
+use dtof_simulate::scene;
 
 const ZONES: usize = 9;
 const CENTRE: usize = 4;

@@ -7,18 +7,18 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use capture_log::{ground_truth, log, tell};
-use dtof::engine::host::host_engine;
-use dtof::engine::settings::Settings;
-use dtof::input::open::{Known, Opening, counts};
-use dtof::input::recorded::{RecordedHistograms, RecordingLength};
-use dtof::input::source::{Geometry, PhotonSource};
-use dtof::input::tmf8820;
-use dtof::simulate::scene;
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
     Count, Count16, EchoNumber, Flags, Histogram, LaserCycle, PixelAddress, PixelConfig, RangeGate,
     RangeScale, WindowRule, z_for,
 };
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::Settings;
+use dtof_photons::open::{Known, Opening, counts};
+use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
+use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_photons::tmf8820;
+use dtof_simulate::scene;
 use flate2::read::GzDecoder;
 
 const CYCLES: u16 = 20_000;

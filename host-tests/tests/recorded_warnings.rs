@@ -3,10 +3,10 @@
 mod capture_log;
 
 use capture_log::{log, tell};
-use dtof::input::open::{Opening, counts};
-use dtof::input::source::PhotonSource;
-use dtof::input::warnings::of_axes;
-use dtof::simulate::scene::Scene;
+use dtof_photons::open::{Opening, counts};
+use dtof_photons::source::PhotonSource;
+use dtof_photons::warnings::of_axes;
+use dtof_simulate::scene::Scene;
 use std::path::Path;
 
 /// The same numbers as if the bins were the first axis: a line a bin and row, of `columns`.

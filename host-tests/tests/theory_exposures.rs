@@ -1,12 +1,12 @@
 //! False alarms of whole exposures: the table against new simulations and
 //! against what lies between its points, and `tune` against the engine.
 
-use dtof::engine::host::host_engine;
-use dtof::engine::settings::Settings;
-use dtof::input::source::{Geometry, PhotonSource};
-use dtof::simulate::{SimulatedArray, SimulatedPixel, scene};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{BlockLevel, Count, DepthEvent, PaperRule, PixelAddress, Threshold};
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::Settings;
+use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_simulate::{SimulatedArray, SimulatedPixel, scene};
 use dtof_theory::counts::binomial::{alike, plausible};
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::looks::repeated_looks::{

@@ -25,7 +25,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    dtof::cli::run::<Cli>(|cli| match cli.command {
+    dtof::run::<Cli>(|cli| match cli.command {
         Command::Sweep(sweep) => sweep.run(),
         Command::Merge(merge) => merge.run(),
         Command::Figures(figures) => figures.run(),

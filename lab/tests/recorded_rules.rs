@@ -9,16 +9,16 @@ mod capture_log;
 use std::fmt::Write as _;
 
 use capture_log::{ground_truth, log, tell};
-use dtof::input::open::{Opening, counts};
-use dtof::input::recorded::{RecordedHistograms, RecordingLength};
-use dtof::input::source::{PhotonSource, Slice};
-use dtof::input::tmf8820::{self, BINS};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AnyRule, AsyncPixel, CentredWindow, DepthEstimator, LaserCycle, PixelAddress, PixelConfig,
     RangeScale, Statistics,
 };
 use dtof_lab::studies::methods::passage::{Ladder, Method, Passage, count_false};
+use dtof_photons::open::{Opening, counts};
+use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
+use dtof_photons::source::{PhotonSource, Slice};
+use dtof_photons::tmf8820::{self, BINS};
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::random::trial_rng;
 use dtof_theory::rates::Rates;

@@ -5,9 +5,9 @@ use std::io::{BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use dtof::events::aer_file::{Event, Reader, Writer};
-use dtof::files::{aside, place_of};
 use dtof_core::RangeScale;
+use dtof_events::aer_file::{Event, Reader, Writer};
+use dtof_options::files::{aside, place_of};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyByteArray;

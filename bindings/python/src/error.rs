@@ -4,7 +4,7 @@ use std::any::Any;
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use dtof::options::{self, Options, option_name};
+use dtof_options::{Options, option_name};
 use pyo3::exceptions::PyValueError;
 use pyo3::{PyErr, PyResult};
 
@@ -18,7 +18,7 @@ pyo3::create_exception!(
 /// The exception for an error.
 pub fn raised(error: &anyhow::Error) -> PyErr {
     let keyword = |key: &str| option_name(key).to_owned();
-    let line = options::line(error, &keyword);
+    let line = dtof_options::line(error, &keyword);
     let line: Vec<&str> = line.lines().collect();
     Error::new_err(line.join(" "))
 }
@@ -30,7 +30,7 @@ pub fn guarded<T>(job: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> 
 
 /// The options of a job, from keywords and their values as texts.
 pub fn options<O: Options>(keywords: Keywords) -> PyResult<O> {
-    checked(|| Ok(options::read(keywords)?))
+    checked(|| Ok(dtof_options::read(keywords)?))
 }
 
 /// Keywords and their values as texts.

@@ -1,16 +1,16 @@
 //! Depth events as records of an array, and back.
 
 use anyhow::{Context, Error, Result, ensure};
-use dtof::events::aer_file::{Event, Header};
-use dtof::events::events_csv::range_mm;
-use dtof::input::source::Geometry;
-use dtof::numbers::bins_of;
 use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
     BinIndex, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress,
     RangeScale, SubBinOffset,
 };
+use dtof_events::aer_file::{Event, Header};
+use dtof_events::events_csv::range_mm;
+use dtof_options::numbers::bins_of;
+use dtof_photons::source::Geometry;
 use pyo3::prelude::*;
 
 /// Bytes of a record: that of `dtof.EVENT`, little-endian, with gaps.

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use dtof::calibrate::{remarks, report};
-use dtof::input::medium::Medium;
-use dtof::rows::Row;
-use dtof::run::calibrate::{Calibrated, Options as CalibrateOptions};
-use dtof::run::compare::{Compared, Input, Options as CompareOptions, Told};
-use dtof::run::tune::Options as TuneOptions;
-use dtof::settings::SettingsFile;
+use dtof_calibrate::{remarks, report};
+use dtof_engine::settings::SettingsFile;
+use dtof_options::rows::Row;
+use dtof_photons::medium::Medium;
+use dtof_run::calibrate::{Calibrated, Options as CalibrateOptions};
+use dtof_run::compare::{Compared, Input, Options as CompareOptions, Told};
+use dtof_run::tune::Options as TuneOptions;
 use pyo3::prelude::*;
 use std::sync::Mutex;
 

@@ -1,10 +1,10 @@
 //! Recordings of every format as arrays.
 
 use anyhow::Result;
-use dtof::input::medium::Medium;
-use dtof::input::open::{Counts, counts};
-use dtof::run::recording::{opening, warnings};
-use dtof::run::replay::Options;
+use dtof_photons::medium::Medium;
+use dtof_photons::open::{Counts, counts};
+use dtof_run::recording::{opening, warnings};
+use dtof_run::replay::Options;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 

@@ -1,11 +1,11 @@
 //! What events say of each pixel, and where they are in space.
 
-use dtof::events::aer_file::Event;
-use dtof::events::echoes::{Echo, Selection};
-use dtof::events::maps::Maps;
-use dtof::export::{self, Projected};
-use dtof::settings::SettingsFile;
 use dtof_core::{EchoNumber, RangeScale};
+use dtof_engine::settings::SettingsFile;
+use dtof_events::aer_file::Event;
+use dtof_events::echoes::{Echo, Selection};
+use dtof_events::maps::Maps;
+use dtof_export::Projected;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyByteArray;
@@ -73,7 +73,7 @@ pub fn points<'py>(
         let header = array.header()?;
         let events = chosen(events(&records, &header)?, options.echo.or(Some(Echo::All)));
         let options = options.options(&SettingsFile::default())?;
-        export::points(&events, &header, &options)
+        dtof_export::points(&events, &header, &options)
     })?;
     Ok(PyByteArray::new(py, &points))
 }

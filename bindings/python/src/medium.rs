@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use dtof::input::medium::{Medium, NpyArray};
+use dtof_photons::medium::{Medium, NpyArray};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 

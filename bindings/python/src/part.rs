@@ -1,12 +1,12 @@
 //! Parts of a recording, replayed on several machines.
 
 use anyhow::{Result, ensure};
-use dtof::calibrate::RunPhotons;
-use dtof::input::recorded::Whole;
-use dtof::input::source::Geometry;
-use dtof::run::glass::brighter;
-use dtof::run::replay::Options;
-use dtof::settings::SettingsFile;
+use dtof_calibrate::RunPhotons;
+use dtof_engine::settings::SettingsFile;
+use dtof_photons::recorded::Whole;
+use dtof_photons::source::Geometry;
+use dtof_run::glass::brighter;
+use dtof_run::replay::Options;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 

@@ -1,12 +1,13 @@
 //! One pixel, step by step.
 
-use anyhow::{Context, Result, bail, ensure};
-use dtof::engine::settings::Settings;
-use dtof::options::{self, Refused};
-use dtof::run::given::Operation;
+use anyhow::{Context, Result, ensure};
 use dtof_core::{
     AnyRule, AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig, RangeScale, Statistics,
 };
+use dtof_engine::settings::Settings;
+use dtof_engine::with_bins;
+use dtof_options::Refused;
+use dtof_run::given::Operation;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
@@ -148,7 +149,7 @@ impl Pixel {
 
 impl Pixel {
     fn of(bins: usize, address: u16, keywords: Keywords) -> Result<Self> {
-        let options: Operation = options::read(keywords)?;
+        let options: Operation = dtof_options::read(keywords)?;
         let said = options.given.merged()?;
         let made = || {
             let settings = said.settings(bins)?;
@@ -178,15 +179,5 @@ impl Pixel {
 }
 
 fn steps(settings: &Settings, address: PixelAddress) -> Result<Box<dyn Steps>> {
-    match settings.bins {
-        8 => OfBins::<8>::boxed(settings, address),
-        16 => OfBins::<16>::boxed(settings, address),
-        32 => OfBins::<32>::boxed(settings, address),
-        64 => OfBins::<64>::boxed(settings, address),
-        128 => OfBins::<128>::boxed(settings, address),
-        256 => OfBins::<256>::boxed(settings, address),
-        512 => OfBins::<512>::boxed(settings, address),
-        1024 => OfBins::<1024>::boxed(settings, address),
-        bins => bail!("{bins} bins: must be a power of two from 8 to 1024"),
-    }
+    with_bins!(settings.bins, BINS => OfBins::<BINS>::boxed(settings, address))?
 }

@@ -9,12 +9,12 @@
 
 use std::fmt::Write as _;
 
-use dtof::calibrate::Calibration;
-use dtof::input::recorded::Capture;
-use dtof::input::source::{PhotonSource, Slice};
-use dtof::simulate::scene::Scene;
+use dtof_calibrate::Calibration;
 use dtof_core::fixed::types::U4F12;
 use dtof_core::{Count, DepthEstimator, Histogram, RangeGate, WindowRule, detect};
+use dtof_photons::recorded::Capture;
+use dtof_photons::source::{PhotonSource, Slice};
+use dtof_simulate::scene::Scene;
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::random::trial_rng;
 use dtof_theory::rates::{Rates, bin_share};
@@ -48,7 +48,7 @@ impl Drawn {
             [[4, 4], [8, 8], [16, 8], [16, 16], [32, 16]][between(0.0, 5.0) as usize];
         let pixels = columns * rows;
         let bin_width_ps = between(60.0, 500.0).round();
-        let mm_per_bin = bin_width_ps * dtof::simulate::MM_PER_PS;
+        let mm_per_bin = bin_width_ps * dtof_simulate::MM_PER_PS;
         let background = log(&mut between, 0.002, 0.3);
         let sigma = between(0.5, 1.6);
         // Some with hot pixels, which take most of the photons there are.

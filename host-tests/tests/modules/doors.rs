@@ -74,12 +74,12 @@ const WRITES: [&str; 13] = [
 const WRITERS: [&str; 8] = [
     "bindings/python/python/dtof/cluster/_folder.py",
     "bindings/python/src/aer.rs",
-    "host/src/compare/page.rs",
-    "host/src/device/monitor/recording.rs",
-    "host/src/export/mod.rs",
-    "host/src/files.rs",
-    "host/src/live/outputs.rs",
-    "host/src/run/output.rs",
+    "host/compare/src/page.rs",
+    "host/device/src/monitor/recording.rs",
+    "host/export/src/lib.rs",
+    "host/live/src/outputs.rs",
+    "host/options/src/files.rs",
+    "host/run/src/output.rs",
 ];
 
 fn root() -> PathBuf {
@@ -188,9 +188,11 @@ fn a_door_that_is_open_is_found() {
 #[test]
 fn results_are_written_in_a_few_places_only() {
     let mut all = Vec::new();
-    for folder in ["host/src", "bindings/python/src", "bindings/python/python"] {
+    for folder in ["host", "bindings/python/src", "bindings/python/python"] {
         files(&root().join(folder), &["rs", "py"], &mut all);
     }
+    // Tests and examples write what they read themselves.
+    all.retain(|(name, _)| !name.starts_with("host/cli/tests/") && !name.contains("/examples/"));
     let writes = |text: &str| WRITES.iter().any(|writes| text.contains(writes));
     let code = |text: &str| {
         let end = text.find("#[cfg(test)]\nmod tests {");

@@ -9,7 +9,7 @@ mod doors;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use syn::visit::Visit;
 
@@ -66,23 +66,6 @@ pub fn imports(source: &Path) -> Imports {
         )
     };
     files.iter().map(of).collect()
-}
-
-/// All files of Rust below `folder`, and their texts.
-pub fn files(folder: &Path) -> Vec<(PathBuf, String)> {
-    let paths = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path());
-    paths
-        .flat_map(|path| match path.extension() {
-            _ if path.is_dir() => files(&path),
-            Some(extension) if extension == "rs" => {
-                let text = fs::read_to_string(&path).unwrap();
-                vec![(path, text)]
-            }
-            _ => Vec::new(),
-        })
-        .collect()
 }
 
 fn read(folder: &Path, module: &mut Module, files: &mut BTreeMap<Module, Vec<syn::Item>>) {

@@ -12,15 +12,15 @@ use std::time::{Duration, Instant};
 use std::{fs, thread};
 
 use anyhow::{Context, Result, ensure};
-use dtof::device::{Client, DeviceEngine, HostTimeout, configuration, monitor};
-use dtof::engine::Engine;
-use dtof::engine::host::host_engine;
-use dtof::engine::settings::Settings;
-use dtof::input::source::{Geometry, PhotonSource};
-use dtof::simulate::{demo, scene};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{BlockLevel, Count, EchoNumber, PaperRule, WindowRule};
+use dtof_device::{Client, DeviceEngine, HostTimeout, configuration, monitor};
+use dtof_engine::Engine;
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::Settings;
 use dtof_link::{AdaptiveBinning, FaultRecord, Source};
+use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_simulate::{demo, scene};
 
 use crate::emulator::{Board, Emulator, End, Laser, Overflow, QEMU};
 use crate::{dtof, histograms, root, skipped, stack, succeed, target_folder, version, wanted};

@@ -8,7 +8,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
-use dtof::device::{self, Port};
+use dtof_device::Port;
 
 use crate::cargo;
 use crate::debugger::Debugger;
@@ -148,7 +148,7 @@ impl Emulator {
     pub fn connect(&mut self) -> Result<Box<dyn Port>> {
         self.debugger.resume()?;
         let port = format!("tcp:127.0.0.1:{}", self.port);
-        open(&mut self.child, || device::open(&port, None))
+        open(&mut self.child, || dtof_device::open(&port, None))
     }
 
     /// Lets the image run until it ends QEMU. With QEMU ends its memory, so the

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use anyhow::{Result, ensure};
-use dtof::device::histograms::{SoFar, collect};
-use dtof::device::{Client, HostTimeout};
-use dtof::engine::settings::Settings;
+use dtof_device::histograms::{SoFar, collect};
+use dtof_device::{Client, HostTimeout};
+use dtof_engine::settings::Settings;
 
 /// Collects them for some seconds. The scene has half a background photon a laser cycle in 128 bins,
 /// and from 0.5 to 0.1 photons of signal in three bins from `20 + 6 * pixel` on.

@@ -19,7 +19,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use dtof::device::{Client, HostTimeout, Port, Stopped, configuration};
+use dtof_device::{Client, HostTimeout, Port, Stopped, configuration};
 use dtof_link::{Report, Source, StopReason};
 
 use crate::pico::senses;

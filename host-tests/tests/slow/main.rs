@@ -19,7 +19,7 @@ mod pico;
 mod readers;
 mod report;
 mod rp2040;
-#[path = "../../../host/tests/common/sensed.rs"]
+#[path = "../../../host/cli/tests/common/sensed.rs"]
 mod sensed;
 mod soak;
 mod stack;
@@ -90,9 +90,16 @@ fn cargo(arguments: &[&str]) -> Result<String> {
     Ok(text)
 }
 
-/// The program as `cargo run --release` builds it.
+/// The program with all its features.
 fn dtof() -> Result<PathBuf> {
-    cargo(&["build", "--quiet", "--release", "--package", "dtof"])?;
+    cargo(&[
+        "build",
+        "--quiet",
+        "--release",
+        "--package",
+        "dtof",
+        "--all-features",
+    ])?;
     Ok(target_folder().join("release/dtof").canonicalize()?)
 }
 

@@ -11,13 +11,13 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use dtof::device::{Client, HostTimeout, configuration};
-use dtof::engine::host::host_engine;
-use dtof::engine::settings::Settings;
-use dtof::input::source::{Geometry, Photon, PixelPhotons, Slice};
 use dtof_core::fixed::types::{U8F8, U16F16};
 use dtof_core::{Count, PaperRule, PixelAddress};
+use dtof_device::{Client, HostTimeout, configuration};
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::Settings;
 use dtof_link::{FaultRecord, Report, Source};
+use dtof_photons::source::{Geometry, Photon, PixelPhotons, Slice};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -261,7 +261,7 @@ fn events(
         }],
     })?;
     let found = found.into_iter().map(|event| match event {
-        dtof::events::aer_file::Event::Depth(event) => Ok(event),
+        dtof_events::aer_file::Event::Depth(event) => Ok(event),
         other => anyhow::bail!("{other:?}"),
     });
     Ok([found.collect::<Result<_>>()?, expected])

@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
-use dtof::device::{self, Port};
+use dtof_device::Port;
 use serde_json::Value;
 
 use crate::emulator::{PATIENCE, free_ports, open};
@@ -148,7 +148,7 @@ impl Rp2040 {
     /// Connects to its serial port.
     pub fn connect(&mut self) -> Result<Box<dyn Port>> {
         let device = self.device();
-        open(&mut self.child, || device::open(&device, None))
+        open(&mut self.child, || dtof_device::open(&device, None))
     }
 
     /// Ends it.

@@ -9,14 +9,14 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
-use dtof::device::{Client, HostTimeout, configuration};
-use dtof::engine::host::host_engine;
-use dtof::engine::settings::Settings;
-use dtof::events::aer_file::Event;
-use dtof::input::source::Geometry;
 use dtof_core::PixelAddress;
+use dtof_device::{Client, HostTimeout, configuration};
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::Settings;
+use dtof_events::aer_file::Event;
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::{Report, Source};
+use dtof_photons::source::Geometry;
 use dtof_sensors::{PhotonSink, Polled, simulated};
 
 use crate::boards::{settings, with_all};

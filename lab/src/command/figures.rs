@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 use clap::Args;
-use dtof::cli::path;
+use dtof::path;
 use dtof_lab::pages::{self, Anew};
 use std::io::{self, Write};
 use std::path::PathBuf;

@@ -7,11 +7,11 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use dtof::cli::path;
-use dtof::numbers::whole;
-use dtof::rows::grouped;
+use dtof::path;
 use dtof_lab::studies;
 use dtof_lab::sweep::{self, Part};
+use dtof_options::numbers::whole;
+use dtof_options::rows::grouped;
 use indicatif::{ProgressBar, ProgressStyle};
 
 #[derive(Args)]

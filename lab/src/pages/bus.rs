@@ -4,8 +4,8 @@
 //! A bus takes one event a slot. Events of random pixels arrive with a Poisson law, `load`
 //! of them a slot on average, and one of those that are there is taken at its end.
 
-use dtof::rows::grouped;
 use dtof_core::AerWord;
+use dtof_options::rows::grouped;
 
 /// Macropixels of the paper's array.
 const PIXELS: u16 = 64 * 32;

@@ -7,7 +7,7 @@ use anyhow::Result;
 use crate::studies::failures::{Case, Method, Outcome, Verdict, Warning, outcomes};
 use crate::sweep::Part;
 use crate::sweep::values::Values;
-use dtof::rows::grouped;
+use dtof_options::rows::grouped;
 
 /// The tables of the page.
 ///

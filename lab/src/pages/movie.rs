@@ -10,15 +10,15 @@ use std::collections::{BTreeMap, HashMap};
 use anyhow::Result;
 use dtof_core::{EchoNumber, PixelAddress, RangeScale};
 
-use dtof::engine::host::host_engine;
-use dtof::events::events_csv::range_mm;
-use dtof::events::reports::LastReports;
-use dtof::input::source::{Geometry, PhotonSource};
-use dtof::rows::grouped;
-use dtof::simulate::demo;
 use dtof_draw::palette;
 use dtof_draw::picture::{levels, span};
 use dtof_draw::svg::{Anchor, At, EDGE, Svg, TEXT, TITLE, wrapped};
+use dtof_engine::host::host_engine;
+use dtof_events::events_csv::range_mm;
+use dtof_events::reports::LastReports;
+use dtof_options::rows::grouped;
+use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_simulate::demo;
 
 /// Laser cycles that are shown, and moments into which they are cut.
 const CYCLES: u16 = 2000;

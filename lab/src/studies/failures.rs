@@ -12,7 +12,6 @@ use crate::sweep::mean::{add, add_error};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, Study, Tally, grid, whole};
 use anyhow::{Context, Result};
-use dtof::rows::grouped;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AnyRule, AsyncPixel, AverageRule, Count, DepthEstimator, DepthEvent, Flags, LaserCycle, Look,
@@ -20,6 +19,7 @@ use dtof_core::{
 };
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
 use dtof_draw::palette::{self, Pen};
+use dtof_options::rows::grouped;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 

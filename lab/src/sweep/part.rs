@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::{Point, Study, Tally};
-use dtof::files::{aside, place_of};
+use dtof_options::files::{aside, place_of};
 
 /// One point with the sum of its trials.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

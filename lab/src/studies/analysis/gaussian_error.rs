@@ -5,10 +5,10 @@ use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target}
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict, ends};
 use crate::sweep::{Part, Point, Study, Tally, grid};
 use anyhow::Result;
-use dtof::rows::grouped;
 use dtof_core::isqrt;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{STEPS, alpha as pen};
+use dtof_options::rows::grouped;
 use dtof_theory::gaussian::threshold;
 use dtof_theory::{gaussian as printed, known_background};
 use rand_pcg::Pcg64;

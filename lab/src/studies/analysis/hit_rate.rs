@@ -4,10 +4,10 @@ use super::paper_setting::{Histograms, gaussian, means, target};
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, tally};
 use anyhow::Result;
-use dtof::rows::grouped;
 use dtof_core::ComparatorTree;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::NEUTRAL;
+use dtof_options::rows::grouped;
 use dtof_theory::known_background;
 use rand_pcg::Pcg64;
 

@@ -6,9 +6,9 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results, ends};
 use crate::sweep::{Part, Point, Study, Tally, grid};
 use anyhow::Result;
-use dtof::input::source::Geometry;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{Pen, REFERENCE, STEPS};
+use dtof_photons::source::Geometry;
 use dtof_theory::rates::Rates;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
@@ -147,7 +147,7 @@ fn results(part: &Part) -> Result<Results> {
         values: [
             ("least", format!("{least:.2}")),
             ("most", format!("{most:.2}")),
-            ("fewest", dtof::rows::grouped(fewest)),
+            ("fewest", dtof_options::rows::grouped(fewest)),
         ]
         .into(),
         tables: vec![("results/data/binning_rate.csv", csv)],

@@ -6,13 +6,13 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
 use anyhow::{Context, Result, ensure};
-use dtof::engine::host::host_engine;
-use dtof::input::source::PhotonSource;
-use dtof::rows::grouped;
-use dtof::simulate::scene::{Scene, Shape};
 use dtof_core::DepthEvent;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
 use dtof_draw::palette::{EVENTS, PAPER};
+use dtof_engine::host::host_engine;
+use dtof_options::rows::grouped;
+use dtof_photons::source::PhotonSource;
+use dtof_simulate::scene::{Scene, Shape};
 use rand_core::Rng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
@@ -55,7 +55,7 @@ const SCENES: [File; 5] = [
     },
     File {
         name: "demo",
-        text: include_str!("../../../../host/src/simulate/demo.toml"),
+        text: include_str!("../../../../host/simulate/src/demo.toml"),
         light: 1.0,
         cycles: 4000,
     },

@@ -2,11 +2,11 @@
 
 use super::setting::{BINS, X};
 use anyhow::Result;
-use dtof::engine::group::{Configs, Group};
-use dtof::engine::settings::Settings;
-use dtof::events::reports::LastReports;
-use dtof::input::source::{Geometry, Photon, PixelPhotons};
 use dtof_core::{DepthEvent, PixelAddress};
+use dtof_engine::group::{Configs, Group};
+use dtof_engine::settings::Settings;
+use dtof_events::reports::LastReports;
+use dtof_photons::source::{Geometry, Photon, PixelPhotons};
 use dtof_theory::rates::Rates;
 use rand_core::Rng;
 use rand_distr::{Distribution, Normal, Poisson};

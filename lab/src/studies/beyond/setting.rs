@@ -3,9 +3,9 @@
 
 use crate::sweep::{Point, PointTally, whole};
 use anyhow::{Context, Result};
-use dtof::engine::settings::{AdaptiveBinning, Settings};
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
 use dtof_core::{BlockLevel, Count, EchoNumber, RangeGate, WindowRule, z_for_levels};
+use dtof_engine::settings::{AdaptiveBinning, Settings};
 
 /// Bins of a histogram.
 pub const BINS: usize = 128;

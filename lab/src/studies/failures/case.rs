@@ -7,9 +7,9 @@ use rand_pcg::Pcg64;
 
 use super::stray::{Stray, StrayPhotons};
 use super::{BINS, PERIOD, SIGMA};
-use dtof::simulate::SimulatedPixel;
-use dtof::simulate::effects::Effects;
-use dtof::simulate::effects::limits::Timing;
+use dtof_simulate::SimulatedPixel;
+use dtof_simulate::effects::Effects;
+use dtof_simulate::effects::limits::Timing;
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 

@@ -7,10 +7,10 @@ use dtof_core::RangeGate;
 use super::L1;
 use super::case::{BACKGROUND, Case, PLACE, SIGNAL};
 use super::stray::Stray;
-use dtof::simulate::effects::Effects;
-use dtof::simulate::effects::dead_time::DeadTime;
-use dtof::simulate::effects::tail::Tail;
-use dtof::simulate::effects::tdc::Tdc;
+use dtof_simulate::effects::Effects;
+use dtof_simulate::effects::dead_time::DeadTime;
+use dtof_simulate::effects::tail::Tail;
+use dtof_simulate::effects::tdc::Tdc;
 
 /// A signal that takes the window rule some 250 laser cycles.
 const WEAK: f64 = 0.12;

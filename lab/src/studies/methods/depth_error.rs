@@ -4,7 +4,6 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results, ends};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::{Context, Result};
-use dtof::rows::grouped;
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
 use dtof_core::{
     BinPosition, Count, Count10, DepthEstimator, DetectionRule, Histogram, Peak, RangeGate,
@@ -12,6 +11,7 @@ use dtof_core::{
 };
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{self, Pen};
+use dtof_options::rows::grouped;
 use dtof_theory::bounds::cramer_rao::Pulse;
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::rates::Rates;

@@ -20,9 +20,9 @@ use self::watched::{Watched, true_steps};
 use super::systems::{Background, FPGA_SIGMAS, L1, PC_SIGMA, System};
 use crate::sweep::mean::add;
 use crate::sweep::{Point, Study, Tally, grid, point};
-use dtof::engine::host::host_engine;
-use dtof::input::source::{Geometry, PhotonSource};
-use dtof::simulate::scene::{Light, Scene, Shape};
+use dtof_engine::host::host_engine;
+use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_simulate::scene::{Light, Scene, Shape};
 
 /// Laser cycles handled at a time.
 const SLICE: u16 = 250;

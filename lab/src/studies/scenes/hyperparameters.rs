@@ -20,8 +20,6 @@ use crate::sweep::results::{Figure, Results};
 use crate::sweep::values::Values;
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, tally, whole};
 use anyhow::Result;
-use dtof::rows::grouped;
-use dtof::simulate::MM_PER_PS;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AnyRule, AsyncPixel, AverageRule, Count, LaserCycle, Look, PaperRule, PixelAddress,
@@ -29,6 +27,8 @@ use dtof_core::{
 };
 use dtof_draw::chart::{Axis, Chart, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{self, STEPS};
+use dtof_options::rows::grouped;
+use dtof_simulate::MM_PER_PS;
 use dtof_theory::rates::bin_share;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;

@@ -3,13 +3,13 @@
 
 use super::systems::FPGA;
 use anyhow::Result;
-use dtof::engine::frame::FramePixel;
-use dtof::simulate::SimulatedPixel;
 use dtof_core::{
     AnyRule, AsyncPixel, BinPosition, DepthEstimator, DepthEvent, LaserCycle, PixelAddress,
     PixelConfig, RangeGate, Statistics,
 };
 use dtof_draw::palette::{self, Pen};
+use dtof_engine::frame::FramePixel;
+use dtof_simulate::SimulatedPixel;
 use dtof_theory::rates::Rates;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;

@@ -21,9 +21,9 @@ use super::ranks::rank_correlation;
 use super::systems::{self, Background, FPGA_SIGMAS, PC, PC_SIGMA, System};
 use crate::sweep::mean::{add, add_error, add_value};
 use crate::sweep::{Point, Study, Tally, Trial, point};
-use dtof::engine::host::host_engine;
-use dtof::input::source::{Geometry, PhotonSource};
-use dtof::simulate::scene::{Light, Scene};
+use dtof_engine::host::host_engine;
+use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_simulate::scene::{Light, Scene};
 
 const CYCLES: u64 = 10_000;
 /// Laser cycles of a frame (L2).

@@ -20,11 +20,11 @@
 
 use crate::sweep::Point;
 use anyhow::Result;
-use dtof::engine::settings::Settings;
-use dtof::simulate::MM_PER_PS;
-use dtof::simulate::scene::{self, Scene};
 use dtof_core::fixed::types::{U8F8, U16F16};
 use dtof_core::{AnyRule, AverageRule, Count, PaperRule};
+use dtof_engine::settings::Settings;
+use dtof_simulate::MM_PER_PS;
+use dtof_simulate::scene::{self, Scene};
 
 /// Standard deviation of the PC's pulse in bins.
 pub const PC_SIGMA: f64 = 0.33;

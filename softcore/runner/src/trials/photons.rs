@@ -1,7 +1,7 @@
 //! Simulated photons for the FIFO.
 
 use anyhow::Result;
-use dtof::simulate::SimulatedPixel;
+use dtof_simulate::SimulatedPixel;
 use dtof_softcore::stream::BINS;
 use dtof_theory::rates::Rates;
 use rand_pcg::Pcg64;

@@ -7,7 +7,7 @@ use crate::sweep::Part;
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Verdict};
 use anyhow::Result;
-use dtof::rows::grouped;
+use dtof_options::rows::grouped;
 
 /// Changes an event below which a wall is silent.
 const SILENT: f64 = 1e-4;

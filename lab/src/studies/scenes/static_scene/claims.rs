@@ -7,7 +7,7 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Verdict};
 use crate::sweep::{Part, PointTally};
 use anyhow::Result;
-use dtof::rows::grouped;
+use dtof_options::rows::grouped;
 
 /// Of the file.
 const BRIGHTEST: &str = "white board";

@@ -1,0 +1,165 @@
+//! The range offset, and the bin width, from targets at known distances.
+//!
+//! The core places the highest peak of each whole histogram, with the estimator that events will
+//! have, so that whatever that is off by is in the offset. With distances that are known for many
+//! histograms the width is the median of the slopes of all pairs (Theil and Sen), which outliers
+//! do not move.
+
+use dtof_core::fixed::types::U24F8;
+use dtof_core::{BinPosition, CentredWindow, Count16, DepthEstimator, Histogram, RangeGate};
+
+use super::limits::{median, quantile};
+use super::observed::Trace;
+use dtof_engine::with_bins;
+use dtof_simulate::MM_PER_PS;
+
+/// Histograms with known distances that are fitted, at most, evenly chosen.
+const MOST: usize = 400;
+/// A bin width is fitted if distances reach over so many bins.
+const LEAST_BINS: f64 = 20.0;
+/// Positions that belong to one flat target differ by so many bins, at most.
+const ONE_TARGET: f64 = 1.5;
+
+/// What distances say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Offset {
+    /// Millimetres to be added to every range.
+    pub mm: f64,
+    /// Its standard error is about so much.
+    pub error_mm: f64,
+    /// Picoseconds a bin, if distances tell.
+    pub bin_width_ps: Option<f64>,
+    /// Histograms it was found from.
+    pub histograms: usize,
+}
+
+/// From pairs of position in bins and true distance in millimetres.
+#[must_use]
+pub fn from_distances(pairs: &[(f64, f64)], bin_width_ps: f64) -> Option<Offset> {
+    let step = pairs.len().div_ceil(MOST).max(1);
+    let pairs: Vec<(f64, f64)> = pairs.iter().copied().step_by(step).collect();
+    let mut slopes = Vec::new();
+    for (index, one) in pairs.iter().enumerate() {
+        for other in &pairs[index + 1..] {
+            let bins = other.0 - one.0;
+            if bins.abs() > LEAST_BINS / 2.0 {
+                slopes.push((other.1 - one.1) / bins);
+            }
+        }
+    }
+    let at = |share| quantile(pairs.iter().map(|pair| pair.0), share);
+    let reaches = at(0.95) - at(0.05) >= LEAST_BINS && slopes.len() >= 3;
+    let fitted = reaches.then(|| median(slopes) / MM_PER_PS);
+    let mm_a_bin = fitted.unwrap_or(bin_width_ps) * MM_PER_PS;
+    let offsets = || pairs.iter().map(|pair| pair.1 - mm_a_bin * pair.0);
+    let mm = median(offsets());
+    let off = median(offsets().map(|offset| (offset - mm).abs()));
+    (!pairs.is_empty()).then(|| Offset {
+        mm,
+        // 1.4826 for a standard deviation, 1.25 for a median.
+        error_mm: 1.85 * off / (pairs.len() as f64).sqrt(),
+        bin_width_ps: fitted,
+        histograms: pairs.len(),
+    })
+}
+
+/// From one target at `distance_mm`: the positions near the most common one count. `None` if that
+/// is not more than half of them.
+#[must_use]
+pub fn from_target(positions: &[f64], distance_mm: f64, bin_width_ps: f64) -> Option<Offset> {
+    let mut sorted = positions.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let near = |at: f64| {
+        let first = sorted.partition_point(|&position| position < at);
+        let end = sorted.partition_point(|&position| position <= at + ONE_TARGET);
+        &sorted[first..end]
+    };
+    let most = sorted
+        .iter()
+        .map(|&at| near(at))
+        .max_by_key(|near| near.len())?;
+    if 2 * most.len() <= positions.len() {
+        return None;
+    }
+    let pairs: Vec<(f64, f64)> = most.iter().map(|&at| (at, distance_mm)).collect();
+    from_distances(&pairs, bin_width_ps)
+}
+
+/// Where the core places the highest peak of a histogram of `bins` bins within `gate`, in bins.
+#[must_use]
+pub fn position(
+    trace: &Trace,
+    bins: usize,
+    gate: (u16, u16),
+    window: CentredWindow,
+) -> Option<f64> {
+    with_bins!(bins, BINS => of::<BINS>(trace, gate, window)).ok()?
+}
+
+fn of<const BINS: usize>(trace: &Trace, gate: (u16, u16), window: CentredWindow) -> Option<f64> {
+    let gate = RangeGate::<BINS>::new(gate.0, gate.1).ok()?;
+    Some(place(&trace.counts, &gate, window))
+}
+
+/// The same of counts of any size.
+#[must_use]
+pub fn place<const BINS: usize>(
+    counts: &[f64],
+    gate: &RangeGate<BINS>,
+    window: CentredWindow,
+) -> f64 {
+    // In counters of 16 bits.
+    let highest = counts.iter().copied().fold(0.0, f64::max);
+    let scale = (60_000.0 / highest.max(1.0)).min(1.0);
+    let mut frame = [0u32; BINS];
+    for (bin, count) in frame.iter_mut().zip(counts) {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let count = (count * scale).round() as u32;
+        *bin = count;
+    }
+    let mut histogram = Histogram::<BINS, Count16>::new();
+    histogram.add_frame(&frame, gate);
+    let peak = histogram.peak();
+    let estimator = DepthEstimator::CentredWindow(window);
+    let depth = estimator.estimate(&histogram, gate, peak, U24F8::ZERO);
+    let position = BinPosition::of(peak.bin, depth.offset);
+    f64::from(position.raw()) / 256.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_give_width_and_offset_whatever_a_few_are() {
+        let mut pairs: Vec<(f64, f64)> = (0..60)
+            .map(|number| f64::from(number) * 0.7 + 10.0)
+            .map(|bins| (bins, bins * 92.0 * MM_PER_PS - 175.0))
+            .collect();
+        for pair in &mut pairs[..9] {
+            pair.0 = 3.0;
+        }
+        let found = from_distances(&pairs, 100.0).unwrap();
+        assert!((found.bin_width_ps.unwrap() - 92.0).abs() < 0.05);
+        assert!((found.mm + 175.0).abs() < 0.5, "{found:?}");
+        // One distance says nothing of the width.
+        let found = from_distances(&pairs[20..21], 92.0).unwrap();
+        assert_eq!(found.bin_width_ps, None);
+        assert!((found.mm + 175.0).abs() < 1e-9);
+        assert_eq!(from_distances(&[], 92.0), None);
+    }
+
+    #[test]
+    fn the_target_is_what_most_pixels_see() {
+        let mut positions = vec![40.3; 10];
+        positions.extend([60.0, 61.0, 62.0, 63.0, 64.0, 65.0, 66.0, 40.4, 40.2]);
+        let found = from_target(&positions, 1000.0, 100.0).unwrap();
+        assert_eq!(found.histograms, 12);
+        assert!((found.mm - (1000.0 - 40.3 * 100.0 * MM_PER_PS)).abs() < 1e-9);
+        assert_eq!(from_target(&[], 1000.0, 100.0), None);
+        // No surface is that of most.
+        positions.truncate(17);
+        positions.extend([20.0; 4]);
+        assert_eq!(from_target(&positions, 1000.0, 100.0), None);
+    }
+}

@@ -1,0 +1,332 @@
+//! The report of a calibration: a page with what was recognised where, and how sure it is.
+
+use anyhow::Result;
+use dtof_draw::chart::{Axis, Chart, Panel, Point, Series, Style, chart};
+use dtof_draw::palette::{AVERAGE, EVENTS, PAPER, REFERENCE};
+
+use super::{Calibration, Length, Nearest, remarks};
+use dtof_engine::settings::SettingsFile;
+use dtof_options::rows::{Row, grouped, significant};
+use dtof_report::{Figure, Section, still};
+
+/// Every settings file and every report has it near its start: files that may be replaced.
+pub const MARKS: [&str; 2] = [dtof_engine::settings::MARK, dtof_report::MARK];
+
+/// What was found, a row each, with its 95 % interval.
+#[must_use]
+pub fn rows(found: &Calibration) -> Vec<Row> {
+    let mut rows: Vec<Row> = Vec::new();
+    let mut row = |name: &str, value: String| rows.push((name.to_owned(), value));
+    let (captures, pixels) = found.looked_at;
+    let several = if captures == 1 { "" } else { "s" };
+    row(
+        "looked at",
+        format!(
+            "{} pixels, {} capture{several}, {} bins",
+            grouped(pixels as u64),
+            grouped(captures as u64),
+            found.bins
+        ),
+    );
+    let unit = if found.length == Length::Unknown {
+        "if the brightest pixel has one photon a laser cycle"
+    } else {
+        "photons a bin and laser cycle"
+    };
+    let between = |(low, high): (f64, f64)| format!("({} to {})", short(low), short(high));
+    let of = &found.pixels;
+    row(
+        "background",
+        format!("{} {} {unit}", short(of.background), between(of.between)),
+    );
+    row(
+        "background of pixels",
+        format!("80 % have {} to {}", short(of.spread.0), short(of.spread.1)),
+    );
+    row("hot pixels", listed(&of.hot));
+    row("dead pixels", listed(&of.dead));
+    row(
+        "pulse",
+        match &found.pulse {
+            None => "no peak is bright enough".to_owned(),
+            Some(pulse) if pulse.is_core => format!(
+                "σ = {} bins, of its core, from {} peaks",
+                short(pulse.sigma),
+                pulse.peaks
+            ),
+            Some(pulse) => format!(
+                "σ = {} {} bins, from {} peaks",
+                short(pulse.sigma),
+                between(pulse.between),
+                pulse.peaks
+            ),
+        },
+    );
+    row(
+        "cover glass",
+        match &found.nearest {
+            Nearest::NotCommon => "none: no peak is the same in all pixels".to_owned(),
+            Nearest::Wall(bin) => format!("none: bin {bin} is a wall, as told"),
+            Nearest::WallOrGlass(bin) => format!("bin {bin} is a wall or a glass"),
+            Nearest::Glass(glass) => format!(
+                "{} {} photons a laser cycle and pixel at bin {}",
+                short(glass.photons),
+                between(glass.photons_between),
+                glass.top
+            ),
+        },
+    );
+    let between = found.glass().map(|glass| glass.end_between);
+    row(
+        "gate",
+        match (found.written_gate(), between) {
+            (None, _) => "not needed".to_owned(),
+            (Some((first, last)), Some((low, high))) if first > 0 && low < high => {
+                format!("{first}..{last} (begins at {low} to {high})")
+            }
+            (Some((first, last)), _) => format!("{first}..{last}"),
+        },
+    );
+    row(
+        "offset",
+        found.offset.map_or("not known".to_owned(), |offset| {
+            let error = 1.96 * offset.error_mm;
+            format!("{:.1} mm (± {error:.1})", offset.mm)
+        }),
+    );
+    if let Some(width) = found.offset.and_then(|offset| offset.bin_width_ps) {
+        row("bin width", format!("{width:.2} ps, from the distances"));
+    }
+    if let Some(of) = &found.detection {
+        let z = of.z.map_or(String::new(), |z| format!(", z {z:.3}"));
+        let counted = if of.exposures == 0 {
+            String::new()
+        } else {
+            format!(", {} simulated exposures", grouped(of.exposures))
+        };
+        row(
+            "rule",
+            format!(
+                "window of {}{z}, at least {} photons, L1 {}, L2 {}; {} % false alarms{counted}",
+                of.window,
+                of.min_count,
+                of.l1,
+                of.l2,
+                of.false_alarm * 100.0
+            ),
+        );
+    }
+    if let Some(spent) = &found.spent {
+        row(
+            "events here",
+            format!(
+                "{:.1} photons each, half of them within {:.2} mm",
+                spent.photons, spent.error_mm
+            ),
+        );
+    }
+    rows
+}
+
+/// What changed since an older calibration, a row each.
+#[must_use]
+pub fn changes(now: &SettingsFile, before: &SettingsFile) -> Vec<Row> {
+    let (now, before) = (&now.sensor, &before.sensor);
+    let mut rows = Vec::new();
+    let mut row = |name: &str, before: Option<f64>, now: Option<f64>| {
+        if let (Some(before), Some(now)) = (before, now) {
+            let times = now / before;
+            let value = format!("{} was {}: {times:.2} times", short(now), short(before));
+            rows.push((name.to_owned(), value));
+        }
+    };
+    row("background", before.background, now.background);
+    row("cover glass", before.glass, now.glass);
+    let sigma =
+        |sensor: &dtof_engine::settings::Sensor| sensor.sigma_bins.map(|sigma| sigma.to_num());
+    row("pulse", sigma(before), sigma(now));
+    let mut named = |name: &str, before: String, now: String| {
+        if before != now {
+            rows.push((name.to_owned(), format!("{now}, was {before}")));
+        }
+    };
+    let gate = |gate: Option<(u16, u16)>| {
+        gate.map_or("none".to_owned(), |(first, last)| {
+            format!("{first}..{last}")
+        })
+    };
+    named("gate", gate(before.gate), gate(now.gate));
+    let mm = |mm: Option<dtof_core::fixed::types::I24F8>| {
+        mm.map_or("not known".to_owned(), |mm| format!("{mm:.1} mm"))
+    };
+    named("offset", mm(before.offset_mm), mm(now.offset_mm));
+    let masked = |masked: &Option<Vec<u16>>| {
+        let of = masked.iter().flatten().map(|&pixel| pixel.into());
+        listed(&of.collect::<Vec<usize>>())
+    };
+    named("masked pixels", masked(&before.masked), masked(&now.masked));
+    rows
+}
+
+/// The page: `name` is that of the recording.
+///
+/// # Errors
+/// If there is nothing to draw.
+pub fn page(
+    found: &Calibration,
+    settings: &SettingsFile,
+    changes: &[Row],
+    name: &str,
+) -> Result<String> {
+    let svg = histogram(found)?;
+    let rows = rows(found);
+    let remarks = remarks(found);
+    let file: Vec<Row> = settings
+        .to_toml()?
+        .lines()
+        .filter_map(|line| {
+            line.split_once('#')
+                .map_or(Some(line), |(key, _)| Some(key))
+        })
+        .filter_map(|line| line.split_once(" = "))
+        .map(|(key, value)| (key.to_owned(), value.trim().to_owned()))
+        .collect();
+    let mut sections = vec![Section {
+        heading: "Found",
+        rows: &rows,
+    }];
+    if !remarks.is_empty() {
+        sections.push(Section {
+            heading: "What to know",
+            rows: &remarks,
+        });
+    }
+    if !changes.is_empty() {
+        sections.push(Section {
+            heading: "Since the older settings",
+            rows: changes,
+        });
+    }
+    sections.push(Section {
+        heading: "Settings written",
+        rows: &file,
+    });
+    let figure = Figure {
+        svg: &svg,
+        caption: "The mean histogram of all good pixels and captures, and what was recognised in it.",
+    };
+    let lead = format!("From the histograms of {name}. Intervals hold 95 %.");
+    Ok(still("Calibration", &lead, &sections, &[figure]))
+}
+
+/// The mean histogram, with what was recognised.
+fn histogram(found: &Calibration) -> Result<String> {
+    let level = found.pixels.background;
+    let positive = found.mean.iter().copied().filter(|&rate| rate > 0.0);
+    let lowest = positive.fold(f64::INFINITY, f64::min);
+    let highest = found.mean.iter().copied().fold(0.0, f64::max).max(1e-9);
+    // An empty bin has no place on a logarithmic axis.
+    let floor = lowest
+        .min(level.max(lowest / 2.0))
+        .clamp(highest * 1e-7, highest)
+        / 1.5;
+    let top = highest * 2.0;
+    let bins = 0..found.mean.len();
+    let curve = |bins: std::ops::Range<usize>| -> Vec<Point> {
+        bins.flat_map(|bin| {
+            let rate = found.mean[bin].max(floor);
+            [
+                Point::exact(bin as f64, rate),
+                Point::exact(bin as f64 + 1.0, rate),
+            ]
+        })
+        .collect()
+    };
+    let mut series = Vec::new();
+    let gate = usize::from(found.gate.0);
+    if gate > 0 {
+        series.push(Series::named("glass", PAPER, Style::Line, curve(0..gate)));
+        let line = vec![
+            Point::exact(gate as f64, floor),
+            Point::exact(gate as f64, top / 1.3),
+        ];
+        series.push(Series::named("gate", AVERAGE, Style::Dashed, line));
+    }
+    series.push(Series::named(
+        "photons",
+        EVENTS,
+        Style::Line,
+        curve(gate..bins.end),
+    ));
+    if level > floor {
+        let line = vec![
+            Point::exact(0.0, level),
+            Point::exact(bins.end as f64, level),
+        ];
+        series.push(Series::named("background", REFERENCE, Style::Dashed, line));
+    }
+    chart(&Chart {
+        finding: finding(found),
+        holds: true,
+        note: "Background is that of the median pixel; peaks of pixels that see other distances \
+               blur in the mean."
+            .to_owned(),
+        x: Axis::linear("bin").within(0.0, bins.end as f64),
+        y: Axis::logarithmic(if found.length == Length::Unknown {
+            "photons a bin, relative"
+        } else {
+            "photons a bin and laser cycle"
+        })
+        .within(floor, top),
+        key: Vec::new(),
+        columns: 1,
+        panels: vec![Panel::only(series)],
+    })
+}
+
+/// One sentence.
+fn finding(found: &Calibration) -> String {
+    let signal = found.pulse.as_ref().map(|pulse| pulse.signal);
+    match (&found.nearest, signal) {
+        (Nearest::Glass(glass), Some(signal)) if glass.end > 0 => format!(
+            "The cover glass ends at bin {}, {} times as bright as targets",
+            glass.end,
+            short(glass.photons / signal.max(1e-12))
+        ),
+        (Nearest::Glass(_), _) => "The cover glass is so dim that no gate is needed".to_owned(),
+        (Nearest::WallOrGlass(bin), _) => {
+            format!("All pixels see one surface at bin {bin}: a wall or a cover glass")
+        }
+        (_, Some(signal)) if found.pixels.background > 0.0 => format!(
+            "No cover glass; targets have {} times the photons of a background bin",
+            short(signal / found.pixels.background)
+        ),
+        _ => "No cover glass".to_owned(),
+    }
+}
+
+fn listed(pixels: &[usize]) -> String {
+    const SHOWN: usize = 20;
+    if pixels.is_empty() {
+        return "none".to_owned();
+    }
+    let shown: Vec<String> = pixels.iter().take(SHOWN).map(ToString::to_string).collect();
+    let more = pixels.len().saturating_sub(SHOWN);
+    let more = if more > 0 {
+        format!(" and {more} more")
+    } else {
+        String::new()
+    };
+    shown.join(", ") + &more
+}
+
+/// To three significant digits.
+fn short(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if !(1e-4..1e5).contains(&value.abs()) {
+        return format!("{value:.2e}");
+    }
+    significant(value, 3)
+}

@@ -1,0 +1,109 @@
+//! What was found, as a settings file.
+
+use anyhow::{Context, Result};
+use dtof_core::fixed::types::{I24F8, U4F12, U16F16};
+
+use super::{Calibration, Glass, Length, Nearest, Tdc};
+use dtof_engine::settings::{Detection, RuleName, Sensor, SettingsFile};
+
+impl Calibration {
+    /// The settings of the sensor. What was not found is that of `before`: an older calibration, or
+    /// what the user says.
+    ///
+    /// # Errors
+    /// If a number does not fit its format.
+    pub fn settings(&self, before: SettingsFile) -> Result<SettingsFile> {
+        let is_absolute = self.length != Length::Unknown;
+        let whole = |value: f64| is_absolute.then(|| four_digits(value));
+        let offset = self.offset.map(|offset| {
+            let mm = I24F8::checked_from_num(offset.mm);
+            mm.with_context(|| format!("an offset of {:.0} mm is too large", offset.mm))
+        });
+        let width = U16F16::checked_from_num(self.bin_width_ps);
+        let glass = self.glass().filter(|_| self.gate.0 > 0);
+        let sensor = Sensor {
+            laser_hz: before.sensor.laser_hz,
+            columns: before.sensor.columns,
+            bins: u16::try_from(self.bins).ok(),
+            bin_width_ps: Some(width.context("the bin width is too large")?),
+            offset_mm: offset.transpose()?.or(before.sensor.offset_mm),
+            gate: self.written_gate(),
+            masked: Some(self.masked()?).filter(|masked| !masked.is_empty()),
+            sigma_bins: match &self.detection {
+                Some(detection) => Some(detection.sigma_bins),
+                None => before.sensor.sigma_bins,
+            },
+            one_hit_tdc: matches!(self.tdc, Some(Tdc::OneHit(_))).then_some(true),
+            background: whole(self.pixels.background),
+            glass: glass.and_then(|glass| whole(glass.photons)),
+            glass_bins: glass.filter(|_| is_absolute).map(|glass| {
+                let before_gate = glass.shape.iter().take(self.gate.0.into());
+                before_gate.map(|&rate| four_digits(rate)).collect()
+            }),
+        };
+        let detection = self.detection.map(|detection| Detection {
+            rule: Some(RuleName::Window),
+            window: Some(detection.window),
+            z: detection.z.map(U4F12::saturating_from_num),
+            false_alarm: detection.z.is_none().then_some(detection.false_alarm),
+            half_widths: detection.half_widths,
+            min_count: Some(detection.min_count),
+            l1: Some(detection.l1),
+            l2: Some(detection.l2),
+            x: Some(detection.x),
+            ..Detection::default()
+        });
+        // The offset was found with the window of this pulse.
+        let mut older = before.detection;
+        if detection.is_some() {
+            (older.estimator, older.half_widths) = (None, None);
+        }
+        let found = SettingsFile {
+            sensor,
+            detection: detection.unwrap_or_default().or(older),
+            rays: before.rays,
+            run: before.run,
+            file: before.file,
+        };
+        Ok(found.of_any_file())
+    }
+
+    /// The gate, if it leaves out a bin.
+    #[must_use]
+    pub fn written_gate(&self) -> Option<(u16, u16)> {
+        let (first, last) = self.gate;
+        (first > 0 || usize::from(last) + 1 < self.bins).then_some(self.gate)
+    }
+
+    /// The cover glass, if there is one.
+    #[must_use]
+    pub const fn glass(&self) -> Option<&Glass> {
+        match &self.nearest {
+            Nearest::Glass(glass) => Some(glass),
+            _ => None,
+        }
+    }
+
+    /// Addresses of hot and dead pixels, in every capture.
+    ///
+    /// # Errors
+    /// If there are more addresses than there can be.
+    pub fn masked(&self) -> Result<Vec<u16>> {
+        let (captures, pixels) = self.looked_at;
+        let mut masked = Vec::new();
+        for capture in 0..captures {
+            for pixel in self.pixels.hot.iter().chain(&self.pixels.dead) {
+                masked.push(
+                    u16::try_from(capture * pixels + pixel).context("more than 65,536 pixels")?,
+                );
+            }
+        }
+        masked.sort_unstable();
+        Ok(masked)
+    }
+}
+
+/// To four significant digits.
+fn four_digits(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}

@@ -1,0 +1,58 @@
+//! A recording to millimetres: `cargo run --package dtof --example recording -- counts.npy`.
+//!
+//! Without a file it takes a list of photons that it writes first.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::Settings;
+use dtof_engine::slices::each_slice;
+use dtof_photons::open::{Opening, open};
+use dtof_simulate::scene;
+
+/// Prints each event of the recording `file` and gives their number.
+fn replay(file: &Path) -> Result<usize> {
+    let mut recording = open(file, &Opening::default())?;
+    let settings = Settings {
+        bins: recording.known.bins,
+        bin_width_ps: recording.known.bin_width_ps,
+        x: 4,
+        l1: 40,
+        ..scene::settings(1)
+    };
+    let scale = settings.range_scale()?;
+    let photons = recording.photons.as_mut();
+    let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses())?;
+    let mut events = 0;
+    each_slice(
+        photons,
+        |slice| engine.run(slice),
+        |_, found, _| {
+            for event in &found {
+                let range = scale.range(event.position());
+                println!(
+                    "cycle {} pixel {}: {range} mm",
+                    event.cycle.0, event.pixel.0
+                );
+            }
+            events += found.len();
+            Ok(())
+        },
+    )?;
+    Ok(events)
+}
+
+fn main() -> Result<()> {
+    if let Some(file) = std::env::args_os().nth(1) {
+        replay(&PathBuf::from(file))?;
+        return Ok(());
+    }
+    // A photon in bin 60 of each of 200 laser cycles: an event every 44.
+    let folder = tempfile::tempdir()?;
+    let file = folder.path().join("photons.csv");
+    let rows: String = (0..200).map(|cycle| format!("0,{cycle},60\n")).collect();
+    std::fs::write(&file, format!("pixel,cycle,bin\n{rows}"))?;
+    assert_eq!(replay(&file)?, 4);
+    Ok(())
+}

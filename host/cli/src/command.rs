@@ -1,0 +1,46 @@
+//! One file a command.
+
+pub mod calibrate;
+pub mod compare;
+pub mod decode;
+pub mod demo;
+mod device_options;
+mod dynamic_depth;
+pub mod export;
+pub mod flags;
+pub mod monitor;
+pub mod replay;
+mod seen;
+pub mod simulate;
+pub mod tune;
+pub mod view;
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use dtof::complain;
+use dtof_options::rows::{Row, aligned, printable};
+use dtof_run::summary::Summary;
+
+/// Says on standard error what to know of `file`, a line each, unless `quiet`.
+fn warn(file: &Path, warnings: impl IntoIterator<Item = String>, quiet: bool) {
+    for warning in warnings.into_iter().filter(|_| !quiet) {
+        let warning = format!("warning: {}: {warning}", file.display());
+        complain(&printable(&warning));
+    }
+}
+
+/// Prints the summary of a run.
+fn print_summary(summary: &Summary, more: &[Row], folder: &Path) -> io::Result<()> {
+    let detection = summary.settings.detection_rows();
+    let rows = [&summary.rows()[..], more, &detection].concat();
+    let report = folder.join("report.html");
+    let mut out = io::stdout().lock();
+    write!(
+        out,
+        "{}\nOpen {} in a browser.\n",
+        aligned(&rows),
+        report.display()
+    )?;
+    out.flush()
+}

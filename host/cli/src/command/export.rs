@@ -1,0 +1,121 @@
+//! `dtof export`: the events of an AER file in formats that other programs read.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use dtof::path;
+use dtof::progress::Bar;
+use dtof_engine::settings::SettingsFile;
+use dtof_events::aer_file::EventKind;
+use dtof_export::{Format, Options, Projected, export};
+use dtof_options::Refused;
+use dtof_options::numbers::whole;
+use dtof_options::rows::grouped;
+
+use super::flags::{Flags, name};
+use super::{dynamic_depth, warn};
+
+#[derive(Args)]
+pub struct Export {
+    /// The AER file
+    #[arg(value_parser = path())]
+    file: PathBuf,
+    /// The format; docs/export.md describes each
+    #[arg(long, value_parser = name::<Format>())]
+    format: Format,
+    /// The file to write
+    #[arg(long, value_name = "FILE", value_parser = path())]
+    out: PathBuf,
+    /// A settings file: its rays and its laser rate hold unless an option says otherwise
+    #[arg(long, value_name = "FILE", value_parser = path())]
+    settings: Option<PathBuf>,
+    #[command(flatten)]
+    projected: Flags<Projected>,
+    /// The kind of events to export from a file with both
+    #[arg(long, value_parser = name::<EventKind>())]
+    events: Option<EventKind>,
+    /// MCAP and ROS 2: microseconds of a point cloud [default: 1/100 of the run, 10 to 10,000]
+    #[arg(long, value_name = "N", value_parser = whole(1..=1_000_000_000_u64))]
+    slice_us: Option<u64>,
+    #[command(flatten)]
+    dynamic_depth: dynamic_depth::Options,
+    /// Print nothing but errors
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl Export {
+    pub fn run(&self) -> Result<()> {
+        self.check()?;
+        let file = self.settings.as_deref().map(SettingsFile::read);
+        let file = file.transpose()?.unwrap_or_default();
+        let projected = self.projected.0.clone();
+        let options = Options {
+            kind: self.events,
+            slice_ns: self.slice_us.map(|us| us * 1000),
+            dynamic_depth: self.dynamic_depth.dynamic_depth(),
+            ..projected.options(&file)?
+        };
+        let exported = export(
+            &self.file,
+            &self.out,
+            self.format,
+            &options,
+            &mut Bar::new(self.quiet),
+        )?;
+        let out = self.out.display();
+        let written = grouped(exported.written);
+        if exported.late > 0 {
+            writeln!(
+                io::stderr(),
+                "{}: {} events came after more than 65,536 later ones: left out of {out}",
+                self.file.display(),
+                grouped(exported.late)
+            )?;
+        }
+        if let Some(damage) = exported.damage {
+            bail!(
+                "{}: {damage}; {out} holds what came before: {written} events",
+                self.file.display()
+            );
+        }
+        warn(&self.file, exported.warning, self.quiet);
+        if !self.quiet {
+            writeln!(
+                io::stdout(),
+                "{out}: {written} events ({})",
+                exported.assumed
+            )?;
+        }
+        Ok(())
+    }
+
+    /// No option is left unused.
+    fn check(&self) -> Result<()> {
+        let evt2 = self.format == Format::Evt2;
+        let slices = matches!(self.format, Format::Mcap | Format::Ros2);
+        let projected = &self.projected.0;
+        let points = "points, which evt2 has not";
+        for (key, has_use, of) in [
+            (self.slice_us.map(|_| "slice_us"), slices, "mcap and ros2"),
+            (self.dynamic_depth.given(), evt2, "evt2"),
+            (
+                projected.fov.map(|_| "field_of_view_degrees"),
+                !evt2,
+                points,
+            ),
+            (
+                projected.calibration.as_ref().map(|_| "calibration"),
+                !evt2,
+                points,
+            ),
+        ] {
+            if let Some(key) = key.filter(|_| !has_use) {
+                bail!(Refused::new(key, format!("is only for {of}")));
+            }
+        }
+        Ok(())
+    }
+}

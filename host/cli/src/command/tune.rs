@@ -1,0 +1,31 @@
+//! `dtof tune`: the threshold and L1 for a wanted rate of false alarms.
+
+use std::io::{self, Write};
+
+use anyhow::Result;
+use clap::Args;
+use dtof_run::tune::Options;
+
+use super::flags::Flags;
+
+#[derive(Args)]
+pub struct Tune {
+    #[command(flatten)]
+    options: Flags<Options>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Tune {
+    pub fn run(&self) -> Result<()> {
+        let tuned = self.options.0.tune()?;
+        let mut out = io::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", serde_json::to_string_pretty(&tuned.json())?)?;
+        } else {
+            out.write_all(tuned.text().as_bytes())?;
+        }
+        Ok(out.flush()?)
+    }
+}

@@ -1,0 +1,98 @@
+//! `dtof view`: a device or a recording, live in a browser.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use anyhow::{Result, ensure};
+use clap::Args;
+use dtof::{complain, flag, interrupt, path};
+use dtof_live::{Device, Feed, Folder, Foxglove, Origin, Playback, Served, Terminal};
+use dtof_options::numbers::{positive, whole};
+
+use super::device_options::DeviceOptions;
+
+#[derive(Args)]
+pub struct View {
+    /// An AER file, which is played at the rate of its laser
+    #[arg(value_name = "FILE.aer", value_parser = path(), required_unless_present = "device", conflicts_with = "device")]
+    file: Option<PathBuf>,
+    /// tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated device
+    #[arg(long, value_name = "DEVICE")]
+    device: Option<String>,
+    /// Of a file: so many times as fast as it was [default: 1]
+    #[arg(long, value_name = "N", value_parser = positive, conflicts_with = "device")]
+    speed: Option<f64>,
+    /// Of a file: laser cycles a second, if it does not say or is wrong [default: as the file says]
+    #[arg(long, value_name = "HZ", value_parser = whole(1..=u64::MAX / 1000), conflicts_with = "device")]
+    laser_hz: Option<u64>,
+    /// The port of the page on this computer [default: any that is free]
+    #[arg(long, value_name = "PORT", value_parser = whole(0..=u16::MAX), default_value_t = 0, hide_default_value = true)]
+    port: u16,
+    /// The folder for recordings and settings that the page saves. Files there are not replaced
+    /// [default: the page saves nothing]
+    #[arg(long, value_name = "DIR", value_parser = path(), conflicts_with = "file")]
+    out: Option<PathBuf>,
+    /// Also serve Foxglove, at a port of this computer [default without PORT: 8765]
+    #[arg(long, value_name = "PORT", value_parser = whole(0..=u16::MAX), num_args = 0..=1, require_equals = true,
+        default_missing_value = "8765")]
+    foxglove: Option<u16>,
+    /// Pages of this origin may read, too, such as `http://localhost:8080`; may be repeated
+    /// [default: Foxglove's pages only]
+    #[arg(long, value_name = "ORIGIN", requires = "foxglove")]
+    foxglove_origin: Vec<Origin>,
+    #[command(flatten)]
+    options: DeviceOptions,
+}
+
+impl View {
+    pub fn run(self) -> Result<()> {
+        let feed = match (self.device, self.file) {
+            (Some(name), _) => {
+                let image = self.options.image.clone();
+                Feed::Device(Box::new(Device {
+                    said: self.options.said()?,
+                    pixels: self.options.pixels,
+                    dynamic_depth: self.options.changes()?,
+                    host_timeout: self.options.host_timeout(),
+                    open: Box::new({
+                        let name = name.clone();
+                        move || dtof_device::open(&name, image.as_deref())
+                    }),
+                    name,
+                }))
+            }
+            (None, file) => {
+                let file = file.unwrap_or_default();
+                ensure!(
+                    !self.options.are_given()?,
+                    "{}: is what it was recorded with; leave out the options of a device",
+                    file.display()
+                );
+                let speed = self.speed.unwrap_or(1.0);
+                let playback = Playback::new(file.clone(), self.laser_hz, speed)?;
+                super::warn(&file, playback.warning.clone(), false);
+                Feed::Playback(playback)
+            }
+        };
+        interrupt::listen(|| ())?;
+        let foxglove = self.foxglove;
+        let foxglove = foxglove.map(|port| Foxglove::bind(port, self.foxglove_origin));
+        let foxglove = foxglove.transpose()?;
+        let served = Served::begin(
+            feed,
+            self.port,
+            Folder::new(self.out.as_deref())?,
+            Terminal {
+                complain,
+                name: flag,
+            },
+        )?;
+        let mut out = io::stdout();
+        writeln!(out, "{}", served.address)?;
+        if let Some(foxglove) = &foxglove {
+            writeln!(out, "{}", foxglove.address())?;
+        }
+        out.flush()?;
+        served.with(foxglove).until(interrupt::is_interrupted)
+    }
+}

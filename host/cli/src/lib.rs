@@ -1,0 +1,155 @@
+//! Command lines, alike in every program of this project: help is printed whole, an
+//! error is one line and a failure.
+
+pub mod interrupt;
+pub mod progress;
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::Parser;
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+
+use dtof_options::rows::printable;
+use dtof_options::{Refused, option_name};
+
+/// Parses the command line and runs it.
+#[must_use]
+pub fn run<C: Parser>(run: impl FnOnce(C) -> Result<()>) -> ExitCode {
+    let done = match C::try_parse() {
+        Ok(cli) => run(cli),
+        Err(error) => return refuse(&error),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        // The reader of the output has seen enough.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            complain(&format!("error: {}", dtof_options::line(&error, &flag)));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Help is printed whole; an error with its hints as one line.
+fn refuse(error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        return error
+            .print()
+            .map_or(ExitCode::FAILURE, |()| ExitCode::SUCCESS);
+    }
+    complain(&format!("error: {}", reason(error)));
+    ExitCode::from(2)
+}
+
+/// The flag that sets a key. What is no key, as `<FILE>`, stays as it is.
+#[must_use]
+pub fn flag(key: &str) -> String {
+    if !key.starts_with(char::is_alphabetic) {
+        return key.to_owned();
+    }
+    format!("--{}", option_name(key).replace('_', "-"))
+}
+
+/// Why options are refused, as one line.
+fn reason(error: &clap::Error) -> String {
+    if let Some(refused) = refused(error) {
+        return refused.line(&flag);
+    }
+    let text = error.to_string();
+    let lines = text.lines().map(str::trim);
+    let is_hint =
+        |line: &str| line.starts_with("Usage:") || line.starts_with("For more information");
+    let reason: Vec<&str> = lines
+        .filter(|line| !line.is_empty() && !is_hint(line))
+        .collect();
+    let reason = reason.join(" ");
+    reason.strip_prefix("error: ").unwrap_or(&reason).to_owned()
+}
+
+/// The same error as of an option that is read from a settings file, or a keyword.
+fn refused(error: &clap::Error) -> Option<Refused> {
+    let all = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => vec![key(text)],
+        Some(ContextValue::Strings(texts)) => texts.iter().map(|text| key(text)).collect(),
+        _ => Vec::new(),
+    };
+    let value = match error.get(ContextKind::InvalidValue) {
+        Some(ContextValue::String(value)) => Some(value),
+        _ => None,
+    };
+    let names = all(ContextKind::InvalidArg);
+    let (first, rest) = names.split_first()?;
+    let quoted = |names: &[String]| {
+        let quoted = |name: &String| match name.starts_with(char::is_alphabetic) {
+            true => format!("`{name}`"),
+            false => name.clone(),
+        };
+        names.iter().map(quoted).collect::<Vec<_>>().join(", ")
+    };
+    Some(match error.kind() {
+        ErrorKind::ValueValidation => {
+            Refused::value(first, value?, std::error::Error::source(error)?.to_string())
+        }
+        ErrorKind::InvalidValue if value?.is_empty() => Refused::new(first, "needs a value"),
+        ErrorKind::InvalidValue => {
+            let reason = format!("must be one of {}", all(ContextKind::ValidValue).join(", "));
+            Refused::value(first, value?, reason)
+        }
+        ErrorKind::UnknownArgument => {
+            let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidArg) else {
+                return None;
+            };
+            let alike = all(ContextKind::SuggestedArg);
+            Refused::unknown(name, alike.iter().map(String::as_str))
+        }
+        ErrorKind::ArgumentConflict => {
+            let others = all(ContextKind::PriorArg);
+            let reason = match others.iter().all(|other| other == first) {
+                true => "is given twice".to_owned(),
+                false => format!("cannot be used with {}", quoted(&others)),
+            };
+            Refused::new(first, reason)
+        }
+        ErrorKind::MissingRequiredArgument if rest.is_empty() => Refused::new(first, "is needed"),
+        ErrorKind::MissingRequiredArgument => {
+            Refused::input(format!("{} are needed", quoted(&names)))
+        }
+        _ => return None,
+    })
+}
+
+/// The key of an argument as clap writes it: `--l1 <N>`, `<FILE>`.
+fn key(arg: &str) -> String {
+    let name = arg.split([' ', '=']).next().unwrap_or_default();
+    match name.strip_prefix("--") {
+        Some(name) => name.replace('-', "_"),
+        None if name.starts_with(char::is_alphabetic) => format!("'{name}'"),
+        None => name.to_owned(),
+    }
+}
+
+/// Reads the name of a file or a folder. `-`, elsewhere standard input or output, is none.
+#[must_use]
+pub fn path() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| {
+        if path.as_os_str() == "-" {
+            return Err("standard input and output are not supported here; give a name");
+        }
+        Ok(path)
+    })
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    let io = error.downcast_ref::<io::Error>();
+    io.is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+}
+
+/// One line on standard error; if that cannot be written, nobody reads it.
+pub fn complain(message: &str) {
+    let line: Vec<&str> = message.lines().collect();
+    let _ = writeln!(io::stderr(), "{}", printable(&line.join(" ")));
+}

@@ -1,0 +1,187 @@
+//! No command replaces a file that it reads, nor one in its folder that it did not write.
+
+use std::fs;
+
+use crate::common::aer::{HEADER, events, file};
+use crate::common::{Scratch, names, says};
+use dtof_photons::open::{Opening, open};
+use dtof_run::output::Output;
+use dtof_run::summary::Summary;
+use dtof_simulate::scene;
+
+const PHOTONS: &str = "pixel,cycle,bin\n0,0,0\n";
+const SCENE: &str = "cycles = 100\n[[surface]]\nrange_mm = 1000\nsignal = 1\n";
+const RESULTS: [&str; 11] = [
+    "depth-last.svg",
+    "depth-mean.svg",
+    "dtof.toml",
+    "event-counts.svg",
+    "events.aer",
+    "events.csv",
+    "photon-counts.svg",
+    "reflectivity-events.svg",
+    "reflectivity-signal.svg",
+    "report.html",
+    "summary.json",
+];
+
+/// `dtof LINE` must end with one line that says `reason`, and leave `name` as it is.
+#[track_caller]
+fn kept(scratch: &Scratch, line: &str, name: &str, reason: &str) {
+    let before = scratch.read(name);
+    let output = scratch.run(line);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{line}");
+    assert!(message.contains(&format!("{name}: {reason}")), "{message}");
+    assert_eq!(message.lines().count(), 1, "{message}");
+    assert_eq!(scratch.read(name), before);
+}
+
+const REPLAY: &str = "replay --input photons.csv --out out";
+const READ: &str = "is the file that is read";
+
+#[test]
+fn a_recording_in_the_output_folder_is_kept() {
+    for name in RESULTS {
+        let scratch = Scratch::new();
+        // Photon lists end in .csv; other names are reached through a link.
+        let result = format!("out/{name}");
+        let photons = scratch.file("out/photons.csv", PHOTONS);
+        fs::hard_link(photons, scratch.path(&result)).unwrap();
+        kept(
+            &scratch,
+            "replay --input out/photons.csv --out out",
+            &result,
+            READ,
+        );
+        assert_eq!(names(&scratch.path("out")).len(), 2);
+    }
+    let scratch = Scratch::new();
+    scratch.file("out/events.csv", PHOTONS);
+    let output = scratch.run("replay --input out/events.csv --out out/../out");
+    says(&String::from_utf8(output.stderr).unwrap(), READ);
+    assert_eq!(scratch.read("out/events.csv"), PHOTONS);
+}
+
+#[cfg(unix)]
+#[test]
+fn links_hide_no_input() {
+    let scratch = Scratch::new();
+    fs::create_dir(scratch.path("out")).unwrap();
+    scratch.file("photons.csv", PHOTONS);
+    scratch.file("scene.toml", SCENE);
+    std::os::unix::fs::symlink("../photons.csv", scratch.path("out/summary.json")).unwrap();
+    kept(&scratch, REPLAY, "out/summary.json", READ);
+    fs::remove_file(scratch.path("out/summary.json")).unwrap();
+    std::os::unix::fs::symlink("../scene.toml", scratch.path("out/report.html")).unwrap();
+    let line = "simulate --scene scene.toml --out out";
+    kept(&scratch, line, "out/report.html", READ);
+    assert_eq!(
+        scratch.read("photons.csv") + &scratch.read("scene.toml"),
+        PHOTONS.to_owned() + SCENE
+    );
+}
+
+#[test]
+fn a_scene_in_the_output_folder_is_kept() {
+    let scratch = Scratch::new();
+    scratch.file("out/summary.json", SCENE);
+    let line = "simulate --scene out/summary.json --out out";
+    kept(&scratch, line, "out/summary.json", READ);
+}
+
+#[test]
+fn settings_in_the_output_folder_are_kept() {
+    let scratch = Scratch::new();
+    scratch.file("photons.csv", PHOTONS);
+    scratch.file("out/dtof.toml", "# dtof settings\n");
+    let line = format!("{REPLAY} --settings out/dtof.toml");
+    kept(&scratch, &line, "out/dtof.toml", READ);
+}
+
+#[test]
+fn a_file_of_somebody_else_is_kept() {
+    for name in RESULTS {
+        // Of the same kind, and empty.
+        for text in ["{}\n", "<svg></svg>\n", "<!DOCTYPE html>\n", PHOTONS, ""] {
+            let scratch = Scratch::new();
+            let result = format!("out/{name}");
+            scratch.file(&result, text);
+            scratch.file("photons.csv", PHOTONS);
+            kept(&scratch, REPLAY, &result, "was not written by this program");
+            assert_eq!(names(&scratch.path("out")), [name]);
+        }
+    }
+    let scratch = Scratch::new();
+    scratch.file("out/demo/report.html", "mine\n");
+    let name = "out/demo/report.html";
+    kept(&scratch, "demo --cycles 200", name, "was not written");
+}
+
+/// Also after one that was ended between any two of its files.
+#[test]
+fn results_of_an_earlier_run_are_replaced() {
+    let scratch = Scratch::new();
+    let photons = scratch.file("photons.csv", PHOTONS);
+    scratch.replayed(&photons, "");
+    assert_eq!(names(&scratch.path("out")), RESULTS);
+    scratch.file("out/notes.txt", "mine\n");
+    scratch.replayed(&photons, "--alpha 8");
+    for name in "summary.json report.html events.aer depth-last.svg".split(' ') {
+        fs::remove_file(scratch.path("out").join(name)).unwrap();
+        scratch.replayed(&photons, "");
+    }
+    assert_eq!(scratch.read("out/notes.txt"), "mine\n");
+    // Another command's, too: they are of this program.
+    let scene = scratch.file("scene.toml", SCENE);
+    assert!(scratch.simulate(&scene, "--quiet").status.success());
+}
+
+/// What came into the way during a run stays, and so does all of the run before.
+#[test]
+fn a_folder_that_cannot_be_completed_is_left_as_it_was() {
+    let scratch = Scratch::new();
+    let photons = scratch.file("photons.csv", PHOTONS);
+    scratch.replayed(&photons, "");
+    let opening = Opening {
+        cycles: 1,
+        ..Opening::default()
+    };
+    let source = open(&photons, &opening).unwrap().photons;
+    let settings = scene::settings(1);
+    let out = scratch.path("out");
+    let summary = Summary::new(Default::default(), source.as_ref(), 0, &settings);
+    let before = scratch.read("out/summary.json");
+    let finish = |come: &dyn Fn()| {
+        let output = Output::create(&out, &settings, source.as_ref(), None).unwrap();
+        fs::remove_file(out.join("report.html")).unwrap();
+        come();
+        let error = output.finish(&summary, "", "", &[]).unwrap_err();
+        assert!(format!("{error:#}").contains("report.html: "), "{error:#}");
+        assert_eq!(scratch.read("out/summary.json"), before);
+        assert!(names(&out).iter().all(|name| !name.starts_with('.')));
+    };
+    finish(&|| fs::write(out.join("report.html"), "mine\n").unwrap());
+    assert_eq!(scratch.read("out/report.html"), "mine\n");
+    let ours = "<meta name=\"generator\" content=\"dtof\">";
+    fs::write(out.join("report.html"), ours).unwrap();
+    finish(&|| fs::create_dir(out.join("report.html")).unwrap());
+}
+
+#[test]
+fn what_an_export_reads_is_kept() {
+    let scratch = Scratch::new();
+    scratch.file("events.aer", file(&HEADER, &events()));
+    scratch.file("calibration.toml", "columns = 64\n");
+    fs::hard_link(scratch.path("events.aer"), scratch.path("same.aer")).unwrap();
+    let export = |out| {
+        let options = "--format ply --calibration calibration.toml";
+        let output = scratch.run(&format!("export events.aer {options} --out {out}"));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    for out in ["events.aer", "./events.aer", "same.aer", "calibration.toml"] {
+        assert_eq!(export(out), format!("error: {out}: {READ}\n"));
+    }
+    assert_eq!(scratch.read("calibration.toml"), "columns = 64\n");
+    assert!(fs::read(scratch.path("same.aer")).unwrap() == file(&HEADER, &events()));
+}

@@ -1,0 +1,96 @@
+//! AER files to export.
+
+use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_core::{
+    BinIndex, BinPosition, BlockLevel, Count, DepthEvent, DynamicDepthEvent, EchoNumber, Flags,
+    LaserCycle, PixelAddress, SubBinOffset,
+};
+use dtof_events::aer_file::{Event, Header, Writer};
+use dtof_export::{Exported, Format, Options, export};
+use dtof_photons::source::Geometry;
+
+use super::{Scratch, names};
+
+/// 64 columns, 32 rows, 128 bins of 250 ps.
+pub const HEADER: Header = Header {
+    bins: 128,
+    geometry: Geometry::new(64, 32),
+    bin_width_ps: U16F16::lit("250"),
+    offset_mm: I24F8::lit("-12.5"),
+    laser_millihertz: 0,
+    start_us: 0,
+};
+
+/// Byte at which the word of a number begins.
+pub fn byte_of(word: usize) -> usize {
+    64 + 16 * word
+}
+
+/// An event in a pixel and laser cycle, its peak in a bin.
+pub fn depth(pixel: u16, cycle: u64, bin: u16) -> Event {
+    Event::Depth(depth_event(pixel, cycle, bin))
+}
+
+/// The same by itself.
+pub fn depth_event(pixel: u16, cycle: u64, bin: u16) -> DepthEvent {
+    DepthEvent {
+        pixel: PixelAddress(pixel),
+        level: BlockLevel::PIXEL,
+        echo: EchoNumber::FIRST,
+        cycle: LaserCycle(cycle),
+        exposure: 44,
+        peak_bin: BinIndex::saturating(bin),
+        offset: SubBinOffset::new(100).unwrap(),
+        peak_count: Count::saturating(37),
+        background: Count::saturating(4),
+        flags: Flags::from_bits(4).unwrap(),
+    }
+}
+
+/// A change of depth of so many bins, to a bin.
+pub fn dynamic(pixel: u16, cycle: u64, bin: i32, change: i32) -> Event {
+    Event::DynamicDepth(
+        DynamicDepthEvent::new(
+            PixelAddress(pixel),
+            BlockLevel::PIXEL,
+            LaserCycle(cycle),
+            BinPosition::new(bin * 256).unwrap(),
+            change * 256,
+            Flags::NONE,
+        )
+        .unwrap(),
+    )
+}
+
+/// The bytes of a whole file.
+pub fn file(header: &Header, events: &[Event]) -> Vec<u8> {
+    let mut writer = Writer::new(Vec::new(), header).unwrap();
+    for event in events {
+        writer.write(event).unwrap();
+    }
+    writer.finish().unwrap()
+}
+
+/// What comes below a header with this end.
+pub fn below<'a>(bytes: &'a [u8], end: &str) -> &'a [u8] {
+    let mut places = bytes.windows(end.len());
+    let header = places.position(|part| part == end.as_bytes());
+    &bytes[header.unwrap() + end.len()..]
+}
+
+/// Twelve events, one of them in the laser cycle of another time word.
+pub fn events() -> Vec<Event> {
+    let near = (0..11).map(|index| depth(index * 150, u64::from(index) * 13, 20 + index));
+    near.chain([depth(2047, 1 << 20, 60)]).collect()
+}
+
+/// Exports `bytes`, and gives what was written.
+pub fn exported(bytes: &[u8], format: Format, options: &Options) -> (Exported, Vec<u8>) {
+    let scratch = Scratch::new();
+    let input = scratch.file("events.aer", bytes);
+    let out = scratch.path("out");
+    let exported = export(&input, &out, format, options, &mut ()).unwrap();
+    let written = std::fs::read(out).unwrap();
+    assert_eq!(names(&scratch.path("")).len(), 2, "files were left");
+    (exported, written)
+}

@@ -1,0 +1,55 @@
+//! The memory that `dtof export` takes does not grow with the file.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use std::process::Stdio;
+
+use crate::common::aer::{HEADER, depth};
+use crate::common::{Scratch, peak_kb};
+use dtof_events::aer_file::Writer;
+
+const FORMATS: [&str; 6] = ["csv", "csv --echo strongest", "pcd", "ply", "mcap", "evt2"];
+
+/// A file of so many events from all pixels, a change of depth each now and then.
+fn write(path: &Path, events: u64) {
+    let out = BufWriter::new(File::create(path).unwrap());
+    let mut writer = Writer::new(out, &HEADER).unwrap();
+    for (index, pixel) in (0..events).zip((0..2048).cycle()) {
+        let bin = if index / 2048 % 8 < 4 { 30 } else { 70 };
+        writer.write(&depth(pixel, index, bin)).unwrap();
+    }
+    writer.finish().unwrap().flush().unwrap();
+}
+
+/// The most memory each format took to export so many events, in kB.
+fn peaks(events: u64) -> Vec<u64> {
+    let scratch = Scratch::new();
+    write(&scratch.path("events.aer"), events);
+    let peak = |format: &&str| {
+        let mut dtof = scratch.command(&format!("export events.aer --format {format} --out out"));
+        let peak = peak_kb(dtof.stdout(Stdio::null()).spawn().unwrap());
+        println!("{events} events as {format}: at most {peak} kB");
+        peak
+    };
+    FORMATS.iter().map(peak).collect()
+}
+
+#[test]
+fn five_times_the_events_take_no_more_memory() {
+    // All that is ever held is there with the first 200,000. To hold the 800,000 others
+    // as the words they came as would take 12,800 kB.
+    for ((few, many), format) in peaks(200_000).iter().zip(peaks(1_000_000)).zip(FORMATS) {
+        assert!(many < few + 3_000, "{format}: {few} kB, then {many} kB");
+    }
+}
+
+/// Prints the figures of the documentation: `cargo test --release --test export memory -- --ignored
+/// --nocapture`.
+#[test]
+#[ignore = "prints figures; half a minute with --release, some minutes without"]
+fn ten_million_events() {
+    for (peak, format) in peaks(10_000_000).iter().zip(FORMATS) {
+        assert!(*peak < 24_000, "{format}: {peak} kB");
+    }
+}

@@ -1,0 +1,177 @@
+//! Recordings as the library opens them: whole histograms, and the logs of sensors.
+
+use std::fs::File;
+use std::io::Write;
+use std::sync::Arc;
+
+use dtof_core::fixed::types::U16F16;
+use dtof_photons::medium::{Medium, NpyArray};
+use dtof_photons::open::{BIN_WIDTH_PS, Counts, Opening, counts, open};
+use dtof_photons::source::Geometry;
+use dtof_photons::{tmf8820, tmf8829};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+
+use crate::common::Scratch;
+
+fn counts_of(name: &str, text: &str) -> Counts {
+    let scratch = Scratch::new();
+    let path = scratch.file(name, text);
+    counts(&path, &Opening::default()).unwrap()
+}
+
+#[test]
+fn photon_lists_are_summed_over_their_laser_cycles() {
+    let counts = counts_of(
+        "a.csv",
+        // Not so many slices as that takes.
+        "pixel,cycle,bin\n2,0,5\n2,7,5\n0,70000000000000,127\n2,70000000000000,6\n",
+    );
+    assert_eq!(counts.geometry, Geometry::new(3, 1));
+    assert_eq!(counts.cycles, Some(70_000_000_000_001));
+    let [pixels] = &counts.captures[..] else {
+        panic!("one capture")
+    };
+    let sums: Vec<u64> = pixels.iter().map(|bins| bins.iter().sum()).collect();
+    assert_eq!(sums, [1, 0, 3]);
+    assert_eq!([pixels[2][5], pixels[2][6], pixels[0][127]], [2, 1, 1]);
+    assert_eq!(counts.known.bin_width_ps, BIN_WIDTH_PS);
+    assert!(!counts.known.has_shape);
+}
+
+/// A run takes as many laser cycles at a time as the brightest part of a list allows.
+#[test]
+fn a_list_says_how_bright_its_brightest_part_is() {
+    let scratch = Scratch::new();
+    let rows = "0,300,5\n".repeat(512);
+    let text = format!("pixel,cycle,bin\n0,0,1\n{rows}0,1000000000,1\n");
+    let path = scratch.file("burst.csv", text);
+    let recording = open(&path, &Opening::default()).unwrap();
+    assert_eq!(recording.photons.photons_per_cycle(), 2.0);
+}
+
+#[test]
+fn the_truth_of_a_log_is_that_of_its_centre_zones() {
+    let zone = format!("[{}]", ["3"; 128].join(","));
+    let zones = format!("\"hists\": [{}]", [zone.as_str(); 9].join(","));
+    let log = format!("[{{{zones}}}, {{{zones}, \"dist_to_plane\": 0.25}}]");
+    let counts = counts_of("a.json", &log);
+    assert_eq!(counts.captures.len(), 2);
+    let truth = counts.truth_mm.unwrap();
+    let expected = |address: usize| (address == 9 + 4).then_some(250.0);
+    assert_eq!(truth, (0..18).map(expected).collect::<Vec<_>>());
+    assert_eq!(counts.known.bin_width_ps, tmf8820::BIN_WIDTH_PS);
+}
+
+/// A log of two frames, two rows and two columns; `bin` gives the count of a bin in a column.
+fn tmf8829_log(bin: impl Fn(usize, usize) -> usize, configuration: &str) -> String {
+    let pixel = |column: usize| {
+        let bins: Vec<String> = (0..64)
+            .map(|place| bin(column, place).to_string())
+            .collect();
+        format!("{{\"bin\": [{}]}}", bins.join(","))
+    };
+    let row = format!("[{}, {}]", pixel(0), pixel(1));
+    let frame = format!("{{\"mp_histo\": [{row}, {row}], \"results\": []}}");
+    format!("{{\"Result_Set\": [{frame}, {frame}]{configuration}}}")
+}
+
+#[test]
+fn a_tmf8829_log_is_told_by_its_content_and_read_packed_or_not() {
+    let configuration = ", \"configuration\": {\"bin_shift\": 2, \"histogram_bins\": 218}";
+    let log = tmf8829_log(|column, place| 100 * column + place, configuration);
+    let plain = counts_of("a.json", &log);
+    assert_eq!(plain.geometry, Geometry::new(2, 4));
+    assert_eq!(plain.captures.len(), 2);
+    assert_eq!(plain.captures[1][3][7], 107);
+    // 218 of the sensor's own bins are 54 of four, and one of two.
+    assert_eq!(plain.known.gate, Some((0, 53)));
+    assert_eq!(plain.known.bin_width_ps, 4 * U16F16::lit("203.8"));
+    assert_eq!(plain.known.offset_mm, Some(tmf8829::OFFSET_MM));
+    let scratch = Scratch::new();
+    // Its name says nothing about it.
+    for name in ["b.json.gz", "b.json"] {
+        let file = File::create(scratch.path(name)).unwrap();
+        let mut packed = GzEncoder::new(file, Compression::default());
+        packed.write_all(log.as_bytes()).unwrap();
+        packed.finish().unwrap();
+        let packed = counts(&scratch.path(name), &Opening::default()).unwrap();
+        assert_eq!(packed.captures, plain.captures);
+    }
+}
+
+#[test]
+fn columns_that_are_all_the_same_are_read_once() {
+    let counts = counts_of("a.json", &tmf8829_log(|_, place| place, ""));
+    assert_eq!(counts.geometry, Geometry::new(1, 4));
+    assert_eq!(counts.captures[0].len(), 2);
+    assert_eq!(counts.known.gate, None);
+    let row = &counts.known.rows[0];
+    assert_eq!(row.0, "columns left out");
+    assert_eq!(row.1, "1 of 2, each the same as the first");
+}
+
+#[test]
+fn logs_that_are_damaged_are_refused() {
+    let scratch = Scratch::new();
+    let good = tmf8829_log(|_, _| 1, "");
+    scratch.file("short.json", good.replacen("1,1,", "1,", 1));
+    scratch.file("empty.json", "{\"Result_Set\": []}");
+    scratch.file("off.json", "{\"Result_Set\": [{}]}");
+    scratch.file("other.json", "{\"a\": 1}");
+    scratch.file("cut.json", &good[..good.len() / 2]);
+    scratch.file("cut.json.gz", [0x1f, 0x8b, 8, 0, 0]);
+    let odd = good.replacen("}, {\"bin\"", "}], [{\"bin\"", 1);
+    scratch.file("odd.json", odd);
+    scratch.all_refused(
+        "replay --out out --input",
+        "
+            short.json | short.json: frame 0, row 0, column 0 has 63 bins, not 64
+            empty.json | empty.json: no frames
+            off.json | off.json: frame 0 has no mp_histo
+            other.json | other.json:1: not a TMF8829 log: missing field
+            cut.json | cut.json:1: not a TMF8829 log
+            cut.json.gz | cut.json.gz
+            odd.json | odd.json: frame 0 is not of 3 rows and 1 columns as frame 0
+        ",
+    );
+}
+
+/// A photon list that is held in memory gives the photons of its file, and the same errors.
+#[test]
+fn an_array_in_memory_is_read_as_its_file_is() {
+    let scratch = Scratch::new();
+    let descr = "[('pixel', '<u2'), ('cycle', '<u2'), ('bin', '|u1')]";
+    let list = |rows: &[[u8; 5]]| {
+        let text = format!(
+            "{{'descr': {descr}, 'fortran_order': False, 'shape': ({},), }}\n",
+            rows.len()
+        );
+        let mut header = b"\x93NUMPY\x01\x00".to_vec();
+        header.extend(u16::try_from(text.len()).unwrap().to_le_bytes());
+        header.extend(text.as_bytes());
+        let path = scratch.path("list.npy");
+        std::fs::write(&path, [&header[..], rows.as_flattened()].concat()).unwrap();
+        let array = NpyArray {
+            name: path.display().to_string(),
+            header,
+            data: Box::new(rows.concat()),
+        };
+        [Medium::File(path), Medium::Array(Arc::new(array))]
+    };
+    let photons = list(&[[0, 0, 0, 0, 9], [3, 0, 1, 1, 127], [0, 0, 2, 1, 5]]);
+    let [file, memory] = photons.map(|medium| {
+        let mut recording = open(&medium, &Opening::default()).unwrap();
+        let slice = recording.photons.next_slice(300).unwrap();
+        (recording.known, recording.photons.cycles(), slice.pixels)
+    });
+    assert_eq!(file, memory);
+    assert_eq!(file.1, 259);
+    let refused = list(&[[0, 0, 1, 1, 0], [0, 0, 0, 1, 0]]);
+    let [file, memory] = refused.map(|medium| {
+        let error = open(&medium, &Opening::default()).err().unwrap();
+        format!("{error:#}")
+    });
+    assert_eq!(file, memory);
+    assert!(file.ends_with("record 1: cycle 256 comes after cycle 257"));
+}

@@ -1,0 +1,115 @@
+//! Runs with several echoes and with blocks: what maps, report and truth take of them.
+
+use crate::common::{Scratch, says};
+
+/// Two surfaces in each of 8x4 pixels, the nearer one brighter.
+const TWO: &str = "columns = 8\nrows = 4\nbackground = 0.01\ncycles = 3000\n[[surface]]\n\
+                   name = \"glass\"\nrange_mm = 1000\nsignal = 0.6\n\
+                   [second_echo]\nshare = 0.3\nbehind_mm = 1500\n";
+const RUN: &str = "--rule window --sigma-bins 1 --echoes 2 --seed 3";
+
+/// What a run says of the echoes shown, and the picture of the last range.
+fn shown(options: &str) -> (String, String, Vec<Vec<String>>) {
+    let scratch = Scratch::new();
+    let scene = scratch.file("scene.toml", TWO);
+    scratch.simulated(&scene, &format!("{RUN} {options}"));
+    let report = scratch.read("out/report.html");
+    (report, scratch.read("out/depth-last.svg"), scratch.events())
+}
+
+/// The least and the greatest number at the colours of a map, in millimetres: all others are
+/// columns and rows.
+fn span(svg: &str) -> [f64; 2] {
+    let texts = svg.split('>').filter_map(|part| part.split_once('<'));
+    let numbers =
+        texts.filter_map(|(text, _)| text.trim_start_matches(['≤', '≥']).trim().parse().ok());
+    let numbers = numbers.filter(|number: &f64| *number > 300.0);
+    numbers.fold([f64::MAX, f64::MIN], |[low, high], number| {
+        [low.min(number), high.max(number)]
+    })
+}
+
+#[test]
+fn maps_show_the_echo_that_is_asked_for_and_files_hold_all() {
+    let (report, strongest, events) = shown("");
+    says(
+        &report,
+        "all as events, the strongest of an exposure in the maps",
+    );
+    says(
+        &report,
+        &format!(
+            "All {} events are shown.",
+            dtof_options::rows::grouped(events.len() as u64)
+        ),
+    );
+    let (of_first, first, same) = shown("--echo first");
+    assert_eq!(events, same);
+    let (_, last, same) = shown("--echo last");
+    assert_eq!(events, same);
+    let (_, all, same) = shown("--echo all");
+    assert_eq!(events, same);
+    says(&of_first, "the nearest of an exposure");
+    let exposures = events.iter().filter(|event| event[10] == "1").count();
+    assert!(exposures < events.len());
+    let shown = format!(
+        "All {} events are shown.",
+        dtof_options::rows::grouped(exposures as u64)
+    );
+    says(&of_first, &shown);
+    assert!(
+        (900.0..1100.0).contains(&span(&first)[1]),
+        "{:?}",
+        span(&first)
+    );
+    assert!(
+        (2400.0..2600.0).contains(&span(&last)[1]),
+        "{:?}",
+        span(&last)
+    );
+    assert!((900.0..1100.0).contains(&span(&strongest)[0]));
+    assert!(first != last && all != first);
+}
+
+#[test]
+fn an_echo_of_the_second_surface_is_no_false_alarm_where_two_are_reported() {
+    let scratch = Scratch::new();
+    let scene = scratch.file("scene.toml", TWO);
+    scratch.simulated(&scene, RUN);
+    let truth = &scratch.summary()["against_truth"];
+    let share = |truth: &serde_json::Value| truth["false_alarm_share"].as_f64().unwrap();
+    assert!(share(truth) < 0.02, "{truth}");
+    let far = scratch.events();
+    let far = far
+        .iter()
+        .filter(|event| event[5].parse::<f64>().unwrap() > 2000.0);
+    assert!(far.count() > 500);
+    // With one echo it is the first surface alone, as before.
+    scratch.simulated(&scene, "--rule window --sigma-bins 1 --gate 50..127");
+    assert!(share(&scratch.summary()["against_truth"]) > 0.9);
+}
+
+/// A dim plane turned by some bins over the array: a block is right for what its pixels see.
+#[test]
+fn blocks_are_compared_with_what_their_pixels_see() {
+    let scratch = Scratch::new();
+    let scene = scratch.file(
+        "scene.toml",
+        "columns = 8\nrows = 8\nbackground = 0.01\ncycles = 6000\n[[surface]]\nname = \"wall\"\n\
+         range_mm = 1500\nrange_right_mm = 1800\nsignal = 0.02\n",
+    );
+    scratch.simulated(&scene, "--rule window --sigma-bins 1 --binning 2 --seed 3");
+    let summary = scratch.summary();
+    let truth = &summary["against_truth"];
+    assert!(
+        summary["events_of_blocks"].as_u64() > Some(100),
+        "{summary}"
+    );
+    assert!(
+        truth["false_alarm_share"].as_f64().unwrap() < 0.05,
+        "{truth}"
+    );
+    // The first column of a block of four lies 64 mm before its middle.
+    assert!(truth["bias_mm"].as_f64().unwrap().abs() < 12.0, "{truth}");
+    assert_eq!(truth["surfaces"][0]["pixels"], 64);
+}

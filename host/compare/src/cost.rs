@@ -1,0 +1,94 @@
+//! What a method costs on a Cortex-M4F: counted instructions, at opt-level 3.
+//!
+//! Source: `docs/results/bench/instructions.csv`. A test holds these numbers against it.
+
+use dtof_core::{DepthEstimator, Statistics};
+
+use super::method::{Kind, Method, Rule};
+use dtof_engine::settings::Settings;
+
+/// A photon in a histogram (`AsyncPixel::count_batch`).
+pub const PHOTON: f64 = 10.22;
+/// More of one that may count in blocks (`count and count_in_blocks; feeds none`, less
+/// `AsyncPixel::count`).
+pub const FEED: f64 = 31.56 - 28.56;
+/// One in a block (`count and count_in_blocks; 1 level`, less `feeds none`).
+pub const BLOCK_PHOTON: f64 = 58.99 - 31.56;
+/// A look without an event with the paper's rule (`kept peak; no event`).
+pub const PAPER: f64 = 90.68;
+/// With the average of all bins (`average; no event`).
+pub const AVERAGE: f64 = 32.0;
+/// With tracking (`look; tracking; no event`).
+pub const TRACKING: f64 = 405.45;
+/// Of a block (`look; block; no event`).
+pub const BLOCK_LOOK: f64 = 247.28;
+/// An exposure that L2 ends (`look at L2`).
+pub const EXPIRY: f64 = 108.0;
+/// Peak and depth of three bins of an event (`kept peak; event and depth`), and its word (`encode
+/// and to_le_bytes`).
+pub const EVENT: f64 = 517.0 + 46.0;
+/// More of the depth from a centred window (`centred window, σ 1`, less `centroid`).
+pub const CENTRED: f64 = 135.84 - 68.0;
+
+/// With a window of so many bins (`window of N; no event`).
+#[must_use]
+pub const fn window(bins: u8) -> f64 {
+    match bins {
+        0 | 1 => 110.88,
+        2 => 134.78,
+        3 => 141.81,
+        4 | 5 => 197.88,
+        _ => 219.97,
+    }
+}
+
+/// A look without an event.
+fn look(method: &Method) -> f64 {
+    match method.kind {
+        Kind::Frames => 0.0,
+        Kind::Events { tracking: true, .. } => TRACKING,
+        Kind::Events { rule, .. } => match rule {
+            Rule::Paper => PAPER,
+            Rule::Average => AVERAGE,
+            Rule::Window(width) => window(width),
+        },
+    }
+}
+
+/// Instructions a laser cycle and pixel of a run of `pixel_cycles` laser cycles of all pixels
+/// together, from what pixels and blocks have counted. Blocks have at most a third of the looks
+/// of the pixels.
+#[must_use]
+pub fn instructions(
+    method: &Method,
+    settings: &Settings,
+    [pixels, blocks]: &[Statistics; 2],
+    pixel_cycles: u64,
+) -> f64 {
+    let all = pixel_cycles as f64;
+    let looks = match method.kind {
+        Kind::Events { .. } => all / f64::from(settings.x.max(1)),
+        Kind::Frames => 0.0,
+    };
+    let has_blocks = settings.binning.is_some();
+    let of_blocks: f64 = if has_blocks {
+        let levels = i32::from(method.levels().raw());
+        let each_pixel = (1.0 - 0.25f64.powi(levels)) / 3.0;
+        FEED * pixels.photons() as f64
+            + BLOCK_PHOTON * blocks.photons() as f64
+            + BLOCK_LOOK * looks * each_pixel
+    } else {
+        0.0
+    };
+    let depth = match settings.estimator() {
+        DepthEstimator::Centroid3 => 0.0,
+        DepthEstimator::CentredWindow(_) => CENTRED,
+    };
+    let events = pixels.events + blocks.events;
+    let sum = PHOTON * pixels.photons() as f64
+        + look(method) * looks
+        + (EVENT + depth) * events as f64
+        + EXPIRY * pixels.expired as f64
+        + of_blocks;
+    sum / all
+}

@@ -1,0 +1,385 @@
+//! Which method for these photons: all of them on the same photons, how fast, how exact, how
+//! cheap; what still holds in harder conditions; and which one to take.
+//!
+//! Every rule has the threshold at which it has the false alarms that are asked for, in
+//! simulated exposures without a target at the background that there is. What is left to choose
+//! is how many photons a peak must hold: more make a report later and more exact. So each
+//! method is a curve of time against error, and frames of all lengths are another.
+
+pub mod answer;
+pub mod bound;
+mod chart;
+pub mod cost;
+pub mod measure;
+pub mod method;
+pub mod page;
+mod selected;
+pub mod stress;
+pub mod survey;
+mod tally;
+mod text;
+pub mod thresholds;
+pub mod truth;
+
+use anyhow::{Result, ensure};
+use dtof_core::{BlockLevel, PixelAddress};
+
+use answer::{Answer, answer, of_longest_frame};
+use bound::Bound;
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::Settings;
+use dtof_options::Refused;
+use dtof_photons::source::{Geometry, PhotonSource, has_only_neighbours};
+use measure::{Outcome, Trial, measure};
+use method::{Kind, Method, Rule};
+use selected::Selected;
+use stress::{Light, Stress, Stressed};
+use survey::{OfPixel, light, median, survey};
+pub use tally::Figures;
+use tally::{WRONG_BEYOND_BINS, mm_per_bin};
+use thresholds::{LEAST_COUNT, Thresholds};
+use truth::Truth;
+
+/// Photons that methods are compared on, about, and those under stress.
+const PHOTONS: f64 = 1.5e7;
+const STRESS_PHOTONS: f64 = 3e6;
+
+/// Photons of a peak, at least: each about 1.4 times the one before.
+const LEAST_COUNTS: [u16; 16] = [
+    LEAST_COUNT,
+    7,
+    10,
+    14,
+    20,
+    28,
+    40,
+    57,
+    80,
+    113,
+    160,
+    226,
+    320,
+    453,
+    640,
+    905,
+];
+
+/// Reports that a trial has at least; one with fewer is not told.
+const LEAST_REPORTS: u64 = 100;
+
+/// Where no method is as exact as frames of L2, the answer may be off by so many times more,
+/// again and again, but by no more than a report that is wrong.
+const WIDER: f64 = std::f64::consts::SQRT_2;
+
+/// Laser cycles of frames, up to L2.
+const FRAMES: [u16; 6] = [100, 200, 500, 1000, 2000, 5000];
+
+/// What is compared.
+pub struct Task<'a> {
+    /// The photons of a seed.
+    pub photons: &'a dyn Fn(u64) -> Result<Box<dyn PhotonSource>>,
+    /// What reports are compared with; without, the range of all photons of the pixel.
+    pub truth: Option<Truth>,
+    /// Bins, gate, masked pixels, L1, L2, X and seed.
+    pub settings: &'a Settings,
+    /// Standard deviation of the pulse in bins.
+    pub sigma: f64,
+    /// The share of exposures without a target that may end with an event.
+    pub false_alarm: f64,
+    /// How exact the answer has to be, in millimetres; as frames of L2 unless given, or as near to
+    /// that as any method comes.
+    pub within_mm: Option<f64>,
+    /// Told what comes next. An error from it ends the comparison.
+    pub progress: &'a dyn Fn(&str) -> Result<()>,
+}
+
+/// What came out.
+pub struct Comparison {
+    /// The methods. Frames are the last.
+    pub methods: Vec<Method>,
+    /// The threshold of each that reports events.
+    pub thresholds: Vec<Option<f64>>,
+    /// All trials, by method and effort.
+    pub outcomes: Vec<Outcome>,
+    /// What a single pixel cannot do better than.
+    pub bound: Option<Bound>,
+    /// The methods at their fastest, and the longest frame, under each stress; the first is none.
+    pub stressed: Vec<(Stress, Vec<Outcome>)>,
+    /// The error of frames of L2, in millimetres.
+    pub frame_mm: Option<f64>,
+    /// The method to take.
+    pub answer: Answer,
+    /// The settings that have it.
+    pub taken: Option<Settings>,
+    /// Photons of the median pixel.
+    pub light: Light,
+    /// How errors came about.
+    pub truth: Truth,
+    /// Pixels and laser cycles that were compared.
+    pub pixels: usize,
+    /// Laser cycles.
+    pub cycles: u64,
+    /// Laser cycles a second, if they are known.
+    pub laser_hz: Option<u64>,
+}
+
+/// The methods, and where their trials come from.
+struct Field<'a> {
+    settings: &'a Settings,
+    methods: Vec<Method>,
+    thresholds: Vec<Option<f64>>,
+}
+
+impl<'a> Field<'a> {
+    /// All methods that suit `light`, each with the threshold of equal false alarms.
+    fn new(task: &Task<'a>, light: &Light, most_levels: u8) -> Result<Self> {
+        let settings = task.settings;
+        let pulse = dtof_core::fixed::types::U8F8::saturating_from_num(light.sigma);
+        let methods = Method::all(pulse, most_levels);
+        let mut rules: Vec<Rule> = methods.iter().filter_map(Method::rule).collect();
+        rules.dedup();
+        let known = Thresholds::simulate(&rules, settings, light.background, settings.seed)?;
+        let thresholds = methods.iter().map(|method| {
+            // Blocks have a quarter of the false alarms.
+            let alone = method.levels() == BlockLevel::PIXEL;
+            let share = task.false_alarm * if alone { 1.0 } else { 0.75 };
+            method.rule().map(|rule| known.of(rule, share)).transpose()
+        });
+        Ok(Self {
+            settings,
+            thresholds: thresholds.collect::<Result<_>>()?,
+            methods,
+        })
+    }
+
+    /// A trial of the method with this number.
+    fn trial(&self, number: usize, effort: u16) -> Result<Trial> {
+        let threshold = self.thresholds[number].unwrap_or_default();
+        Ok(Trial {
+            method: number,
+            effort,
+            settings: self.methods[number].settings(self.settings, threshold, effort)?,
+        })
+    }
+
+    /// Every method with every effort.
+    fn trials(&self, light: &Light) -> Result<Vec<Trial>> {
+        let methods = self.methods.iter().enumerate();
+        let trials = methods.flat_map(|(number, method)| {
+            let efforts = efforts(method, self.settings.l2, light).into_iter();
+            efforts.map(move |effort| self.trial(number, effort))
+        });
+        trials.collect()
+    }
+
+    /// Every method at its fastest, and the longest frame.
+    fn fastest(&self) -> Result<Vec<Trial>> {
+        let methods = self.methods.iter().enumerate();
+        let trials = methods.map(|(number, method)| match method.kind {
+            Kind::Frames => self.trial(number, self.settings.l2),
+            Kind::Events { .. } => self.trial(number, LEAST_COUNT),
+        });
+        trials.collect()
+    }
+}
+
+/// Compares all methods that suit the pulse.
+///
+/// # Errors
+/// If the photons cannot be had, or the settings are none.
+pub fn compare(task: &Task) -> Result<Comparison> {
+    let Task {
+        settings, sigma, ..
+    } = *task;
+    // What no pixel could run with is refused before anything is drawn.
+    host_engine(settings, Geometry::new(1, 1), &[])?;
+    (task.progress)("surveys the photons")?;
+    let mut source = photons(task, 0, PHOTONS)?;
+    let (geometry, laser_hz) = (source.geometry(), source.laser_hz());
+    let most_levels = most_levels(source.as_ref());
+    let surveyed = survey(source.as_mut(), settings, sigma)?;
+    let truth = known_ranges(task.truth.clone(), &surveyed, settings, geometry)?;
+    let has_target = |pixel| truth.has_target(pixel, 0);
+    ensure!(
+        surveyed.iter().any(|(pixel, _)| has_target(*pixel)),
+        "no pixel has a target: there is nothing to compare"
+    );
+    let light = light(&surveyed, sigma, has_target);
+
+    (task.progress)("finds thresholds of equal false alarms")?;
+    let field = Field::new(task, &light, most_levels)?;
+    let bound = Bound::new(&light, settings, task.false_alarm, settings.seed)?;
+
+    (task.progress)("tries all methods")?;
+    let mut source = photons(task, 0, PHOTONS)?;
+    let (pixels, cycles) = (source.addresses().len(), source.cycles());
+    let trials = field.trials(&light)?;
+    let mut outcomes = measure(
+        source.as_mut(),
+        &field.methods,
+        &trials,
+        &truth,
+        &Stress::NONE,
+    )?;
+    outcomes.retain(|outcome| is_measured(outcome, cycles));
+
+    let frame_mm = of_longest_frame(&field.methods, &outcomes).map(|frame| frame.0);
+    let answer = choose(task, &field.methods, &outcomes, frame_mm)?;
+    let taken = answer.taken.as_ref();
+    let taken = taken.map(|taken| field.trial(taken.method, taken.effort));
+    let taken = taken.transpose()?;
+    // The one to take stands under stress as it is taken.
+    let mut trials = field.fastest()?;
+    trials.extend(taken.clone());
+    let mut stresses = Stress::all(&light, settings.gate.map_or(0, |gate| gate.0));
+    // Where every pixel is hot there is no other to look at.
+    let is_hot = |stress: &Stress, pixel| stress.is_hot(pixel, geometry.columns);
+    stresses.retain(|stress| surveyed.iter().any(|(pixel, _)| !is_hot(stress, *pixel)));
+    let stressed = stresses
+        .into_iter()
+        .map(|stress| under_stress(task, &field, &trials, &truth, stress))
+        .collect::<Result<_>>()?;
+    Ok(Comparison {
+        frame_mm,
+        answer,
+        taken: taken.map(|taken| taken.settings),
+        methods: field.methods,
+        thresholds: field.thresholds,
+        outcomes,
+        bound,
+        stressed,
+        light,
+        truth,
+        pixels,
+        cycles,
+        laser_hz,
+    })
+}
+
+/// About `most` photons of the seed after so many others.
+fn photons(task: &Task, nth_seed: u64, most: f64) -> Result<Box<dyn PhotonSource>> {
+    let Settings { seed, l2, .. } = *task.settings;
+    limited((task.photons)(seed + nth_seed)?, most, l2)
+}
+
+/// The method to take, as exact as was asked for, or as frames of L2 are with `frame_mm`.
+fn choose(
+    task: &Task,
+    methods: &[Method],
+    outcomes: &[Outcome],
+    frame_mm: Option<f64>,
+) -> Result<Answer> {
+    if let Some(within_mm) = task.within_mm {
+        return Ok(answer(methods, outcomes, within_mm));
+    }
+    let frame_mm = frame_mm.ok_or_else(|| {
+        Refused::input(format!(
+            "frames of L2 give fewer than {LEAST_REPORTS} reports here; say `within`, or take more \
+             laser cycles"
+        ))
+    })?;
+    let mut found = answer(methods, outcomes, frame_mm);
+    let widest = WRONG_BEYOND_BINS * mm_per_bin(task.settings);
+    while found.taken.is_none() && found.within_mm < widest {
+        found = answer(methods, outcomes, WIDER * found.within_mm);
+    }
+    Ok(found)
+}
+
+/// What `trials` come to under `stress`, on photons of another seed.
+fn under_stress(
+    task: &Task,
+    field: &Field,
+    trials: &[Trial],
+    truth: &Truth,
+    stress: Stress,
+) -> Result<(Stress, Vec<Outcome>)> {
+    (task.progress)(stress.name)?;
+    let source = photons(task, 1, STRESS_PHOTONS)?;
+    let bins = u16::try_from(task.settings.bins)?;
+    let mut source = Stressed::new(source, &stress, bins, task.sigma, task.settings.seed);
+    let outcomes = measure(&mut source, &field.methods, trials, truth, &stress)?;
+    Ok((stress, outcomes))
+}
+
+/// Whether a trial has enough reports to tell its time and its error.
+fn is_measured(outcome: &Outcome, cycles: u64) -> bool {
+    let figures = &outcome.figures;
+    figures.reports >= LEAST_REPORTS && figures.cycles <= cycles as f64
+}
+
+/// The truth. Without, it is where all photons of a pixel lie. That of a recording may have
+/// another offset: the median pixel tells.
+fn known_ranges(
+    truth: Option<Truth>,
+    surveyed: &[(PixelAddress, OfPixel)],
+    settings: &Settings,
+    geometry: Geometry,
+) -> Result<Truth> {
+    let mm_per_bin = mm_per_bin(settings);
+    let offset = settings.offset_mm.to_num::<f64>();
+    let range = |pixel: &OfPixel| Some(pixel.position? * mm_per_bin + offset);
+    Ok(match truth {
+        Some(Truth::Scene(scene)) => Truth::Scene(scene),
+        Some(known) => {
+            let errors = surveyed
+                .iter()
+                .filter_map(|(address, pixel)| Some(range(pixel)? - known.ranges(*address, 0)[0]?));
+            let offset = median(errors.collect());
+            known.moved(offset)
+        }
+        None => {
+            let mut ranges = vec![None; geometry.addresses()];
+            for (address, pixel) in surveyed {
+                ranges[usize::from(address.0)] = range(pixel);
+            }
+            Truth::OfAllPhotons(ranges)
+        }
+    })
+}
+
+/// The highest level whose blocks have more than a pixel, and none of another capture.
+fn most_levels(source: &dyn PhotonSource) -> u8 {
+    let Geometry { columns, rows } = source.geometry();
+    let fits = |level: &u8| {
+        columns.min(rows) >= 1 << level
+            && has_only_neighbours(source, BlockLevel::saturating(*level))
+    };
+    [2, 1].into_iter().find(fits).unwrap_or(0)
+}
+
+/// So much of `source` that it has about `most` photons: fewer laser cycles, but enough for three
+/// exposures, and then fewer pixels.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "positive, limited"
+)]
+fn limited(source: Box<dyn PhotonSource>, most: f64, l2: u16) -> Result<Box<dyn PhotonSource>> {
+    let each_cycle = source.photons_per_cycle();
+    let least = 3 * u64::from(l2);
+    if each_cycle * source.cycles() as f64 <= most {
+        return Ok(source);
+    }
+    let cycles = ((most / each_cycle) as u64).clamp(least.min(source.cycles()), source.cycles());
+    let nth = (each_cycle * cycles as f64 / most).ceil().max(1.0) as u32;
+    Ok(Box::new(Selected::new(source, nth, cycles)))
+}
+
+/// The least counts that a method can reach within L2, or lengths of frames.
+fn efforts(method: &Method, l2: u16, light: &Light) -> Vec<u16> {
+    match method.kind {
+        Kind::Frames => {
+            let mut lengths: Vec<u16> = FRAMES.into_iter().filter(|&length| length < l2).collect();
+            lengths.push(l2);
+            lengths
+        }
+        Kind::Events { .. } => {
+            let all = (light.signal + light.background) * f64::from(l2);
+            let reachable = LEAST_COUNTS.into_iter();
+            reachable
+                .filter(|&count| count == LEAST_COUNT || f64::from(count) <= 2.0 * all)
+                .collect()
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! The tables and the page of a comparison.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use dtof_draw::svg;
+
+use super::Comparison;
+use super::measure::Outcome;
+use dtof_engine::settings::{self, SettingsFile};
+use dtof_options::files::{Marked, may_replace, write_marked};
+use dtof_report::{Figure, Section, still};
+
+/// The files of a comparison, and what stands near the start of each. The last makes a folder
+/// complete.
+pub const FILES: [(&str, &str); 5] = [
+    ("dtof.toml", settings::MARK),
+    ("compare.svg", svg::MARK),
+    ("methods.csv", TABLE_HEAD),
+    ("stress.csv", STRESS_HEAD),
+    ("report.html", dtof_report::MARK),
+];
+
+impl Comparison {
+    /// All trials as a table, `methods.csv`.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let mut text = format!("{TABLE_HEAD}\n");
+        for outcome in &self.outcomes {
+            self.line(&mut text, "", outcome);
+        }
+        text
+    }
+
+    /// The same under stress, `stress.csv`.
+    #[must_use]
+    pub fn stress_table(&self) -> String {
+        let mut text = format!("{STRESS_HEAD},{TABLE_HEAD}\n");
+        for (stress, outcomes) in &self.stressed {
+            for outcome in outcomes {
+                let holds = if self.holds(outcome) { "yes" } else { "no" };
+                let before = format!("\"{}\",{holds},", stress.name);
+                self.line(&mut text, &before, outcome);
+            }
+        }
+        text
+    }
+
+    fn line(&self, text: &mut String, before: &str, outcome: &Outcome) {
+        let figures = &outcome.figures;
+        let threshold = self.thresholds[outcome.trial.method];
+        let threshold = threshold.map_or(String::new(), |threshold| format!("{threshold:.4}"));
+        let time = |cycles: f64| {
+            if cycles.is_finite() {
+                format!("{cycles:.2}")
+            } else {
+                String::new()
+            }
+        };
+        let _ = writeln!(
+            text,
+            "{before}\"{}\",{threshold},{},{},{},{:.4},{:.6},{},{},{:.2}",
+            self.methods[outcome.trial.method].name,
+            outcome.trial.effort,
+            time(figures.cycles),
+            time(figures.slow_cycles),
+            figures.error_mm,
+            figures.wrong,
+            figures.reports,
+            figures.stray,
+            outcome.instructions
+        );
+    }
+}
+
+/// The columns of the tables.
+pub const TABLE_HEAD: &str = "method,threshold,least_photons_or_frame,cycles,cycles_slow_pixel,error_mm,\
+     wrong_share,reports,reports_without_target,instructions";
+
+/// The columns before these under stress.
+const STRESS_HEAD: &str = "condition,holds";
+
+/// Checks that the results may be written into `folder`.
+///
+/// # Errors
+/// If a file is there that no comparison has written, or one of `inputs`.
+pub fn may_write(folder: &Path, inputs: &[&Path]) -> Result<()> {
+    ensure!(
+        !folder.join("summary.json").exists(),
+        "{}: holds the results of a run; take another folder",
+        folder.display()
+    );
+    FILES
+        .iter()
+        .try_for_each(|(name, mark)| may_replace(&folder.join(name), mark, inputs))
+}
+
+/// Writes the results of photons called `name` into `folder`: charts, tables, the page, and the
+/// settings that were `taken`, if there are any.
+///
+/// # Errors
+/// If the folder cannot be written.
+pub fn write(
+    compared: &Comparison,
+    folder: &Path,
+    name: &Path,
+    taken: Option<&SettingsFile>,
+    inputs: &[&Path],
+) -> Result<()> {
+    fs::create_dir_all(folder)
+        .with_context(|| format!("{}: cannot be the output folder", folder.display()))?;
+    may_write(folder, inputs)?;
+    let svg = compared.chart()?;
+    let section = |heading, rows| Section { heading, rows };
+    let (answer, able, stress) = (
+        compared.rows(),
+        compared.able_rows(),
+        compared.stress_rows(),
+    );
+    let sections = [
+        section("Answer", &answer[..]),
+        section("Methods as exact as wanted", &able),
+        section("Harder conditions: times as long to a report", &stress),
+    ];
+    let lead = format!("All methods on the same photons of {}.", name.display());
+    let (title, _) = compared.finding();
+    let caption = "methods.csv has every dot, stress.csv the harder conditions.";
+    let figure = Figure { svg: &svg, caption };
+    let page = still(&title, &lead, &sections, &[figure]);
+    let toml = taken.map(SettingsFile::to_toml).transpose()?;
+    let texts = [
+        toml,
+        Some(svg.clone()),
+        Some(compared.table()),
+        Some(compared.stress_table()),
+        Some(page),
+    ];
+    let places = FILES.map(|(name, _)| folder.join(name));
+    let all = places.iter().zip(FILES).zip(&texts);
+    let files: Vec<Marked> = all
+        .filter_map(|((place, (_, mark)), text)| {
+            let text = text.as_deref()?;
+            Some(Marked { place, text, mark })
+        })
+        .collect();
+    write_marked(&files, inputs)?;
+    let [settings, ..] = &places;
+    if taken.is_none() && settings.exists() {
+        // Settings of an earlier comparison are not the answer of this one.
+        fs::remove_file(settings).with_context(|| settings.display().to_string())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,110 @@
+//! A part of a large array: whole blocks of 8×8 pixels, evenly spread.
+
+use std::collections::BTreeSet;
+
+use anyhow::Result;
+use dtof_core::PixelAddress;
+
+use dtof_photons::source::{Geometry, PhotonSource, Slice};
+
+/// A source with some of its pixels, and with fewer laser cycles.
+pub struct Selected {
+    source: Box<dyn PhotonSource>,
+    addresses: Vec<PixelAddress>,
+    /// Where they are in a slice.
+    places: Vec<usize>,
+    cycles: u64,
+    photons_per_cycle: f64,
+}
+
+impl Selected {
+    /// Every `nth` block of `source`, for at most `cycles` laser cycles.
+    #[must_use]
+    pub fn new(mut source: Box<dyn PhotonSource>, nth: u32, cycles: u64) -> Self {
+        let columns = source.geometry().columns;
+        let blocks_across = columns.div_ceil(8);
+        let block = |address: PixelAddress| {
+            let (row, column) = (
+                u32::from(address.0) / columns,
+                u32::from(address.0) % columns,
+            );
+            // Not one below the other.
+            (row / 8 * blocks_across + column / 8, row / 8)
+        };
+        let mut blocks: Vec<_> = source.addresses().into_iter().map(block).collect();
+        blocks.sort_unstable();
+        blocks.dedup();
+        let numbered = blocks.into_iter().zip(0u32..);
+        let wanted: BTreeSet<_> = numbered
+            .filter(|((_, row), number)| *number == 0 || (number + row).is_multiple_of(nth))
+            .map(|(block, _)| block)
+            .collect();
+        let is_in = |address| wanted.contains(&block(address));
+        source.spare(&is_in);
+        let all = source.addresses();
+        let all_pixels = all.len();
+        let all = all.into_iter().enumerate();
+        let (places, addresses) = all.filter(|(_, address)| is_in(*address)).unzip();
+        let addresses: Vec<PixelAddress> = addresses;
+        let share = addresses.len() as f64 / all_pixels.max(1) as f64;
+        Self {
+            cycles: source.cycles().min(cycles),
+            photons_per_cycle: source.photons_per_cycle() * share,
+            source,
+            addresses,
+            places,
+        }
+    }
+}
+
+impl PhotonSource for Selected {
+    fn inner(&self) -> Option<&dyn PhotonSource> {
+        Some(&*self.source)
+    }
+
+    fn geometry(&self) -> Geometry {
+        self.source.geometry()
+    }
+
+    fn addresses(&self) -> Vec<PixelAddress> {
+        self.addresses.clone()
+    }
+
+    fn cycles(&self) -> u64 {
+        self.cycles
+    }
+
+    fn photons_per_cycle(&self) -> f64 {
+        self.photons_per_cycle
+    }
+
+    fn next_slice(&mut self, cycles: u16) -> Result<Slice> {
+        let mut slice = self.source.next_slice(cycles)?;
+        let pixels = self
+            .places
+            .iter()
+            .map(|&place| std::mem::take(&mut slice.pixels[place]));
+        Ok(Slice {
+            first_cycle: slice.first_cycle,
+            pixels: pixels.collect(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dtof_photons::masked::Masked;
+    use dtof_simulate::demo;
+
+    #[test]
+    fn what_it_does_not_change_is_what_its_source_says() {
+        let source = demo::photons(Geometry::new(32, 16), 1, 100).unwrap();
+        let masked = Masked::new(Box::new(source), &[3]).unwrap();
+        let mut part = Selected::new(Box::new(masked.with_laser_hz(Some(20_000))), 2, 50);
+        part.next_slice(50).unwrap();
+        assert_eq!(part.laser_hz(), Some(20_000));
+        assert!(part.masked() > 0);
+        assert_eq!((part.cycles(), part.addresses().len()), (50, 256));
+    }
+}

@@ -1,0 +1,292 @@
+//! Harder conditions, made of the photons there are: any source can be tried in them.
+//!
+//! Poisson counts stay Poisson counts when photons are left out at random or others are added.
+//! So half of the signal is half of all photons and the missing half of the background anew.
+
+use anyhow::{Context, Result};
+use dtof_core::PixelAddress;
+use rand_distr::{Bernoulli, Distribution, Normal, Poisson, StandardUniform};
+use rand_pcg::Pcg64;
+
+use dtof_photons::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
+use dtof_theory::random::pixel_rng;
+
+/// What is done to the photons.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stress {
+    /// What it is called.
+    pub name: &'static str,
+    /// The share of the photons that stays.
+    pub keep: f64,
+    /// Background photons a bin and laser cycle that are added.
+    pub background: f64,
+    /// The same in one pixel of each block of 8×8, which is hot.
+    pub hot: f64,
+    /// How many bins all photons have moved by the last laser cycle, and the truth with them.
+    pub drift_bins: f64,
+    /// A second pulse in each laser cycle: photons, where it lies in the first one, and how many
+    /// bins later it comes each laser cycle.
+    pub pulse: Option<(f64, f64, f64)>,
+}
+
+/// What is known of the photons.
+#[derive(Clone, Copy, Debug)]
+pub struct Light {
+    /// Background photons a bin and laser cycle of the median pixel.
+    pub background: f64,
+    /// Signal photons a laser cycle of the median pixel with a target.
+    pub signal: f64,
+    /// Standard deviation of the pulse in bins.
+    pub sigma: f64,
+}
+
+/// From one pulse of the second laser to the next, in lengths of the histogram.
+const PERIODS: f64 = 8.0;
+
+impl Stress {
+    /// Nothing is done to them.
+    pub const NONE: Self = Self {
+        name: "as it is",
+        keep: 1.0,
+        background: 0.0,
+        hot: 0.0,
+        drift_bins: 0.0,
+        pulse: None,
+    };
+
+    /// All of them, the first of which changes nothing. Bins from `first_bin` on may hold a peak.
+    #[must_use]
+    pub fn all(light: &Light, first_bin: u16) -> Vec<Self> {
+        let Light {
+            background, signal, ..
+        } = *light;
+        let glass = f64::from(first_bin) + 4.0;
+        vec![
+            Self::NONE,
+            Self {
+                name: "twice the background",
+                background,
+                ..Self::NONE
+            },
+            Self {
+                name: "four times the background",
+                background: 3.0 * background,
+                ..Self::NONE
+            },
+            Self {
+                name: "half the signal",
+                keep: 0.5,
+                background: 0.5 * background,
+                ..Self::NONE
+            },
+            Self {
+                name: "a quarter of the signal",
+                keep: 0.25,
+                background: 0.75 * background,
+                ..Self::NONE
+            },
+            Self {
+                name: "a hot pixel in each block",
+                hot: 99.0 * background,
+                ..Self::NONE
+            },
+            Self {
+                name: "drift of 4 bins",
+                drift_bins: 4.0,
+                ..Self::NONE
+            },
+            Self {
+                name: "a glass inside the gate, ten times the signal",
+                pulse: Some((10.0 * signal, glass, 0.0)),
+                ..Self::NONE
+            },
+            Self {
+                name: "a second LiDAR",
+                pulse: Some((signal, 0.0, 4.37)),
+                ..Self::NONE
+            },
+        ]
+    }
+
+    /// How many bins photons have moved in a laser cycle.
+    #[must_use]
+    pub fn moved(&self, cycle: u64, cycles: u64) -> f64 {
+        self.drift_bins * cycle as f64 / cycles.max(1) as f64
+    }
+
+    /// Whether `pixel` of an array of `columns` is hot: one of each 8×8.
+    #[must_use]
+    pub fn is_hot(&self, pixel: PixelAddress, columns: u32) -> bool {
+        let place = [u32::from(pixel.0) / columns, u32::from(pixel.0) % columns];
+        self.hot > 0.0 && place.map(|side| side % 8) == [0, 0]
+    }
+}
+
+/// A source under stress.
+pub struct Stressed {
+    source: Box<dyn PhotonSource>,
+    stress: Stress,
+    sigma: f64,
+    bins: u16,
+    cycles: u64,
+    columns: u32,
+    pixels: Vec<(PixelAddress, Pcg64)>,
+}
+
+impl Stressed {
+    /// `source`, of `bins` bins and with a pulse of standard deviation `sigma`, under `stress`.
+    #[must_use]
+    pub fn new(
+        source: Box<dyn PhotonSource>,
+        stress: &Stress,
+        bins: u16,
+        sigma: f64,
+        seed: u64,
+    ) -> Self {
+        let pixels = source.addresses().into_iter();
+        // Other numbers than those of the photons there are.
+        let seed = seed.wrapping_add(0x5eed_0f57_2e55_0000);
+        Self {
+            cycles: source.cycles(),
+            columns: source.geometry().columns,
+            pixels: pixels
+                .map(|pixel| (pixel, pixel_rng(seed, pixel)))
+                .collect(),
+            source,
+            stress: stress.clone(),
+            sigma,
+            bins,
+        }
+    }
+}
+
+impl PhotonSource for Stressed {
+    fn inner(&self) -> Option<&dyn PhotonSource> {
+        Some(&*self.source)
+    }
+
+    fn geometry(&self) -> Geometry {
+        self.source.geometry()
+    }
+
+    fn cycles(&self) -> u64 {
+        self.cycles
+    }
+
+    fn next_slice(&mut self, cycles: u16) -> Result<Slice> {
+        use rayon::prelude::*;
+
+        let slice = self.source.next_slice(cycles)?;
+        if self.stress == Stress::NONE {
+            return Ok(slice);
+        }
+        let Self {
+            stress,
+            sigma,
+            bins,
+            cycles,
+            columns,
+            pixels,
+            ..
+        } = self;
+        let first = slice.first_cycle;
+        let stressed = pixels.par_iter_mut().zip(slice.pixels);
+        let stressed = stressed.map(|((address, rng), photons)| {
+            let of_pixel = OfPixel {
+                stress,
+                background: stress.background
+                    + if stress.is_hot(*address, *columns) {
+                        stress.hot
+                    } else {
+                        0.0
+                    },
+                sigma: *sigma,
+                bins: *bins,
+                first,
+                cycles: *cycles,
+            };
+            of_pixel.photons(&photons, rng)
+        });
+        Ok(Slice {
+            first_cycle: first,
+            pixels: stressed.collect::<Result<_>>()?,
+        })
+    }
+}
+
+/// One pixel and slice.
+struct OfPixel<'a> {
+    stress: &'a Stress,
+    background: f64,
+    sigma: f64,
+    bins: u16,
+    first: u64,
+    cycles: u64,
+}
+
+impl OfPixel<'_> {
+    fn photons(&self, before: &PixelPhotons, rng: &mut Pcg64) -> Result<PixelPhotons> {
+        let bins = f64::from(self.bins);
+        let stays = Bernoulli::new(self.stress.keep).context("a share of the photons")?;
+        let even = self.background * bins;
+        let even = (even > 0.0).then(|| Poisson::new(even)).transpose()?;
+        let pulse = self.stress.pulse.filter(|pulse| pulse.0 > 0.0);
+        let of_pulse = pulse.map(|pulse| Poisson::new(pulse.0)).transpose()?;
+        let mut photons = Vec::with_capacity(before.photons.len());
+        let mut left = before.photons.iter().peekable();
+        for cycle in 0..before.cycles {
+            let now = self.first + u64::from(cycle);
+            let moved = self.stress.moved(now, self.cycles);
+            let mut put = |place: f64| {
+                if (0.0..bins).contains(&place) {
+                    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                    let code = place as u16;
+                    photons.push(Photon { cycle, code });
+                }
+            };
+            while let Some(photon) = left.next_if(|photon| photon.cycle == cycle) {
+                if self.stress.keep < 1.0 && !stays.sample(rng) {
+                    continue;
+                }
+                let code = f64::from(photon.code);
+                // Anywhere in its bin.
+                put(if moved == 0.0 {
+                    code
+                } else {
+                    code + moved + within(rng)
+                });
+            }
+            if let Some(even) = &even {
+                for _ in 0..count(even, rng) {
+                    put(within(rng) * bins);
+                }
+            }
+            if let (Some(of_pulse), Some((_, at, step))) = (&of_pulse, pulse) {
+                let place = (at + step * now as f64).rem_euclid(PERIODS * bins);
+                let place = Normal::new(place, self.sigma)?;
+                for _ in 0..count(of_pulse, rng) {
+                    put(place.sample(rng));
+                }
+            }
+        }
+        Ok(PixelPhotons {
+            cycles: before.cycles,
+            photons,
+        })
+    }
+}
+
+/// A Poisson number, which is whole.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "whole and small"
+)]
+pub(super) fn count(poisson: &Poisson<f64>, rng: &mut Pcg64) -> u64 {
+    poisson.sample(rng) as u64
+}
+
+/// From 0 up to 1.
+fn within(rng: &mut Pcg64) -> f64 {
+    StandardUniform.sample(rng)
+}

@@ -1,0 +1,235 @@
+//! What the reports of one method come to: how often they come, and how far off they are.
+
+use anyhow::Result;
+use dtof_core::{DepthEvent, PixelAddress, RangeScale};
+
+use super::stress::Stress;
+use super::truth::Truth;
+use dtof_engine::settings::Settings;
+use dtof_events::events_csv::range_mm;
+use dtof_photons::source::Geometry;
+use dtof_simulate::MM_PER_PS;
+
+/// A report farther off than so many bins is wrong.
+pub const WRONG_BEYOND_BINS: f64 = 3.0;
+
+/// How long a bin is.
+pub fn mm_per_bin(settings: &Settings) -> f64 {
+    settings.bin_width_ps.to_num::<f64>() * MM_PER_PS
+}
+
+/// Reports that are kept for their errors, of all pixels together.
+const MOST_KEPT: usize = 400_000;
+
+/// The reports of a method.
+pub struct Tally<'a> {
+    truth: &'a Truth,
+    stress: &'a Stress,
+    geometry: Geometry,
+    scale: RangeScale,
+    mm_per_bin: f64,
+    cycles: u64,
+    /// Reports kept of a pixel, at most.
+    most: usize,
+    pixels: Vec<Reports>,
+    /// Reports of pixels without a target.
+    stray: u64,
+}
+
+/// The reports of a pixel.
+#[derive(Clone, Default)]
+struct Reports {
+    right: u32,
+    wrong: u32,
+    /// Errors in millimetres: every `2^stride`-th.
+    kept: Vec<f32>,
+    stride: u32,
+}
+
+impl Reports {
+    fn keep(&mut self, value: f64, most: usize) {
+        let number = self.right + self.wrong;
+        if number.trailing_zeros() < self.stride {
+            return;
+        }
+        if self.kept.len() == most {
+            // Every other one goes.
+            let mut odd = false;
+            self.kept.retain(|_| {
+                odd = !odd;
+                !odd
+            });
+            self.stride += 1;
+            if number.trailing_zeros() < self.stride {
+                return;
+            }
+        }
+        #[allow(clippy::cast_possible_truncation, reason = "millimetres")]
+        self.kept.push(value as f32);
+    }
+}
+
+/// How a method did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Figures {
+    /// Laser cycles of a pixel from one right report to the next, of the middle half of the pixels
+    /// with a target together. Infinite if these have none.
+    pub cycles: f64,
+    /// The same in the pixel that nine of ten are faster than.
+    pub slow_cycles: f64,
+    /// 68 % of the reports of pixels with a target are at most so many millimetres off. Each
+    /// pixel counts the same.
+    pub error_mm: f64,
+    /// Reports of pixels with a target.
+    pub reports: u64,
+    /// The share of these that is more than three bins off.
+    pub wrong: f64,
+    /// Reports of pixels without a target.
+    pub stray: u64,
+}
+
+impl<'a> Tally<'a> {
+    /// Of an array, for a run of `cycles` laser cycles.
+    ///
+    /// # Errors
+    /// If bins have no range.
+    pub fn new(
+        truth: &'a Truth,
+        stress: &'a Stress,
+        geometry: Geometry,
+        settings: &Settings,
+        cycles: u64,
+    ) -> Result<Self> {
+        let pixels = geometry.addresses();
+        Ok(Self {
+            truth,
+            stress,
+            geometry,
+            scale: settings.range_scale()?,
+            mm_per_bin: mm_per_bin(settings),
+            cycles,
+            most: (MOST_KEPT / pixels.max(1)).clamp(8, 1024),
+            pixels: vec![Reports::default(); pixels],
+            stray: 0,
+        })
+    }
+
+    /// Takes events into account: one of a block for each of its pixels.
+    pub fn add(&mut self, events: &[DepthEvent]) {
+        for event in events {
+            for pixel in self.geometry.block(event.pixel, event.level) {
+                self.report(event, pixel);
+            }
+        }
+    }
+
+    fn report(&mut self, event: &DepthEvent, pixel: PixelAddress) {
+        let cycle = event.cycle.0;
+        if self.stress.is_hot(pixel, self.geometry.columns) {
+            return;
+        }
+        let ranges = self.truth.ranges(pixel, cycle);
+        if ranges[0].is_none() {
+            self.stray += 1;
+            return;
+        }
+        // Where it would be if nothing had moved, half an exposure ago.
+        let middle = cycle.saturating_sub(u64::from(event.exposure) / 2);
+        let moved = self.stress.moved(middle, self.cycles) * self.mm_per_bin;
+        let range = range_mm(event, &self.scale) - moved;
+        let errors = ranges.into_iter().flatten().map(|truth| range - truth);
+        let error = errors.min_by(|one, other| one.abs().total_cmp(&other.abs()));
+        let limit = WRONG_BEYOND_BINS * self.mm_per_bin;
+        let reports = &mut self.pixels[usize::from(pixel.0)];
+        let Some(error) = error else { return };
+        if error.abs() > limit {
+            reports.wrong += 1;
+        } else {
+            reports.right += 1;
+        }
+        reports.keep(error, self.most);
+    }
+
+    /// What it came to. `watched` are the laser cycles in which each pixel had a target.
+    #[must_use]
+    pub fn finish(mut self, watched: &[u64]) -> Figures {
+        if !matches!(self.truth, Truth::Scene(_)) {
+            self.without_offset(watched);
+        }
+        let mut figures = Figures {
+            stray: self.stray,
+            ..Figures::default()
+        };
+        let mut times = Vec::new();
+        let mut errors = Vec::new();
+        let mut wrong = 0;
+        for (pixel, (reports, &cycles)) in self.pixels.iter().zip(watched).enumerate() {
+            #[allow(clippy::cast_possible_truncation, reason = "an address")]
+            let is_hot = self
+                .stress
+                .is_hot(PixelAddress(pixel as u16), self.geometry.columns);
+            if cycles == 0 || is_hot {
+                continue;
+            }
+            times.push((cycles as f64, f64::from(reports.right)));
+            figures.reports += u64::from(reports.right + reports.wrong);
+            wrong += u64::from(reports.wrong);
+            let weight = 1.0 / reports.kept.len().max(1) as f64;
+            errors.extend(reports.kept.iter().map(|error| (error.abs(), weight)));
+        }
+        // No right report is an infinite time.
+        let time = |(cycles, right): &(f64, f64)| cycles / right;
+        times.sort_unstable_by(|one, other| time(one).total_cmp(&time(other)));
+        let quarter = times.len() / 4;
+        let middle = &times[quarter..times.len() - quarter];
+        let sum = |of: fn(&(f64, f64)) -> f64| middle.iter().map(of).sum::<f64>();
+        figures.cycles = sum(|pixel| pixel.0) / sum(|pixel| pixel.1);
+        if figures.cycles.is_nan() {
+            figures.cycles = f64::INFINITY;
+        }
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a place"
+        )]
+        let slow = (0.9 * times.len() as f64) as usize;
+        figures.slow_cycles = times.get(slow).map_or(f64::INFINITY, time);
+        figures.wrong = wrong as f64 / figures.reports.max(1) as f64;
+        figures.error_mm = weighted_quantile(&mut errors, 0.68);
+        figures
+    }
+
+    /// Leaves out the median error: a sensor's offset is calibrated with the estimator it has.
+    fn without_offset(&mut self, watched: &[u64]) {
+        let mut errors = Vec::new();
+        for (reports, _) in self
+            .pixels
+            .iter()
+            .zip(watched)
+            .filter(|(_, cycles)| **cycles > 0)
+        {
+            let weight = 1.0 / reports.kept.len().max(1) as f64;
+            errors.extend(reports.kept.iter().map(|error| (*error, weight)));
+        }
+        let median = weighted_quantile(&mut errors, 0.5);
+        if median.is_finite() {
+            let kept = self.pixels.iter_mut().flat_map(|reports| &mut reports.kept);
+            #[allow(clippy::cast_possible_truncation, reason = "millimetres")]
+            kept.for_each(|error| *error -= median as f32);
+        }
+    }
+}
+
+/// The value that so much of the weight lies at or below; infinite without any.
+fn weighted_quantile(values: &mut [(f32, f64)], share: f64) -> f64 {
+    values.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
+    let all: f64 = values.iter().map(|value| value.1).sum();
+    let mut sum = 0.0;
+    for (value, weight) in values.iter() {
+        sum += weight;
+        if sum >= share * all {
+            return (*value).into();
+        }
+    }
+    f64::INFINITY
+}

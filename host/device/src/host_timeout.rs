@@ -1,0 +1,99 @@
+//! How long a device goes on without its host.
+
+use std::fmt;
+
+use dtof_link::Configuration;
+
+use dtof_options::numbers::real;
+
+/// A device stops its sensor, and with it the laser, once its host has been silent for so long.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HostTimeout {
+    milliseconds: u16,
+}
+
+impl HostTimeout {
+    /// So many milliseconds, if a device takes them; with 0 the sensor never stops for that.
+    #[must_use]
+    pub fn from_milliseconds(milliseconds: u16) -> Option<Self> {
+        let is_known = milliseconds == 0 || Configuration::HOST_TIMEOUTS_MS.contains(&milliseconds);
+        is_known.then_some(Self { milliseconds })
+    }
+
+    /// Reads seconds.
+    ///
+    /// # Errors
+    /// If no device takes them.
+    pub fn from_seconds(text: &str) -> Result<Self, String> {
+        let exact = real(text).map(|seconds| seconds * 1000.0);
+        let milliseconds = exact.filter(|exact| (exact - exact.round()).abs() < 1e-6);
+        // What does not fit is refused as -1 is.
+        #[allow(clippy::cast_possible_truncation, reason = "saturates")]
+        let milliseconds = milliseconds.map_or(-1, |exact| exact.round() as i64);
+        let milliseconds = u16::try_from(milliseconds).ok();
+        milliseconds
+            .and_then(Self::from_milliseconds)
+            .ok_or_else(|| {
+                let (least, most) = Configuration::HOST_TIMEOUTS_MS.into_inner();
+                let [least, most] = [least, most].map(|end| f64::from(end) / 1000.0);
+                format!("must be seconds from {least} to {most} with at most three decimals, or 0")
+            })
+    }
+
+    /// As a configuration has it.
+    #[must_use]
+    pub const fn milliseconds(self) -> u16 {
+        self.milliseconds
+    }
+}
+
+/// 3 seconds.
+impl Default for HostTimeout {
+    fn default() -> Self {
+        Self {
+            milliseconds: Configuration::HOST_TIMEOUT_MS,
+        }
+    }
+}
+
+impl fmt::Display for HostTimeout {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} s", f64::from(self.milliseconds) / 1000.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seconds_are_read_to_the_millisecond() {
+        for (text, milliseconds, shown) in [
+            ("0.2", 200, "0.2 s"),
+            ("3", 3_000, "3 s"),
+            ("1.125", 1_125, "1.125 s"),
+            ("57.301", 57_301, "57.301 s"),
+            ("6e1", 60_000, "60 s"),
+            ("0", 0, "0 s"),
+        ] {
+            let timeout = HostTimeout::from_seconds(text).unwrap();
+            assert_eq!(timeout.milliseconds(), milliseconds);
+            assert_eq!(timeout.to_string(), shown);
+        }
+        assert_eq!(HostTimeout::from_seconds("3"), Ok(HostTimeout::default()));
+    }
+
+    #[test]
+    fn what_no_device_takes_is_refused() {
+        for text in [
+            "", "x", "-3", "0.199", "0.1999", "0.0001", "2.0005", "60.001", "61", "65536", "1e300",
+            "3 s", "inf", "NaN",
+        ] {
+            assert_eq!(
+                HostTimeout::from_seconds(text).unwrap_err(),
+                "must be seconds from 0.2 to 60 with at most three decimals, or 0",
+                "{text}"
+            );
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! The engine on a device: the same photons over the link, the same events
+//! back. [`monitor`] and [`histograms`] are of a device with a sensor.
+
+mod assembly;
+mod client;
+mod exposures;
+pub mod histograms;
+mod host_timeout;
+pub mod monitor;
+mod open;
+mod port;
+mod qemu;
+pub mod setup;
+mod stopped;
+
+use anyhow::{Result, bail, ensure};
+use dtof_core::{DepthEvent, PixelAddress, Statistics};
+use dtof_link::endpoint::BODY_BYTES;
+use dtof_link::{Configuration, DynamicDepth, Report, Source, Token, message};
+
+pub use assembly::{HistogramAnswer, PixelHistogram};
+pub use client::Client;
+pub use host_timeout::HostTimeout;
+pub use open::open;
+pub use port::Port;
+pub use setup::Setup;
+pub use stopped::Stopped;
+
+use dtof_engine::Engine;
+use dtof_engine::settings::Settings;
+use dtof_events::aer_file::Event;
+use dtof_options::Refused;
+use dtof_photons::source::{Geometry, Slice};
+
+/// Photons into a device, events out.
+pub struct DeviceEngine {
+    client: Client,
+    report: Report,
+    /// Photons and laser cycles sent so far.
+    sent: u64,
+    cycles: u64,
+}
+
+impl DeviceEngine {
+    /// Configures the device for the pixels `addresses`, which must be the first
+    /// of its own, and for photons from the link.
+    ///
+    /// # Errors
+    /// If the device refuses, with its reason.
+    pub fn new(
+        mut client: Client,
+        settings: &Settings,
+        array: Geometry,
+        addresses: &[PixelAddress],
+    ) -> Result<Self> {
+        let consecutive = addresses
+            .iter()
+            .map(|address| address.0)
+            .eq((0..).take(addresses.len()));
+        ensure!(consecutive, "a device has pixels 0 up, without gaps");
+        ensure!(
+            usize::from(client.bins()) == settings.bins,
+            "the device has {} bins, not {}",
+            client.bins(),
+            settings.bins
+        );
+        let pixels = u16::try_from(addresses.len())?;
+        let wanted = configuration(
+            settings,
+            pixels,
+            array.columns,
+            Source::Link,
+            None,
+            HostTimeout::default(),
+        )?;
+        client.configure(&wanted)?;
+        Ok(Self {
+            client,
+            report: Report::default(),
+            sent: 0,
+            cycles: 0,
+        })
+    }
+
+    /// The report of the device after the last slice.
+    #[must_use]
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+}
+
+/// The settings as the device takes them. With `dynamic_depth` it sends changes of depth
+/// in place of depth events. A sensor that it takes photons from stops after `host_timeout`.
+///
+/// # Errors
+/// If there are no bins, or it is to read frames.
+pub fn configuration(
+    settings: &Settings,
+    pixels: u16,
+    columns: u32,
+    source: Source,
+    dynamic_depth: Option<DynamicDepth>,
+    host_timeout: HostTimeout,
+) -> Result<Configuration> {
+    ensure!(
+        settings.frame.is_none(),
+        Refused::new("frame", "is not for a device, which reports events")
+    );
+    let last_bin = u16::try_from(settings.bins)? - 1;
+    Ok(Configuration {
+        rule: settings.rule,
+        estimator: settings.estimator(),
+        x: settings.x,
+        l1: settings.l1,
+        l2: settings.l2,
+        gate: settings.gate.unwrap_or((0, last_bin)),
+        one_hit_tdc: settings.one_hit_tdc,
+        pixels,
+        columns: u16::try_from(columns)?,
+        binning: settings.binning,
+        tracking: settings.tracking,
+        echoes: settings.echoes,
+        peel_reach: settings.peel_reach(),
+        echo_wait: settings.echo_wait_times(),
+        bin_width_ps: settings.bin_width_ps,
+        offset_mm: settings.offset_mm,
+        source,
+        dynamic_depth,
+        host_timeout_ms: host_timeout.milliseconds(),
+    })
+}
+
+impl Engine for DeviceEngine {
+    fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
+        let cycles = slice.pixels.first().map_or(0, |pixel| pixel.cycles);
+        if slice.pixels.iter().any(|pixel| pixel.cycles != cycles) {
+            bail!("a device cannot replay pixels whose recordings end at different times");
+        }
+        let mut tokens = Tokens {
+            client: &mut self.client,
+            body: Vec::new(),
+        };
+        let photons = slice.pixels.iter().map(|pixel| &pixel.photons);
+        let mut photons: Vec<_> = photons.map(|of| of.iter().peekable()).collect();
+        for cycle in 0..cycles {
+            let mut at = 0;
+            for (pixel, photons) in photons.iter_mut().enumerate() {
+                while let Some(photon) = photons.next_if(|photon| photon.cycle == cycle) {
+                    at = tokens.photon(at, pixel, photon.code)?;
+                }
+            }
+            tokens.push(Token::EndOfCycles { cycles: 1 })?;
+        }
+        tokens.flush()?;
+        let events = self.client.synchronise()?.into_iter();
+        let events = events.map(|event| match event {
+            Event::Depth(event) => Ok(event),
+            Event::DynamicDepth(_) => bail!("the device sends changes of depth nobody asked for"),
+        });
+        let events = events.collect::<Result<_>>()?;
+        self.report = self.client.report()?;
+        self.cycles += u64::from(cycles);
+        let photons = slice.pixels.iter().map(|pixel| pixel.photons.len());
+        self.sent += photons.sum::<usize>() as u64;
+        let accounted = self.report.statistics.photons();
+        ensure!(
+            accounted == self.sent && self.report.cycles == self.cycles,
+            "the device accounts for {accounted} of {} photons and {} of {} laser cycles; {} messages \
+             made no sense to it",
+            self.sent,
+            self.report.cycles,
+            self.cycles,
+            self.report.unknown
+        );
+        Ok(events)
+    }
+
+    fn statistics(&self) -> [Statistics; 2] {
+        [self.report.statistics, self.report.blocks]
+    }
+}
+
+/// Tokens on their way into photons messages.
+struct Tokens<'a> {
+    client: &'a mut Client,
+    body: Vec<u8>,
+}
+
+impl Tokens<'_> {
+    /// A photon of `pixel` where the present pixel is `at`; gives the present
+    /// pixel then.
+    fn photon(&mut self, mut at: usize, pixel: usize, code: u16) -> Result<usize> {
+        // The most that a photon takes: three bytes and the way from pixel 0,
+        // where a new message begins.
+        if self.body.len() + Token::MAX_BYTES + pixel.div_ceil(64) > BODY_BYTES {
+            self.flush()?;
+            at = 0;
+        }
+        while at < pixel {
+            #[allow(clippy::cast_possible_truncation, reason = "at most 64")]
+            let pixels = (pixel - at).min(64) as u8;
+            self.push(Token::Advance { pixels })?;
+            at += usize::from(pixels);
+        }
+        self.push(Token::Photon { code })?;
+        Ok(at)
+    }
+
+    fn push(&mut self, token: Token) -> Result<()> {
+        let token = token.to_bytes();
+        if self.body.len() + token.len() > BODY_BYTES {
+            self.flush()?;
+        }
+        self.body.extend(token);
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        self.client.send(message::PHOTONS, &self.body)?;
+        self.body.clear();
+        Ok(())
+    }
+}

@@ -1,0 +1,182 @@
+//! The events of a device as an AER file.
+
+use std::fs;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use tempfile::NamedTempFile;
+
+use dtof_events::aer_file::{Event, Header, Writer};
+use dtof_options::files::{aside, flushed, place_of};
+
+/// A file on its way: written aside, and at its place once [`Recording::finish`] has
+/// returned. What cannot be moved there stays aside: events do not come twice.
+///
+/// Events that were written are in the file aside, whatever becomes of this program.
+pub struct Recording {
+    aer: Writer<BufWriter<NamedTempFile>>,
+    path: PathBuf,
+    aside: PathBuf,
+    is_empty: bool,
+    /// What is at its place stays there.
+    is_new: bool,
+    /// The disk did not take an event: the file aside is not whole, and never will be.
+    is_broken: bool,
+}
+
+impl Recording {
+    /// Begins a file, which replaces none of `inputs`.
+    ///
+    /// # Errors
+    /// If nothing can be written in its folder, or what is at `path` is no file.
+    pub fn new(path: &Path, inputs: &[&Path], header: &Header) -> Result<Self> {
+        let place = place_of(path, inputs)?;
+        let name = || path.display().to_string();
+        let mut file = aside(&place.folder, ".dtof-recording-").with_context(name)?;
+        file.disable_cleanup(true);
+        let aside = file.path().to_owned();
+        let begun = Writer::new(BufWriter::new(file), header).and_then(|mut aer| {
+            aer.flush()?;
+            Ok(aer)
+        });
+        if begun.is_err() {
+            // Nothing is in it. That it cannot be removed is the lesser failure.
+            let _ = fs::remove_file(&aside);
+        }
+        Ok(Self {
+            aer: begun.with_context(name)?,
+            path: place.file,
+            aside,
+            is_empty: true,
+            is_new: false,
+            is_broken: false,
+        })
+    }
+
+    /// The same, which fails at its end if something has come to its place meanwhile.
+    #[must_use]
+    pub fn that_replaces_nothing(mut self) -> Self {
+        self.is_new = true;
+        self
+    }
+
+    /// Writes events in the order they come.
+    ///
+    /// # Errors
+    /// If the disk does not take them.
+    pub fn write(&mut self, events: &[Event]) -> Result<()> {
+        if events.is_empty() {
+            return Ok(());
+        }
+        self.is_empty = false;
+        let mut all = events.iter();
+        let written = all.try_for_each(|event| self.aer.write(event));
+        let written = written.and_then(|()| self.aer.flush());
+        self.is_broken |= written.is_err();
+        written.with_context(|| self.path.display().to_string())
+    }
+
+    /// Ends the file after a failure: what came before is kept, and if nothing came, so is
+    /// what was at its place.
+    ///
+    /// # Errors
+    /// Those of [`Recording::finish`], or if the file cannot be removed.
+    pub fn finish_after_failure(self) -> Result<()> {
+        if !self.is_empty {
+            return self.finish();
+        }
+        drop(self.aer);
+        fs::remove_file(&self.aside).with_context(|| self.aside.display().to_string())
+    }
+
+    /// Ends the file and moves it to its place.
+    ///
+    /// # Errors
+    /// If the disk does not take it, or has not taken an event; says where the events are then.
+    pub fn finish(self) -> Result<()> {
+        let Self {
+            aer,
+            path,
+            aside,
+            is_new,
+            is_broken,
+            ..
+        } = self;
+        let moved = || -> Result<()> {
+            ensure!(!is_broken, "the disk did not take an event");
+            let file = flushed(aer.finish()?)?;
+            let moved = if is_new {
+                file.persist_noclobber(&path)
+            } else {
+                file.persist(&path)
+            };
+            moved.map_err(|error| error.error)?;
+            Ok(())
+        };
+        moved().with_context(|| {
+            let (path, aside) = (path.display(), aside.display());
+            format!("{path}: cannot be written, {aside} has what was recorded")
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dtof_core::fixed::types::{I24F8, U16F16};
+
+    use super::*;
+    use dtof_photons::source::Geometry;
+
+    const HEADER: Header = Header {
+        bins: 128,
+        geometry: Geometry::new(2, 2),
+        bin_width_ps: U16F16::lit("250"),
+        offset_mm: I24F8::ZERO,
+        laser_millihertz: 0,
+        start_us: 0,
+    };
+
+    #[test]
+    fn only_a_file_in_a_folder_that_is_there_is_begun() {
+        let folder = tempfile::tempdir().unwrap();
+        let gone = folder.path().join("gone").join("events.aer");
+        for (path, part) in [
+            (folder.path(), ": is there, and is no file"),
+            (&gone, ": there is no folder "),
+        ] {
+            let error = Recording::new(path, &[], &HEADER).map(|_| ()).unwrap_err();
+            assert!(format!("{error:#}").contains(part), "{error:#}");
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_new_one_replaces_nothing_that_came_meanwhile() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("events.aer");
+        let recording = Recording::new(&path, &[], &HEADER).unwrap();
+        let recording = recording.that_replaces_nothing();
+        fs::write(&path, "older").unwrap();
+        let error = format!("{:#}", recording.finish().unwrap_err());
+        assert!(error.contains(" has what was recorded"), "{error}");
+        assert_eq!(fs::read(path).unwrap(), b"older");
+    }
+
+    #[test]
+    fn what_cannot_be_moved_to_its_place_stays_and_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("events.aer");
+        let recording = Recording::new(&path, &[], &HEADER).unwrap();
+        let aside = recording.aside.clone();
+        fs::create_dir(&path).unwrap();
+        let error = format!("{:#}", recording.finish().unwrap_err());
+        assert!(
+            error.contains(&format!("{} has what was recorded", aside.display())),
+            "{error}"
+        );
+        assert_eq!(error.matches("os error").count(), 1, "{error}");
+        // The header and the end.
+        assert_eq!(fs::read(aside).unwrap().len(), 64 + 16);
+    }
+}

@@ -1,0 +1,58 @@
+//! A number of bins as a type. All other code asks here.
+
+use std::error::Error;
+use std::fmt::{self, Display, Formatter};
+
+/// No histogram has so many bins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UnsupportedBins(pub usize);
+
+impl Display for UnsupportedBins {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self(bins) = self;
+        write!(f, "{bins} bins: must be a power of two from 8 to 1024")
+    }
+}
+
+impl Error for UnsupportedBins {}
+
+/// Evaluates an expression for a number of bins that is known only when the program runs:
+/// [`UnsupportedBins`] unless it is a power of two from 8 to 1024.
+///
+/// ```
+/// use dtof_core::Histogram;
+/// use dtof_engine::with_bins;
+///
+/// let bytes = with_bins!(128, BINS => size_of::<Histogram<BINS>>());
+/// assert!(bytes.is_ok());
+/// assert!(with_bins!(100, BINS => BINS).is_err());
+/// ```
+#[macro_export]
+macro_rules! with_bins {
+    ($bins:expr, $name:ident => $value:expr) => {
+        $crate::with_bins!(@ $bins, $name, $value, 8 16 32 64 128 256 512 1024)
+    };
+    (@ $bins:expr, $name:ident, $value:expr, $($number:literal)*) => {
+        match $bins {
+            $($number => {
+                const $name: usize = $number;
+                Ok($value)
+            })*
+            bins => Err($crate::bins::UnsupportedBins(bins)),
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::UnsupportedBins;
+
+    #[test]
+    fn the_numbers_are_those_of_the_core() {
+        for bins in 0..=2048_usize {
+            let is_supported = (8..=1024).contains(&bins) && bins.is_power_of_two();
+            let expected = is_supported.then_some(bins).ok_or(UnsupportedBins(bins));
+            assert_eq!(with_bins!(bins, BINS => BINS), expected);
+        }
+    }
+}

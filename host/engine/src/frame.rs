@@ -1,0 +1,172 @@
+//! The frame-based sensor events are held against: the same photons and histograms, but
+//! every pixel reads its highest bin at the same time, if it stands above the background
+//! at all. Pile-up is not flagged.
+
+use anyhow::{Result, ensure};
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{
+    Count, Count16, Decided, DepthEstimator, DepthEvent, Histogram, LaserCycle, PaperRule,
+    PeeledBins, PixelAddress, RangeGate, Statistics, detect,
+};
+
+use super::decisions::{Decision, LastDecision};
+use crate::Engine;
+use crate::settings::Settings;
+use dtof_options::Refused;
+use dtof_photons::source::Slice;
+
+/// Whatever stands above the background.
+pub const ANY: PaperRule = PaperRule::new(U8F8::ZERO, Count::saturating(1));
+
+/// One pixel, with 16-bit counters, as frames may be long.
+#[derive(Clone, Debug)]
+pub struct FramePixel<const BINS: usize> {
+    address: PixelAddress,
+    /// The first laser cycle of the frame.
+    first: u64,
+    /// Laser cycles of a frame.
+    length: u16,
+    histogram: Histogram<BINS, Count16>,
+    /// Photons of the frame that the gate left out.
+    gated_out: u32,
+    statistics: Statistics,
+    /// If it is to be kept.
+    last: Option<Box<LastDecision<BINS>>>,
+}
+
+impl<const BINS: usize> FramePixel<BINS> {
+    /// The first frame begins with laser cycle `first`.
+    #[must_use]
+    pub fn new(address: PixelAddress, first: u64, length: u16) -> Self {
+        Self {
+            address,
+            first,
+            length,
+            histogram: Histogram::new(),
+            gated_out: 0,
+            statistics: Statistics::default(),
+            last: None,
+        }
+    }
+
+    /// Counts a photon of laser cycle `cycle`, unless that is before the first frame.
+    pub fn count(&mut self, gate: &RangeGate<BINS>, cycle: u64, code: u16) {
+        if cycle < self.first {
+            return;
+        }
+        if usize::from(code) < BINS && !gate.contains(code) {
+            self.gated_out += 1;
+        } else {
+            self.histogram.add(code);
+        }
+    }
+
+    /// Ends laser cycle `cycle`. None until the frame ends, or if no bin stands above the
+    /// background, the paper's.
+    pub fn end_laser_cycle(
+        &mut self,
+        gate: &RangeGate<BINS>,
+        estimator: &DepthEstimator,
+        cycle: u64,
+    ) -> Option<DepthEvent> {
+        if cycle + 1 < self.first + u64::from(self.length) {
+            return None;
+        }
+        self.first = cycle + 1;
+        let found = detect(&self.histogram, gate, &ANY, estimator);
+        let event = found.map(|found| found.event(self.address, LaserCycle(cycle), self.length));
+        if let (Some(last), Some(event)) = (&mut self.last, event) {
+            last.see(&Decided {
+                histogram: &self.histogram,
+                expected: None,
+                peeled: PeeledBins::NONE,
+            });
+            last.report(event);
+        }
+        self.statistics = self.statistics();
+        self.histogram.clear();
+        self.gated_out = 0;
+        match event {
+            Some(_) => self.statistics.events += 1,
+            None => self.statistics.expired += 1,
+        }
+        event
+    }
+
+    /// Its counts so far, the frame that has not ended included.
+    fn statistics(&self) -> Statistics {
+        let mut statistics = self.statistics;
+        statistics.add_photons_of(&self.histogram, self.gated_out);
+        statistics
+    }
+}
+
+/// Pixels that all read at the same laser cycles.
+pub struct FrameEngine<const BINS: usize> {
+    gate: RangeGate<BINS>,
+    estimator: DepthEstimator,
+    pixels: Vec<FramePixel<BINS>>,
+}
+
+impl<const BINS: usize> FrameEngine<BINS> {
+    /// Frames of `length` laser cycles, from laser cycle 0 on.
+    ///
+    /// # Errors
+    /// The constraint the settings break.
+    pub fn new(settings: &Settings, length: u16, addresses: &[PixelAddress]) -> Result<Self> {
+        ensure!(
+            length > 0,
+            Refused::value("frame", 0, "a frame has at least one laser cycle")
+        );
+        let pixels = addresses.iter();
+        Ok(Self {
+            gate: settings.range_gate()?,
+            estimator: settings.estimator(),
+            pixels: pixels
+                .map(|&address| FramePixel::new(address, 0, length))
+                .collect(),
+        })
+    }
+}
+
+impl<const BINS: usize> Engine for FrameEngine<BINS> {
+    fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
+        let mut events = Vec::new();
+        for (pixel, received) in self.pixels.iter_mut().zip(&slice.pixels) {
+            let mut photons = received.photons.iter().peekable();
+            for cycle in 0..received.cycles {
+                let now = slice.first_cycle + u64::from(cycle);
+                while let Some(photon) = photons.next_if(|photon| photon.cycle == cycle) {
+                    pixel.count(&self.gate, now, photon.code);
+                }
+                events.extend(pixel.end_laser_cycle(&self.gate, &self.estimator, now));
+            }
+        }
+        sort(&mut events);
+        Ok(events)
+    }
+
+    fn statistics(&self) -> [Statistics; 2] {
+        let mut sum = Statistics::default();
+        for pixel in &self.pixels {
+            sum += pixel.statistics();
+        }
+        [sum, Statistics::default()]
+    }
+
+    fn keep_decisions(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+        for pixel in &mut self.pixels {
+            pixel.last = LastDecision::room(is_wanted(pixel.address));
+        }
+    }
+
+    fn decisions(&self) -> Vec<Decision> {
+        let all = self.pixels.iter().filter_map(|pixel| pixel.last.as_ref());
+        all.filter_map(|last| last.decision()).collect()
+    }
+}
+
+/// By laser cycle and pixel.
+fn sort(events: &mut [DepthEvent]) {
+    events.sort_unstable_by_key(|event| (event.cycle, event.pixel));
+}

@@ -1,0 +1,330 @@
+//! Pixels that decide together: one by itself, or those of one block of the highest level
+//! with all the blocks in it. Groups know nothing of each other, so that each runs on a thread
+//! of its own.
+
+use anyhow::{Context, Result};
+use dtof_core::{
+    AnyRule, Array, AsyncPixel, Binning, Block, BlockLevel, BlockPlace, Count16, Decided,
+    DepthEvent, Feed, LaserCycle, PixelAddress, PixelConfig, Statistics, count_in_blocks,
+    end_laser_cycles_of_blocks_seen,
+};
+use dtof_link::AdaptiveBinning;
+
+use super::decisions::{Decision, LastDecision};
+use dtof_photons::source::{Geometry, PixelPhotons};
+
+/// The configurations of pixels and blocks.
+#[derive(Clone, Copy, Debug)]
+pub struct Configs<const BINS: usize> {
+    /// Of pixels.
+    pub pixels: PixelConfig<BINS, AnyRule>,
+    /// Of blocks.
+    pub blocks: PixelConfig<BINS, AnyRule>,
+    /// Laser cycles between ticks.
+    pub patience: u16,
+}
+
+/// A pixel of a group.
+#[derive(Clone, Debug)]
+struct Member<const BINS: usize> {
+    /// Its number among the pixels of the source.
+    number: usize,
+    pixel: AsyncPixel<BINS>,
+    feed: Option<Feed>,
+    /// If it is to be kept.
+    last: Option<Box<LastDecision<BINS>>>,
+}
+
+impl<const BINS: usize> Member<BINS> {
+    /// Runs a pixel by itself, `since_look` laser cycles after its last look. Looks before L1
+    /// decide nothing: the photons until the first one after it are counted at once.
+    fn run(
+        &mut self,
+        configs: &Configs<BINS>,
+        first: u64,
+        received: &PixelPhotons,
+        since_look: &mut u16,
+        done: &mut Done,
+    ) {
+        let (config, x) = (&configs.pixels, configs.pixels.x());
+        let mut photons = &received.photons[..];
+        let mut cycle = 0;
+        while cycle < received.cycles {
+            let left = received.cycles - cycle;
+            let mut cycles = x - *since_look;
+            let early = config.l1().saturating_sub(self.pixel.exposure());
+            if early >= cycles {
+                cycles = cycles
+                    .saturating_add((early - cycles) / x * x)
+                    .saturating_add(x);
+            }
+            if cycles > left {
+                // Up to the last look there is, if there is one, and then to the end.
+                let after_look = after(*since_look, left, x);
+                cycles = if left > after_look {
+                    left - after_look
+                } else {
+                    left
+                };
+            }
+            cycle += cycles;
+            while let Some((photon, later)) = photons.split_first()
+                && photon.cycle < cycle
+            {
+                self.pixel.count(config, photon.code);
+                photons = later;
+            }
+            let last = LaserCycle(first + u64::from(cycle) - 1);
+            self.end_laser_cycles(config, done, last, cycles);
+            *since_look = after(*since_look, cycles, x);
+        }
+    }
+
+    /// Ends laser cycles, the last of which is `last`. The link takes an event at once; whether
+    /// there was one.
+    fn end_laser_cycles(
+        &mut self,
+        config: &PixelConfig<BINS, AnyRule>,
+        done: &mut Done,
+        last: LaserCycle,
+        cycles: u16,
+    ) -> bool {
+        let kept = &mut self.last;
+        let see = |decided: Decided<'_, BINS, _>| {
+            if let Some(kept) = kept {
+                kept.see(&decided);
+            }
+        };
+        self.pixel
+            .end_laser_cycles_seen(config, &mut done.pixels, last, cycles, see);
+        let Some(event) = self.pixel.acknowledge() else {
+            return false;
+        };
+        if let Some(kept) = &mut self.last {
+            kept.report(event);
+        }
+        done.events.push(event);
+        true
+    }
+}
+
+/// Laser cycles since the last look, `cycles` later, where each `x` there is one.
+fn after(since_look: u16, cycles: u16, x: u16) -> u16 {
+    let rest = (u32::from(since_look) + u32::from(cycles)) % u32::from(x);
+    u16::try_from(rest).unwrap_or(0)
+}
+
+/// Pixels and blocks in the order in which they report.
+#[derive(Clone, Debug)]
+pub struct Group<const BINS: usize> {
+    members: Vec<Member<BINS>>,
+    blocks: Vec<Block<BINS>>,
+    /// One for each block.
+    of_blocks: Vec<Option<Box<LastDecision<BINS>>>>,
+    /// Laser cycles since the last look, and of blocks since the last tick.
+    since_look: u16,
+    since_tick: u16,
+}
+
+/// What a group has done: its pixels, and its blocks.
+#[derive(Clone, Debug, Default)]
+pub struct Done {
+    /// In no particular order.
+    pub events: Vec<DepthEvent>,
+    /// What its pixels have done.
+    pub pixels: Statistics,
+    /// What its blocks have done.
+    pub blocks: Statistics,
+}
+
+impl<const BINS: usize> Group<BINS> {
+    /// One pixel by itself, which has a number among the pixels of the source.
+    #[must_use]
+    pub fn of_pixel(number: usize, address: PixelAddress) -> Self {
+        let member = Member {
+            number,
+            pixel: AsyncPixel::new(address),
+            feed: None,
+            last: None,
+        };
+        Self {
+            members: vec![member],
+            blocks: Vec::new(),
+            of_blocks: Vec::new(),
+            since_look: 0,
+            since_tick: 0,
+        }
+    }
+
+    /// The groups of an array, of which the pixels `addresses` are there, ascending.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn of_array(
+        array: Geometry,
+        binning: AdaptiveBinning,
+        addresses: &[PixelAddress],
+    ) -> Result<Vec<Self>> {
+        let whole = Array::new(array.columns, array.rows).context("an array without pixels")?;
+        let top = binning.levels;
+        let groups = (0..whole.blocks(top)).map(|block| {
+            let pixels: Vec<PixelAddress> =
+                whole.pixels_of(whole.first_of(block, top), top).collect();
+            Self::of_block(whole, top, &pixels, addresses)
+        });
+        groups.collect()
+    }
+
+    /// The pixels of one block of the highest level, row by row.
+    fn of_block(
+        whole: Array,
+        top: BlockLevel,
+        pixels: &[PixelAddress],
+        addresses: &[PixelAddress],
+    ) -> Result<Self> {
+        // As if it were an array by itself.
+        let row = |pixel: &PixelAddress| u32::from(pixel.0) / whole.columns();
+        let rows = match pixels {
+            [first, .., last] => row(last) - row(first) + 1,
+            _ => 1,
+        };
+        let columns = u32::try_from(pixels.len())? / rows;
+        let part = Array::new(columns, rows).context("a block without pixels")?;
+        let binning = Binning::new(part, top).context("an array without blocks")?;
+        let local = (0..=u16::MAX).map(PixelAddress);
+        let members = local.zip(pixels).filter_map(|(local, &address)| {
+            let number = addresses.binary_search(&address).ok()?;
+            Some(Member {
+                number,
+                pixel: AsyncPixel::new(address),
+                feed: Some(binning.feed_of(local)),
+                last: None,
+            })
+        });
+        let blocks = binning.blocks().map(|place| {
+            Block::new(BlockPlace {
+                first: pixels[usize::from(place.first.0)],
+                ..place
+            })
+        });
+        let blocks: Vec<_> = blocks.collect();
+        Ok(Self {
+            members: members.collect(),
+            of_blocks: vec![None; blocks.len()],
+            blocks,
+            since_look: 0,
+            since_tick: 0,
+        })
+    }
+
+    /// Runs one slice that begins with laser cycle `first`. The link takes each event at once.
+    pub fn run(&mut self, configs: &Configs<BINS>, first: u64, photons: &[PixelPhotons]) -> Done {
+        let mut done = Done::default();
+        if let ([member], []) = (&mut self.members[..], &self.blocks[..]) {
+            let photons = &photons[member.number];
+            member.run(configs, first, photons, &mut self.since_look, &mut done);
+            return done;
+        }
+        let of_member = |member: &Member<BINS>| &photons[member.number];
+        let cycles = self.members.iter().map(|member| of_member(member).cycles);
+        let cycles = cycles.max().unwrap_or(0);
+        let mut next = vec![0; self.members.len()];
+        for cycle in 0..cycles {
+            let now = LaserCycle(first + u64::from(cycle));
+            for (member, next) in self.members.iter_mut().zip(&mut next) {
+                let received = &photons[member.number];
+                while let Some(photon) = received.photons.get(*next)
+                    && photon.cycle == cycle
+                {
+                    *next += 1;
+                    member.pixel.count(&configs.pixels, photon.code);
+                    if let Some(feed) = &member.feed {
+                        count_in_blocks(&mut self.blocks, feed, &configs.blocks, photon.code);
+                    }
+                }
+                if cycle < received.cycles {
+                    let has_reported = member.end_laser_cycles(&configs.pixels, &mut done, now, 1);
+                    if let Some(feed) = member.feed.as_mut().filter(|_| has_reported) {
+                        feed.reported();
+                    }
+                }
+            }
+            if !self.blocks.is_empty() {
+                self.end_laser_cycle_of_blocks(configs, now, &mut done);
+            }
+        }
+        done
+    }
+
+    fn end_laser_cycle_of_blocks(
+        &mut self,
+        configs: &Configs<BINS>,
+        now: LaserCycle,
+        done: &mut Done,
+    ) {
+        let (blocks, statistics) = (&mut self.blocks, &mut done.blocks);
+        let of_blocks = &mut self.of_blocks;
+        let see = |number: usize, decided: Decided<'_, BINS, Count16>| {
+            if let Some(Some(last)) = of_blocks.get_mut(number) {
+                last.see(&decided);
+            }
+        };
+        if end_laser_cycles_of_blocks_seen(blocks, &configs.blocks, statistics, now, 1, see) {
+            for (block, last) in blocks.iter_mut().zip(of_blocks) {
+                let Some(event) = block.acknowledge() else {
+                    continue;
+                };
+                if let Some(last) = last {
+                    last.report(event);
+                }
+                done.events.push(event);
+            }
+        }
+        self.since_look += 1;
+        if self.since_look < configs.pixels.x() {
+            return;
+        }
+        self.since_tick = self.since_tick.saturating_add(self.since_look);
+        self.since_look = 0;
+        if self.since_tick >= configs.patience {
+            self.since_tick = 0;
+            for member in &mut self.members {
+                if let Some(feed) = &mut member.feed {
+                    feed.tick(member.pixel.has_reported());
+                }
+            }
+            self.blocks.iter_mut().for_each(Block::tick);
+        }
+    }
+
+    /// Keeps what the last event was decided from, of pixels that `is_wanted` names and of
+    /// blocks that begin with one.
+    pub fn keep_decisions(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+        for member in &mut self.members {
+            member.last = LastDecision::room(is_wanted(member.pixel.address()));
+        }
+        for (block, last) in self.blocks.iter().zip(&mut self.of_blocks) {
+            *last = LastDecision::room(is_wanted(block.pixel().address()));
+        }
+    }
+
+    /// What was kept.
+    pub fn decisions(&self) -> impl Iterator<Item = Decision> {
+        let of_members = self.members.iter().map(|member| &member.last);
+        let all = of_members.chain(&self.of_blocks).flatten();
+        all.filter_map(|last| last.decision())
+    }
+
+    /// Adds the photons of exposures that have not ended.
+    pub fn add_photons_to(&self, pixels: &mut Statistics, blocks: &mut Statistics) {
+        for member in &self.members {
+            member.pixel.add_photons_to(pixels);
+        }
+        for block in &self.blocks {
+            block.pixel().add_photons_to(blocks);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,70 @@
+use proptest::prelude::*;
+
+use super::*;
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{Count, EchoNumber, PaperRule, RangeGate};
+use dtof_photons::source::Photon;
+
+/// The pixel laser cycle by laser cycle, as hardware would.
+fn one_by_one(
+    config: &PixelConfig<16, AnyRule>,
+    first: u64,
+    received: &PixelPhotons,
+) -> (Vec<DepthEvent>, Statistics) {
+    let mut pixel = AsyncPixel::<16>::new(PixelAddress(3));
+    let (mut events, mut statistics) = (Vec::new(), Statistics::new());
+    for cycle in 0..received.cycles {
+        let now = received
+            .photons
+            .iter()
+            .filter(|photon| photon.cycle == cycle);
+        now.for_each(|photon| pixel.count(config, photon.code));
+        let cycle = LaserCycle(first + u64::from(cycle));
+        pixel.end_laser_cycle(config, &mut statistics, cycle);
+        events.extend(pixel.acknowledge());
+    }
+    pixel.add_photons_to(&mut statistics);
+    (events, statistics)
+}
+
+proptest! {
+    /// Whatever is counted at once, and however the laser cycles are sliced.
+    #[test]
+    fn a_pixel_decides_as_it_does_laser_cycle_by_laser_cycle(
+        photons in prop::collection::vec((0u16..600, prop_oneof![Just(5u16), 0u16..20]), 0..900),
+        (x, l1, more) in (1u16..40, 0u16..200, 1u16..200),
+        echoes in 1u8..4,
+        has_gate in any::<bool>(),
+        slices in prop::collection::vec(1u16..200, 1..8),
+        first in 0u64..1 << 40,
+    ) {
+        let l1 = l1.max(x);
+        let rule = PaperRule::new(U8F8::lit("1"), Count::saturating(4));
+        let gate = if has_gate { RangeGate::new(2, 11).unwrap() } else { RangeGate::full() };
+        let config = PixelConfig::with_rule(AnyRule::from(rule));
+        let config = config.x(x).l1(l1).l2(l1 + x + more).gate(gate);
+        let config = config.echoes(EchoNumber::new(echoes).unwrap(), 1).build().unwrap();
+        let mut all = PixelPhotons { cycles: 600, photons: Vec::new() };
+        all.photons = photons.iter().map(|&(cycle, code)| Photon { cycle, code }).collect();
+        all.photons.sort_by_key(|photon| photon.cycle);
+        let (events, statistics) = one_by_one(&config, first, &all);
+
+        let configs = Configs { pixels: config, blocks: config, patience: 0 };
+        let mut group = Group::<16>::of_pixel(0, PixelAddress(3));
+        let (mut found, mut counted) = (Vec::new(), Statistics::new());
+        let mut begin = 0;
+        for length in slices.into_iter().chain([600]) {
+            let end = (begin + length).min(600);
+            let of_slice = all.photons.iter().filter(|photon| (begin..end).contains(&photon.cycle));
+            let moved = of_slice.map(|photon| Photon { cycle: photon.cycle - begin, ..*photon });
+            let slice = PixelPhotons { cycles: end - begin, photons: moved.collect() };
+            let done = group.run(&configs, first + u64::from(begin), &[slice]);
+            found.extend(done.events);
+            counted += done.pixels;
+            begin = end;
+        }
+        group.add_photons_to(&mut counted, &mut Statistics::new());
+        prop_assert_eq!(found, events);
+        prop_assert_eq!(counted, statistics);
+    }
+}

@@ -1,0 +1,117 @@
+//! The core on this computer.
+
+use anyhow::Result;
+use dtof_core::{DepthEvent, PixelAddress, Statistics};
+use rayon::prelude::*;
+
+use super::Engine;
+use super::decisions::{self, Decision};
+use super::frame::FrameEngine;
+use super::group::{Configs, Done, Group};
+use crate::settings::Settings;
+use crate::with_bins;
+use dtof_photons::source::{Geometry, Slice};
+
+/// `dtof-core` on this computer, groups of pixels spread over its threads.
+#[derive(Debug)]
+struct HostEngine<const BINS: usize> {
+    configs: Configs<BINS>,
+    groups: Vec<Group<BINS>>,
+    /// Of all pixels, without the exposures that have not ended.
+    pixels: Statistics,
+    /// The same of all blocks.
+    blocks: Statistics,
+}
+
+/// An engine on this computer for the pixels `addresses` of an array.
+///
+/// # Errors
+/// The constraint the settings break.
+pub fn host_engine(
+    settings: &Settings,
+    array: Geometry,
+    addresses: &[PixelAddress],
+) -> Result<Box<dyn Engine>> {
+    with_bins!(settings.bins, BINS => HostEngine::<BINS>::boxed(settings, array, addresses))?
+}
+
+impl<const BINS: usize> HostEngine<BINS> {
+    fn boxed(
+        settings: &Settings,
+        array: Geometry,
+        addresses: &[PixelAddress],
+    ) -> Result<Box<dyn Engine>> {
+        if let Some(length) = settings.frame {
+            return Ok(Box::new(FrameEngine::<BINS>::new(
+                settings, length, addresses,
+            )?));
+        }
+        let groups = match settings.binning {
+            Some(binning) => Group::of_array(array, binning, addresses)?,
+            None => {
+                let numbered = addresses.iter().enumerate();
+                numbered
+                    .map(|(number, &address)| Group::of_pixel(number, address))
+                    .collect()
+            }
+        };
+        Ok(Box::new(Self {
+            configs: Configs {
+                pixels: settings.config()?,
+                blocks: settings.block_config()?,
+                patience: settings.binning.map_or(0, |binning| binning.patience),
+            },
+            groups,
+            pixels: Statistics::new(),
+            blocks: Statistics::new(),
+        }))
+    }
+}
+
+impl<const BINS: usize> Engine for HostEngine<BINS> {
+    fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
+        let configs = &self.configs;
+        let of_groups: Vec<Done> = self
+            .groups
+            .par_iter_mut()
+            .map(|group| group.run(configs, slice.first_cycle, &slice.pixels))
+            .collect();
+        let mut events = Vec::new();
+        for done in of_groups {
+            events.extend(done.events);
+            self.pixels += done.pixels;
+            self.blocks += done.blocks;
+        }
+        sort(&mut events, slice.first_cycle);
+        Ok(events)
+    }
+
+    fn statistics(&self) -> [Statistics; 2] {
+        let [mut pixels, mut blocks] = [self.pixels, self.blocks];
+        for group in &self.groups {
+            group.add_photons_to(&mut pixels, &mut blocks);
+        }
+        [pixels, blocks]
+    }
+
+    fn keep_decisions(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+        for group in &mut self.groups {
+            group.keep_decisions(is_wanted);
+        }
+    }
+
+    fn decisions(&self) -> Vec<Decision> {
+        let mut all: Vec<Decision> = self.groups.iter().flat_map(Group::decisions).collect();
+        decisions::sort(&mut all);
+        all
+    }
+}
+
+/// By laser cycle, level and pixel. The same for every number of bins, so it is compiled once.
+fn sort(events: &mut [DepthEvent], first_cycle: u64) {
+    // As one number: three compare more slowly.
+    events.sort_unstable_by_key(|event| {
+        let cycle = event.cycle.0 - first_cycle;
+        cycle << 24 | u64::from(event.level.raw()) << 16 | u64::from(event.pixel.0)
+    });
+}

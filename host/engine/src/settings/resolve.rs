@@ -1,0 +1,161 @@
+//! From what is said to what holds: defaults, and the thresholds of rules.
+
+use anyhow::{Result, ensure};
+use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_core::{AnyRule, EchoNumber, HIGHEST_Z, RangeGate, z_for_levels};
+use dtof_theory::tune::window::one_in;
+
+use super::engine::{Settings, no_gate};
+use super::{Detection, EstimatorName, RuleName, Run, Sensor, SettingsFile};
+use dtof_options::Refused;
+
+impl SettingsFile {
+    /// What holds for histograms of `bins` bins.
+    ///
+    /// # Errors
+    /// What contradicts itself, by the names of options, or of a file and its keys.
+    pub fn settings(&self, bins: usize) -> Result<Settings> {
+        self.resolved(bins).map_err(|error| self.blame(error))
+    }
+
+    fn resolved(&self, bins: usize) -> Result<Settings> {
+        let Self {
+            sensor, detection, ..
+        } = self;
+        let x = detection.x.unwrap_or(4);
+        let l1 = detection.l1.unwrap_or(40);
+        let l2 = detection.l2.unwrap_or(2000);
+        let z_for = |share| {
+            // Only how many bins the gate leaves counts; a number of bins that cannot be is
+            // refused by the engine.
+            #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
+            let last_bin = bins.clamp(8, 1024) as u16 - 1;
+            let (first, last) = sensor.gate.unwrap_or((0, last_bin));
+            let gate = RangeGate::<1024>::new(first, last)
+                .map_err(|error| no_gate((first, last), bins, &error))?;
+            let z = z_for_levels(one_in(share), &gate, x, l1, l2, detection.levels());
+            ensure!(
+                z < HIGHEST_Z,
+                Refused::value(
+                    "false_alarm",
+                    share,
+                    "there is no z for so few; `z` may be up to 15.9998"
+                )
+            );
+            Ok(z)
+        };
+        let (echoes, echo_wait) = detection.several()?;
+        let has_window = sensor.sigma_bins.is_some() || detection.half_widths.is_some();
+        ensure!(
+            detection.estimator != Some(EstimatorName::Window) || has_window,
+            Refused::new("estimator", "window needs `sigma_bins` or `half_widths`")
+        );
+        let centroid = detection.estimator == Some(EstimatorName::Centroid);
+        ensure!(
+            !centroid || detection.half_widths.is_none(),
+            Refused::new("half_widths", "is for `estimator` window")
+        );
+        Ok(Settings {
+            bins,
+            bin_width_ps: sensor.bin_width_ps.unwrap_or(const { U16F16::lit("250") }),
+            offset_mm: sensor.offset_mm.unwrap_or(I24F8::ZERO),
+            gate: sensor.gate,
+            masked: sensor.masked.clone().unwrap_or_default(),
+            rule: detection.rule(sensor.sigma_bins, z_for)?,
+            sigma_bins: sensor.sigma_bins,
+            half_widths: detection.half_widths,
+            centroid,
+            l1,
+            l2,
+            x,
+            binning: detection.blocks()?,
+            tracking: detection.tracking.unwrap_or(false),
+            echoes,
+            echo_wait,
+            one_hit_tdc: sensor.one_hit_tdc.unwrap_or(false),
+            frame: self.run.frame,
+            seed: self.run.seed.unwrap_or(1),
+        })
+    }
+
+    /// The file that says these settings, and the rest of this one.
+    #[must_use]
+    pub fn with(&self, settings: &Settings) -> Self {
+        let masked = &settings.masked;
+        Self {
+            sensor: Sensor {
+                bins: u16::try_from(settings.bins).ok(),
+                bin_width_ps: Some(settings.bin_width_ps),
+                offset_mm: Some(settings.offset_mm),
+                gate: settings.gate,
+                masked: (!masked.is_empty()).then(|| masked.clone()),
+                sigma_bins: settings.sigma_bins,
+                one_hit_tdc: settings.one_hit_tdc.then_some(true),
+                ..self.sensor.clone()
+            },
+            detection: Detection::of(settings),
+            rays: self.rays.clone(),
+            run: Run {
+                seed: Some(settings.seed),
+                frame: settings.frame,
+                ..self.run.clone()
+            },
+            file: self.file.clone(),
+        }
+    }
+}
+
+impl Detection {
+    /// What says how the pixels of `settings` decide.
+    fn of(settings: &Settings) -> Self {
+        let (rule, minimum) = match settings.rule {
+            AnyRule::Paper(rule) => (
+                Self {
+                    rule: Some(RuleName::Paper),
+                    alpha: Some(rule.threshold().alpha()),
+                    ..Self::default()
+                },
+                rule.threshold().minimum_count(),
+            ),
+            AnyRule::Average(rule) => (
+                Self {
+                    rule: Some(RuleName::Average),
+                    alpha: Some(rule.threshold().alpha()),
+                    ..Self::default()
+                },
+                rule.threshold().minimum_count(),
+            ),
+            AnyRule::Window(rule) => (
+                Self {
+                    rule: Some(RuleName::Window),
+                    window: Some(rule.width()),
+                    z: Some(rule.z()),
+                    ..Self::default()
+                },
+                rule.minimum_count(),
+            ),
+        };
+        let binning = settings.binning;
+        let several = settings.echoes > EchoNumber::FIRST;
+        let half_widths = settings.half_widths.filter(|_| !settings.centroid);
+        let estimator = match (settings.centroid, half_widths) {
+            (true, _) => Some(EstimatorName::Centroid),
+            (false, Some(_)) => Some(EstimatorName::Window),
+            (false, None) => None,
+        };
+        Self {
+            min_count: u16::try_from(minimum.raw()).ok(),
+            estimator,
+            half_widths,
+            l1: Some(settings.l1),
+            l2: Some(settings.l2),
+            x: Some(settings.x),
+            binning: binning.map(|binning| binning.levels.raw()),
+            patience: binning.map(|binning| binning.patience),
+            tracking: settings.tracking.then_some(true),
+            echoes: several.then(|| settings.echoes.raw()),
+            echo_wait: settings.echo_wait.filter(|_| several),
+            ..rule
+        }
+    }
+}

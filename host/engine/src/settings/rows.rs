@@ -1,0 +1,132 @@
+//! Settings as rows of text.
+
+use dtof_core::{AnyRule, DepthEstimator, EchoNumber, Threshold};
+use dtof_options::rows::Row;
+
+use super::engine::Settings;
+
+impl Settings {
+    /// The settings.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Row> {
+        let row = |name: &str, value: String| (name.to_owned(), value);
+        let gate = self.gate.map_or("none".to_owned(), |(first, last)| {
+            format!("{first}..{last}")
+        });
+        let mut rows = vec![
+            row("bins", format!("{} of {} ps", self.bins, self.bin_width_ps)),
+            row("range offset", format!("{} mm", self.offset_mm)),
+            row("range gate", gate),
+        ];
+        if !self.masked.is_empty() {
+            let pixels: Vec<String> = self.masked.iter().map(u16::to_string).collect();
+            rows.push(row("pixels left out", pixels.join(", ")));
+        }
+        rows.extend(self.detection_rows());
+        if let Some(binning) = self.binning {
+            let side = 1 << binning.levels.raw();
+            rows.push(row(
+                "adaptive binning",
+                format!(
+                    "blocks of up to {side}x{side} pixels that have been silent for {} laser cycles",
+                    binning.patience
+                ),
+            ));
+        }
+        if self.tracking {
+            let text = "half of the false alarms near the last event of a pixel";
+            rows.push(row("tracking", text.to_owned()));
+        }
+        if self.echoes > EchoNumber::FIRST {
+            let reach = self.peel_reach();
+            let (most, wait) = (self.echoes, self.echo_wait);
+            let ends = wait.map_or(String::new(), |times| {
+                format!(", which ends after {times} times the laser cycles of the last")
+            });
+            let text = format!("up to {most} an exposure{ends}; ±{reach} bins left out");
+            rows.push(row("echoes", text));
+        }
+        if self.frame.is_none() {
+            rows.push(row(
+                "decisions",
+                format!(
+                    "every {} laser cycles (X), in exposures longer than {} (L1) and shorter than {} (L2)",
+                    self.x, self.l1, self.l2
+                ),
+            ));
+        }
+        rows.push(row("seed", self.seed.to_string()));
+        rows
+    }
+
+    /// The title of the report.
+    #[must_use]
+    pub fn title(&self) -> &'static str {
+        match self.frame {
+            None => "Asynchronous depth events",
+            Some(_) => "Frames, as a frame-based sensor reads them",
+        }
+    }
+
+    /// The name of what a pixel reports: one of them, and several.
+    #[must_use]
+    pub const fn reports(&self) -> [&'static str; 2] {
+        match self.frame {
+            None => ["event", "events"],
+            Some(_) => ["reading", "readings"],
+        }
+    }
+
+    /// Laser cycles until the first decision.
+    #[must_use]
+    pub fn first_decision(&self) -> u64 {
+        let (x, l1) = (u64::from(self.x), u64::from(self.l1));
+        self.frame.map_or((l1 / x + 1) * x, u64::from)
+    }
+
+    /// Rule, or frame, and estimator.
+    #[must_use]
+    pub fn detection_rows(&self) -> [Row; 2] {
+        let decision = match self.frame {
+            None => ("threshold".to_owned(), threshold(&self.rule)),
+            Some(length) => (
+                "frames".to_owned(),
+                format!("the highest bin of each {length} laser cycles"),
+            ),
+        };
+        let depth = match self.estimator() {
+            DepthEstimator::Centroid3 => "centroid of 3 bins".to_owned(),
+            DepthEstimator::CentredWindow(window) => {
+                let [before, after] = [window.before(), window.after()];
+                if before == after {
+                    format!("centred window of ±{before} bins")
+                } else {
+                    format!("centred window from −{before} to +{after} bins")
+                }
+            }
+        };
+        [decision, ("depth".to_owned(), depth)]
+    }
+}
+
+fn with_alpha(background: &str, threshold: &Threshold) -> String {
+    format!(
+        "{background} + {} × its square root (α), at least {} photons",
+        threshold.alpha(),
+        threshold.minimum_count()
+    )
+}
+
+/// The threshold that a detection exceeds.
+fn threshold(rule: &AnyRule) -> String {
+    match rule {
+        AnyRule::Paper(rule) => with_alpha("background", rule.threshold()),
+        AnyRule::Average(rule) => with_alpha("average of all bins", rule.threshold()),
+        AnyRule::Window(rule) => format!(
+            "in a window of {} bins: background + {} standard deviations (z), at least {} photons",
+            rule.width(),
+            rule.z(),
+            rule.minimum_count()
+        ),
+    }
+}

@@ -1,0 +1,61 @@
+//! Photons in slices: those of the next are made while an engine decides on one.
+
+use anyhow::{Context, Result};
+
+use dtof_photons::source::{PhotonSource, Slice};
+
+/// Laser cycles produced and decided at a time, at most. Changes nothing in the events.
+const SLICE: u16 = 256;
+/// About how many photons these are: so many a pixel, that they stay near the processor, but
+/// not so few in all that a slice takes longer than they do, nor more than fit into memory.
+const PHOTONS_A_PIXEL: f64 = 128.0;
+const FEWEST_PHOTONS: f64 = 5e5;
+const MOST_PHOTONS: f64 = 1e7;
+
+/// Gives all of `source` to `decide`, slice by slice, and makes the photons of the next slice
+/// meanwhile. `see` is given each slice, what was decided, and how many laser cycles are done.
+///
+/// # Errors
+/// Those of the recording, of `decide` and of `see`. The first of them ends it.
+pub fn each_slice<T: Send>(
+    source: &mut dyn PhotonSource,
+    mut decide: impl FnMut(&Slice) -> Result<T> + Send,
+    mut see: impl FnMut(&Slice, T, u64) -> Result<()>,
+) -> Result<()> {
+    let mut done = 0;
+    let mut next = next_slice(source, done)?;
+    while let Some((slice, length)) = next {
+        done += u64::from(length);
+        let (mut decided, mut after) = (None, Ok(None));
+        rayon::in_place_scope(|scope| {
+            scope.spawn(|_| decided = Some(decide(&slice)));
+            after = next_slice(source, done);
+        });
+        see(&slice, decided.context("no slice was decided on")??, done)?;
+        next = after?;
+    }
+    Ok(())
+}
+
+/// The photons after `done` laser cycles, if there are any, and of how many laser cycles.
+fn next_slice(source: &mut dyn PhotonSource, done: u64) -> Result<Option<(Slice, u16)>> {
+    if done >= source.cycles() {
+        return Ok(None);
+    }
+    let length = next_cycles(source, done);
+    Ok(Some((source.next_slice(length)?, length)))
+}
+
+/// Laser cycles of the next slice, `done` of all being done.
+#[must_use]
+pub fn next_cycles(source: &dyn PhotonSource, done: u64) -> u16 {
+    let photons = source.addresses().len() as f64 * PHOTONS_A_PIXEL;
+    let photons = photons.clamp(FEWEST_PHOTONS, MOST_PHOTONS);
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "1 to SLICE"
+    )]
+    let most = (photons / source.photons_per_cycle()).clamp(1.0, SLICE.into()) as u16;
+    u16::try_from(source.cycles() - done).map_or(most, |left| left.min(most))
+}

@@ -1,0 +1,307 @@
+//! AER files: a header, words, and an end word with their number and checksum.
+//! The format is `docs/aer-format.md`, section "Files".
+
+mod header;
+
+use std::io::{self, Read, Write};
+
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
+use dtof_core::{
+    AerDecoder, AerEncoder, AerRecord, AerWord, BinPosition, BlockLevel, DepthEvent,
+    DynamicDepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress,
+};
+
+pub use header::Header;
+pub use header::MAGIC;
+use header::{HEADER_BYTES, header_length};
+
+use dtof_options::Named;
+
+/// Of 16 bytes at a time, as long as a word.
+type Checksum = Table<16>;
+static CRC_32: Crc<u32, Checksum> = Crc::<u32, Checksum>::new(&CRC_32_ISO_HDLC);
+
+/// An event of either kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A peak stood clear.
+    Depth(DepthEvent),
+    /// The mean depth has changed.
+    DynamicDepth(DynamicDepthEvent),
+}
+
+/// Which kind of event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventKind {
+    /// Depth events.
+    Depth,
+    /// Dynamic depth events.
+    DynamicDepth,
+}
+
+impl Named for EventKind {
+    const NAMES: &'static [(&'static str, Self, &'static str)] = &[
+        ("depth", Self::Depth, "Depth events"),
+        ("dynamic-depth", Self::DynamicDepth, "Dynamic depth events"),
+    ];
+}
+
+impl Event {
+    /// Which kind it is.
+    #[must_use]
+    pub fn kind(&self) -> EventKind {
+        match self {
+            Self::Depth(_) => EventKind::Depth,
+            Self::DynamicDepth(_) => EventKind::DynamicDepth,
+        }
+    }
+
+    /// Which macropixel.
+    #[must_use]
+    pub fn pixel(&self) -> PixelAddress {
+        match self {
+            Self::Depth(event) => event.pixel,
+            Self::DynamicDepth(event) => event.pixel,
+        }
+    }
+
+    /// Whether it is one macropixel, or a block.
+    #[must_use]
+    pub fn level(&self) -> BlockLevel {
+        match self {
+            Self::Depth(event) => event.level,
+            Self::DynamicDepth(event) => event.level,
+        }
+    }
+
+    /// Which echo of its exposure; the first of a change of depth.
+    #[must_use]
+    pub fn echo(&self) -> EchoNumber {
+        match self {
+            Self::Depth(event) => event.echo,
+            Self::DynamicDepth(_) => EchoNumber::FIRST,
+        }
+    }
+
+    /// When.
+    #[must_use]
+    pub fn cycle(&self) -> LaserCycle {
+        match self {
+            Self::Depth(event) => event.cycle,
+            Self::DynamicDepth(event) => event.cycle,
+        }
+    }
+
+    /// Where: the pulse, or the mean after the change.
+    #[must_use]
+    pub fn position(&self) -> BinPosition {
+        match self {
+            Self::Depth(event) => event.position(),
+            Self::DynamicDepth(event) => event.position,
+        }
+    }
+
+    /// Its flags.
+    #[must_use]
+    pub fn flags(&self) -> Flags {
+        match self {
+            Self::Depth(event) => event.flags,
+            Self::DynamicDepth(event) => event.flags,
+        }
+    }
+}
+
+/// Writes a file; it is complete once [`Writer::finish`] has returned.
+pub struct Writer<W: Write> {
+    out: W,
+    digest: Digest<'static, u32, Checksum>,
+    encoder: AerEncoder,
+    events: u64,
+}
+
+impl<W: Write> Writer<W> {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn new(out: W, header: &Header) -> io::Result<Self> {
+        let mut writer = Self {
+            out,
+            digest: CRC_32.digest(),
+            encoder: AerEncoder::new(),
+            events: 0,
+        };
+        writer.put(&header.to_bytes())?;
+        Ok(writer)
+    }
+
+    /// Writes one event, and the time word before it if one is due.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write(&mut self, event: &Event) -> io::Result<()> {
+        let (time, word) = match event {
+            Event::Depth(event) => self.encoder.encode(event),
+            Event::DynamicDepth(event) => self.encoder.encode_dynamic_depth(event),
+        };
+        if let Some(time) = time {
+            self.put(&time.to_le_bytes())?;
+        }
+        self.events += 1;
+        self.put(&word.to_le_bytes())
+    }
+
+    /// What was written goes as far as it can.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+
+    /// Ends the file and gives the writer back.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn finish(mut self) -> io::Result<W> {
+        let end = AerWord::end(self.events, self.digest.finalize());
+        self.out.write_all(&end.to_le_bytes())?;
+        Ok(self.out)
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.digest.update(bytes);
+        self.out.write_all(bytes)
+    }
+}
+
+/// Reads a file, event by event.
+pub struct Reader<R: Read> {
+    input: R,
+    digest: Digest<'static, u32, Checksum>,
+    decoder: AerDecoder,
+    header: Header,
+    offset: u64,
+    events: u64,
+    ended: bool,
+}
+
+impl<R: Read> Reader<R> {
+    /// Reads the header.
+    ///
+    /// # Errors
+    /// If there is none, or one of another format.
+    pub fn new(mut input: R) -> Result<Self> {
+        let mut bytes = [0; HEADER_BYTES as usize];
+        input
+            .read_exact(&mut bytes)
+            .map_err(|error| match error.kind() {
+                io::ErrorKind::UnexpectedEof => anyhow!("not an AER file: shorter than its header"),
+                _ => error.into(),
+            })?;
+        let mut digest = CRC_32.digest();
+        digest.update(&bytes);
+        let header = Header::from_bytes(&bytes)?;
+        // The settings of the run, which no event needs.
+        let length = header_length(&bytes).unwrap_or(HEADER_BYTES);
+        let mut settings = vec![0; usize::from(length - HEADER_BYTES)];
+        input
+            .read_exact(&mut settings)
+            .context("the file ends inside its header")?;
+        digest.update(&settings);
+        Ok(Self {
+            input,
+            digest,
+            decoder: AerDecoder::new(),
+            header,
+            offset: length.into(),
+            events: 0,
+            ended: false,
+        })
+    }
+
+    /// The header.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The byte of the file at which the next word begins.
+    pub fn offset(&self) -> u64 {
+        self.offset
+    }
+
+    /// The next event, or `None` after the end word.
+    ///
+    /// # Errors
+    /// What is wrong and at which byte of the file.
+    pub fn next_event(&mut self) -> Result<Option<Event>> {
+        while !self.ended {
+            let word = self.next_word();
+            // Nothing that is wrong has been passed.
+            if let Some(event) = word.with_context(|| format!("byte {}", self.offset))? {
+                return Ok(Some(event));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Reads one word; gives the event if it is one.
+    fn next_word(&mut self) -> Result<Option<Event>> {
+        let Some(bytes) = self.read_word()? else {
+            bail!("the file ends without an end word");
+        };
+        match self.decoder.decode(AerWord::from_le_bytes(bytes))? {
+            AerRecord::Event(event) => self.counted(&bytes, Event::Depth(event)).map(Some),
+            AerRecord::DynamicDepth(event) => {
+                self.counted(&bytes, Event::DynamicDepth(event)).map(Some)
+            }
+            AerRecord::Time(_) => {
+                self.accept(&bytes);
+                Ok(None)
+            }
+            AerRecord::End { events, checksum } => {
+                self.ended = true;
+                ensure!(
+                    events == self.events,
+                    "the end word counts {events} events, the file holds {}",
+                    self.events
+                );
+                ensure!(
+                    checksum == self.digest.clone().finalize(),
+                    "the checksum does not match: a word before this one is damaged"
+                );
+                self.offset += AerWord::BYTES as u64;
+                ensure!(self.input.read(&mut [0])? == 0, "bytes follow the end word");
+                Ok(None)
+            }
+        }
+    }
+
+    /// The bytes of the next word, or `None` at the end of the file.
+    fn read_word(&mut self) -> Result<Option<[u8; AerWord::BYTES]>> {
+        let mut bytes = Vec::with_capacity(AerWord::BYTES);
+        self.input
+            .by_ref()
+            .take(AerWord::BYTES as u64)
+            .read_to_end(&mut bytes)?;
+        if bytes.is_empty() {
+            return Ok(None);
+        }
+        let word = <[u8; AerWord::BYTES]>::try_from(bytes);
+        word.map(Some)
+            .map_err(|_| anyhow!("the file ends inside a word"))
+    }
+
+    fn counted(&mut self, bytes: &[u8; AerWord::BYTES], event: Event) -> Result<Event> {
+        self.header.check(&event)?;
+        self.accept(bytes);
+        self.events += 1;
+        Ok(event)
+    }
+
+    fn accept(&mut self, bytes: &[u8; AerWord::BYTES]) {
+        self.digest.update(bytes);
+        self.offset += AerWord::BYTES as u64;
+    }
+}

@@ -1,0 +1,264 @@
+//! The events of a run, pixel by pixel.
+
+use std::collections::VecDeque;
+
+use dtof_core::fixed::types::I24F8;
+use dtof_core::{BlockLevel, DepthEvent, PixelAddress, RangeScale, Reflectivity};
+
+use crate::events_csv::range_mm;
+use crate::reports::LastReports;
+use dtof_options::rows::{Row, grouped};
+use dtof_photons::source::{Geometry, Slice};
+
+/// How many events the mean map averages, as in the paper's figure.
+pub const MEAN_OF: usize = 10;
+
+/// The ranges of one pixel.
+#[derive(Clone, Debug, Default)]
+pub struct PixelHistory {
+    /// Millimetres of the last [`MEAN_OF`] events, or fewer, oldest first.
+    recent: VecDeque<f64>,
+    /// How bright the surface is, by the pixel's own events.
+    reflectivity: Reflectivity,
+    /// All events, those of blocks that stand for the pixel included.
+    pub events: u64,
+    reports: LastReports,
+    /// All photons, whatever became of them.
+    pub photons: u64,
+}
+
+impl PixelHistory {
+    fn push(&mut self, range_mm: f64) {
+        if self.recent.len() == MEAN_OF {
+            self.recent.pop_front();
+        }
+        self.recent.push_back(range_mm);
+    }
+
+    /// The range of the last event.
+    #[must_use]
+    pub fn last_mm(&self) -> Option<f64> {
+        self.recent.back().copied()
+    }
+
+    /// The mean range of the last [`MEAN_OF`] events, or of as many as there
+    /// are.
+    #[must_use]
+    pub fn mean_mm(&self) -> Option<f64> {
+        let count = self.recent.len();
+        (count > 0).then(|| self.recent.iter().sum::<f64>() / count as f64)
+    }
+
+    /// Blocks say nothing of how bright a pixel is.
+    fn has_own_events(&self) -> bool {
+        self.reflectivity.events() > 0
+    }
+
+    /// Relative reflectivity as the paper has it, events × range², at the mean range.
+    #[must_use]
+    pub fn reflectivity_of_events(&self) -> Option<f64> {
+        self.has_own_events().then_some(())?;
+        let range = I24F8::saturating_from_num(self.mean_mm()?);
+        Some(self.reflectivity.of_events(range) as f64)
+    }
+
+    /// Relative reflectivity from the signal photons a laser cycle, × range², at the
+    /// mean range.
+    #[must_use]
+    pub fn reflectivity_of_signal(&self) -> Option<f64> {
+        self.has_own_events().then_some(())?;
+        let range = I24F8::saturating_from_num(self.mean_mm()?);
+        Some(self.reflectivity.of_signal(range).to_num())
+    }
+}
+
+/// All pixels of an array, row by row.
+#[derive(Clone, Debug)]
+pub struct Maps {
+    /// The array.
+    pub geometry: Geometry,
+    /// One for each address.
+    pub pixels: Vec<PixelHistory>,
+}
+
+impl Maps {
+    /// Nothing yet.
+    #[must_use]
+    pub fn new(geometry: Geometry) -> Self {
+        Self {
+            geometry,
+            pixels: vec![PixelHistory::default(); geometry.addresses()],
+        }
+    }
+
+    /// Takes one event into account. That of a block holds for those of its pixels that
+    /// [`LastReports`] tells.
+    pub fn add(&mut self, event: &DepthEvent, scale: &RangeScale) {
+        let range_mm = range_mm(event, scale);
+        let exposure = event.exposure.into();
+        for address in self.geometry.block(event.pixel, event.level) {
+            let pixel = &mut self.pixels[usize::from(address.0)];
+            if pixel.reports.take(event.level, event.cycle, exposure) {
+                pixel.push(range_mm);
+                pixel.events += 1;
+            }
+        }
+        if event.level == BlockLevel::PIXEL {
+            self.pixels[usize::from(event.pixel.0)]
+                .reflectivity
+                .add(event);
+        }
+    }
+
+    /// Takes the photons of `pixels` into account.
+    pub fn count(&mut self, pixels: &[PixelAddress], slice: &Slice) {
+        for (address, received) in pixels.iter().zip(&slice.pixels) {
+            self.pixels[usize::from(address.0)].photons += received.photons.len() as u64;
+        }
+    }
+
+    /// Pixels with at least one event.
+    #[must_use]
+    pub fn reporting(&self) -> usize {
+        self.pixels.iter().filter(|pixel| pixel.events > 0).count()
+    }
+
+    /// What is known of each pixel, as a row of a table.
+    #[must_use]
+    pub fn rows(&self, [column, row]: [&str; 2], [one, several]: [&str; 2]) -> Vec<Row> {
+        let columns = self.geometry.columns.max(1) as usize;
+        let rows = self.pixels.iter().enumerate().map(|(at, pixel)| {
+            let name = format!("{column} {}, {row} {}", at % columns, at / columns);
+            let photons = format!("{} photons", grouped(pixel.photons));
+            let (Some(last), Some(mean)) = (pixel.last_mm(), pixel.mean_mm()) else {
+                return (name, format!("no {one}; {photons}"));
+            };
+            let [events, called] = match pixel.events {
+                1 => ["1".to_owned(), one.to_owned()],
+                events => [grouped(events), several.to_owned()],
+            };
+            let text = format!(
+                "{events} {called}; range of the last {last:.1} mm, mean of up to {MEAN_OF} \
+                 {mean:.1} mm; {photons}"
+            );
+            (name, text)
+        });
+        rows.collect()
+    }
+
+    /// Of the pixels with an event, those with the most, the median number and the
+    /// fewest, and the two halfway between; fewer if there are fewer. The lower address
+    /// comes first where two have as many.
+    #[must_use]
+    pub fn spread(&self) -> Vec<PixelAddress> {
+        let all = (0..=u16::MAX).map(PixelAddress).zip(&self.pixels);
+        let mut pixels: Vec<_> = all.filter(|(_, pixel)| pixel.events > 0).collect();
+        pixels.sort_by_key(|(_, pixel)| std::cmp::Reverse(pixel.events));
+        let Some(last) = pixels.len().checked_sub(1) else {
+            return Vec::new();
+        };
+        let mut places: Vec<usize> = (0..=4).map(|quarter| last * quarter / 4).collect();
+        places.dedup();
+        places.into_iter().map(|place| pixels[place].0).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures;
+    use dtof_photons::source::{Photon, PixelPhotons};
+
+    #[test]
+    fn the_last_range_is_the_newest_and_the_mean_that_of_the_last_ten() {
+        let mut pixel = PixelHistory::default();
+        assert_eq!((pixel.last_mm(), pixel.mean_mm()), (None, None));
+        for range in 1..=12u32 {
+            pixel.push(range.into());
+        }
+        assert_eq!(pixel.last_mm(), Some(12.0));
+        assert_eq!(pixel.mean_mm(), Some(7.5)); // of 3 to 12
+    }
+
+    #[test]
+    fn a_block_stands_for_its_pixels_that_have_not_reported_since() {
+        let mut maps = Maps::new(Geometry::new(3, 3));
+        let scale = fixtures::scale();
+        let of_block = |pixel, cycle, bin, level| DepthEvent {
+            level: BlockLevel::new(level).unwrap(),
+            ..fixtures::event(pixel, cycle, bin) // over 40 laser cycles
+        };
+        maps.add(&of_block(4, 100, 10, 0), &scale);
+        maps.add(&of_block(0, 140, 20, 1), &scale); // from 101 on
+        maps.add(&of_block(1, 150, 30, 0), &scale);
+        maps.add(&of_block(0, 189, 40, 2), &scale); // from 150 on
+        maps.add(&of_block(0, 190, 50, 1), &scale); // from 151 on
+        let last = maps.pixels.iter().map(|pixel| {
+            let range = pixel.last_mm().unwrap();
+            (range / 37.474 - 0.5).round()
+        });
+        assert!(last.eq([50.0, 50.0, 40.0, 50.0, 50.0, 40.0, 40.0, 40.0, 40.0]));
+        let events = maps.pixels.iter().map(|pixel| pixel.events);
+        assert!(events.eq([3, 3, 1, 3, 4, 1, 1, 1, 1]));
+        assert_eq!(maps.reporting(), 9);
+    }
+
+    #[test]
+    fn photons_are_those_of_their_pixel() {
+        let mut maps = Maps::new(Geometry::new(3, 1));
+        let photon = Photon { cycle: 0, code: 5 };
+        let received = |photons| PixelPhotons {
+            cycles: 1,
+            photons: vec![photon; photons],
+        };
+        let slice = Slice {
+            first_cycle: 0,
+            pixels: vec![received(2), received(7)],
+        };
+        for _ in 0..2 {
+            maps.count(&[0, 2].map(PixelAddress), &slice);
+        }
+        let photons = maps.pixels.iter().map(|pixel| pixel.photons);
+        assert!(photons.eq([4, 0, 14]));
+    }
+
+    #[test]
+    fn a_row_says_what_is_known_of_a_pixel() {
+        let mut maps = Maps::new(Geometry::new(2, 2));
+        let at = |pixel, cycle, bin| fixtures::event(pixel, cycle, bin);
+        for event in [at(3, 50, 10), at(3, 99, 12), at(0, 120, 10)] {
+            maps.add(&event, &fixtures::scale());
+        }
+        maps.pixels[3].photons = 12_345;
+        let rows = maps.rows(["zone", "capture"], ["event", "events"]);
+        let texts = rows.iter().map(|(name, text)| format!("{name}: {text}"));
+        let bins = |bins: f64| bins * 37.474;
+        let [last, mean] = [bins(12.5), bins(11.5)];
+        let expected = format!(
+            "zone 1, capture 1: 2 events; range of the last {last:.1} mm, mean of up to 10 \
+             {mean:.1} mm; 12,345 photons"
+        );
+        let texts: Vec<String> = texts.collect();
+        assert_eq!(texts[1], "zone 1, capture 0: no event; 0 photons");
+        assert_eq!(texts[3], expected);
+        assert!(texts[0].starts_with("zone 0, capture 0: 1 event; range"));
+    }
+
+    #[test]
+    fn the_spread_goes_from_most_to_fewest_events() {
+        let with = |events: &[u64]| {
+            let mut maps = Maps::new(Geometry::new(u32::try_from(events.len()).unwrap(), 1));
+            for (pixel, events) in maps.pixels.iter_mut().zip(events) {
+                pixel.events = *events;
+            }
+            maps.spread()
+        };
+        assert_eq!(with(&[0, 0]), []);
+        assert_eq!(with(&[0, 3]), [PixelAddress(1)]);
+        assert_eq!(with(&[3, 3]), [0, 1].map(PixelAddress));
+        assert_eq!(
+            with(&[5, 0, 9, 1, 3, 7, 2, 8, 4, 6]),
+            [2, 5, 0, 4, 3].map(PixelAddress)
+        );
+    }
+}

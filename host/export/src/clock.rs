@@ -1,0 +1,257 @@
+//! From laser cycles to time.
+
+use std::fmt;
+
+use anyhow::{Result, ensure};
+
+use super::Format;
+use dtof_events::aer_file::Header;
+use dtof_options::Refused;
+
+/// Bits of a time of EVT2, in microseconds.
+pub(super) const EVT2_BITS: u32 = 34;
+
+/// How many laser cycles a second has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LaserClock {
+    /// Laser cycles in a thousand seconds, not 0.
+    millihertz: u128,
+}
+
+impl Default for LaserClock {
+    fn default() -> Self {
+        Self {
+            millihertz: 1000 * u128::from(Self::PAPER_HZ),
+        }
+    }
+}
+
+impl LaserClock {
+    /// The paper's 10 MHz (section III-A).
+    pub const PAPER_HZ: u64 = 10_000_000;
+
+    /// `hz` laser cycles a second.
+    ///
+    /// # Errors
+    /// If `hz` is 0.
+    pub fn new(hz: u64) -> Result<Self> {
+        ensure!(hz > 0, "the laser has 0 cycles a second");
+        Ok(Self {
+            millihertz: 1000 * u128::from(hz),
+        })
+    }
+
+    /// That of a file which says so.
+    #[must_use]
+    pub fn of(header: &Header) -> Option<Self> {
+        Self::from_millihertz(header.laser_millihertz)
+    }
+
+    /// So many laser cycles in a thousand seconds; none if that is 0, which stands for unknown.
+    #[must_use]
+    pub fn from_millihertz(millihertz: u64) -> Option<Self> {
+        let millihertz = u128::from(millihertz);
+        (millihertz > 0).then_some(Self { millihertz })
+    }
+
+    /// The one that holds for a file, and a warning if that is not the file's: `wanted` comes
+    /// before the file, and the paper's is for want of any. To the whole hertz they are the same.
+    pub(crate) fn choose(wanted: Option<Self>, header: &Header) -> (Self, Option<String>) {
+        match Self::known(wanted, Self::of(header), "the file") {
+            (Some(clock), warning) => (clock, warning),
+            (None, _) => {
+                let assumed = Self::default();
+                let warning = format!(
+                    "the laser rate is not known; times are for {assumed}, unless --laser-hz says \
+                     another"
+                );
+                (assumed, Some(warning))
+            }
+        }
+    }
+
+    /// The same if there is one; `own` is what `whose`, a file or a device, says.
+    #[must_use]
+    pub fn known(
+        wanted: Option<Self>,
+        own: Option<Self>,
+        whose: &str,
+    ) -> (Option<Self>, Option<String>) {
+        match (wanted, own) {
+            (Some(wanted), Some(own)) if own.millihertz / 1000 * 1000 != wanted.millihertz => {
+                let differ = format!("{whose} has a laser of {own}; times are for {wanted}");
+                (Some(wanted), Some(differ))
+            }
+            _ => (own.or(wanted), None),
+        }
+    }
+
+    /// Laser cycles in a thousand seconds, as a header has them.
+    #[must_use]
+    pub fn millihertz(&self) -> u64 {
+        u64::try_from(self.millihertz).unwrap_or(u64::MAX)
+    }
+
+    /// Nanoseconds from the start of laser cycle 0 to that of `cycle`, rounded down.
+    #[must_use]
+    pub fn nanoseconds(&self, cycle: u64) -> u128 {
+        u128::from(cycle) * 1_000_000_000_000 / self.millihertz
+    }
+
+    /// The same in microseconds.
+    #[must_use]
+    pub fn microseconds(&self, cycle: u64) -> u128 {
+        u128::from(cycle) * 1_000_000_000 / self.millihertz
+    }
+
+    /// The nanosecond in which laser cycle `cycle` ends, as far as 64 bits go; not 0.
+    pub(super) fn end_ns(&self, cycle: u64) -> u64 {
+        let end = self.nanoseconds(cycle.saturating_add(1)).max(1);
+        u64::try_from(end).unwrap_or(u64::MAX)
+    }
+
+    /// Whether `format` can hold the time of an event in laser cycle `cycle`.
+    pub(super) fn check(&self, format: Format, cycle: u64) -> Result<()> {
+        let Some(end_ns) = format.end_ns() else {
+            return Ok(());
+        };
+        let time = self.nanoseconds(cycle);
+        let name = format.name();
+        ensure!(
+            time < end_ns,
+            Refused::input(format!(
+                "laser cycle {cycle} lies beyond, {} s after the start: {name} holds {} s of time \
+                 (`laser_hz` {})",
+                time / 1_000_000_000,
+                end_ns / 1_000_000_000,
+                self.millihertz as f64 / 1e3
+            ))
+        );
+        Ok(())
+    }
+}
+
+/// "10 MHz", "20 kHz".
+impl fmt::Display for LaserClock {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let millihertz = self.millihertz as f64;
+        if millihertz < 1e9 {
+            return write!(f, "{} kHz", millihertz / 1e6);
+        }
+        write!(f, "{} MHz", millihertz / 1e9)
+    }
+}
+
+/// When the events of a file were.
+#[derive(Clone, Copy, Debug)]
+pub struct Span {
+    /// The nanosecond of 1970-01-01 UTC at which laser cycle 0 was; 0 if that is not known.
+    pub start_ns: u64,
+    /// The nanosecond after laser cycle 0 at which the last event's laser cycle ended, not 0.
+    pub end_ns: u64,
+}
+
+impl Span {
+    /// That of a file whose latest event is in laser cycle `latest`.
+    ///
+    /// # Errors
+    /// If `format` cannot hold the time of its events.
+    pub fn of(format: Format, clock: &LaserClock, header: &Header, latest: u64) -> Result<Self> {
+        let start_ns = i128::from(header.start_us) * 1000;
+        let end_ns = clock.end_ns(latest);
+        if let Some(seconds) = format.end_seconds() {
+            let end = start_ns + i128::from(end_ns);
+            ensure!(
+                start_ns >= 0 && end < i128::from(seconds) * 1_000_000_000,
+                "its events are {} s to {} s after 1970: {} holds those of less than {seconds} s",
+                start_ns / 1_000_000_000,
+                end / 1_000_000_000,
+                format.name()
+            );
+        }
+        // Others have no such time.
+        let start_ns = u64::try_from(start_ns).unwrap_or(0);
+        Ok(Self { start_ns, end_ns })
+    }
+}
+
+impl Format {
+    /// As people write it.
+    fn name(self) -> String {
+        format!("{self:?}").to_uppercase()
+    }
+
+    /// The second since 1970 from which on it does not hold the time, if it has that time.
+    fn end_seconds(self) -> Option<u64> {
+        match self {
+            Self::Csv | Self::Pcd | Self::Ply | Self::Evt2 => None,
+            Self::Mcap => Some(1 << 32),
+            Self::Ros2 => Some(1 << 31),
+        }
+    }
+
+    /// The nanosecond from which on it does not hold the time of an event.
+    fn end_ns(self) -> Option<u128> {
+        match self {
+            Self::Csv => None,
+            // Whole numbers in a double.
+            Self::Pcd | Self::Ply | Self::Mcap | Self::Ros2 => Some(1 << 53),
+            // Readers differ in what they take time for that has wrapped.
+            Self::Evt2 => Some(1000 << EVT2_BITS),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_is_rounded_down_and_never_overflows() {
+        let clock = LaserClock::default();
+        assert_eq!(clock.nanoseconds(3), 300);
+        assert_eq!(clock.microseconds(19), 1);
+        let slow = LaserClock::new(3).unwrap();
+        assert_eq!(slow.microseconds(2), 666_666);
+        let one = LaserClock::new(1).unwrap();
+        assert_eq!(
+            one.nanoseconds(u64::MAX),
+            u128::from(u64::MAX) * 1_000_000_000
+        );
+        assert!(LaserClock::new(0).is_err());
+        assert_eq!((clock.end_ns(0), one.end_ns(u64::MAX)), (100, u64::MAX));
+        assert_eq!(LaserClock::new(u64::MAX).unwrap().end_ns(0), 1);
+        assert_eq!(clock.to_string(), "10 MHz");
+    }
+
+    #[test]
+    fn what_was_said_of_the_laser_holds_and_a_difference_is_told() {
+        let known = |said: Option<u64>, own| {
+            let said = said.map(|hz| LaserClock::new(hz).unwrap());
+            let (clock, warning) =
+                LaserClock::known(said, LaserClock::from_millihertz(own), "the device");
+            (clock.map(|clock| clock.millihertz()), warning)
+        };
+        assert_eq!(known(None, 0), (None, None));
+        assert_eq!(known(None, 4_165_818), (Some(4_165_818), None));
+        assert_eq!(known(Some(10_000), 0), (Some(10_000_000), None));
+        // A setting has whole hertz: to these, what the device says is exact.
+        assert_eq!(known(Some(4165), 4_165_818), (Some(4_165_818), None));
+        let (rate, warning) = known(Some(3000), 4_165_818);
+        assert_eq!(rate, Some(3_000_000));
+        let told = "the device has a laser of 4.165818 kHz; times are for 3 kHz";
+        assert_eq!(warning.as_deref(), Some(told));
+    }
+
+    #[test]
+    fn times_that_a_double_would_round_are_refused() {
+        let clock = LaserClock::new(1_000_000_000).unwrap();
+        assert!(clock.check(Format::Pcd, (1 << 53) - 1).is_ok());
+        let error = clock.check(Format::Ply, 1 << 53).unwrap_err();
+        assert!(error.to_string().contains("PLY holds 9007199 s"), "{error}");
+        assert!(clock.check(Format::Csv, u64::MAX).is_ok());
+        let clock = LaserClock::new(1_000_000).unwrap();
+        assert!(clock.check(Format::Evt2, (1 << 34) - 1).is_ok());
+        assert!(clock.check(Format::Evt2, 1 << 34).is_err());
+    }
+}

@@ -1,0 +1,273 @@
+//! Messages for Foxglove: the points of a slice of time and its statistics, the same in an MCAP file
+//! and live.
+
+use anyhow::{Context, Result};
+use dtof_core::{BlockLevel, Flags};
+use foxglove::messages::{PackedElementField, PointCloud, Pose, Quaternion, Timestamp, Vector3};
+use foxglove::{Encode, Schema};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::points::fields;
+use dtof_events::aer_file::{Event, EventKind};
+use dtof_photons::source::Geometry;
+
+/// Points of a message, at most.
+pub const MOST_POINTS: usize = 1 << 16;
+
+/// The frame that points are in.
+pub const FRAME: &str = "dtof_optical";
+
+/// A topic, and what its messages are.
+pub struct Channel {
+    /// Its name.
+    pub topic: &'static str,
+    /// Of its messages.
+    pub encoding: &'static str,
+    /// Of its messages.
+    pub schema: Schema,
+}
+
+impl Channel {
+    /// Points of a slice of time.
+    ///
+    /// # Errors
+    /// Never: the messages have a schema.
+    pub fn events() -> Result<Self> {
+        Self::of::<PointCloud>("/events")
+    }
+
+    /// Statistics of the same slice.
+    ///
+    /// # Errors
+    /// Never: the messages are objects.
+    pub fn statistics() -> Result<Self> {
+        Self::json("/statistics", "Statistics", &Statistics::default())
+    }
+
+    /// Messages that Foxglove knows.
+    ///
+    /// # Errors
+    /// If they have no schema.
+    pub fn of<T: Encode>(topic: &'static str) -> Result<Self> {
+        let schema = T::get_schema();
+        Ok(Self {
+            topic,
+            encoding: "protobuf",
+            schema: schema.with_context(|| format!("{topic} has no schema"))?,
+        })
+    }
+
+    /// Messages of this project, all with the fields of `sample`.
+    ///
+    /// # Errors
+    /// If `sample` is no object.
+    pub fn json(topic: &'static str, name: &str, sample: &impl Serialize) -> Result<Self> {
+        let fields = serde_json::to_value(sample)?;
+        let fields = fields.as_object().context("a message has fields")?;
+        let kind = |of: &str| json!({ "type": of });
+        let properties = fields.iter().map(|(name, value)| {
+            let schema = match value {
+                // The only one of them.
+                Value::Object(_) => json!({
+                    "type": "object",
+                    "title": "time",
+                    "properties": { "sec": kind("integer"), "nsec": kind("integer") },
+                }),
+                Value::String(_) => kind("string"),
+                Value::Number(number) if number.is_u64() => kind("integer"),
+                _ => kind("number"),
+            };
+            (name.clone(), schema)
+        });
+        let name = format!("dtof.{name}");
+        let schema = json!({
+            "title": name,
+            "type": "object",
+            "properties": properties.collect::<serde_json::Map<_, _>>(),
+        });
+        Ok(Self {
+            topic,
+            encoding: "json",
+            schema: Schema::new(name, "jsonschema", schema.to_string().into_bytes()),
+        })
+    }
+}
+
+/// Counts of a slice of time.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Statistics {
+    /// When the slice begins.
+    timestamp: Time,
+    /// How long it is, in seconds. In a file the last one ends with the last event.
+    duration_s: f64,
+    /// Events.
+    events: u64,
+    /// The same a second; null of a slice of no length, whose events are no later than the slice
+    /// before.
+    events_per_s: f64,
+    /// Pixels with an event.
+    pixels: u64,
+    /// Events with any flag.
+    flagged: u64,
+    /// Events whose peak counter was full.
+    saturated: u64,
+    /// Events whose depth window was cut by the range gate, or whose position was held two
+    /// bins from the peak.
+    clipped: u64,
+    /// Events that had to wait for the link.
+    deferred: u64,
+    /// Events of exposures with so many photons that the TDC missed some.
+    pile_up: u64,
+    /// Echoes on the tail of another.
+    tail: u64,
+    /// Events of blocks of pixels.
+    blocks: u64,
+    /// Events from the start of the file, or of the program, to the end of the slice.
+    events_so_far: u64,
+}
+
+impl Statistics {
+    /// Of a slice that began at `time` and lasted so many nanoseconds, after which there were so
+    /// many events.
+    #[must_use]
+    pub fn over(self, time: u64, duration_ns: u64, events_so_far: u64) -> Self {
+        let duration_s = duration_ns as f64 / 1e9;
+        let rate = self.events as f64 / duration_s;
+        Self {
+            timestamp: Time::of(time),
+            duration_s,
+            events_per_s: if duration_ns > 0 { rate } else { f64::NAN },
+            events_so_far,
+            ..self
+        }
+    }
+}
+
+/// As Foxglove has it in JSON.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Time {
+    sec: u32,
+    nsec: u32,
+}
+
+impl Time {
+    /// A time of less than 2^32 s.
+    #[allow(clippy::cast_possible_truncation, reason = "checked by the clock")]
+    #[must_use]
+    pub fn of(nanoseconds: u64) -> Self {
+        Self {
+            sec: (nanoseconds / 1_000_000_000) as u32,
+            nsec: (nanoseconds % 1_000_000_000) as u32,
+        }
+    }
+
+    /// The same in a message.
+    #[must_use]
+    pub fn stamp(self) -> Option<Timestamp> {
+        Timestamp::new_checked(self.sec, self.nsec)
+    }
+}
+
+/// Counts the events of slices.
+#[derive(Debug)]
+pub struct Tally {
+    now: Statistics,
+    /// The slice in which each pixel had its last event, counted from 1.
+    last_slice: Vec<u64>,
+    so_far: u64,
+}
+
+impl Tally {
+    /// No event of an array yet.
+    #[must_use]
+    pub fn new(array: Geometry) -> Self {
+        Self {
+            now: Statistics::default(),
+            last_slice: vec![0; array.addresses()],
+            so_far: 0,
+        }
+    }
+
+    /// Counts an event of the slice with this number. Numbers rise.
+    ///
+    /// # Errors
+    /// If the array has no such pixel. Nothing is counted then.
+    pub fn add(&mut self, event: &Event, slice: u64) -> Result<()> {
+        let last = self.last_slice.get_mut(usize::from(event.pixel().0));
+        let last = last.context("an event of no pixel")?;
+        let now = &mut self.now;
+        now.events += 1;
+        now.pixels += u64::from(*last != slice + 1);
+        *last = slice + 1;
+        let flags = event.flags();
+        for (count, flag) in [
+            (&mut now.saturated, Flags::SATURATED),
+            (&mut now.clipped, Flags::CLIPPED),
+            (&mut now.deferred, Flags::DEFERRED),
+            (&mut now.pile_up, Flags::PILE_UP),
+            (&mut now.tail, Flags::TAIL),
+        ] {
+            *count += u64::from(flags.contains(flag));
+        }
+        now.blocks += u64::from(event.level() != BlockLevel::PIXEL);
+        now.flagged += u64::from(flags != Flags::NONE);
+        self.so_far += 1;
+        Ok(())
+    }
+
+    /// The counts of a slice, which ends.
+    pub fn take(&mut self) -> Statistics {
+        std::mem::take(&mut self.now)
+    }
+
+    /// All events.
+    #[must_use]
+    pub fn so_far(&self) -> u64 {
+        self.so_far
+    }
+}
+
+/// Packed points as a message.
+///
+/// # Errors
+/// If it cannot be encoded.
+pub fn cloud(kind: EventKind, time: u64, data: Vec<u8>) -> Result<Vec<u8>> {
+    let mut offset = 0;
+    let mut fields_of_points = Vec::new();
+    for field in fields(kind) {
+        fields_of_points.push(PackedElementField {
+            name: field.name.to_owned(),
+            offset,
+            r#type: field.number.mcap.into(),
+        });
+        offset += field.number.bytes;
+    }
+    encoded(&PointCloud {
+        timestamp: Time::of(time).stamp(),
+        frame_id: FRAME.to_owned(),
+        pose: Some(Pose {
+            position: Some(Vector3::default()),
+            orientation: Some(Quaternion {
+                w: 1.0,
+                ..Quaternion::default()
+            }),
+        }),
+        point_stride: offset,
+        fields: fields_of_points,
+        data: data.into(),
+    })
+}
+
+/// A message as bytes.
+///
+/// # Errors
+/// If it cannot be encoded.
+pub fn encoded<T: Encode>(message: &T) -> Result<Vec<u8>>
+where
+    T::Error: Send + Sync + 'static,
+{
+    let mut bytes = Vec::new();
+    message.encode(&mut bytes)?;
+    Ok(bytes)
+}

@@ -1,0 +1,42 @@
+//! Events in metres and nanoseconds.
+
+use anyhow::{Context, Result};
+use dtof_core::RangeScale;
+
+use super::LaserClock;
+use dtof_events::aer_file::Event;
+use dtof_photons::geometry::Rays;
+
+/// Turns an event into a point in space and time.
+pub struct Projection {
+    /// Where pixels look.
+    pub rays: Rays,
+    /// Bins to millimetres.
+    pub scale: RangeScale,
+    /// Laser cycles to nanoseconds.
+    pub clock: LaserClock,
+}
+
+impl Projection {
+    /// x, y and z in metres, rounded to what files hold.
+    ///
+    /// # Errors
+    /// If the pixel of the event has no ray.
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "rounded to the nearest f32"
+    )]
+    pub fn point(&self, event: &Event) -> Result<[f32; 3]> {
+        let range_mm = self.scale.range(event.position()).to_num();
+        let point = self.rays.point(event.pixel(), event.level(), range_mm);
+        let point = point.with_context(|| format!("pixel {} has no ray", event.pixel().0))?;
+        // No negative zeros.
+        Ok(point.map(|side| side as f32 + 0.0))
+    }
+
+    /// When it was, in nanoseconds.
+    #[must_use]
+    pub fn nanoseconds(&self, event: &Event) -> u128 {
+        self.clock.nanoseconds(event.cycle().0)
+    }
+}

@@ -1,0 +1,114 @@
+//! Maps as images: a number for each pixel, NaN where there is none.
+
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use foxglove::messages::RawImage;
+
+use crate::foxglove::topics::Topic;
+use crate::hub::Pixel;
+use dtof_export::foxglove::{FRAME, Time, encoded};
+use dtof_photons::source::Geometry;
+
+/// Rates are those of so long.
+const RATE: Duration = Duration::from_secs(1);
+
+/// What is known of all pixels.
+#[derive(Default)]
+pub struct Images {
+    array: Option<Geometry>,
+    pixels: Vec<Pixel>,
+    change: Option<u64>,
+    /// The counts at the beginning of the second, and when that was.
+    counts: Option<(Vec<u32>, Instant)>,
+    /// Events a second of each pixel.
+    rates: Vec<f32>,
+    has_new_rates: bool,
+}
+
+impl Images {
+    /// No events of an array yet.
+    pub fn of(array: Geometry) -> Self {
+        Self {
+            array: Some(array),
+            ..Self::default()
+        }
+    }
+
+    /// The last change that is known, or one that there is not.
+    pub fn change(&self) -> u64 {
+        self.change.unwrap_or(u64::MAX)
+    }
+
+    /// Takes pixels in if they have changed. Says whether they have.
+    pub fn take(&mut self, seen: Option<&(Vec<Pixel>, u64)>, is_wanted: bool) -> bool {
+        if !is_wanted {
+            // The rates of a time that was not seen are not those of a second.
+            (self.counts, self.has_new_rates) = (None, false);
+            return false;
+        }
+        if let Some((pixels, change)) = seen {
+            self.pixels.clone_from(pixels);
+            self.change = Some(*change);
+        }
+        self.has_new_rates = false;
+        let counts = || self.pixels.iter().map(|pixel| pixel.count);
+        match &self.counts {
+            // Of another array.
+            Some((before, _)) if before.len() != self.pixels.len() => self.counts = None,
+            Some((before, since)) if since.elapsed() >= RATE => {
+                let elapsed = since.elapsed().as_secs_f32();
+                let events = counts().zip(before);
+                let events = events.map(|(now, before)| now.wrapping_sub(*before) as f32);
+                self.rates = events.map(|events| events / elapsed).collect();
+                self.has_new_rates = true;
+                self.counts = Some((counts().collect(), Instant::now()));
+            }
+            Some(_) => {}
+            None => self.counts = Some((counts().collect(), Instant::now())),
+        }
+        seen.is_some()
+    }
+
+    /// Whether rates were found.
+    pub fn has_new_rates(&self) -> bool {
+        self.has_new_rates
+    }
+
+    /// The image of a topic, if there is an array.
+    ///
+    /// # Errors
+    /// If it cannot be encoded.
+    pub fn message(&self, topic: Topic, time: u64) -> Result<Option<Vec<u8>>> {
+        let Some(array) = self.array else {
+            return Ok(None);
+        };
+        let (width, height) = (array.columns, array.rows);
+        let all = width as usize * height as usize;
+        if all == 0 || self.pixels.is_empty() {
+            return Ok(None);
+        }
+        let value = |(number, pixel): (usize, &Pixel)| match topic {
+            Topic::Rate => self.rates.get(number).copied().unwrap_or(f32::NAN),
+            // No event yet that tells it.
+            _ if pixel.level_echo == 0 => f32::NAN,
+            Topic::Range => pixel.range_mm / 1000.0,
+            // No event is reported of a peak of 0 photons: changes of depth do not measure light.
+            _ if pixel.peak == 0 => f32::NAN,
+            _ => pixel.reflectivity,
+        };
+        let values = self.pixels.iter().enumerate().map(value);
+        let values = values.chain(std::iter::repeat(f32::NAN)).take(all);
+        let data: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
+        let image = RawImage {
+            timestamp: Time::of(time).stamp(),
+            frame_id: FRAME.to_owned(),
+            width,
+            height,
+            encoding: "32FC1".to_owned(),
+            step: 4 * width,
+            data: data.into(),
+        };
+        encoded(&image).map(Some)
+    }
+}

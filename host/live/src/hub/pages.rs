@@ -1,0 +1,149 @@
+//! The pages that are open, and what waits for each.
+
+use std::collections::VecDeque;
+
+use dtof_core::PixelAddress;
+
+use dtof_events::aer_file::Event;
+use dtof_photons::source::Geometry;
+
+/// Pages that are open at a time, at most.
+pub const MOST_PAGES: usize = 16;
+
+/// Events of its pixel in a frame, at most: the newest.
+pub const MOST_EVENTS: usize = 256;
+
+/// What a page was sent.
+#[derive(Debug)]
+pub struct Page {
+    /// Its number.
+    pub number: u64,
+    /// The last change of each pixel that it knows.
+    pub(super) pixels: Vec<u64>,
+    /// Where the search for changes goes on.
+    pub(super) next: usize,
+    pub(super) version: u64,
+    pub(super) shot: u64,
+    pub(super) frames: u64,
+    /// Events that had arrived at its last frame.
+    pub(super) arrived: u64,
+}
+
+/// An event of a pixel that a page looks at.
+#[derive(Clone, Copy, Debug)]
+pub struct Waiting {
+    pub event: Event,
+    pub range_mm: f32,
+}
+
+#[derive(Debug)]
+struct Open {
+    number: u64,
+    pixel: u16,
+    /// The newest, at most [`MOST_EVENTS`].
+    events: VecDeque<Waiting>,
+    /// All of them.
+    arrived: u64,
+}
+
+/// All pages.
+#[derive(Debug, Default)]
+pub struct Pages {
+    open: Vec<Open>,
+    opened: u64,
+}
+
+impl Pages {
+    pub fn join(&mut self, pixel: u16) -> Option<Page> {
+        if self.open.len() >= MOST_PAGES {
+            return None;
+        }
+        self.opened += 1;
+        self.open.push(Open {
+            number: self.opened,
+            pixel,
+            events: VecDeque::new(),
+            arrived: 0,
+        });
+        Some(Page {
+            number: self.opened,
+            pixels: Vec::new(),
+            next: 0,
+            version: 0,
+            shot: 0,
+            frames: 0,
+            arrived: 0,
+        })
+    }
+
+    pub fn watch(&mut self, number: u64, pixel: u16) -> bool {
+        let page = self.open.iter_mut().find(|page| page.number == number);
+        page.is_some_and(|page| {
+            if page.pixel != pixel {
+                page.pixel = pixel;
+                page.events.clear();
+                page.arrived = 0;
+            }
+            true
+        })
+    }
+
+    /// Laser cycles begin at 0 again: what waits is not to be drawn among what comes.
+    pub fn restart(&mut self) {
+        for page in &mut self.open {
+            page.events.clear();
+            page.arrived = 0;
+        }
+    }
+
+    pub fn leave(&mut self, page: &Page) {
+        self.open.retain(|open| open.number != page.number);
+    }
+
+    /// The pixels that pages look at, each once.
+    pub fn watched(&self) -> Vec<u16> {
+        let mut pixels: Vec<u16> = self.open.iter().map(|page| page.pixel).collect();
+        pixels.sort_unstable();
+        pixels.dedup();
+        pixels
+    }
+
+    pub fn len(&self) -> usize {
+        self.open.len()
+    }
+
+    /// Events that wait.
+    pub fn kept(&self) -> usize {
+        self.open.iter().map(|page| page.events.len()).sum()
+    }
+
+    /// Takes an event in for the pages that look at its pixel, or at one of its block.
+    pub fn add(&mut self, event: &Event, range_mm: f32, array: Geometry) {
+        for page in &mut self.open {
+            let pixel = PixelAddress(page.pixel);
+            let is_of = event.pixel() == pixel
+                || event.level().raw() > 0
+                    && array
+                        .block(event.pixel(), event.level())
+                        .any(|other| other == pixel);
+            if !is_of {
+                continue;
+            }
+            page.arrived += 1;
+            if page.events.len() == MOST_EVENTS {
+                page.events.pop_front();
+            }
+            let event = *event;
+            page.events.push_back(Waiting { event, range_mm });
+        }
+    }
+
+    /// The pixel of a page, its events since the last time, and how many there were.
+    pub fn take(&mut self, page: &Page) -> (u16, Vec<Waiting>, u64) {
+        let open = self.open.iter_mut().find(|open| open.number == page.number);
+        open.map_or((0, Vec::new(), 0), |open| {
+            let events = open.events.drain(..).collect();
+            (open.pixel, events, std::mem::take(&mut open.arrived))
+        })
+    }
+}

@@ -1,0 +1,219 @@
+//! How the bins of a recording become those of a run, a power of two from 8 to 1024.
+//!
+//! First neighbours are added up, then empty bins are added at the end, or bins at the end are
+//! cut off. Nothing is cut off unless fewer bins are asked for.
+
+use std::iter::repeat_n;
+
+use anyhow::{Result, ensure};
+
+use dtof_options::Refused;
+use dtof_options::rows::{Row, grouped};
+
+/// Most bins of a recording.
+pub const MOST_BINS: usize = 4096;
+/// Most bins of a run.
+const MOST_OF_A_RUN: usize = 1024;
+/// Fewest bins that may hold a peak.
+const FEWEST: usize = 8;
+
+/// From the bins of a recording to those of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fit {
+    /// Bins of the recording.
+    recorded: usize,
+    /// The first of them that were measured in full.
+    measured: usize,
+    /// Neighbours that are added up.
+    rebin: usize,
+    /// Bins of the run.
+    run: usize,
+}
+
+impl Fit {
+    /// Sums `rebin` neighbours of `recorded` bins each, the first `measured` of which were
+    /// measured in full. The run then has `wanted` bins, or the next power of two.
+    ///
+    /// # Errors
+    /// If no run can have so many bins.
+    pub fn new(
+        recorded: usize,
+        measured: usize,
+        rebin: usize,
+        wanted: Option<u16>,
+    ) -> Result<Self> {
+        ensure!(
+            (FEWEST..=MOST_BINS).contains(&recorded),
+            Refused::input(format!(
+                "{recorded} bins: must be from {FEWEST} to {MOST_BINS} (`axes` says which axis they \
+                 are)"
+            ))
+        );
+        let summed = recorded.div_ceil(rebin.max(1));
+        let run = wanted.map_or(summed.next_power_of_two(), usize::from);
+        ensure!(
+            run <= MOST_OF_A_RUN,
+            Refused::input(format!(
+                "{summed} bins are more than {MOST_OF_A_RUN}: add up neighbours with `rebin` {}, or \
+                 cut off the last with `bins` {MOST_OF_A_RUN}",
+                recorded.div_ceil(MOST_OF_A_RUN)
+            ))
+        );
+        let fit = Self {
+            recorded,
+            measured: measured.min(recorded),
+            rebin: rebin.max(1),
+            run,
+        };
+        ensure!(
+            fit.whole() >= FEWEST,
+            Refused::value(
+                "rebin",
+                rebin,
+                format!(
+                    "makes {} whole bins of {measured}: must be at least {FEWEST}",
+                    fit.whole()
+                )
+            )
+        );
+        Ok(fit)
+    }
+
+    /// Bins of the run.
+    #[must_use]
+    pub fn bins(&self) -> usize {
+        self.run
+    }
+
+    /// Sums that are made of as many bins as the others, of those that the run has.
+    fn whole(&self) -> usize {
+        (self.measured / self.rebin).min(self.run)
+    }
+
+    /// The bins of the run that were recorded as the others, if not all were: from 0 on.
+    #[must_use]
+    pub fn gate(&self) -> Option<(u16, u16)> {
+        let last = u16::try_from(self.whole() - 1).unwrap_or(u16::MAX);
+        (self.whole() < self.run).then_some((0, last))
+    }
+
+    /// The histogram of a run, and the photons that were cut off.
+    #[must_use]
+    pub fn apply(&self, recorded: Vec<u64>) -> (Vec<u64>, u64) {
+        if self.rebin == 1 && self.run == recorded.len() {
+            return (recorded, 0);
+        }
+        let sums = recorded.chunks(self.rebin).map(sum);
+        let sums: Vec<u64> = sums.chain(repeat_n(0, self.run)).collect();
+        let (kept, cut_off) = sums.split_at(self.run);
+        (kept.to_vec(), sum(cut_off))
+    }
+
+    /// What is done, for people; `cut_off` photons were.
+    #[must_use]
+    pub fn rows(&self, cut_off: u64) -> Vec<Row> {
+        let row = |name: &str, value: String| (name.to_owned(), value);
+        let mut rows = Vec::new();
+        if self.rebin == 1 && self.run == self.recorded {
+            return rows;
+        }
+        rows.push(row("bins of the recording", self.recorded.to_string()));
+        let summed = self.recorded.div_ceil(self.rebin);
+        if self.rebin > 1 {
+            let rest = self.recorded % self.rebin;
+            let last = match rest {
+                0 => String::new(),
+                rest => format!(", the last of {rest}"),
+            };
+            let text = format!("{summed} sums of {}{last}", self.rebin);
+            rows.push(row("neighbours added up", text));
+        }
+        if summed < self.run {
+            rows.push(row("empty bins added", (self.run - summed).to_string()));
+        }
+        if summed > self.run {
+            let text = format!(
+                "the last {}, with {} photons",
+                summed - self.run,
+                grouped(cut_off)
+            );
+            rows.push(row("bins cut off", text));
+        }
+        rows
+    }
+}
+
+/// Sticks at the most: no pixel may hold so many.
+fn sum(counts: &[u64]) -> u64 {
+    counts
+        .iter()
+        .fold(0, |sum: u64, &count| sum.saturating_add(count))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn bins_are_padded_summed_and_cut() {
+        let counts: Vec<u64> = (1..=100).collect();
+        let fit = |rebin, wanted| Fit::new(100, 100, rebin, wanted).unwrap();
+        let padded = fit(1, None);
+        assert_eq!((padded.bins(), padded.gate()), (128, Some((0, 99))));
+        let (bins, cut_off) = padded.apply(counts.clone());
+        assert_eq!((&bins[..100], cut_off), (&counts[..], 0));
+        assert_eq!(bins[100..], [0; 28]);
+        // 14 sums of 7, one of 2, one empty bin.
+        let summed = fit(7, None);
+        assert_eq!((summed.bins(), summed.gate()), (16, Some((0, 13))));
+        let (bins, _) = summed.apply(counts.clone());
+        assert_eq!((bins[0], bins[13], bins[14], bins[15]), (28, 665, 199, 0));
+        let cut = fit(1, Some(64));
+        assert_eq!((cut.bins(), cut.gate()), (64, None));
+        assert_eq!(cut.apply(counts).1, (65..=100).sum::<u64>());
+    }
+
+    #[test]
+    fn what_fits_no_run_is_refused() {
+        for (recorded, rebin, wanted) in [
+            (7, 1, None),
+            (4097, 1, None),
+            (1025, 1, None),
+            (64, 9, None),
+            (4096, 3, None),
+        ] {
+            assert!(
+                Fit::new(recorded, recorded, rebin, wanted).is_err(),
+                "{recorded}"
+            );
+        }
+        assert!(Fit::new(4096, 4096, 4, None).is_ok() && Fit::new(4096, 4096, 1, Some(8)).is_ok());
+    }
+
+    proptest! {
+        #[test]
+        fn no_photon_is_lost(
+            counts in prop::collection::vec(0u64..1000, 8..300),
+            rebin in 1usize..5,
+            log2 in 3u32..11,
+            asked in any::<bool>(),
+            unmeasured in 0usize..9,
+        ) {
+            let wanted = asked.then_some(1u16 << log2);
+            let measured = counts.len() - unmeasured.min(counts.len());
+            let Ok(fit) = Fit::new(counts.len(), measured, rebin, wanted) else { return Ok(()) };
+            let (bins, cut_off) = fit.apply(counts.clone());
+            prop_assert_eq!(bins.len(), fit.bins());
+            prop_assert_eq!(bins.iter().sum::<u64>() + cut_off, counts.iter().sum::<u64>());
+            for (bin, count) in bins.iter().enumerate() {
+                let of = counts.iter().skip(bin * rebin).take(rebin);
+                prop_assert_eq!(*count, of.sum::<u64>());
+            }
+            // The gate keeps bins that are sums of as many as the others.
+            let last = fit.gate().map_or(bins.len() - 1, |gate| gate.1.into());
+            prop_assert!((last + 1) * rebin <= measured);
+            prop_assert!(wanted.is_some() || cut_off == 0);
+        }
+    }
+}

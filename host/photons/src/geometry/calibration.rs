@@ -1,0 +1,86 @@
+//! Calibration files: a direction and a range bias for each pixel.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow, ensure};
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{Ray, unit};
+use crate::range::within;
+use crate::source::Geometry;
+
+/// No file of 65,536 pixels is longer.
+const MOST_BYTES: u64 = 1 << 24;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CalibrationFile {
+    columns: Spanned<u32>,
+    rows: u32,
+    /// x, y, z and range bias, row by row.
+    pixels: Vec<Spanned<[f64; 4]>>,
+}
+
+pub fn read(path: &Path, array: Geometry) -> Result<Vec<Ray>> {
+    let name = || path.display().to_string();
+    let mut text = String::new();
+    let file = File::open(path).with_context(name)?;
+    // Some files have no end.
+    let read = file.take(MOST_BYTES + 1).read_to_string(&mut text);
+    ensure!(
+        read.with_context(name)? as u64 <= MOST_BYTES,
+        "{}: more than {MOST_BYTES} bytes: no calibration file is so long",
+        name()
+    );
+    parse(&text, array).with_context(name)
+}
+
+pub(super) fn parse(text: &str, array: Geometry) -> Result<Vec<Ray>> {
+    let line = |at: usize| {
+        let before = text.get(..at).unwrap_or(text);
+        before.matches('\n').count() + 1
+    };
+    let file: CalibrationFile = toml::from_str(text).map_err(|error| {
+        let at = error.span().map_or(0, |span| span.start);
+        anyhow!("line {}: {}", line(at), error.message())
+    })?;
+    let said = (*file.columns.get_ref(), file.rows);
+    ensure!(
+        said == (array.columns, array.rows),
+        "line {}: is of {}x{} pixels, the events are of {}x{}",
+        line(file.columns.span().start),
+        said.0,
+        said.1,
+        array.columns,
+        array.rows
+    );
+    let wanted = array.addresses();
+    // What is too much, or the last of what is there.
+    let last = file.pixels.get(wanted).or(file.pixels.last());
+    ensure!(
+        file.pixels.len() == wanted,
+        "line {}: {} pixels, should be {wanted}",
+        line(last.map_or(0, |pixel| pixel.span().start)),
+        file.pixels.len()
+    );
+    let rays = file.pixels.iter().map(|pixel| {
+        ray(*pixel.get_ref()).with_context(|| format!("line {}", line(pixel.span().start)))
+    });
+    rays.collect()
+}
+
+fn ray([x, y, z, bias_mm]: [f64; 4]) -> Result<Ray> {
+    for side in [x, y, z] {
+        within("direction", side, -1e6..=1e6)?;
+    }
+    let longest = x.abs().max(y.abs()).max(z.abs());
+    ensure!(longest >= 1e-6, "the direction has no length");
+    within("range bias", bias_mm, -1e6..=1e6)?;
+    Ok(Ray {
+        direction: unit([x, y, z]),
+        bias_mm,
+    })
+}

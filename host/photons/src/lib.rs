@@ -1,0 +1,18 @@
+//! Where photons come from.
+
+pub mod axes;
+pub mod bins;
+pub mod capture_log;
+pub mod geometry;
+pub mod masked;
+pub mod medium;
+pub mod npy;
+pub mod open;
+pub mod photon_csv;
+pub mod photon_list;
+pub mod range;
+pub mod recorded;
+pub mod source;
+pub mod tmf8820;
+pub mod tmf8829;
+pub mod warnings;

@@ -1,0 +1,96 @@
+//! Pixels that are left out: hot ones, which would report noise and drown their block, and dead
+//! ones.
+
+use anyhow::{Result, bail};
+use dtof_core::PixelAddress;
+
+use super::source::{Geometry, PhotonSource, Slice};
+
+use dtof_options::Refused;
+
+/// A source whose masked pixels have no photons. What they had is counted.
+pub struct Masked {
+    source: Box<dyn PhotonSource>,
+    /// Where the masked pixels are in a slice.
+    places: Vec<usize>,
+    photons: u64,
+    laser_hz: Option<u64>,
+}
+
+/// Whether each of `masked` is one of so many `pixels`.
+///
+/// # Errors
+/// Names the first that is not.
+pub fn check(masked: &[u16], pixels: usize) -> Result<()> {
+    let past = masked.iter().find(|&&masked| usize::from(masked) >= pixels);
+    past.map_or(Ok(()), |past| {
+        bail!(Refused::value(
+            "masked",
+            past,
+            format!("there are {pixels} pixels")
+        ))
+    })
+}
+
+impl Masked {
+    /// `source` without the photons of `pixels`.
+    ///
+    /// # Errors
+    /// If one of `pixels` is not in the array.
+    pub fn new(source: Box<dyn PhotonSource>, pixels: &[u16]) -> Result<Self> {
+        check(pixels, source.geometry().addresses())?;
+        let addresses = source.addresses();
+        let place = |&pixel| addresses.binary_search(&PixelAddress(pixel)).ok();
+        Ok(Self {
+            laser_hz: source.laser_hz(),
+            places: pixels.iter().filter_map(place).collect(),
+            source,
+            photons: 0,
+        })
+    }
+
+    /// The same with a laser of `hz` cycles a second, if that is said.
+    #[must_use]
+    pub fn with_laser_hz(self, hz: Option<u64>) -> Self {
+        Self {
+            laser_hz: hz.or(self.laser_hz),
+            ..self
+        }
+    }
+}
+
+impl PhotonSource for Masked {
+    fn inner(&self) -> Option<&dyn PhotonSource> {
+        Some(&*self.source)
+    }
+
+    fn geometry(&self) -> Geometry {
+        self.source.geometry()
+    }
+
+    fn cycles(&self) -> u64 {
+        self.source.cycles()
+    }
+
+    fn masked(&self) -> u64 {
+        self.photons
+    }
+
+    fn laser_hz(&self) -> Option<u64> {
+        self.laser_hz
+    }
+
+    fn spare(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+        self.source.spare(is_wanted);
+    }
+
+    fn next_slice(&mut self, cycles: u16) -> Result<Slice> {
+        let mut slice = self.source.next_slice(cycles)?;
+        for &place in &self.places {
+            let photons = &mut slice.pixels[place].photons;
+            self.photons += photons.len() as u64;
+            photons.clear();
+        }
+        Ok(slice)
+    }
+}

@@ -1,0 +1,63 @@
+//! `.npz` files: arrays by name in a zip archive.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail, ensure};
+use npyz::npz::array_name_from_file_name;
+use zip::ZipArchive;
+
+use super::header::Array;
+use super::histograms::{Histograms, of_array};
+use crate::axes::Axes;
+use dtof_options::{Refused, plain};
+
+/// Reads the histograms of the array `name`; a single array needs no name.
+///
+/// # Errors
+/// What is wrong with the file, its name first.
+pub fn read(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histograms> {
+    named(path, name, axes).with_context(|| path.display().to_string())
+}
+
+fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histograms> {
+    let file = BufReader::new(File::open(path)?);
+    let mut zip = ZipArchive::new(file).context("not an .npz file as numpy.savez writes it")?;
+    let mut arrays = Vec::new();
+    for name in zip.file_names() {
+        let name = name.context("a file without a name")?;
+        arrays.extend(array_name_from_file_name(&name).map(str::to_owned));
+    }
+    arrays.sort();
+    // A name may be any text, an error is one line.
+    let list: Vec<String> = arrays.iter().map(|name| one_line(name)).collect();
+    let list = list.join(", ");
+    let chosen = match (name, &arrays[..]) {
+        (Some(name), arrays) => arrays.iter().find(|array| *array == name),
+        (None, [single]) => Some(single),
+        (None, []) => None,
+        (None, several) => {
+            let several = several.len();
+            bail!(Refused::input(format!(
+                "{several} arrays: choose one with `array`: {}",
+                plain(list)
+            )));
+        }
+    };
+    ensure!(!arrays.is_empty(), "no arrays");
+    let chosen = chosen.with_context(|| {
+        let name = name.unwrap_or_default();
+        format!("no array {name:?}; there is {list}")
+    })?;
+    let entry = zip.by_name(&format!("{chosen}.npy"));
+    let entry = entry.with_context(|| format!("array {}", one_line(chosen)))?;
+    let length = entry.size();
+    let array = Array::read(BufReader::new(entry), length);
+    let histograms = array.and_then(|array| of_array(array, axes));
+    histograms.with_context(|| format!("array {}", one_line(chosen)))
+}
+
+fn one_line(name: &str) -> String {
+    name.escape_debug().to_string()
+}

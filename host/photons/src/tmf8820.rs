@@ -1,0 +1,84 @@
+//! Recorded histograms from the public TMF8820 capture log, as it is: a JSON
+//! list of captures of the 3×3-zone sensor, each with nine histograms of 128
+//! bins. Pixel address = capture × 9 + zone; zone 4 is the centre.
+
+use std::io::Read;
+
+use anyhow::{Result, anyhow, ensure};
+use dtof_core::fixed::types::{I24F8, U16F16};
+use serde::Deserialize;
+
+use crate::recorded::Capture;
+use crate::source::Geometry;
+
+/// Zones of the sensor.
+pub const ZONES: u32 = 9;
+/// The one that looks straight ahead.
+pub const CENTRE: u32 = 4;
+/// The names of the columns and rows of a log.
+pub const SIDES: [&str; 2] = ["zone", "capture"];
+/// Bins of its histograms.
+pub const BINS: usize = 128;
+/// Its bin width: a fit of pulse positions to distances from 30 to 400 mm gives
+/// 13.80 mm a bin; the log's authors state 91 ps.
+pub const BIN_WIDTH_PS: U16F16 = U16F16::lit("92.1");
+/// Brings the centre zone of the public log to its ground truth from 30 to 400 mm.
+pub const OFFSET_MM: I24F8 = I24F8::lit("-179.5");
+
+/// The log: rows are captures, columns zones.
+#[derive(Clone, Debug)]
+pub struct Tmf8820Log {
+    /// Nine columns.
+    pub geometry: Geometry,
+    /// Nine histograms each.
+    pub captures: Vec<Capture>,
+    /// The true distance in millimetres of each zone that has one, if the log has it: of the
+    /// centre zones.
+    pub truth_mm: Option<Vec<Option<f64>>>,
+}
+
+/// The part of a capture that is read. The sensor's own results stand beside it in the log.
+#[derive(Deserialize)]
+struct LogEntry {
+    hists: Vec<Vec<u64>>,
+    /// Of the centre zone, in metres.
+    dist_to_plane: Option<f64>,
+}
+
+/// Reads the log from the text of the file `name`.
+///
+/// # Errors
+/// What is wrong with the file; its name, and the line where there is one,
+/// first.
+pub fn read(name: &str, text: impl Read) -> Result<Tmf8820Log> {
+    let entries: Vec<LogEntry> = serde_json::from_reader(text).map_err(|error| {
+        let line = error.line();
+        anyhow!("{name}:{line}: not a TMF8820 capture log: {error}")
+    })?;
+    ensure!(!entries.is_empty(), "{name}: no captures");
+    for (index, entry) in entries.iter().enumerate() {
+        let zones = entry.hists.len();
+        ensure!(
+            zones == ZONES as usize,
+            "{name}: capture {index} has {zones} zones, not 9"
+        );
+        for (zone, histogram) in entry.hists.iter().enumerate() {
+            let bins = histogram.len();
+            ensure!(
+                bins == BINS,
+                "{name}: capture {index}, zone {zone} has {bins} bins, not 128"
+            );
+        }
+    }
+    let rows = u32::try_from(entries.len())?;
+    let truth = entries
+        .iter()
+        .flat_map(|entry| (0..ZONES).map(|zone| entry.dist_to_plane.filter(|_| zone == CENTRE)));
+    let truth: Vec<Option<f64>> = truth.map(|metres| Some(metres? * 1000.0)).collect();
+    let truth_mm = truth.iter().any(Option::is_some).then_some(truth);
+    Ok(Tmf8820Log {
+        geometry: Geometry::new(ZONES, rows),
+        captures: entries.into_iter().map(|entry| entry.hists).collect(),
+        truth_mm,
+    })
+}

@@ -1,0 +1,142 @@
+//! Recorded histograms from a log of the TMF8829, as the vendor's viewer writes it: a JSON
+//! object with a frame in each `Result_Set`, and in each frame a histogram a pixel,
+//! `mp_histo[row][column].bin`. Pixel address = (frame × rows + row) × columns + column.
+//!
+//! The sensor's own results stand beside the histograms, and are not read.
+
+use std::io::Read;
+
+use anyhow::{Context, Result, anyhow, ensure};
+use dtof_core::fixed::types::{I24F8, U16F16};
+use serde::Deserialize;
+
+use crate::recorded::Capture;
+use crate::source::Geometry;
+use dtof_options::rows::Row;
+
+/// Bins of its histograms.
+pub const BINS: usize = 64;
+/// The width of the sensor's own bins: a fit of the pulses to its distances from 0.26 to
+/// 2.85 m, in a log with four of them a bin, gives 122.2 mm a bin of the log.
+const OWN_BIN_WIDTH_PS: U16F16 = U16F16::lit("203.8");
+/// Brings pulses to the sensor's distances: from the same fit.
+pub const OFFSET_MM: I24F8 = I24F8::lit("-441.1");
+/// What a sensor does unless the log says otherwise: four of its bins make one.
+const BIN_SHIFT: u32 = 2;
+
+/// The log: the rows of each frame below those of the one before.
+#[derive(Clone, Debug)]
+pub struct Tmf8829Log {
+    /// Of all frames.
+    pub geometry: Geometry,
+    /// The frames.
+    pub captures: Vec<Capture>,
+    /// Picoseconds a bin.
+    pub bin_width_ps: U16F16,
+    /// The first bins that were measured in full: all, if the log does not say.
+    pub measured_bins: usize,
+    /// What was left out.
+    pub rows: Vec<Row>,
+}
+
+/// The part of a log that is read.
+#[derive(Deserialize)]
+struct Log {
+    #[serde(rename = "Result_Set")]
+    frames: Vec<Frame>,
+    configuration: Option<Configuration>,
+}
+
+#[derive(Deserialize)]
+struct Frame {
+    mp_histo: Option<Vec<Vec<Pixel>>>,
+}
+
+#[derive(Deserialize, PartialEq)]
+struct Pixel {
+    bin: Vec<u64>,
+}
+
+#[derive(Deserialize)]
+struct Configuration {
+    /// Of the sensor's own bins, two to this power make one of the log.
+    bin_shift: Option<u32>,
+    /// How many of its own bins the sensor measured.
+    histogram_bins: Option<u32>,
+}
+
+/// Reads the log from the text of the file `name`.
+///
+/// # Errors
+/// What is wrong with the file; its name, and the line where there is one, first.
+pub fn read(name: &str, text: impl Read) -> Result<Tmf8829Log> {
+    let log: Log = serde_json::from_reader(text).map_err(|error| {
+        let line = error.line();
+        anyhow!("{name}:{line}: not a TMF8829 log: {error}")
+    })?;
+    of_log(log).with_context(|| name.to_owned())
+}
+
+fn of_log(log: Log) -> Result<Tmf8829Log> {
+    ensure!(!log.frames.is_empty(), "no frames");
+    let mut frames = Vec::new();
+    for (number, frame) in log.frames.into_iter().enumerate() {
+        let histograms = frame.mp_histo.filter(|rows| !rows.is_empty());
+        frames.push(
+            histograms
+                .with_context(|| format!("frame {number} has no mp_histo: histograms were off"))?,
+        );
+    }
+    let (rows, columns) = (frames[0].len(), frames[0][0].len());
+    for (number, frame) in frames.iter().enumerate() {
+        let is_alike = frame.len() == rows && frame.iter().all(|row| row.len() == columns);
+        ensure!(
+            is_alike && columns > 0,
+            "frame {number} is not of {rows} rows and {columns} columns as frame 0"
+        );
+        for (row, pixels) in frame.iter().enumerate() {
+            for (column, pixel) in pixels.iter().enumerate() {
+                let bins = pixel.bin.len();
+                ensure!(
+                    bins == BINS,
+                    "frame {number}, row {row}, column {column} has {bins} bins, not {BINS}"
+                );
+            }
+        }
+    }
+    // Some viewers write one column as many times as the sensor has columns.
+    let mut all = frames.iter().flatten();
+    let is_copied = columns > 1 && all.all(|row| row.iter().all(|pixel| *pixel == row[0]));
+    let kept = if is_copied { 1 } else { columns };
+    let captures: Vec<Capture> = frames
+        .into_iter()
+        .map(|frame| {
+            let pixels = frame.into_iter().flat_map(|row| row.into_iter().take(kept));
+            pixels.map(|pixel| pixel.bin).collect()
+        })
+        .collect();
+    let configuration = log.configuration.as_ref();
+    let shift = configuration
+        .and_then(|of| of.bin_shift)
+        .unwrap_or(BIN_SHIFT);
+    let width = 1u16
+        .checked_shl(shift)
+        .and_then(|own| OWN_BIN_WIDTH_PS.checked_mul_int(own.into()));
+    let measured = configuration.and_then(|of| of.histogram_bins);
+    let measured = measured.and_then(|bins| usize::try_from(bins.checked_shr(shift)?).ok());
+    let measured = measured.filter(|bins| (1..BINS).contains(bins));
+    let copies = format!(
+        "{} of {columns}, each the same as the first",
+        columns - kept
+    );
+    Ok(Tmf8829Log {
+        geometry: Geometry::new(u32::try_from(kept)?, u32::try_from(rows * captures.len())?),
+        captures,
+        bin_width_ps: width.with_context(|| format!("bin_shift {shift}: bins are too wide"))?,
+        measured_bins: measured.unwrap_or(BINS),
+        rows: is_copied
+            .then(|| ("columns left out".to_owned(), copies))
+            .into_iter()
+            .collect(),
+    })
+}

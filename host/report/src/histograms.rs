@@ -1,0 +1,129 @@
+//! The histograms of the report: of each pixel the one that its last event was decided from.
+
+use std::collections::BTreeSet;
+
+use serde_json::json;
+
+use super::packed::Packed;
+use dtof_engine::decisions::{Decision, Kept};
+use dtof_engine::look::{Look, look_back};
+use dtof_engine::settings::Settings;
+use dtof_events::events_csv::range_mm;
+use dtof_photons::source::Geometry;
+
+/// The last decisions of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Decisions<'a> {
+    /// How they were made.
+    pub settings: &'a Settings,
+    /// Which of them are there.
+    pub kept: Kept,
+    /// In order of level and pixel.
+    pub all: &'a [Decision],
+    /// The array.
+    pub array: Geometry,
+}
+
+impl Decisions<'_> {
+    /// What the script is given, in at most so many bytes of base64: if there is no room for all,
+    /// the pixels of every second column and row, and so on.
+    pub(super) fn data(&self, room: usize) -> (serde_json::Value, usize) {
+        let all = self.last();
+        let looks = look_back(self.settings, &all);
+        let mut kept = self.kept;
+        let (packed, count) = loop {
+            let pairs = all.iter().zip(&looks);
+            let pairs = pairs.filter(|(decision, _)| kept.holds(decision.event.pixel));
+            let (mut packed, mut count) = (Packed::default(), 0);
+            for (decision, look) in pairs {
+                self.push(&mut packed, decision, look);
+                count += 1;
+            }
+            if packed.len() <= room || count == 0 {
+                break (packed, count);
+            }
+            kept.every = kept.every.saturating_mul(2);
+            if kept.every > u32::from(u16::MAX) {
+                break (Packed::default(), 0);
+            }
+        };
+        let bins = self.settings.bins;
+        let last = bins.saturating_sub(1);
+        let gate = self.settings.gate;
+        let data = json!({
+            "bins": bins,
+            "gate": gate.map_or([0, last], |(first, last)| [first.into(), last.into()]),
+            "quadrants": looks.first().map(|look| look.quadrants),
+            "every": kept.every,
+            "count": count,
+            "packed": packed.base64(),
+        });
+        (data, packed.len())
+    }
+
+    /// Those that are the last of some pixel: of the decisions of a pixel and of its blocks the
+    /// latest, of several the smallest block's.
+    fn last(&self) -> Vec<Decision> {
+        let mut last: Vec<Option<usize>> = vec![None; self.array.addresses()];
+        for (number, decision) in self.all.iter().enumerate() {
+            for pixel in self.array.block(decision.event.pixel, decision.event.level) {
+                if let Some(last) = last.get_mut(usize::from(pixel.0)) {
+                    let before = last.map(|before| self.all[before].event.cycle);
+                    if before.is_none_or(|before| before < decision.event.cycle) {
+                        *last = Some(number);
+                    }
+                }
+            }
+        }
+        let shown: BTreeSet<usize> = last.into_iter().flatten().collect();
+        shown
+            .into_iter()
+            .map(|number| self.all[number].clone())
+            .collect()
+    }
+
+    /// Event, look, bins that are left out, and counts.
+    fn push(&self, packed: &mut Packed, decision: &Decision, look: &Look) {
+        let Decision { event, counts, .. } = decision;
+        packed.push(event.pixel.0);
+        packed.push(super::events::kind(event.level, event.echo, event.flags));
+        packed.push(event.cycle.0);
+        packed.push(event.exposure);
+        let scale = self.settings.range_scale().ok();
+        packed.push_range(scale.map_or(0.0, |scale| range_mm(event, &scale)));
+        packed.push(event.peak_bin.raw());
+        // One more than the number, or 0 for none.
+        packed.push(look.needed.map_or(0, |needed| u64::from(needed) + 1));
+        let background = look.background.unwrap_or_default();
+        packed.push_range(background);
+        let [first, width] = look
+            .window
+            .map_or([0; 2], |(first, last)| [first, last + 1 - first]);
+        packed.push(width);
+        if width > 0 {
+            packed.push(first);
+        }
+        let left_out = self.left_out(decision);
+        packed.push(left_out.len() as u64);
+        for [first, last] in left_out {
+            packed.push(first);
+            packed.push(last);
+        }
+        for &count in counts {
+            packed.push(count);
+        }
+    }
+
+    /// First and last bin of each range around earlier echoes.
+    fn left_out(&self, decision: &Decision) -> Vec<[u16; 2]> {
+        let mut ranges: Vec<[u16; 2]> = Vec::new();
+        let bins = u16::try_from(self.settings.bins).unwrap_or(0);
+        for bin in (0..bins).filter(|&bin| decision.peeled.contains(bin)) {
+            match ranges.last_mut() {
+                Some([_, last]) if *last + 1 == bin => *last = bin,
+                _ => ranges.push([bin, bin]),
+            }
+        }
+        ranges
+    }
+}

@@ -1,0 +1,148 @@
+use super::*;
+use dtof_core::{BinIndex, PeeledBins};
+use dtof_engine::decisions::{Decision, Kept};
+use dtof_engine::host::host_engine;
+use dtof_engine::look::look_back;
+use dtof_photons::source::PhotonSource;
+use dtof_simulate::{demo, scene};
+
+/// What a run of the demo on a small array is told of its last decisions, in so many bytes.
+fn decided(array: Geometry, room: usize) -> (Vec<Decision>, serde_json::Value, usize) {
+    let settings = demo::settings(1).unwrap();
+    let mut photons = demo::photons(array, 1, 2000).unwrap();
+    let mut engine = host_engine(&settings, array, &photons.addresses()).unwrap();
+    engine.keep_decisions(&|_| true);
+    engine.run(&photons.next_slice(2000).unwrap()).unwrap();
+    let all = engine.decisions();
+    let decisions = Decisions {
+        settings: &settings,
+        kept: Kept::of(array, 128),
+        all: &all,
+        array,
+    };
+    let (data, bytes) = decisions.data(room);
+    (all, data, bytes)
+}
+
+/// Each pixel has the histogram of its last event or its block's, to the photon, and nothing
+/// else is there.
+#[test]
+fn the_script_is_given_what_the_last_event_of_each_pixel_was_decided_from() {
+    let array = Geometry::new(16, 8);
+    let (all, data, bytes) = decided(array, usize::MAX);
+    let settings = demo::settings(1).unwrap();
+    let looks = look_back(&settings, &all);
+    assert_eq!(data["every"], 1);
+    assert_eq!(data["gate"], serde_json::json!([0, 127]));
+    let text = data["packed"].as_str().unwrap();
+    assert_eq!(text.len(), bytes);
+    let mut reader = Reader::new(text);
+    let mut covered = vec![None; array.addresses()];
+    for _ in 0..data["count"].as_u64().unwrap() {
+        let [pixel, kind, cycle, exposure] = [(); 4].map(|()| reader.number());
+        let of = |decision: &Decision| {
+            let event = decision.event;
+            let place = (u64::from(event.pixel.0), u64::from(event.level.raw()));
+            place == (pixel, kind >> 2 & 3)
+        };
+        let at = all.iter().position(of).unwrap();
+        let (
+            Decision {
+                event,
+                counts,
+                peeled,
+                ..
+            },
+            look,
+        ) = (&all[at], &looks[at]);
+        assert_eq!(
+            (event.cycle.0, u64::from(event.exposure)),
+            (cycle, exposure)
+        );
+        assert_eq!(
+            reader.range(),
+            range_mm(event, &settings.range_scale().unwrap())
+        );
+        assert_eq!(reader.number(), u64::from(event.peak_bin.raw()));
+        assert_eq!(reader.number(), u64::from(look.needed.unwrap()) + 1);
+        assert!((reader.range() - look.background.unwrap()).abs() < 1e-9);
+        let width = reader.number();
+        let first = reader.number();
+        assert_eq!(
+            look.window
+                .map(|(first, last)| (u64::from(first), u64::from(last))),
+            Some((first, first + width - 1))
+        );
+        let mut left_out = [false; 128];
+        for _ in 0..reader.number() {
+            let [first, last] = [(); 2].map(|()| usize::try_from(reader.number()).unwrap());
+            left_out[first..=last].fill(true);
+        }
+        assert!((0..128u16).all(|bin| left_out[usize::from(bin)] == peeled.contains(bin)));
+        for &count in counts {
+            assert_eq!(reader.number(), u64::from(count));
+        }
+        for pixel in array.block(event.pixel, event.level) {
+            let place = &mut covered[usize::from(pixel.0)];
+            *place = (*place).max(Some(cycle));
+        }
+    }
+    assert!(reader.is_at_end());
+    // The latest of each pixel is there.
+    for (pixel, covered) in (0u16..).zip(covered) {
+        let of = |decision: &&Decision| {
+            let Decision { event, .. } = decision;
+            array
+                .block(event.pixel, event.level)
+                .any(|one| one.0 == pixel)
+        };
+        let latest = all
+            .iter()
+            .filter(of)
+            .map(|decision| decision.event.cycle.0)
+            .max();
+        assert_eq!(covered, latest, "{pixel}");
+    }
+}
+
+#[test]
+fn histograms_are_thinned_until_there_is_room() {
+    let array = Geometry::new(16, 8);
+    let (_, whole, bytes) = decided(array, usize::MAX);
+    let (_, part, fewer) = decided(array, bytes / 3);
+    assert!(fewer <= bytes / 3 && fewer > 0);
+    assert!(whole["count"].as_u64() > part["count"].as_u64());
+    assert!(part["every"] == 2 || part["every"] == 4, "{part}");
+    let (_, none, bytes) = decided(array, 0);
+    assert_eq!((&none["count"], bytes), (&0.into(), 0));
+}
+
+#[test]
+fn a_large_array_of_bright_pixels_stays_below_the_documented_size() {
+    let array = Geometry::new(64, 64);
+    let settings = scene::settings(0);
+    let counts: Vec<u16> = (0..128)
+        .map(|bin| if bin == 10 { 1023 } else { 800 + bin })
+        .collect();
+    let decision = |pixel| Decision {
+        event: event(pixel, 1 << 40, 10),
+        counts: counts.clone(),
+        expected: Some(BinIndex::saturating(3)),
+        peeled: PeeledBins::NONE,
+    };
+    let all: Vec<Decision> = (0..64 * 64).map(decision).collect();
+    let mut sample = sample(Sample::LIMIT, 1 << 18);
+    let events = Cloud {
+        geometry: array,
+        decisions: Some(Decisions {
+            settings: &settings,
+            kept: Kept::of(array, 128),
+            all: &all,
+            array,
+        }),
+        ..cloud(&mut sample, 1 << 41, ["event", "events"])
+    };
+    let page = html("t", "l", &[], &[], events);
+    assert!(page.len() < PAGE, "{}", page.len());
+    assert_eq!(data(&page)["histograms"]["count"], 64 * 64);
+}

@@ -1,0 +1,139 @@
+//! The maps of a run as pictures.
+
+use anyhow::Result;
+
+use dtof_draw::picture::{Map, heat_map};
+use dtof_events::maps::{Maps, PixelHistory};
+use dtof_photons::source::Geometry;
+
+/// The files, in the order of [`pictures`].
+pub const NAMES: [&str; 6] = [
+    "depth-last.svg",
+    "depth-mean.svg",
+    "event-counts.svg",
+    "reflectivity-events.svg",
+    "reflectivity-signal.svg",
+    "photon-counts.svg",
+];
+
+/// A picture and the file it becomes.
+pub struct Picture {
+    pub name: &'static str,
+    pub svg: String,
+    /// For those of the report, which has one of each quantity.
+    pub caption: Option<String>,
+}
+
+/// The maps of a run on an array with these `sides`, whose pixels report what is called
+/// `one` and `several`.
+pub fn pictures(maps: &Maps, sides: [&str; 2], [one, several]: [&str; 2]) -> Result<[Picture; 6]> {
+    let draw_without = |missing, name, title: &str, unit, caption, values: Vec<Option<f64>>| {
+        let Geometry { columns, rows } = maps.geometry;
+        let svg = heat_map(&Map {
+            title,
+            unit,
+            sides,
+            missing,
+            columns: columns as usize,
+            rows: rows as usize,
+            values: &values,
+        })?;
+        anyhow::Ok(Picture { name, svg, caption })
+    };
+    let draw = |name, title: &str, unit, caption, values| {
+        draw_without(one, name, title, unit, caption, values)
+    };
+    let all = |value: &dyn Fn(&PixelHistory) -> Option<f64>| -> Vec<Option<f64>> {
+        maps.pixels.iter().map(value).collect()
+    };
+    Ok([
+        draw(
+            "depth-last.svg",
+            &format!("Range of the last {one}"),
+            "mm",
+            Some(format!("The range of the last {one} of each pixel.")),
+            all(&PixelHistory::last_mm),
+        )?,
+        draw(
+            "depth-mean.svg",
+            &format!("Range, mean of the last ten {several}"),
+            "mm",
+            None,
+            all(&PixelHistory::mean_mm),
+        )?,
+        draw(
+            "event-counts.svg",
+            &format!("Number of {several}"),
+            several,
+            Some(if one == "event" {
+                "How many events each pixel has. Near and bright surfaces report more often. Two echoes \
+                 count twice, and an event of a block counts for its pixels."
+                    .to_owned()
+            } else {
+                format!("How many {several} each pixel has: one a frame with a photon.")
+            }),
+            all(&|pixel| Some(pixel.events as f64)),
+        )?,
+        draw(
+            "reflectivity-events.svg",
+            &format!("Reflectivity from the number of {several}"),
+            "of the most",
+            None,
+            relative(all(&PixelHistory::reflectivity_of_events)),
+        )?,
+        draw(
+            "reflectivity-signal.svg",
+            "Reflectivity from the signal",
+            "of the most",
+            Some(format!(
+                "Relative reflectivity: signal photons a laser cycle × range², over all {several} \
+                 of the pixel."
+            )),
+            relative(all(&PixelHistory::reflectivity_of_signal)),
+        )?,
+        draw_without(
+            "photon",
+            "photon-counts.svg",
+            "Number of photons",
+            "photons",
+            Some(
+                "How many photons each pixel received in the whole run, signal and background: an \
+                 active image. With the laser off (simulate --laser-off) it is the passive one."
+                    .to_owned(),
+            ),
+            all(&|pixel| (pixel.photons > 0).then_some(pixel.photons as f64)),
+        )?,
+    ])
+}
+
+/// `values` as shares of the highest.
+fn relative(mut values: Vec<Option<f64>>) -> Vec<Option<f64>> {
+    let most = values.iter().flatten().copied().fold(0.0, f64::max);
+    if most > 0.0 {
+        values.iter_mut().flatten().for_each(|value| *value /= most);
+    }
+    values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_picture_has_its_name_and_mark() {
+        let maps = Maps::new(Geometry::new(1, 1));
+        let pictures = pictures(&maps, ["column", "row"], ["event", "events"]).unwrap();
+        assert_eq!(pictures.each_ref().map(|picture| picture.name), NAMES);
+        for picture in pictures {
+            assert!(picture.svg[..1024].contains(dtof_draw::svg::MARK));
+        }
+    }
+
+    #[test]
+    fn shares_are_those_of_the_highest() {
+        let values = relative(vec![Some(1.0), None, Some(4.0), Some(0.0)]);
+        assert_eq!(values, [Some(0.25), None, Some(1.0), Some(0.0)]);
+        let dark = vec![None, Some(0.0)];
+        assert_eq!(relative(dark.clone()), dark);
+    }
+}

@@ -1,0 +1,133 @@
+//! A scene on an array, ready to be simulated.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, ensure};
+use dtof_core::fixed::types::U16F16;
+
+use super::given::{FRAME, Given, SENSOR};
+use dtof_engine::settings::{Detection, Rays, Run, Sensor, SettingsFile};
+use dtof_options::Refused;
+use dtof_options::numbers::{truth, whole};
+use dtof_photons::source::Geometry;
+use dtof_simulate::scene::Scene;
+
+/// What is simulated beside the scene, and how.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The array that looks at the scene.
+    pub array: Option<Geometry>,
+    /// Without signal: the picture of photon counts is then a passive image.
+    pub laser_off: bool,
+    /// The settings.
+    pub given: Given,
+}
+
+impl dtof_options::Options for Options {
+    const KEYS: &'static [&'static [&'static str]] = &[
+        &["array", "laser_off"],
+        SENSOR,
+        Detection::KEYS,
+        FRAME,
+        &["cycles", "seed"],
+    ];
+
+    fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
+        match key {
+            "array" => self.array = Some(array(text)?),
+            "laser_off" => self.laser_off = truth(text)?,
+            key => self.given.set(key, text)?,
+        }
+        Ok(())
+    }
+
+    fn file(&mut self, key: &str) -> Option<&mut Option<PathBuf>> {
+        self.given.file(key)
+    }
+
+    fn check(&self) -> Result<(), Refused> {
+        self.given.check()
+    }
+}
+
+impl Options {
+    /// What these options say, and the settings file.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn said(&self) -> Result<SettingsFile> {
+        self.given.merged()
+    }
+
+    /// The scene as the array sees it.
+    #[must_use]
+    pub fn seen(&self, mut scene: Scene) -> Scene {
+        scene.geometry = self.array.unwrap_or(scene.geometry);
+        match self.laser_off {
+            true => scene.with_laser_off(),
+            false => scene,
+        }
+    }
+}
+
+/// What is said, on a scene: it has histograms, a TDC and rays of its own.
+///
+/// # Errors
+/// If what is said is for other histograms.
+pub fn of_scene(said: SettingsFile, scene: &Scene) -> Result<SettingsFile> {
+    let bin_width_ps = U16F16::from_num(scene.bin_width_ps);
+    let Sensor {
+        bins: said_bins,
+        bin_width_ps: said_width,
+        ..
+    } = said.sensor;
+    let (bins, width) = (
+        said_bins.unwrap_or(scene.bins),
+        said_width.unwrap_or(bin_width_ps),
+    );
+    ensure!(
+        (bins, width) == (scene.bins, bin_width_ps),
+        "{bins} bins of {width} ps, but the scene has {} of {bin_width_ps} ps",
+        scene.bins
+    );
+    Ok(SettingsFile {
+        sensor: Sensor {
+            laser_hz: Some(scene.laser_hz()),
+            columns: Some(scene.geometry.columns),
+            bins: Some(bins),
+            bin_width_ps: Some(width),
+            // Simulated photons come at their distance.
+            offset_mm: None,
+            one_hit_tdc: scene.effects.one_hit_tdc().then_some(true),
+            ..said.sensor
+        },
+        rays: Rays {
+            // As written: 60 is not 59.99999999999999.
+            field_of_view_degrees: Some(
+                scene
+                    .view()
+                    .degrees()
+                    .map(|angle| (angle * 1e9).round() / 1e9),
+            ),
+            calibration: None,
+        },
+        run: Run {
+            cycles: said.run.cycles.or(Some(scene.cycles)),
+            ..said.run
+        },
+        ..said
+    })
+}
+
+/// As `64x32`.
+///
+/// # Errors
+/// If it is no array.
+pub fn array(text: &str) -> Result<Geometry, String> {
+    let sides = text.split_once('x').and_then(|(columns, rows)| {
+        let side = whole(1..=u16::MAX);
+        Some((side(columns).ok()?, side(rows).ok()?))
+    });
+    let (columns, rows) = sides.ok_or("must be COLUMNSxROWS, as 64x32")?;
+    Ok(Geometry::new(columns.into(), rows.into()))
+}

@@ -1,0 +1,224 @@
+//! The summary of a run: `summary.json`, and the same on the terminal and in
+//! the report.
+
+use dtof_core::{DepthEstimator, Statistics};
+use serde::{Serialize, Serializer};
+
+use crate::truth::AgainstTruth;
+use dtof_engine::settings::Settings;
+use dtof_options::rows::{Row, grouped};
+use dtof_photons::source::PhotonSource;
+
+/// Every `summary.json` begins with it, less the version.
+pub(crate) const MARK: &str = "\"program\": \"dtof ";
+
+/// The summary, as in `summary.json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// This program and its version.
+    pub program: &'static str,
+    /// The recording or the scene, if it was a file.
+    pub input: Option<String>,
+    /// Laser cycles a second of a simulated scene.
+    pub laser_hz: Option<u64>,
+    /// The field of view of a simulated scene: horizontal and vertical angle.
+    pub field_of_view_degrees: Option<[f64; 2]>,
+    /// The options that `dtof export` needs for the scene, if any.
+    pub export_with: Option<String>,
+    /// Laser cycles that recorded histograms were taken to have lasted: the
+    /// shortest and the longest capture.
+    pub recorded_cycles: Option<(u64, u64)>,
+    /// Laser cycles.
+    pub cycles: u64,
+    /// Photons offered to the pixels: counted, saturated, rejected or gated out.
+    pub photons: u64,
+    /// Depth events.
+    pub events: u64,
+    /// Of these, those of blocks of pixels.
+    pub events_of_blocks: u64,
+    /// Pixels that were there.
+    pub pixels: usize,
+    /// Pixels with at least one event.
+    pub pixels_reporting: usize,
+    /// Photons in the bins around an echo that was reported.
+    pub held: u64,
+    /// Photons with a TDC code past the last bin.
+    pub rejected: u64,
+    /// Photons that met a full counter.
+    pub saturated: u64,
+    /// Photons that met a full counter of a block; pixels have counted them.
+    pub saturated_in_blocks: u64,
+    /// Photons outside the range gate.
+    pub gated_out: u64,
+    /// Photons of pixels that are left out.
+    pub masked: u64,
+    /// Decisions put off because the event before was not taken yet.
+    pub deferred: u64,
+    /// Exposures that reached L2 without an event.
+    pub expired: u64,
+    /// Of these, exposures with a decision put off.
+    pub expired_deferred: u64,
+    /// Recorded photons that were not replayed, as they lie after the last
+    /// laser cycle.
+    pub not_replayed: u64,
+    /// How many times as bright the cover glass is as when it was calibrated, and how many times
+    /// at least, if that is surely more.
+    pub cover_glass: Option<[f64; 2]>,
+    /// Recorded photons in bins that were cut off.
+    pub cut_off: u64,
+    /// What was done to the recording before.
+    #[serde(serialize_with = "named")]
+    pub recording: Vec<Row>,
+    /// What is surely wrong with the recording.
+    pub warnings: Vec<String>,
+    /// How the events of a simulated scene compare with it.
+    pub against_truth: Option<AgainstTruth>,
+    /// How the pixels operated.
+    #[serde(serialize_with = "with_estimator")]
+    pub settings: Settings,
+}
+
+/// Settings, and the name of the estimator that they choose.
+fn with_estimator<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Chosen<'a> {
+        #[serde(flatten)]
+        settings: &'a Settings,
+        estimator: &'static str,
+    }
+    let estimator = match settings.estimator() {
+        DepthEstimator::Centroid3 => "centroid",
+        DepthEstimator::CentredWindow(_) => "centred-window",
+    };
+    Chosen {
+        settings,
+        estimator,
+    }
+    .serialize(serializer)
+}
+
+/// Rows as an object.
+fn named<S: Serializer>(rows: &[Row], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(rows.iter().map(|(name, value)| (name, value)))
+}
+
+impl Summary {
+    /// Puts together what the pixels counted and where it came from.
+    #[must_use]
+    pub fn new(
+        [statistics, blocks]: [Statistics; 2],
+        source: &dyn PhotonSource,
+        pixels_reporting: usize,
+        settings: &Settings,
+    ) -> Self {
+        Self {
+            program: concat!("dtof ", env!("CARGO_PKG_VERSION")),
+            input: None,
+            laser_hz: source.laser_hz(),
+            field_of_view_degrees: None,
+            export_with: None,
+            recorded_cycles: source.recorded_cycles(),
+            cycles: source.cycles(),
+            photons: statistics.photons(),
+            events: statistics.events + blocks.events,
+            events_of_blocks: blocks.events,
+            pixels: source.addresses().len(),
+            pixels_reporting,
+            held: statistics.held,
+            rejected: statistics.rejected,
+            saturated: statistics.saturated,
+            saturated_in_blocks: blocks.saturated,
+            gated_out: statistics.gated_out,
+            masked: source.masked(),
+            deferred: statistics.deferred + blocks.deferred,
+            expired: statistics.expired,
+            expired_deferred: statistics.expired_deferred,
+            not_replayed: source.not_replayed(),
+            cover_glass: None,
+            cut_off: 0,
+            recording: Vec::new(),
+            warnings: Vec::new(),
+            against_truth: None,
+            settings: settings.clone(),
+        }
+    }
+
+    /// The totals.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Row> {
+        let row = |name: &str, value: u64| (name.to_owned(), grouped(value));
+        let mut rows = Vec::new();
+        if let Some(input) = &self.input {
+            rows.push(("input".to_owned(), input.clone()));
+        }
+        rows.extend(self.recording.iter().cloned());
+        if let Some((shortest, longest)) = self.recorded_cycles {
+            let cycles = if shortest == longest {
+                grouped(longest)
+            } else {
+                format!("{} to {}, by capture", grouped(shortest), grouped(longest))
+            };
+            rows.push((
+                "taken to have lasted".to_owned(),
+                format!("{cycles} laser cycles"),
+            ));
+        }
+        rows.extend([
+            row("laser cycles", self.cycles),
+            row("photons", self.photons),
+            match self.settings.frame {
+                None => row("depth events", self.events),
+                Some(_) => row("readings of frames", self.events),
+            },
+            (
+                "pixels reporting".to_owned(),
+                format!("{} of {}", self.pixels_reporting, self.pixels),
+            ),
+        ]);
+        if self.settings.binning.is_some() {
+            rows.push(row("events of blocks", self.events_of_blocks));
+        }
+        if self.settings.frame.is_none() {
+            rows.push(row("exposures without an event", self.expired));
+        }
+        let first_decision = self.settings.first_decision();
+        if self.cycles < first_decision {
+            rows.push((
+                "too short for an event".to_owned(),
+                format!("the first decision comes after {first_decision} laser cycles"),
+            ));
+        }
+        // Losses are named where there are any.
+        let losses = [
+            ("photons outside the range gate", self.gated_out),
+            ("photons of pixels left out", self.masked),
+            ("photons lost to full counters", self.saturated),
+            (
+                "photons lost to full counters of blocks",
+                self.saturated_in_blocks,
+            ),
+            ("photons with a code past the last bin", self.rejected),
+            ("decisions put off", self.deferred),
+            ("recorded photons not replayed", self.not_replayed),
+            ("recorded photons in bins cut off", self.cut_off),
+        ];
+        rows.extend(
+            losses
+                .iter()
+                .filter(|loss| loss.1 > 0)
+                .map(|&(name, value)| row(name, value)),
+        );
+        if let Some([times, least]) = self.cover_glass {
+            let text = format!(
+                "{times:.1} times as bright as when it was calibrated, at least {least:.1}: clean it"
+            );
+            rows.push(("cover glass".to_owned(), text));
+        }
+        let warnings = self.warnings.iter();
+        rows.extend(warnings.map(|warning| ("warning".to_owned(), warning.clone())));
+        if let Some(options) = &self.export_with {
+            rows.push(("export with".to_owned(), options.clone()));
+        }
+        rows
+    }
+}

@@ -1,0 +1,418 @@
+//! The threshold and L1 for a wanted rate of false alarms.
+
+mod average;
+mod window;
+
+use std::fmt::Write as _;
+
+use anyhow::{Result, ensure};
+use dtof_core::BlockLevel;
+use dtof_engine::settings::RuleName;
+use dtof_options::numbers::{MOST_WHOLE, bins, positive, shortest, whole};
+use dtof_options::rows::significant;
+use dtof_options::{NO_OPTION, Refused, named};
+use dtof_simulate::MM_PER_PS;
+use dtof_theory::gaussian;
+use dtof_theory::looks::detections::Detections;
+use dtof_theory::looks::table::Table;
+use dtof_theory::rates::{signal_for_snr, snr};
+use dtof_theory::tune::{Request, Source, Wanted, tune};
+use serde_json::json;
+
+/// What settings are for.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The rule to find settings for
+    pub rule: RuleName,
+    /// Background photons a bin and laser cycle (B)
+    pub background: Option<f64>,
+    /// Signal photons a laser cycle (A)
+    pub signal: Option<f64>,
+    /// Instead: the SNR of the whole exposure, N·A / √(N·B) with N = L2
+    pub snr: Option<f64>,
+    /// Standard deviation of the pulse in bins
+    pub sigma_bins: Option<f64>,
+    /// Instead: in picoseconds
+    pub sigma_ps: Option<f64>,
+    /// Bins of a histogram, a power of two from 8 to 1024
+    pub bins: u16,
+    /// Picoseconds a bin
+    pub bin_width_ps: f64,
+    /// The share of exposures without a target that may end with an event [default: 0.01]
+    pub false_alarm: Option<f64>,
+    /// Instead: the false alarms of a pixel a second
+    pub false_alarms_per_second: Option<f64>,
+    /// Laser cycles a second
+    pub laser_hz: Option<f64>,
+    /// The exposure a decision must exceed, in laser cycles [default: the one with the shortest
+    /// time to an event]
+    pub l1: Option<u16>,
+    /// The exposure at which a pixel starts over without an event, in laser cycles
+    pub l2: u16,
+    /// Laser cycles between looks
+    pub x: u16,
+    /// Photons a reported peak holds at least
+    pub min_count: u16,
+    /// Window rule: the largest blocks of adaptive binning, which share the false alarms with the
+    /// pixels
+    pub binning: u8,
+    /// Seed of the simulated exposures
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            rule: RuleName::Paper,
+            background: None,
+            signal: None,
+            snr: None,
+            sigma_bins: None,
+            sigma_ps: None,
+            bins: 128,
+            bin_width_ps: 250.0,
+            false_alarm: None,
+            false_alarms_per_second: None,
+            laser_hz: None,
+            l1: None,
+            l2: 2000,
+            x: 4,
+            min_count: 5,
+            binning: 0,
+            seed: 1,
+        }
+    }
+}
+
+impl dtof_options::Options for Options {
+    const KEYS: &'static [&'static [&'static str]] = &[&[
+        "rule",
+        "background",
+        "signal",
+        "snr",
+        "sigma_bins",
+        "sigma_ps",
+        "bins",
+        "bin_width_ps",
+        "false_alarm",
+        "false_alarms_per_second",
+        "laser_hz",
+        "l1",
+        "l2",
+        "x",
+        "min_count",
+        "binning",
+        "seed",
+    ]];
+
+    fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
+        match key {
+            "rule" => self.rule = named(text)?,
+            "background" => self.background = Some(positive(text)?),
+            "signal" => self.signal = Some(positive(text)?),
+            "snr" => self.snr = Some(positive(text)?),
+            "sigma_bins" => self.sigma_bins = Some(positive(text)?),
+            "sigma_ps" => self.sigma_ps = Some(positive(text)?),
+            "bins" => self.bins = bins(text)?,
+            "bin_width_ps" => self.bin_width_ps = positive(text)?,
+            "false_alarm" => self.false_alarm = Some(positive(text)?),
+            "false_alarms_per_second" => self.false_alarms_per_second = Some(positive(text)?),
+            "laser_hz" => self.laser_hz = Some(positive(text)?),
+            "l1" => self.l1 = Some(whole(0..=u16::MAX)(text)?),
+            "l2" => self.l2 = whole(1..=u16::MAX)(text)?,
+            "x" => self.x = whole(1..=u16::MAX)(text)?,
+            "min_count" => self.min_count = whole(1..=1023)(text)?,
+            "binning" => self.binning = whole(0..=BlockLevel::MAX.raw())(text)?,
+            "seed" => self.seed = whole(0..=MOST_WHOLE)(text)?,
+            _ => return Err(NO_OPTION.to_owned()),
+        }
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), Refused> {
+        let (signal, sigma) = (self.signal.is_some(), self.sigma_bins.is_some());
+        let (per_second, is_share) = (
+            self.false_alarms_per_second.is_some(),
+            self.false_alarm.is_some(),
+        );
+        let missing = [
+            (self.background.is_none(), "`background`"),
+            (!signal && self.snr.is_none(), "`signal` or `snr`"),
+            (
+                !sigma && self.sigma_ps.is_none(),
+                "`sigma_bins` or `sigma_ps`",
+            ),
+        ];
+        let missing = missing.iter().filter(|(is_missing, _)| *is_missing);
+        let missing: Vec<&str> = missing.map(|(_, keys)| *keys).collect();
+        if missing.len() > 1 {
+            let reason = format!("{} are needed", missing.join(", "));
+            return Err(Refused::input(reason));
+        }
+        let refused = [
+            (self.background.is_none(), "background", "is needed"),
+            (
+                !signal && self.snr.is_none(),
+                "signal",
+                "is needed, or `snr`",
+            ),
+            (
+                signal && self.snr.is_some(),
+                "snr",
+                "cannot be used with `signal`",
+            ),
+            (
+                !sigma && self.sigma_ps.is_none(),
+                "sigma_bins",
+                "is needed, or `sigma_ps`",
+            ),
+            (
+                sigma && self.sigma_ps.is_some(),
+                "sigma_ps",
+                "cannot be used with `sigma_bins`",
+            ),
+            (
+                is_share && per_second,
+                "false_alarm",
+                "cannot be used with `false_alarms_per_second`",
+            ),
+            (
+                per_second && self.laser_hz.is_none(),
+                "false_alarms_per_second",
+                "needs `laser_hz`",
+            ),
+        ];
+        match refused.into_iter().find(|(is_wrong, ..)| *is_wrong) {
+            Some((_, key, reason)) => Err(Refused::new(key, reason)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// One result: its name in JSON, its value and where that comes from.
+struct Line(&'static str, f64, String);
+
+/// What was found.
+pub struct Tuned {
+    lines: Vec<Line>,
+    /// The options that other commands take.
+    options: String,
+}
+
+/// Name in JSON, name for people, unit.
+const NAMES: [(&str, &str, &str); 14] = [
+    ("alpha", "α", ""),
+    ("z", "z", ""),
+    ("window", "window", "bins"),
+    ("half_width", "depth from, ±", "bins"),
+    ("l1", "L1", "laser cycles"),
+    ("false_alarms", "false alarms", "an exposure"),
+    ("at_least", "  at least", "an exposure"),
+    ("at_most", "  at most", "an exposure"),
+    ("cycles_to_event", "time to an event", "laser cycles"),
+    ("seconds_to_event", "", "s"),
+    ("detected", "exposures with one", ""),
+    ("depth_error_mm", "depth error", "mm rms"),
+    ("snr", "SNR at L2", ""),
+    ("gaussian_alpha", "α by Eq. 11", ""),
+];
+
+impl Line {
+    /// Name for people and unit.
+    fn names(&self) -> (&'static str, &'static str) {
+        let known = NAMES.iter().find(|names| names.0 == self.0);
+        known.map_or((self.0, ""), |names| (names.1, names.2))
+    }
+}
+
+impl Options {
+    /// Finds them.
+    ///
+    /// # Errors
+    /// If nothing suits what is asked for.
+    pub fn tune(&self) -> Result<Tuned> {
+        let request = self.request()?;
+        let (lines, rule) = match self.rule {
+            RuleName::Paper => self.paper(&request)?,
+            RuleName::Average => self.average(&request)?,
+            RuleName::Window => self.window(&request)?,
+        };
+        // Without them `replay` takes another histogram than these settings are for.
+        let histogram = if (self.bins, self.bin_width_ps) == (128, 250.0) {
+            String::new()
+        } else {
+            format!(" --bins {} --bin-width-ps {}", self.bins, self.bin_width_ps)
+        };
+        let options = format!(
+            "{rule} --l2 {} --x {} --min-count {}{histogram}",
+            self.l2, self.x, self.min_count
+        );
+        Ok(Tuned { lines, options })
+    }
+
+    fn request(&self) -> Result<Request> {
+        let needed = |key: &'static str| move || Refused::new(key, "is needed");
+        let background = self.background.ok_or_else(needed("background"))?;
+        let by_snr = |snr| signal_for_snr(snr, background, self.l2.into());
+        let signal = self.signal.or(self.snr.map(by_snr));
+        let signal = signal.ok_or_else(needed("signal"))?;
+        let by_ps = self.sigma_ps.map(|ps| ps / self.bin_width_ps);
+        let sigma = self.sigma_bins.or(by_ps);
+        let sigma = sigma.ok_or_else(needed("sigma_bins"))?;
+        ensure!(
+            sigma <= f64::from(self.bins) / 4.0,
+            "a pulse of σ = {} bins does not fit {} bins",
+            number(sigma),
+            self.bins
+        );
+        ensure!(
+            self.binning == 0 || self.rule == RuleName::Window,
+            Refused::new(
+                "binning",
+                "needs `rule` window here: only its z is shared with blocks"
+            )
+        );
+        let wanted = match (self.false_alarms_per_second, self.laser_hz) {
+            (Some(per_second), Some(laser_hz)) => Wanted::PerCycle(per_second / laser_hz),
+            _ => Wanted::PerExposure(self.false_alarm.unwrap_or(0.01)),
+        };
+        Ok(Request {
+            background,
+            signal,
+            sigma,
+            bins: self.bins,
+            minimum_count: self.min_count,
+            x: self.x,
+            l1: self.l1,
+            l2: self.l2,
+            wanted,
+            levels: BlockLevel::saturating(self.binning),
+            seed: self.seed,
+        })
+    }
+
+    /// α, L1 and what to expect of them; the options for it.
+    fn paper(&self, request: &Request) -> Result<(Vec<Line>, String)> {
+        let table = Table::kept()?;
+        let tuned = tune(request, &table)?;
+        let false_alarms = match tuned.source {
+            Source::Table => format!("simulation: table, {} exposures a point", table.exposures),
+            Source::TableAtMost => format!(
+                "simulation: at most, the least the table saw, {} exposures a point",
+                table.exposures
+            ),
+            Source::Bound => "formula: upper bound, single looks (exact) added up".to_owned(),
+        };
+        let exact = |what: &str| format!("formula: {what}, single look (exact)");
+        let alpha = format!("smallest for the false alarms wanted; {false_alarms}");
+        let gaussian = gaussian::alpha_min(tuned.wanted, u32::from(request.bins) - 1);
+        let mut lines = vec![
+            Line("alpha", tuned.alpha.to_num(), alpha),
+            self.l1(tuned.l1, &tuned.detections),
+            Line("false_alarms", tuned.false_alarms, false_alarms),
+            Line("at_least", tuned.bounds.worst_look, exact("worst look")),
+            Line("at_most", tuned.bounds.sum, exact("sum over looks")),
+        ];
+        lines.extend(self.expected(request, &tuned.detections));
+        let source = "formula: Eq. 11, one look, background known; not for use";
+        lines.push(Line("gaussian_alpha", gaussian, source.to_owned()));
+        // As few digits as name it.
+        let alpha = shortest(tuned.alpha);
+        Ok((lines, format!("--alpha {alpha} --l1 {}", tuned.l1)))
+    }
+
+    fn simulated(&self, detections: &Detections) -> String {
+        format!(
+            "simulation: seed {}, {} exposures",
+            self.seed, detections.exposures
+        )
+    }
+
+    fn l1(&self, l1: u16, detections: &Detections) -> Line {
+        let source = match self.l1 {
+            Some(_) => "as given".to_owned(),
+            None => format!("shortest time to an event; {}", self.simulated(detections)),
+        };
+        Line("l1", l1.into(), source)
+    }
+
+    /// False alarms counted in so many exposures, of which so many have an event.
+    #[allow(clippy::cast_precision_loss)]
+    fn counted(&self, (exposures, events): (u64, u64)) -> Line {
+        let blocks = match self.binning {
+            0 => "",
+            _ => "; blocks come to a third as many",
+        };
+        let source = format!(
+            "simulation: seed {}, {events} events in {exposures} exposures without a target{blocks}",
+            self.seed
+        );
+        Line("false_alarms", events as f64 / exposures as f64, source)
+    }
+
+    /// Time, depth error and SNR to expect, with any rule.
+    fn expected(&self, request: &Request, detections: &Detections) -> Vec<Line> {
+        let simulated = self.simulated(detections);
+        let cycles = detections.cycles_to_event();
+        let mut lines = vec![Line("cycles_to_event", cycles, simulated.clone())];
+        if let Some(laser_hz) = self.laser_hz {
+            lines.push(Line(
+                "seconds_to_event",
+                cycles / laser_hz,
+                simulated.clone(),
+            ));
+        }
+        let mm = detections.depth_error_bins() * self.bin_width_ps * MM_PER_PS;
+        let at_l2 = snr(request.signal, request.background, request.l2.into());
+        lines.extend([
+            Line("detected", detections.detected(), simulated.clone()),
+            Line("depth_error_mm", mm, simulated),
+            Line("snr", at_l2, "formula: N·A/√(N·B)".to_owned()),
+        ]);
+        lines
+    }
+}
+
+impl Tuned {
+    /// For programs: each result with its value, unit and source.
+    #[must_use]
+    pub fn json(&self) -> serde_json::Value {
+        let fields = self.lines.iter().map(|line| {
+            let Line(name, value, source) = line;
+            let result = json!({ "value": value, "unit": line.names().1, "source": source });
+            ((*name).to_owned(), result)
+        });
+        fields.collect::<serde_json::Map<_, _>>().into()
+    }
+
+    /// For people; the last line is what other commands take.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        for line in &self.lines {
+            let Line(_, value, source) = line;
+            let (name, unit) = line.names();
+            let value = format!("{} {unit}", number(*value));
+            let _ = writeln!(text, "{name:<18}  {value:<24}  {source}");
+        }
+        let _ = writeln!(text, "\n{}", self.options);
+        text
+    }
+
+    /// The options that other commands take, as `--alpha 4.5 --l1 40`.
+    #[must_use]
+    pub fn options(&self) -> &str {
+        &self.options
+    }
+}
+
+/// Whole numbers as they are, others to four significant digits.
+fn number(value: f64) -> String {
+    if value == value.round() && value.abs() < 1e6 {
+        format!("{value}")
+    } else if (0.001..1e6).contains(&value) {
+        significant(value, 4)
+    } else {
+        format!("{value:.3e}")
+    }
+}

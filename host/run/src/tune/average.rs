@@ -1,0 +1,30 @@
+//! The average rule.
+
+use anyhow::Result;
+use dtof_options::numbers::shortest;
+use dtof_theory::tune::{Request, average};
+
+use super::{Line, Options};
+
+impl Options {
+    /// α, L1 and what to expect of them; the options for it.
+    pub(super) fn average(&self, request: &Request) -> Result<(Vec<Line>, String)> {
+        let tuned = average::tune(request)?;
+        let alpha = format!(
+            "smallest for the false alarms wanted; simulation: seed {}, {} exposures without a target",
+            self.seed, tuned.exposures
+        );
+        let mut lines = vec![
+            Line("alpha", tuned.alpha.to_num(), alpha),
+            self.l1(tuned.l1, &tuned.detections),
+            self.counted(tuned.false_alarms),
+        ];
+        lines.extend(self.expected(request, &tuned.detections));
+        let options = format!(
+            "--rule average --alpha {} --l1 {}",
+            shortest(tuned.alpha),
+            tuned.l1
+        );
+        Ok((lines, options))
+    }
+}

@@ -1,0 +1,55 @@
+//! The window rule.
+
+use anyhow::{Result, ensure};
+use dtof_core::{CentredWindow, DepthEstimator};
+use dtof_options::Refused;
+use dtof_options::numbers::shortest;
+use dtof_theory::tune::{Request, window};
+
+use super::{Line, Options, number};
+
+impl Options {
+    /// z, L1 and what to expect of them; the options for it.
+    pub(super) fn window(&self, request: &Request) -> Result<(Vec<Line>, String)> {
+        let widest = CentredWindow::WIDEST_PULSE;
+        ensure!(
+            request.sigma <= widest.to_num::<f64>(),
+            Refused::input(format!(
+                "a pulse of σ = {} bins is too wide for a window, which suits up to {widest}; take \
+                 wider bins, or `rule` paper",
+                number(request.sigma)
+            ))
+        );
+        let tuned = window::tune(request)?;
+        let z = format!(
+            "for a false alarm in {} exposures; simulation: table",
+            tuned.one_in
+        );
+        let window = "formula: 2 up to σ = 0.6 bins, 3 up to 1.25, 5 above";
+        let mut lines = vec![
+            Line("z", tuned.z.to_num(), z),
+            Line("window", tuned.window.into(), window.to_owned()),
+        ];
+        if let DepthEstimator::CentredWindow(window) = tuned.estimator {
+            let source = "formula: 2σ + 1/2, from 1 to 4; centred window".to_owned();
+            lines.push(Line("half_width", window.after().to_num(), source));
+        }
+        lines.extend([
+            self.l1(tuned.l1, &tuned.detections),
+            self.counted(tuned.false_alarms),
+        ]);
+        lines.extend(self.expected(request, &tuned.detections));
+        // As few digits as name them.
+        let binning = match self.binning {
+            0 => String::new(),
+            levels => format!(" --binning {levels}"),
+        };
+        let options = format!(
+            "--rule window --sigma-bins {} --z {} --l1 {}{binning}",
+            shortest(tuned.sigma),
+            shortest(tuned.z),
+            tuned.l1
+        );
+        Ok((lines, options))
+    }
+}

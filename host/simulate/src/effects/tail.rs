@@ -1,0 +1,54 @@
+//! The pulse's tail: a laser and a SPAD that decay slowly. Recorded sensors show
+//! tens of bins.
+
+use anyhow::Result;
+use rand_distr::{Bernoulli, Distribution, Exp};
+use rand_pcg::Pcg64;
+use serde::Deserialize;
+
+use super::limits::SHARE;
+use dtof_photons::range::within;
+
+/// A share of the photons of the laser comes later, by an exponentially
+/// distributed time. The mean position moves by `share * decay_bins`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tail {
+    /// How much of the pulse's energy is in the tail.
+    pub share: f64,
+    /// After so many bins it has fallen to 1/e.
+    pub decay_bins: f64,
+}
+
+impl Tail {
+    pub(crate) fn check(&self) -> Result<()> {
+        within("share", self.share, SHARE)?;
+        within("decay_bins", self.decay_bins, 0.001..=1000.0)
+    }
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Late {
+    is_late: Bernoulli,
+    delay: Exp<f64>,
+    rng: Pcg64,
+}
+
+impl Late {
+    pub(crate) fn new(tail: &Tail, rng: Pcg64) -> Result<Self> {
+        Ok(Self {
+            is_late: Bernoulli::new(tail.share)?,
+            delay: Exp::new(tail.decay_bins.recip())?,
+            rng,
+        })
+    }
+
+    /// How much later a photon comes, in bins.
+    pub(crate) fn delay(&mut self) -> f64 {
+        if self.is_late.sample(&mut self.rng) {
+            self.delay.sample(&mut self.rng)
+        } else {
+            0.0
+        }
+    }
+}

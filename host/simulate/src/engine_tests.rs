@@ -1,0 +1,217 @@
+//! Tests of the engine, and of sources of photons, with simulated photons.
+
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{
+    AnyRule, AverageRule, BlockLevel, Count, DepthEvent, EchoNumber, PaperRule, WindowRule,
+};
+use dtof_engine::decisions::Decision;
+use dtof_engine::host::host_engine;
+use dtof_engine::look::look_back;
+use dtof_engine::settings::Settings;
+use dtof_photons::masked::Masked;
+use dtof_photons::source::{Geometry, PhotonSource, Slice};
+
+use crate::{demo, scene};
+
+const ARRAY: Geometry = Geometry::new(8, 4);
+
+/// Events and decisions of the demo in slices of so many laser cycles, and its photons.
+fn run(settings: &Settings, length: u16) -> (Vec<DepthEvent>, Vec<Decision>, Vec<Slice>) {
+    let mut photons = demo::photons(ARRAY, 3, 3000).unwrap();
+    let mut engine = host_engine(settings, ARRAY, &photons.addresses()).unwrap();
+    engine.keep_decisions(&|_| true);
+    let (mut events, mut slices, mut done) = (Vec::new(), Vec::new(), 0);
+    while done < photons.cycles() {
+        let next = u16::try_from(photons.cycles() - done).map_or(length, |left| left.min(length));
+        let slice = photons.next_slice(next).unwrap();
+        events.extend(engine.run(&slice).unwrap());
+        slices.push(slice);
+        done += u64::from(next);
+    }
+    (events, engine.decisions(), slices)
+}
+
+fn rules() -> [AnyRule; 3] {
+    let least = Count::saturating(5);
+    let alpha = U8F8::lit("4");
+    [
+        PaperRule::new(alpha, least).into(),
+        AverageRule::new(alpha, least).into(),
+        WindowRule::new(3, "4.5".parse().unwrap(), least)
+            .unwrap()
+            .into(),
+    ]
+}
+
+/// Settings with everything a decision can depend on, one after the other.
+fn all_settings() -> Vec<Settings> {
+    let plain = rules().map(|rule| Settings {
+        rule,
+        ..scene::settings(0)
+    });
+    let window = plain[2].clone();
+    let gated = plain.clone().map(|settings| Settings {
+        gate: Some((30, 119)),
+        ..settings
+    });
+    let echoes = plain.clone().map(|settings| Settings {
+        echoes: EchoNumber::new(3).unwrap(),
+        echo_wait: Some(4),
+        ..settings
+    });
+    let tracking = Settings {
+        tracking: true,
+        ..window.clone()
+    };
+    let both = Settings {
+        tracking: true,
+        ..echoes[2].clone()
+    };
+    let frames = Settings {
+        frame: Some(500),
+        ..window
+    };
+    let mut all = vec![tracking, both, frames, demo::settings(3).unwrap()];
+    all.extend(plain.into_iter().chain(gated).chain(echoes));
+    all
+}
+
+#[test]
+fn the_last_event_of_every_pixel_and_block_is_kept() {
+    for settings in all_settings() {
+        let (events, decisions, _) = run(&settings, 256);
+        let mut last = std::collections::BTreeMap::new();
+        for event in &events {
+            last.insert((event.level, event.pixel), *event);
+        }
+        assert!(last.len() > 20, "{}", last.len());
+        let kept = decisions.iter().map(|decision| &decision.event);
+        assert!(kept.eq(last.values()), "{settings:?}");
+    }
+}
+
+/// Counted from the photons, without the pixel.
+#[test]
+fn counts_are_the_photons_of_the_exposure() {
+    for settings in all_settings() {
+        let (_, decisions, slices) = run(&settings, 100);
+        let mut compared = 0;
+        let gate = settings.gate.unwrap_or((0, 127));
+        for decision in decisions {
+            let event = decision.event;
+            if event.level != BlockLevel::PIXEL {
+                continue;
+            }
+            let first = event.cycle.0 + 1 - u64::from(event.exposure);
+            let mut counts = vec![0u16; 128];
+            for slice in &slices {
+                for photon in &slice.pixels[usize::from(event.pixel.0)].photons {
+                    let cycle = slice.first_cycle + u64::from(photon.cycle);
+                    let is_counted = (first..=event.cycle.0).contains(&cycle)
+                        && (gate.0..=gate.1).contains(&photon.code)
+                        && !decision.peeled.contains(photon.code);
+                    counts[usize::from(photon.code)] += u16::from(is_counted);
+                }
+            }
+            assert_eq!(decision.counts, counts, "{event:?} {settings:?}");
+            compared += 1;
+        }
+        assert!(compared > 15, "{compared}");
+    }
+}
+
+/// A block counts photons of pixels that are silent only: not more than all, and enough.
+#[test]
+fn counts_of_a_block_are_those_its_event_tells() {
+    let settings = demo::settings(3).unwrap();
+    let (_, decisions, _) = run(&settings, 256);
+    let blocks = decisions
+        .iter()
+        .filter(|decision| decision.event.level > BlockLevel::PIXEL);
+    assert!(blocks.count() > 3);
+    for Decision { event, counts, .. } in decisions {
+        let peak = counts[usize::from(event.peak_bin.raw())];
+        assert_eq!(u32::from(peak), event.peak_count.raw());
+    }
+}
+
+#[test]
+fn decisions_do_not_depend_on_slices_or_threads() {
+    for settings in [demo::settings(3).unwrap(), scene::settings(0)] {
+        let (_, whole, _) = run(&settings, 256);
+        let one = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build()
+            .unwrap();
+        for length in [1, 37, 255] {
+            assert_eq!(one.install(|| run(&settings, length)).1, whole);
+        }
+    }
+}
+
+/// Whatever the rule, the number it needs is at most that of the peak, and the background is the
+/// event's.
+#[test]
+fn looking_back_finds_what_the_pixel_found() {
+    for settings in all_settings() {
+        let (_, decisions, _) = run(&settings, 256);
+        let looks = look_back(&settings, &decisions);
+        assert_eq!(looks.len(), decisions.len());
+        let mut exactly = 0;
+        for (look, Decision { event, counts, .. }) in looks.iter().zip(&decisions) {
+            let bin = event.peak_bin.raw();
+            assert_eq!(look.peak, (bin, event.peak_count.raw()));
+            assert!(!look.depends);
+            let needed = look.needed.unwrap();
+            assert!(needed <= look.peak.1, "{event:?} {settings:?}");
+            exactly += usize::from(needed == look.peak.1);
+            let background = look.background.unwrap();
+            let told = f64::from(event.background.raw());
+            assert!(
+                (background - told).abs() <= 0.5,
+                "{background} {event:?} {settings:?}"
+            );
+            let is_window = matches!(settings.rule, AnyRule::Window(_)) && settings.frame.is_none();
+            assert_eq!(look.window.is_some(), is_window);
+            if let (Some((first, last)), false) = (look.window, settings.tracking) {
+                assert!((first..=last).contains(&bin));
+            }
+            assert_eq!(counts.len(), 128);
+        }
+        // Most report the moment that they may, unless it was a frame.
+        assert!(exactly > 0 || settings.frame.is_some(), "{settings:?}");
+    }
+}
+
+#[test]
+fn no_room_is_taken_unless_asked_for() {
+    let mut photons = demo::photons(ARRAY, 3, 2000).unwrap();
+    let mut engine = host_engine(&scene::settings(0), ARRAY, &photons.addresses()).unwrap();
+    engine.run(&photons.next_slice(256).unwrap()).unwrap();
+    assert!(engine.decisions().is_empty());
+    engine.keep_decisions(&|pixel| pixel.0 == 5);
+    engine.run(&photons.next_slice(1744).unwrap()).unwrap();
+    let kept = engine.decisions();
+    assert!(kept.iter().map(|decision| decision.event.pixel.0).eq([5]));
+}
+
+#[test]
+fn only_masked_pixels_lose_their_photons_and_they_are_counted() {
+    let array = Geometry::new(4, 2);
+    let photons = || Box::new(demo::photons(array, 1, 100).unwrap());
+    let whole = photons().next_slice(100).unwrap();
+    let mut masked = Masked::new(photons(), &[1, 6, 6]).unwrap();
+    let part = masked.next_slice(100).unwrap();
+    let mut lost = 0;
+    for (pixel, (whole, part)) in whole.pixels.iter().zip(&part.pixels).enumerate() {
+        if [1, 6].contains(&pixel) {
+            assert!(part.photons.is_empty() && !whole.photons.is_empty());
+            lost += whole.photons.len() as u64;
+        } else {
+            assert_eq!(whole, part);
+        }
+    }
+    assert_eq!(masked.masked(), lost);
+    let refused = Masked::new(photons(), &[8]).err().unwrap();
+    assert_eq!(refused.to_string(), "masked 8: there are 8 pixels");
+}

@@ -1,0 +1,192 @@
+//! A depth map, and a picture of the same view, as a surface.
+//!
+//! A pixel sees the one sample that its middle lies in: the nearest. Samples are never mixed,
+//! so that there are no surfaces between those on the two sides of an edge.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+
+use super::sight::Sight;
+use dtof_options::Named;
+use dtof_photons::npy::numbers::{self, Element, Numbers};
+use dtof_photons::source::Geometry;
+
+/// The highest reflectivity of a sample, as of other surfaces.
+const MOST_REFLECTIVITY: f64 = 100.0;
+
+/// What the values of a depth map are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Along {
+    /// Depth along the optical axis, as of depth cameras and renderers (z)
+    #[default]
+    Axis,
+    /// Range along the ray of each sample
+    Ray,
+}
+
+impl Named for Along {
+    const NAMES: &'static [(&'static str, Self, &'static str)] = &[
+        (
+            "axis",
+            Self::Axis,
+            "Depth along the optical axis, as of depth cameras and renderers (z)",
+        ),
+        ("ray", Self::Ray, "Range along the ray of each sample"),
+    ];
+}
+
+/// How far away what each sample shows is, and how bright.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthMap {
+    size: Geometry,
+    along: Along,
+    /// Row by row; none where there is no surface.
+    depth_mm: Vec<Option<f64>>,
+    /// Of each sample; empty if all are white.
+    reflectivity: Vec<f64>,
+}
+
+impl DepthMap {
+    /// Reads a depth map: floats are metres, integers millimetres. There is no surface where
+    /// it is 0, negative, infinite, or not a number.
+    ///
+    /// # Errors
+    /// One line with the name of the file and what is wrong with it.
+    pub fn read(path: &Path, along: Along) -> Result<Self> {
+        let numbers = numbers::read(&path.into())?;
+        Self::of(&numbers, along).with_context(|| path.display().to_string())
+    }
+
+    fn of(numbers: &Numbers, along: Along) -> Result<Self> {
+        let unit_mm = match numbers.element {
+            Element::Float => 1000.0,
+            Element::Byte | Element::Integer => 1.0,
+        };
+        let values = numbers.values.iter().map(|value| value * unit_mm);
+        let is_surface = |value: &f64| value.is_finite() && *value > 0.0;
+        let depth_mm: Vec<_> = values.map(|value| Some(value).filter(is_surface)).collect();
+        let &[rows, columns] = &numbers.shape[..] else {
+            anyhow::bail!(
+                "a depth map has two axes, rows and columns; this has {:?}",
+                numbers.shape
+            );
+        };
+        ensure!(
+            depth_mm.iter().any(Option::is_some),
+            "no surface anywhere: no depth is finite and above 0"
+        );
+        Ok(Self {
+            size: Geometry::new(u32::try_from(columns)?, u32::try_from(rows)?),
+            along,
+            depth_mm,
+            reflectivity: Vec::new(),
+        })
+    }
+
+    /// Reads the picture: one of bytes from black, 0, to white, 255, or one of floats, the
+    /// reflectivity itself, 0 to 100. Of colours it takes the mean.
+    ///
+    /// # Errors
+    /// One line with the name of the file and what is wrong with it.
+    pub fn with_picture(mut self, path: &Path) -> Result<Self> {
+        let numbers = numbers::read(&path.into())?;
+        let reflectivity = reflectivity(&numbers, self.size);
+        self.reflectivity = reflectivity.with_context(|| path.display().to_string())?;
+        Ok(self)
+    }
+
+    /// Columns and rows.
+    #[must_use]
+    pub fn size(&self) -> Geometry {
+        self.size
+    }
+
+    /// The range of what a pixel sees.
+    pub(super) fn range_mm(&self, sight: &Sight) -> Option<f64> {
+        let depth_mm = self.depth_mm[self.sample(sight)]?;
+        Some(match self.along {
+            Along::Axis => depth_mm / sight.ray[2],
+            Along::Ray => depth_mm,
+        })
+    }
+
+    /// The reflectivity of what a pixel sees.
+    pub(super) fn reflectivity(&self, sight: &Sight) -> f64 {
+        let reflectivity = self.reflectivity.get(self.sample(sight));
+        reflectivity.copied().unwrap_or(1.0)
+    }
+
+    /// No pixel sees anything nearer.
+    pub(super) fn nearest_mm(&self) -> f64 {
+        let depths = self.depth_mm.iter().flatten();
+        depths.copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// The sample that the most photons come back from: its reflectivity, and its depth.
+    pub(super) fn brightest(&self) -> Option<(f64, f64)> {
+        let samples = self.depth_mm.iter().enumerate();
+        let seen = samples.filter_map(|(sample, depth_mm)| {
+            let reflectivity = self.reflectivity.get(sample).copied().unwrap_or(1.0);
+            Some((reflectivity, (*depth_mm)?))
+        });
+        let light = |(reflectivity, depth_mm): &(f64, f64)| reflectivity / depth_mm.powi(2);
+        seen.max_by(|a, b| light(a).total_cmp(&light(b)))
+    }
+
+    /// No pixel sees anything farther away.
+    pub(super) fn farthest_mm(&self) -> f64 {
+        self.depth_mm.iter().flatten().copied().fold(0.0, f64::max)
+    }
+
+    /// The sample that the middle of a pixel lies in; on a border the later one.
+    fn sample(&self, sight: &Sight) -> usize {
+        let at = |index: u32, of: u32, samples: u32| {
+            (2 * index as usize + 1) * samples as usize / (2 * of as usize)
+        };
+        let [column, row] = sight.pixel;
+        let (array, size) = (sight.array, self.size);
+        at(row, array.rows, size.rows) * size.columns as usize
+            + at(column, array.columns, size.columns)
+    }
+}
+
+/// The reflectivity of each sample of a picture that is as large as the depth map.
+fn reflectivity(numbers: &Numbers, size: Geometry) -> Result<Vec<f64>> {
+    let shape = &numbers.shape;
+    let colours = match shape[..] {
+        [_, _] => 1,
+        [_, _, 3] => 3,
+        _ => anyhow::bail!(
+            "a picture has two axes, rows and columns, or a third of three colours; this has \
+             {shape:?}"
+        ),
+    };
+    ensure!(
+        shape[..2] == [u64::from(size.rows), u64::from(size.columns)],
+        "{} rows and {} columns, but the depth map has {} and {}",
+        shape[0],
+        shape[1],
+        size.rows,
+        size.columns
+    );
+    let white = match numbers.element {
+        Element::Byte => 255.0,
+        Element::Float => 1.0,
+        Element::Integer => anyhow::bail!(
+            "elements of a picture must be bytes or floats; convert them with .astype(numpy.uint8)"
+        ),
+    };
+    let most = MOST_REFLECTIVITY * white;
+    let wrong = numbers
+        .values
+        .iter()
+        .find(|value| !(0.0..=most).contains(*value));
+    if let Some(value) = wrong {
+        anyhow::bail!("a value of {value}: must be from 0 to {most}, white is {white}");
+    }
+    let samples = numbers.values.chunks(colours);
+    Ok(samples
+        .map(|sample| sample.iter().sum::<f64>() / (white * colours as f64))
+        .collect())
+}

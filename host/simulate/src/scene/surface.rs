@@ -1,0 +1,231 @@
+//! Surfaces: where they are, and where they go.
+
+use std::f64::consts::TAU;
+
+use serde::Deserialize;
+
+use super::depth_map::DepthMap;
+use super::sight::Sight;
+use dtof_photons::source::Geometry;
+
+/// Nothing is farther away.
+const FARTHEST_MM: f64 = 1e9;
+
+/// Something that photons come back from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    /// Its name in reports.
+    pub name: String,
+    /// Millimetres away at the start, at the first column; for a ball its centre.
+    pub range_mm: f64,
+    /// The same at the last column of the layout.
+    pub range_right_mm: f64,
+    /// How many photons come back.
+    pub light: Light,
+    /// How much light passes each way, to the surface behind and back.
+    pub transmittance: f64,
+    /// Metres a second away from the sensor.
+    pub velocity_m_per_s: f64,
+    /// Columns and rows a second across the array, to the right and down.
+    pub drift_per_s: [f64; 2],
+    /// Which places it covers.
+    pub shape: Shape,
+}
+
+/// How many photons come back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Light {
+    /// Of a surface with this share of a white one's, by the inverse square of
+    /// its range.
+    Reflectivity(f64),
+    /// Signal photons a laser cycle, whatever the range.
+    Signal(f64),
+}
+
+impl Light {
+    /// The same, by `factor`.
+    pub(super) fn times(self, factor: f64) -> Self {
+        match self {
+            Self::Reflectivity(share) => Self::Reflectivity(share * factor),
+            Self::Signal(signal) => Self::Signal(signal * factor),
+        }
+    }
+}
+
+/// Which places a surface covers at the start.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// All.
+    Everywhere,
+    /// A rectangle of the array.
+    Rectangle(Rectangle),
+    /// A ball.
+    Ball(Ball),
+    /// A fan.
+    Fan(Fan),
+    /// A plane, wherever a ray meets it.
+    Plane(Plane),
+    /// All samples of a depth map that show something.
+    DepthMap(DepthMap),
+}
+
+/// From the first column (row) up to the second, which is not covered.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rectangle {
+    /// First and last, in columns of the layout.
+    pub columns: [f64; 2],
+    /// First and last, in rows of the layout.
+    pub rows: [f64; 2],
+}
+
+/// A ball, of which the half that faces the sensor is seen.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ball {
+    /// Column and row.
+    pub centre: [f64; 2],
+    /// How large it looks, in columns.
+    pub radius: f64,
+    /// How large it is.
+    pub radius_mm: f64,
+}
+
+/// Blades around a centre that turn clockwise.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fan {
+    /// Column and row.
+    pub centre: [f64; 2],
+    /// How long the blades are, in columns.
+    pub radius: f64,
+    /// How many.
+    pub blades: u16,
+    /// How much of the circle they cover: the share of the time in which a
+    /// place sees one.
+    pub blade_share: f64,
+    /// Revolutions a minute.
+    pub rpm: f64,
+}
+
+/// A flat surface at any angle. The optical axis meets it at `range_mm`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// At right angles to it, of any length: x to the right, y down, z forward. Its z is
+    /// not 0.
+    pub normal: [f64; 3],
+}
+
+impl Surface {
+    /// Does what a pixel sees of it change?
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        let turns = matches!(&self.shape, Shape::Fan(fan) if fan.rpm != 0.0);
+        turns || self.velocity_m_per_s != 0.0 || self.drift_per_s != [0.0; 2]
+    }
+
+    /// How far away it is where a pixel looks, after `seconds`. None if it does not cover
+    /// the place.
+    pub(super) fn range_mm(&self, sight: &Sight, seconds: f64, layout: Geometry) -> Option<f64> {
+        let [column, row] = self.at_start(sight.place, seconds);
+        let nearer_mm = match &self.shape {
+            Shape::Everywhere => 0.0,
+            Shape::Rectangle(Rectangle { columns, rows }) => {
+                let covered =
+                    (columns[0]..columns[1]).contains(&column) && (rows[0]..rows[1]).contains(&row);
+                covered.then_some(0.0)?
+            }
+            Shape::Ball(ball) => {
+                let from_centre =
+                    (column - ball.centre[0]).hypot(row - ball.centre[1]) / ball.radius;
+                (from_centre < 1.0).then(|| ball.radius_mm * (1.0 - from_centre.powi(2)).sqrt())?
+            }
+            Shape::Fan(fan) => fan.covers([column, row], seconds).then_some(0.0)?,
+            Shape::Plane(plane) => {
+                return plane.along(sight.ray, self.plane_mm(0.0, seconds, layout));
+            }
+            Shape::DepthMap(map) => return map.range_mm(sight),
+        };
+        Some(self.plane_mm(column, seconds, layout) - nearer_mm)
+    }
+
+    /// How many photons come back from where a pixel looks.
+    pub(super) fn light(&self, sight: &Sight) -> Light {
+        match (&self.shape, self.light) {
+            (Shape::DepthMap(map), Light::Reflectivity(share)) => {
+                Light::Reflectivity(share * map.reflectivity(sight))
+            }
+            (_, light) => light,
+        }
+    }
+
+    /// What the most photons come back from, and how far away it is, if all of it is
+    /// `nearest_mm` away or farther.
+    pub(super) fn brightest(&self, nearest_mm: f64) -> (Light, f64) {
+        if let (Shape::DepthMap(map), Light::Reflectivity(share)) = (&self.shape, self.light)
+            && let Some((reflectivity, depth_mm)) = map.brightest()
+        {
+            return (Light::Reflectivity(share * reflectivity), depth_mm);
+        }
+        (self.light, nearest_mm)
+    }
+
+    /// The least it can be at any place of the layout after `seconds`; of a plane the
+    /// least it is anywhere.
+    pub(super) fn nearest_mm(&self, seconds: f64, layout: Geometry) -> f64 {
+        let nearer_mm = match &self.shape {
+            Shape::Plane(plane) => return plane.distance(self.plane_mm(0.0, seconds, layout)),
+            Shape::DepthMap(map) => return map.nearest_mm(),
+            Shape::Ball(ball) => ball.radius_mm,
+            _ => 0.0,
+        };
+        let ends = [0.0, f64::from(layout.columns)];
+        let ends = ends.map(|column| {
+            let [column, _] = self.at_start([column, 0.0], seconds);
+            self.plane_mm(column, seconds, layout)
+        });
+        ends[0].min(ends[1]) - nearer_mm
+    }
+
+    /// The place that has moved to `place` by now.
+    fn at_start(&self, place: [f64; 2], seconds: f64) -> [f64; 2] {
+        let [columns, rows] = self.drift_per_s;
+        [place[0] - columns * seconds, place[1] - rows * seconds]
+    }
+
+    fn plane_mm(&self, column: f64, seconds: f64, layout: Geometry) -> f64 {
+        let turned = self.range_right_mm - self.range_mm;
+        let last = f64::from(layout.columns.max(2) - 1);
+        self.range_mm + turned * column / last + self.velocity_m_per_s * 1000.0 * seconds
+    }
+}
+
+impl Plane {
+    /// How far along a ray it is, if the optical axis meets it at `axis_mm`. None if the
+    /// ray leads away from it.
+    fn along(&self, ray: [f64; 3], axis_mm: f64) -> Option<f64> {
+        let towards: f64 = self.normal.iter().zip(ray).map(|(n, side)| n * side).sum();
+        let range_mm = axis_mm * self.normal[2] / towards;
+        // Farther than that is parallel.
+        (range_mm > 0.0 && range_mm < FARTHEST_MM).then_some(range_mm)
+    }
+
+    /// How far from the lens it is.
+    fn distance(&self, axis_mm: f64) -> f64 {
+        let [x, y, z] = self.normal;
+        axis_mm * z.abs() / x.hypot(y).hypot(z)
+    }
+}
+
+impl Fan {
+    fn covers(&self, place: [f64; 2], seconds: f64) -> bool {
+        // Rows count downwards, so that angles grow clockwise.
+        let (across, down) = (place[0] - self.centre[0], place[1] - self.centre[1]);
+        if across.hypot(down) > self.radius {
+            return false;
+        }
+        let turns = down.atan2(across) / TAU - self.rpm / 60.0 * seconds;
+        (turns * f64::from(self.blades)).rem_euclid(1.0) < self.blade_share
+    }
+}
