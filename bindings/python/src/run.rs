@@ -3,23 +3,17 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use dtof_core::DepthEvent;
-use dtof_engine::Engine;
+use dtof_core::{DepthEvent, RangeScale};
 use dtof_engine::host::host_engine;
-use dtof_engine::settings::Settings;
-use dtof_engine::settings::SettingsFile;
-use dtof_engine::slices::each_slice;
-use dtof_events::aer_file::Header;
-use dtof_photons::masked::Masked;
+use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_photons::medium::Medium;
 use dtof_photons::recorded::Whole;
-use dtof_photons::source::PhotonSource;
-use dtof_run::glass::watch_glass;
+use dtof_photons::source::{PhotonSource, Slice};
+use dtof_run::Sink;
+use dtof_run::output::header;
 use dtof_run::recording::{opening, warnings};
-use dtof_run::replay::{Options, Replay};
-use dtof_run::simulate::{Options as SimulateOptions, of_scene};
-use dtof_run::summary::Summary;
-use dtof_run::truth::Comparison;
+use dtof_run::replay::Options;
+use dtof_run::simulate::Options as SimulateOptions;
 use dtof_simulate::scene::Scene;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
@@ -48,13 +42,10 @@ pub struct Ran<'py> {
 
 /// The same, before Python has it.
 struct Done {
-    /// Records of some slices each.
-    events: Vec<Vec<u8>>,
-    summary: Summary,
+    records: Records,
+    ran: dtof_run::Ran,
     said: SettingsFile,
-    array: Array,
     warnings: Vec<String>,
-    bins: Option<Vec<u64>>,
 }
 
 /// Replays a recording, a file or an array; one that is a part as it is replayed in the whole.
@@ -89,27 +80,15 @@ fn replayed(
     whole: Option<Whole>,
     watch: &Watch,
 ) -> Result<Done> {
-    let Replay {
-        mut photons,
-        mut engine,
-        settings,
-        said,
-        known,
-    } = options.open_part(input, said, whole)?;
-    let mut done = run(
-        &mut photons,
-        engine.as_mut(),
-        &settings,
-        &said,
-        watch,
-        |_| (),
-    )?;
-    done.warnings = warnings(&known).collect();
-    done.summary.input = Some(input.to_string());
-    done.summary.cut_off = known.cut_off;
-    done.summary.recording = known.rows;
-    done.summary.warnings = known.warnings;
-    Ok(done)
+    let mut replay = options.open_part(input, said, whole)?;
+    let mut records = Records::of(&replay.settings, &replay.photons)?;
+    let ran = replay.run(input, &mut records, &mut { watch })?;
+    Ok(Done {
+        records,
+        ran,
+        said: replay.said.with(&replay.settings),
+        warnings: warnings(&replay.known).collect(),
+    })
 }
 
 /// Simulates a scene: the name of a file, or the text of one.
@@ -135,31 +114,17 @@ fn simulated(
     said: SettingsFile,
     watch: &Watch,
 ) -> Result<Done> {
-    let name = scene.name();
-    let scene = options.seen(scene.read()?);
-    let said = of_scene(said, &scene).with_context(|| {
-        let file = options.given.file.as_deref();
-        file.map_or("the scene".to_owned(), |file| file.display().to_string())
-    })?;
-    let settings = said.settings(scene.bins.into())?;
-    let cycles = said.run.cycles.unwrap_or(scene.cycles);
-    let photons = scene.photons(settings.seed, cycles);
-    let photons = photons.with_context(|| name.clone())?;
-    let mut photons = Masked::new(Box::new(photons), &settings.masked)?;
-    let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses())?;
-    let mut comparison = Comparison::new(&scene, &settings, cycles)?;
-    let mut done = run(
-        &mut photons,
-        engine.as_mut(),
-        &settings,
-        &said,
-        watch,
-        |events| comparison.add(events),
-    )?;
-    done.summary.input = Some(name);
-    done.summary.field_of_view_degrees = Some(scene.view().degrees());
-    done.summary.against_truth = Some(comparison.finish());
-    Ok(done)
+    let mut simulation = options.open(scene.read()?, &scene.name(), said)?;
+    let (photons, settings) = (&simulation.photons, &simulation.settings);
+    let mut engine = host_engine(settings, photons.geometry(), &photons.addresses())?;
+    let mut records = Records::of(settings, photons)?;
+    let ran = simulation.run(engine.as_mut(), &mut records, &mut { watch })?;
+    Ok(Done {
+        records,
+        ran,
+        said: simulation.said.with(&simulation.settings),
+        warnings: Vec::new(),
+    })
 }
 
 /// A scene as Python gives it.
@@ -192,75 +157,41 @@ impl SceneGiven {
     }
 }
 
-/// Runs all of `source`, as is `said`.
-fn run(
-    source: &mut dyn PhotonSource,
-    engine: &mut dyn Engine,
-    settings: &Settings,
-    said: &SettingsFile,
-    watch: &Watch,
-    mut see: impl FnMut(&[DepthEvent]),
-) -> Result<Done> {
-    let (scale, geometry) = (settings.range_scale()?, source.geometry());
-    let cycles = source.cycles();
-    let mut bins = said
-        .sensor
-        .glass_bins
-        .as_ref()
-        .map(|_| vec![0u64; settings.bins]);
-    let mut has_reported = vec![false; geometry.addresses()];
-    let mut records = Vec::new();
-    watch.at(0, cycles)?;
-    each_slice(
-        source,
-        |slice| engine.run(slice),
-        |slice, events, done| {
-            let mut of_slice = Vec::with_capacity(events.len() * RECORD);
-            for event in &events {
-                push(&mut of_slice, event, &scale);
-                for pixel in geometry.block(event.pixel, event.level) {
-                    has_reported[usize::from(pixel.0)] = true;
-                }
-            }
-            records.push(of_slice);
-            if let Some(bins) = &mut bins {
-                let photons = slice.pixels.iter().flat_map(|pixel| &pixel.photons);
-                for photon in photons {
-                    if let Some(count) = bins.get_mut(usize::from(photon.code)) {
-                        *count += 1;
-                    }
-                }
-            }
-            see(&events);
-            watch.at(done, cycles)
-        },
-    )?;
-    let reporting = has_reported.into_iter().filter(|&has| has).count();
-    let header = Header {
-        bins: u32::try_from(settings.bins)?,
-        geometry,
-        bin_width_ps: settings.bin_width_ps,
-        offset_mm: settings.offset_mm,
-        laser_millihertz: source.laser_hz().map_or(0, |hz| hz.saturating_mul(1000)),
-        start_us: 0,
-    };
-    let mut summary = Summary::new(engine.statistics(), source, reporting, settings);
-    watch_glass(said, bins.as_deref(), &mut summary);
-    Ok(Done {
-        events: records,
-        summary,
-        said: said.with(settings),
-        array: Array::of(&header),
-        warnings: Vec::new(),
-        bins,
-    })
+/// Events as records, in memory.
+struct Records {
+    scale: RangeScale,
+    array: Array,
+    /// Those of some slices each.
+    events: Vec<Vec<u8>>,
+}
+
+impl Records {
+    fn of(settings: &Settings, source: &dyn PhotonSource) -> Result<Self> {
+        Ok(Self {
+            scale: settings.range_scale()?,
+            array: Array::of(&header(settings, source)?),
+            events: Vec::new(),
+        })
+    }
+}
+
+impl Sink for Records {
+    fn take(&mut self, _slice: &Slice, events: &[DepthEvent]) -> Result<()> {
+        let mut records = Vec::with_capacity(events.len() * RECORD);
+        for event in events {
+            push(&mut records, event, &self.scale);
+        }
+        self.events.push(records);
+        Ok(())
+    }
 }
 
 impl Done {
     fn into_python(self, py: Python) -> PyResult<Ran> {
-        let bytes = self.events.iter().map(Vec::len).sum();
+        let all_records = self.records.events;
+        let bytes = all_records.iter().map(Vec::len).sum();
         let events = PyByteArray::new_with(py, bytes, |mut all| {
-            for records in &self.events {
+            for records in &all_records {
                 let (these, rest) = all.split_at_mut(records.len());
                 these.copy_from_slice(records);
                 all = rest;
@@ -269,7 +200,7 @@ impl Done {
         })?;
         let (summary, toml, settings) = checked(|| {
             Ok((
-                serde_json::to_string(&self.summary)?,
+                serde_json::to_string(&self.ran.summary)?,
                 self.said.to_toml()?,
                 serde_json::to_string(&self.said)?,
             ))
@@ -279,9 +210,9 @@ impl Done {
             summary,
             toml,
             settings,
-            array: self.array,
+            array: self.records.array,
             warnings: self.warnings,
-            bins: self.bins,
+            bins: self.ran.bins,
         })
     }
 }

@@ -10,6 +10,7 @@ use std::thread;
 use std::time::Duration;
 
 use anyhow::{Result, ensure};
+use dtof_options::progress::Progress;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -51,6 +52,20 @@ impl Watch {
         ensure!(!self.is_stopped.load(Ordering::Relaxed), "stopped");
         Ok(())
     }
+}
+
+/// A run tells it what has been done.
+impl Progress for &Watch {
+    fn begin(&mut self, total: u64, _unit: &str) {
+        self.total.store(total, Ordering::Relaxed);
+    }
+
+    fn at(&mut self, done: u64) -> Result<()> {
+        self.done.store(done, Ordering::Relaxed);
+        self.go_on()
+    }
+
+    fn end(&mut self) {}
 }
 
 /// What a program is told of its work.

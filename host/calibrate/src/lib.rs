@@ -1,12 +1,12 @@
-//! Calibration: what a sensor needs for its settings, from whole histograms of any scene.
+#![doc = include_str!("../README.md")]
+//! ## From histograms to settings
 //!
 //! ```text
 //! histograms → pile-up → background, hot and dead pixels → peaks → cover glass → pulse
 //!   → offset → gate, window, z, L1
 //! ```
 //!
-//! Everything found comes with how sure it is. What a recording does not say is asked for by the
-//! name of the option. `docs/calibrate.md` says how each is found.
+//! `docs/calibrate.md` says how each is found.
 
 mod false_alarms;
 mod find;

@@ -1,3 +1,6 @@
+#![doc = include_str!("../README.md")]
+//! ## Command lines
+//!
 //! Command lines, alike in every program of this project: help is printed whole, an
 //! error is one line and a failure.
 

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use anyhow::Result;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use dtof_options::progress::Progress;
@@ -35,13 +36,14 @@ impl Progress for Bar {
         (self.bar, self.since) = (bar, Instant::now());
     }
 
-    fn at(&mut self, done: u64) {
+    fn at(&mut self, done: u64) -> Result<()> {
         let long = self.since.elapsed() > Duration::from_secs(1);
         if self.bar.is_hidden() && long && !self.quiet {
             // Stays hidden where standard error is not a terminal.
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }
         self.bar.set_position(done);
+        Ok(())
     }
 
     fn end(&mut self) {

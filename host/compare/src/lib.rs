@@ -1,5 +1,5 @@
-//! Which method for these photons: all of them on the same photons, how fast, how exact, how
-//! cheap; what still holds in harder conditions; and which one to take.
+#![doc = include_str!("../README.md")]
+//! ## Time against error
 //!
 //! Every rule has the threshold at which it has the false alarms that are asked for, in
 //! simulated exposures without a target at the background that there is. What is left to choose

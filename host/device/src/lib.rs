@@ -1,5 +1,4 @@
-//! The engine on a device: the same photons over the link, the same events
-//! back. [`monitor`] and [`histograms`] are of a device with a sensor.
+#![doc = include_str!("../README.md")]
 
 mod assembly;
 mod client;

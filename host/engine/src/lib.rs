@@ -1,4 +1,4 @@
-//! The engine: photons in, depth events out.
+#![doc = include_str!("../README.md")]
 
 pub mod bins;
 pub mod decisions;

@@ -1,4 +1,4 @@
-//! The output of events: tables, words, maps.
+#![doc = include_str!("../README.md")]
 
 pub mod aer_file;
 pub mod changes;

@@ -102,7 +102,7 @@ impl Survey {
             }
             survey.latest = survey.latest.max(event.cycle().0);
             if survey.all().is_multiple_of(4096) {
-                progress.at(reader.offset());
+                progress.at(reader.offset())?;
             }
         }
         selection.finish();

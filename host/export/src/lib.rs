@@ -1,9 +1,8 @@
-//! Events of an AER file in formats that other programs read. `docs/export.md` says
-//! what is in them.
+#![doc = include_str!("../README.md")]
+//! ## From events to a file
 //!
-//! The file is read twice: once to count the events up to its end, or to where it is
-//! damaged; once to write them, without ever holding more than a few of them. What is
-//! written is moved to its place when it is whole.
+//! The AER file is read once to count the events up to its end, or to where it is damaged, and once
+//! to write them. `docs/export.md` says what is in each format.
 
 mod clock;
 mod csv;
@@ -330,7 +329,7 @@ pub fn export(
             sink.write(&Event::Depth(event)).with_context(to)?;
         }
         if done.is_multiple_of(4096) {
-            progress.at(done);
+            progress.at(done)?;
         }
     }
     selection.finish();

@@ -1,13 +1,11 @@
-//! The live page: what a device or a recording does, in a browser on this computer.
+#![doc = include_str!("../README.md")]
+//! ## From a device to a page
 //!
 //! ```text
 //! device, recording → feed (a thread) → Hub → server → pages, Foxglove
 //!                       ↑ commands               ↓
 //!                       └────────────────────────┘
 //! ```
-//!
-//! The feed never waits for a page. A page is sent what has changed since its last frame; what is
-//! drawn is thinned, what is recorded never.
 
 mod feed;
 #[cfg(feature = "foxglove")]

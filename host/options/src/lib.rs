@@ -1,9 +1,8 @@
-//! Options by key and text, and how one is refused.
+#![doc = include_str!("../README.md")]
+//! ## An error that names another option
 //!
-//! A flag of the program, a key of a settings file and a keyword of Python set the same value of the same
-//! struct, so a mistake is the same error in all three. A key is written as in a settings file,
-//! `false_alarm`. Where a reason names another option it stands in backticks: whoever prints the error
-//! puts the name in its place that its user knows, `--false-alarm`.
+//! Where a reason names another option it stands in backticks, with its key in a settings file: `false_alarm`.
+//! Whoever prints the error puts the name in its place that its user knows, `--false-alarm`.
 //!
 //! ```
 //! use dtof_options::{Refused, line};

@@ -28,7 +28,7 @@ const NAMES: [(Axis, &str); 4] = [
 /// The axes of an array by name, in the order of its shape.
 ///
 /// ```
-/// use crate::axes::Axes;
+/// use dtof_photons::axes::Axes;
 ///
 /// let axes: Axes = "bins,rows,columns".parse().unwrap();
 /// assert_eq!(axes.to_string(), "bins,rows,columns");

@@ -1,4 +1,4 @@
-//! Where photons come from.
+#![doc = include_str!("../README.md")]
 
 pub mod axes;
 pub mod bins;

@@ -1,4 +1,4 @@
-//! The report on a run: one HTML page with everything in it.
+#![doc = include_str!("../README.md")]
 
 mod cloud;
 mod events;

@@ -6,7 +6,7 @@ use dtof_engine::settings::{Sensor, SettingsFile};
 
 /// Notes it in the summary of a run that was set by `said`, if `bins` has all its photons bin by
 /// bin.
-pub fn watch_glass(said: &SettingsFile, bins: Option<&[u64]>, summary: &mut Summary) {
+pub(crate) fn watch_glass(said: &SettingsFile, bins: Option<&[u64]>, summary: &mut Summary) {
     if let Some(bins) = bins {
         let run = RunPhotons {
             bins,

@@ -14,8 +14,10 @@ use anyhow::{Context, Error, Result, ensure};
 use dtof_core::{DepthEvent, EchoNumber, PixelAddress, RangeScale};
 use tempfile::NamedTempFile;
 
+use crate::Sink;
 use crate::summary::{self, Summary};
 use dtof_draw::svg;
+use dtof_engine::Engine;
 use dtof_engine::decisions::{Decision, Kept};
 use dtof_engine::settings::Settings;
 use dtof_engine::settings::{self, SettingsFile};
@@ -48,6 +50,7 @@ pub struct Output {
     inputs: Vec<PathBuf>,
     /// The settings of the run.
     settings: SettingsFile,
+    bins: usize,
     /// Unless it is not wanted.
     csv: Option<BufWriter<NamedTempFile>>,
     aer: aer_file::Writer<BufWriter<NamedTempFile>>,
@@ -63,8 +66,8 @@ pub struct Output {
     selection: Option<Selection>,
     /// If they are asked for.
     changes: Option<Changes>,
-    /// All photons of the run, bin by bin, if the settings know what a cover glass sends back.
-    bins: Option<Vec<u64>>,
+    /// The pixels of the photons.
+    pixels: Vec<PixelAddress>,
 }
 
 impl Output {
@@ -95,20 +98,14 @@ impl Output {
         let name = || folder.display().to_string();
         let mut csv = BufWriter::new(aside(folder, OF_A_RUN)?);
         writeln!(csv, "{}", events_csv::HEADER).with_context(name)?;
-        let header = aer_file::Header {
-            bins: u32::try_from(settings.bins)?,
-            geometry,
-            bin_width_ps: settings.bin_width_ps,
-            offset_mm: settings.offset_mm,
-            laser_millihertz: source.laser_hz().map_or(0, |hz| hz.saturating_mul(1000)),
-            start_us: 0,
-        };
+        let header = header(settings, source)?;
         let aer = BufWriter::new(aside(folder, OF_A_RUN)?);
         let aer = aer_file::Writer::new(aer, &header).with_context(name)?;
         Ok(Self {
             folder: folder.to_owned(),
             inputs,
             settings: SettingsFile::default().with(settings),
+            bins: settings.bins,
             csv: Some(csv),
             aer,
             scale,
@@ -119,7 +116,7 @@ impl Output {
             echo: None,
             selection: selection(None, settings),
             changes: None,
-            bins: None,
+            pixels: source.addresses(),
         })
     }
 
@@ -128,8 +125,6 @@ impl Output {
     /// # Errors
     /// If a result would replace it.
     pub fn with_settings(mut self, said: SettingsFile, file: Option<&Path>) -> Result<Self> {
-        let has_glass = said.sensor.glass_bins.is_some();
-        self.bins = has_glass.then(|| vec![0; said.sensor.bins.unwrap_or_default().into()]);
         self.settings = said;
         self.inputs.extend(file.map(Path::to_owned));
         may_hold_results(&self.folder, &self.inputs)?;
@@ -162,44 +157,6 @@ impl Output {
         Self { csv, ..self }
     }
 
-    /// Writes events in the order they come.
-    ///
-    /// # Errors
-    /// If the disk does not take them.
-    pub fn write(&mut self, events: &[DepthEvent]) -> Result<()> {
-        for event in events {
-            let csv = self.csv.as_mut();
-            csv.map_or(Ok(()), |csv| events_csv::write(csv, event, &self.scale))
-                .and_then(|()| self.aer.write(&aer_file::Event::Depth(*event)))
-                .with_context(|| self.folder.display().to_string())?;
-            if let Some(changes) = &mut self.changes {
-                changes.add(event);
-            }
-            if self.echo.is_none() {
-                self.sample.add(event, range_mm(event, &self.scale));
-            }
-            match &mut self.selection {
-                Some(selection) => selection.push(*event),
-                None => self.show(event),
-            }
-            self.show_decided();
-        }
-        Ok(())
-    }
-
-    /// There are no more events: none waits for another echo of its exposure.
-    pub fn end_events(&mut self) {
-        if let Some(selection) = &mut self.selection {
-            selection.finish();
-        }
-        self.show_decided();
-    }
-
-    /// The report shows what the last events of pixels were decided from: all that are kept.
-    pub fn keep(&mut self, kept: Kept, decisions: Vec<Decision>) {
-        self.decisions = Some((kept, decisions));
-    }
-
     fn show_decided(&mut self) {
         while let Some(event) = self.selection.as_mut().and_then(Selection::next) {
             self.show(&event);
@@ -212,31 +169,6 @@ impl Output {
         if self.echo.is_some() {
             self.sample.add(event, range_mm(event, &self.scale));
         }
-    }
-
-    /// Takes the photons of `pixels` into account.
-    pub fn count(&mut self, pixels: &[PixelAddress], slice: &Slice) {
-        self.maps.count(pixels, slice);
-        let photons = slice.pixels.iter().flat_map(|pixel| &pixel.photons);
-        if let Some(bins) = &mut self.bins {
-            for photon in photons {
-                if let Some(count) = bins.get_mut(usize::from(photon.code)) {
-                    *count += 1;
-                }
-            }
-        }
-    }
-
-    /// All photons bin by bin, if the settings know what a cover glass sends back.
-    #[must_use]
-    pub fn bins(&self) -> Option<&[u64]> {
-        self.bins.as_deref()
-    }
-
-    /// The events so far, pixel by pixel.
-    #[must_use]
-    pub fn maps(&self) -> &Maps {
-        &self.maps
     }
 
     /// Which echoes maps and report show, if pixels report several.
@@ -354,6 +286,63 @@ impl Output {
         }
         Ok(())
     }
+}
+
+impl Sink for Output {
+    /// The report shows what the last events of pixels were decided from.
+    fn begin(&mut self, source: &dyn PhotonSource, engine: &mut dyn Engine) {
+        let kept = Kept::of(source.geometry(), self.bins);
+        engine.keep_decisions(&|pixel| kept.holds(pixel));
+        self.decisions = Some((kept, Vec::new()));
+    }
+
+    fn take(&mut self, slice: &Slice, events: &[DepthEvent]) -> Result<()> {
+        self.maps.count(&self.pixels, slice);
+        for event in events {
+            let csv = self.csv.as_mut();
+            csv.map_or(Ok(()), |csv| events_csv::write(csv, event, &self.scale))
+                .and_then(|()| self.aer.write(&aer_file::Event::Depth(*event)))
+                .with_context(|| self.folder.display().to_string())?;
+            if let Some(changes) = &mut self.changes {
+                changes.add(event);
+            }
+            if self.echo.is_none() {
+                self.sample.add(event, range_mm(event, &self.scale));
+            }
+            match &mut self.selection {
+                Some(selection) => selection.push(*event),
+                None => self.show(event),
+            }
+            self.show_decided();
+        }
+        Ok(())
+    }
+
+    /// No event waits for another echo of its exposure.
+    fn end(&mut self, engine: &dyn Engine) {
+        if let Some(selection) = &mut self.selection {
+            selection.finish();
+        }
+        self.show_decided();
+        if let Some((_, decisions)) = &mut self.decisions {
+            *decisions = engine.decisions();
+        }
+    }
+}
+
+/// The header of an AER file with the events of `source`.
+///
+/// # Errors
+/// Never: a run has at most 1024 bins.
+pub fn header(settings: &Settings, source: &dyn PhotonSource) -> Result<aer_file::Header> {
+    Ok(aer_file::Header {
+        bins: u32::try_from(settings.bins)?,
+        geometry: source.geometry(),
+        bin_width_ps: settings.bin_width_ps,
+        offset_mm: settings.offset_mm,
+        laser_millihertz: source.laser_hz().map_or(0, |hz| hz.saturating_mul(1000)),
+        start_us: 0,
+    })
 }
 
 /// What chooses the echo of each exposure, if a pixel reports several and not all are shown.

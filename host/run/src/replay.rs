@@ -6,11 +6,13 @@ use anyhow::{Context, Result, ensure};
 
 use super::given::{FRAME, Given, SENSOR};
 use super::recording::{RECORDING, of_file, opening};
+use super::run::{Ran, Sink, run};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_engine::settings::{Detection, SettingsFile};
 use dtof_options::Refused;
+use dtof_options::progress::Progress;
 use dtof_photons::masked::Masked;
 use dtof_photons::medium::Medium;
 use dtof_photons::open::{Known, Opening, open};
@@ -58,6 +60,28 @@ pub struct Replay {
     pub said: SettingsFile,
     /// What is known of the recording.
     pub known: Known,
+}
+
+impl Replay {
+    /// Replays all of `input`, which it was opened from, into `sink`.
+    ///
+    /// # Errors
+    /// Those of [`run`].
+    pub fn run(
+        &mut self,
+        input: &Medium,
+        sink: &mut dyn Sink,
+        progress: &mut dyn Progress,
+    ) -> Result<Ran> {
+        let how = (&self.settings, &self.said);
+        let engine = self.engine.as_mut();
+        let mut ran = run(&mut self.photons, engine, how, &mut [sink], progress)?;
+        ran.summary.input = Some(input.to_string());
+        ran.summary.cut_off = self.known.cut_off;
+        ran.summary.recording.clone_from(&self.known.rows);
+        ran.summary.warnings.clone_from(&self.known.warnings);
+        Ok(ran)
+    }
 }
 
 impl Options {

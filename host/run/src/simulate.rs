@@ -2,14 +2,20 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
+use dtof_core::DepthEvent;
 use dtof_core::fixed::types::U16F16;
 
 use super::given::{FRAME, Given, SENSOR};
-use dtof_engine::settings::{Detection, Rays, Run, Sensor, SettingsFile};
+use super::run::{Ran, Sink, run};
+use super::truth::Comparison;
+use dtof_engine::Engine;
+use dtof_engine::settings::{Detection, Rays, Run, Sensor, Settings, SettingsFile};
 use dtof_options::Refused;
 use dtof_options::numbers::{truth, whole};
-use dtof_photons::source::Geometry;
+use dtof_options::progress::Progress;
+use dtof_photons::masked::Masked;
+use dtof_photons::source::{Geometry, PhotonSource, Slice};
 use dtof_simulate::scene::Scene;
 
 /// What is simulated beside the scene, and how.
@@ -59,14 +65,90 @@ impl Options {
         self.given.merged()
     }
 
-    /// The scene as the array sees it.
-    #[must_use]
-    pub fn seen(&self, mut scene: Scene) -> Scene {
+    /// `scene` as the array sees it, and as is `said`. Errors call it `name`.
+    ///
+    /// # Errors
+    /// If what is said is for other histograms, or there are more pixels than addresses.
+    pub fn open(&self, mut scene: Scene, name: &str, said: SettingsFile) -> Result<Simulation> {
         scene.geometry = self.array.unwrap_or(scene.geometry);
-        match self.laser_off {
-            true => scene.with_laser_off(),
-            false => scene,
+        if self.laser_off {
+            scene = scene.with_laser_off();
         }
+        let said = of_scene(said, &scene).with_context(|| match &self.given.file {
+            Some(file) => file.display().to_string(),
+            None => "the scene".to_owned(),
+        })?;
+        let settings = said.settings(scene.bins.into())?;
+        Simulation::new(scene, settings, said, Some(name.to_owned()))
+    }
+}
+
+/// A simulation that can begin.
+pub struct Simulation {
+    /// The scene.
+    pub scene: Scene,
+    /// Its photons.
+    pub photons: Masked,
+    /// How the pixels operate.
+    pub settings: Settings,
+    /// What was said of them, and what the scene says besides.
+    pub said: SettingsFile,
+    /// What summary and errors call the scene; none where it is a part of the program.
+    pub input: Option<String>,
+}
+
+impl Simulation {
+    /// Of `scene`, with `settings`, which come of `said`. Summary and errors call it `input`.
+    ///
+    /// # Errors
+    /// If there are more pixels than addresses, or one that is left out is not there.
+    pub fn new(
+        scene: Scene,
+        settings: Settings,
+        said: SettingsFile,
+        input: Option<String>,
+    ) -> Result<Self> {
+        let cycles = said.run.cycles.unwrap_or(scene.cycles);
+        let photons = scene.photons(settings.seed, cycles);
+        let photons = match &input {
+            Some(name) => photons.with_context(|| name.clone())?,
+            None => photons?,
+        };
+        Ok(Self {
+            photons: Masked::new(Box::new(photons), &settings.masked)?,
+            scene,
+            settings,
+            said,
+            input,
+        })
+    }
+
+    /// Runs all of it with `engine`, on this computer or a device, into `sink`. The events are
+    /// compared with the scene.
+    ///
+    /// # Errors
+    /// Those of [`run`].
+    pub fn run(
+        &mut self,
+        engine: &mut dyn Engine,
+        sink: &mut dyn Sink,
+        progress: &mut dyn Progress,
+    ) -> Result<Ran> {
+        let mut comparison = Comparison::new(&self.scene, &self.settings, self.photons.cycles())?;
+        let how = (&self.settings, &self.said);
+        let sinks: &mut [&mut dyn Sink] = &mut [sink, &mut comparison];
+        let mut ran = run(&mut self.photons, engine, how, sinks, progress)?;
+        ran.summary.input.clone_from(&self.input);
+        ran.summary.field_of_view_degrees = Some(self.scene.view().degrees());
+        ran.summary.against_truth = Some(comparison.finish());
+        Ok(ran)
+    }
+}
+
+impl Sink for Comparison<'_> {
+    fn take(&mut self, _slice: &Slice, events: &[DepthEvent]) -> Result<()> {
+        self.add(events);
+        Ok(())
     }
 }
 

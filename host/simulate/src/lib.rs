@@ -1,5 +1,5 @@
-//! Simulated photons: for each pixel a background, a signal and a pulse, and
-//! the effects of light and detector that are switched on.
+#![doc = include_str!("../README.md")]
+//! ## The model
 //!
 //! Background photons are Poisson distributed and spread evenly over the bins;
 //! signal photons are Poisson distributed and normally distributed around the

@@ -8,10 +8,10 @@ use dtof::path;
 use dtof_engine::settings::Run;
 use dtof_options::numbers::{MOST_WHOLE, whole};
 use dtof_photons::source::Geometry;
-use dtof_run::simulate::{array, of_scene};
+use dtof_run::simulate::{Simulation, array, of_scene};
 use dtof_simulate::demo;
 
-use super::simulate::Simulation;
+use super::simulate::Results;
 
 #[derive(Parser)]
 pub struct Demo {
@@ -62,13 +62,10 @@ impl Demo {
              across.",
             scene.geometry.columns, scene.geometry.rows
         );
-        Simulation {
-            scene: &scene,
+        let simulation = Simulation::new(scene, settings, said, None)?;
+        Results {
             input: None,
             light: Vec::new(),
-            cycles: self.cycles,
-            settings: &settings,
-            said: &said,
             file: None,
             changes: None,
             echo: None,
@@ -79,6 +76,6 @@ impl Demo {
             lead: &lead,
             quiet: self.quiet,
         }
-        .run()
+        .of(simulation)
     }
 }

@@ -9,11 +9,10 @@ use dtof::progress::Bar;
 use dtof_engine::settings::SettingsFile;
 use dtof_events::echoes::Echo;
 use dtof_photons::medium::Medium;
-use dtof_run::glass::watch_glass;
+use dtof_run::Ran;
 use dtof_run::output::Output;
 use dtof_run::recording::warnings;
-use dtof_run::replay::{Options, Replay as Opened};
-use dtof_run::run;
+use dtof_run::replay::Options;
 
 use super::dynamic_depth::Shown;
 use super::flags::{Flags, name};
@@ -52,35 +51,19 @@ impl Replay {
 
     fn replay(&self, said: &SettingsFile) -> Result<()> {
         let changes = self.changes.wanted()?;
-        let Opened {
-            mut photons,
-            mut engine,
-            settings,
-            said,
-            known,
-        } = self.options.0.open(&Medium::from(&self.input), said)?;
-        let mut output = Output::create(&self.out, &settings, &photons, Some(&self.input))?
-            .with_settings(said.with(&settings), self.options.0.given.file.as_deref())?
+        let input = Medium::from(&self.input);
+        let mut replay = self.options.0.open(&input, said)?;
+        let settings = &replay.settings;
+        let file = self.options.0.given.file.as_deref();
+        let mut output = Output::create(&self.out, settings, &replay.photons, Some(&self.input))?
+            .with_settings(replay.said.with(settings), file)?
             .with_changes(changes.as_ref())?
-            .with_echo(self.echo, &settings)
+            .with_echo(self.echo, settings)
             .without_csv(self.no_csv);
-        warn(&self.input, warnings(&known), self.quiet);
-        let mut summary = run(
-            &mut photons,
-            engine.as_mut(),
-            &mut output,
-            &settings,
-            &mut Bar::new(self.quiet),
-            |_| (),
-        )?;
-        let input = self.input.display().to_string();
+        warn(&self.input, warnings(&replay.known), self.quiet);
+        let Ran { summary, .. } = replay.run(&input, &mut output, &mut Bar::new(self.quiet))?;
         let lead = format!("Recorded photons of {input}.");
-        summary.input = Some(input);
-        watch_glass(&said, output.bins(), &mut summary);
-        summary.cut_off = known.cut_off;
-        summary.recording = known.rows;
-        summary.warnings = known.warnings;
-        output.finish(&summary, settings.title(), &lead, &[])?;
+        output.finish(&summary, replay.settings.title(), &lead, &[])?;
         if !self.quiet {
             print_summary(&summary, &[], &self.out)?;
         }

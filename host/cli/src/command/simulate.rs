@@ -17,14 +17,10 @@ use dtof_link::DynamicDepth;
 use dtof_options::Refused;
 use dtof_options::rows::Row;
 use dtof_photons::geometry::FieldOfView;
-use dtof_photons::masked::Masked;
 use dtof_photons::source::{Geometry, PhotonSource};
 use dtof_report::Section;
-use dtof_run::glass::watch_glass;
 use dtof_run::output::Output;
-use dtof_run::run;
-use dtof_run::simulate::{Options, of_scene};
-use dtof_run::truth::Comparison;
+use dtof_run::simulate::{Options, Simulation};
 use dtof_simulate::scene::Scene;
 
 use super::dynamic_depth::Shown;
@@ -73,27 +69,20 @@ impl Simulate {
     }
 
     fn simulate(&self, said: SettingsFile) -> Result<()> {
-        let scene = self.options.0.seen(self.view.scene(self.scene.as_deref())?);
-        let said = of_scene(said, &scene).with_context(|| match &self.options.0.given.file {
-            Some(file) => file.display().to_string(),
-            None => "the scene".to_owned(),
-        })?;
-        let settings = said.settings(scene.bins.into())?;
+        let scene = self.view.scene(self.scene.as_deref())?;
+        let input = self.scene.as_deref().or(self.view.depth.as_deref());
+        let name = input.unwrap_or(Path::new("")).display().to_string();
+        let simulation = self.options.0.open(scene, &name, said)?;
         let file = self.view.input(self.scene.as_deref());
-        let Geometry { columns, rows } = scene.geometry;
+        let Geometry { columns, rows } = simulation.scene.geometry;
         let laser = if self.options.0.laser_off {
             ", the laser off"
         } else {
             ""
         };
-        let lead = format!("Simulated photons of {file}, {columns}×{rows} macropixels{laser}.");
-        Simulation {
-            scene: &scene,
-            input: self.scene.as_deref().or(self.view.depth.as_deref()),
-            light: self.view.rows(&scene),
-            cycles: said.run.cycles.unwrap_or(scene.cycles),
-            settings: &settings,
-            said: &said,
+        Results {
+            input,
+            light: self.view.rows(&simulation.scene),
             file: self.options.0.given.file.as_deref(),
             changes: self.changes.wanted()?,
             echo: self.echo,
@@ -101,24 +90,20 @@ impl Simulate {
             image: self.image.as_deref(),
             out: &self.out,
             no_csv: self.no_csv,
-            lead: &lead,
+            lead: &format!("Simulated photons of {file}, {columns}×{rows} macropixels{laser}."),
             quiet: self.quiet,
         }
-        .run()
+        .of(simulation)
     }
 }
 
-/// One run of a scene.
-pub struct Simulation<'a> {
-    pub scene: &'a Scene,
+/// What comes of a scene, and where.
+pub struct Results<'a> {
     /// The file the scene comes from, if there is one.
     pub input: Option<&'a Path>,
     /// What is to be said of its light, if it is not in a scene file alone.
     pub light: Vec<Row>,
-    pub cycles: u64,
-    pub settings: &'a Settings,
-    /// What was said of them, and the file that did.
-    pub said: &'a SettingsFile,
+    /// The settings file.
     pub file: Option<&'a Path>,
     /// Dynamic depth, if the report is to show it.
     pub changes: Option<DynamicDepth>,
@@ -135,48 +120,35 @@ pub struct Simulation<'a> {
     pub quiet: bool,
 }
 
-impl Simulation<'_> {
-    pub fn run(self) -> Result<()> {
-        let photons = self.scene.photons(self.settings.seed, self.cycles);
-        let photons = match self.input {
-            Some(file) => photons.with_context(|| file.display().to_string())?,
-            None => photons?,
-        };
-        let mut photons = Masked::new(Box::new(photons), &self.settings.masked)?;
+impl Results<'_> {
+    pub fn of(self, mut simulation: Simulation) -> Result<()> {
+        let Simulation {
+            photons, settings, ..
+        } = &simulation;
         let mut engine = engine(
             self.device,
             self.image,
-            self.settings,
+            settings,
             photons.geometry(),
             &photons.addresses(),
         )?;
-        let mut output = Output::create(self.out, self.settings, &photons, self.input)?
-            .with_settings(self.said.with(self.settings), self.file)?
+        let mut output = Output::create(self.out, settings, photons, self.input)?
+            .with_settings(simulation.said.with(settings), self.file)?
             .with_changes(self.changes.as_ref())?
-            .with_echo(self.echo, self.settings)
+            .with_echo(self.echo, settings)
             .without_csv(self.no_csv);
-        let mut comparison = Comparison::new(self.scene, self.settings, self.cycles)?;
-        let mut summary = run(
-            &mut photons,
-            engine.as_mut(),
-            &mut output,
-            self.settings,
-            &mut Bar::new(self.quiet),
-            |events| comparison.add(events),
-        )?;
-        watch_glass(self.said, output.bins(), &mut summary);
-        summary.input = self.input.map(|file| file.display().to_string());
-        summary.field_of_view_degrees = Some(self.scene.view().degrees());
-        summary.export_with = export_with(self.scene);
-        let against_truth = comparison.finish();
+        let progress = &mut Bar::new(self.quiet);
+        let ran = simulation.run(engine.as_mut(), &mut output, progress)?;
+        let mut summary = ran.summary;
+        summary.export_with = export_with(&simulation.scene);
         let mut surfaces = self.light;
-        surfaces.extend(against_truth.rows(self.settings.reports()));
-        summary.against_truth = Some(against_truth);
+        let against_truth = summary.against_truth.iter();
+        surfaces.extend(against_truth.flat_map(|truth| truth.rows(summary.settings.reports())));
         let sections = [Section {
             heading: "Surfaces",
             rows: &surfaces,
         }];
-        output.finish(&summary, self.settings.title(), self.lead, &sections)?;
+        output.finish(&summary, summary.settings.title(), self.lead, &sections)?;
         if !self.quiet {
             print_summary(&summary, &surfaces, self.out)?;
         }

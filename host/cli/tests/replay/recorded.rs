@@ -243,7 +243,10 @@ fn every_pixel_of_the_demo_reports_alone_or_in_a_block() {
         ("event-counts", "demo-events"),
         ("photon-counts", "demo-photons"),
     ] {
-        let path = format!("{}/../../docs/figures/{shown}.svg", env!("CARGO_MANIFEST_DIR"));
+        let path = format!(
+            "{}/../../docs/figures/{shown}.svg",
+            env!("CARGO_MANIFEST_DIR")
+        );
         let committed = std::fs::read_to_string(path).unwrap();
         assert!(read(&format!("{picture}.svg")) == committed, "{shown}");
     }

@@ -9,7 +9,9 @@ use dtof_photons::source::Geometry;
 use dtof_simulate::scene::Scene;
 
 fn repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../..")
+        .join(path)
 }
 
 #[track_caller]

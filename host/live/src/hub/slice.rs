@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use dtof_events::aer_file::Event;
-use dtof_export::foxglove::{self, MOST_POINTS, Tally};
+use dtof_export::foxglove::{MOST_POINTS, Tally};
 use dtof_photons::source::Geometry;
 
 /// What has arrived since it was taken last.
@@ -56,7 +56,7 @@ impl Slice {
 
     /// What has arrived: the events that were kept, the counts of all, and how many were left out.
     #[cfg(feature = "foxglove")]
-    pub fn take(&mut self) -> (Vec<Event>, foxglove::Statistics, u64) {
+    pub fn take(&mut self) -> (Vec<Event>, dtof_export::foxglove::Statistics, u64) {
         self.number += 1;
         let left_out = std::mem::take(&mut self.left_out);
         (self.events.drain(..).collect(), self.tally.take(), left_out)

@@ -190,8 +190,8 @@ impl Desk {
             let done = self
                 .photons
                 .map_or(so_far.elapsed.as_secs(), |_| so_far.photons);
-            progress.at(done);
-            interrupt::is_interrupted()
+            progress.at(done).is_err()
+                || interrupt::is_interrupted()
                 || so_far.elapsed >= length
                 || self.photons.is_some_and(|most| so_far.photons >= most)
         });

@@ -1,0 +1,93 @@
+//! Photons through an engine, slice by slice.
+
+use anyhow::Result;
+use dtof_core::DepthEvent;
+
+use crate::glass::watch_glass;
+use crate::summary::Summary;
+use dtof_engine::Engine;
+use dtof_engine::settings::{Settings, SettingsFile};
+use dtof_engine::slices::each_slice;
+use dtof_options::progress::Progress;
+use dtof_photons::source::{PhotonSource, Slice};
+
+/// Where the photons and the events of a run go.
+pub trait Sink {
+    /// The run begins.
+    fn begin(&mut self, _source: &dyn PhotonSource, _engine: &mut dyn Engine) {}
+
+    /// Takes a slice of photons, and the events of its laser cycles.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    fn take(&mut self, slice: &Slice, events: &[DepthEvent]) -> Result<()>;
+
+    /// The run has ended.
+    fn end(&mut self, _engine: &dyn Engine) {}
+}
+
+/// A run that has ended.
+#[derive(Clone, Debug)]
+pub struct Ran {
+    /// Its totals.
+    pub summary: Summary,
+    /// Its photons bin by bin, if the settings know what the cover glass sends back.
+    pub bins: Option<Vec<u64>>,
+}
+
+/// Runs all of `source` with `settings`, which come of `said`, into `sinks`.
+///
+/// # Errors
+/// What is wrong with the recording, the engine or a sink, or that `progress` wants no more.
+pub fn run(
+    source: &mut dyn PhotonSource,
+    engine: &mut dyn Engine,
+    (settings, said): (&Settings, &SettingsFile),
+    sinks: &mut [&mut dyn Sink],
+    progress: &mut dyn Progress,
+) -> Result<Ran> {
+    let geometry = source.geometry();
+    let mut has_reported = vec![false; geometry.addresses()];
+    let has_glass = said.sensor.glass_bins.is_some();
+    let mut bins = has_glass.then(|| vec![0; settings.bins]);
+    for sink in &mut *sinks {
+        sink.begin(source, engine);
+    }
+    progress.begin(source.cycles(), "laser cycles");
+    progress.at(0)?;
+    each_slice(
+        source,
+        |slice| engine.run(slice),
+        |slice, events, done| {
+            for event in &events {
+                for pixel in geometry.block(event.pixel, event.level) {
+                    has_reported[usize::from(pixel.0)] = true;
+                }
+            }
+            if let Some(bins) = &mut bins {
+                add_photons(slice, bins);
+            }
+            for sink in &mut *sinks {
+                sink.take(slice, &events)?;
+            }
+            progress.at(done)
+        },
+    )?;
+    progress.end();
+    for sink in &mut *sinks {
+        sink.end(engine);
+    }
+    let reporting = has_reported.into_iter().filter(|&has| has).count();
+    let mut summary = Summary::new(engine.statistics(), source, reporting, settings);
+    watch_glass(said, bins.as_deref(), &mut summary);
+    Ok(Ran { summary, bins })
+}
+
+/// Photons past the last bin are counted elsewhere.
+fn add_photons(slice: &Slice, bins: &mut [u64]) {
+    for photon in slice.pixels.iter().flat_map(|pixel| &pixel.photons) {
+        if let Some(count) = bins.get_mut(usize::from(photon.code)) {
+            *count += 1;
+        }
+    }
+}
