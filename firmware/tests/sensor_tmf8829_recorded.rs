@@ -105,7 +105,7 @@ fn recorded_histograms_come_out_as_recorded_and_give_the_sensors_distances() {
     let about = bench.sensor.about();
     let scale = RangeScale::new(about.bin_width.unwrap(), about.offset).unwrap();
     let gate = RangeGate::<128>::new(0, about.bins - 1).unwrap();
-    // As in `host-tests/tests/recorded_echoes.rs`.
+    // As in `host-tests/tests/simulations/recorded_echoes.rs`.
     let z = z_for(100, &gate, 4, 40, 2000);
     let rule = WindowRule::new(3, z, Count::saturating(5)).unwrap();
     let two = EchoNumber::new(2).unwrap();

@@ -3,7 +3,7 @@
 //! off it is. Needs the public TMF8820 capture log, as `recorded.rs` does, prints a
 //! table, and holds it against `docs/results/data/recorded_rules.csv`.
 
-#[path = "../../host-tests/tests/capture_log/mod.rs"]
+#[path = "../../host-tests/tests/simulations/capture_log.rs"]
 mod capture_log;
 
 use std::fmt::Write as _;

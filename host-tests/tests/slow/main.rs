@@ -19,7 +19,7 @@ mod pico;
 mod readers;
 mod report;
 mod rp2040;
-#[path = "../../../host/cli/tests/common/sensed.rs"]
+#[path = "../../../host/cli/tests/program/common/sensed.rs"]
 mod sensed;
 mod soak;
 mod stack;

@@ -8,6 +8,8 @@
 //!
 //! `docs/calibrate.md` says how each is found.
 
+#![deny(clippy::print_stderr, clippy::print_stdout)]
+
 mod false_alarms;
 mod find;
 mod remarks;

@@ -6,6 +6,8 @@
 //! is how many photons a peak must hold: more make a report later and more exact. So each
 //! method is a curve of time against error, and frames of all lengths are another.
 
+#![deny(clippy::print_stderr, clippy::print_stdout)]
+
 pub mod answer;
 pub mod bound;
 mod chart;

@@ -4,6 +4,8 @@
 //! The AER file is read once to count the events up to its end, or to where it is damaged, and once
 //! to write them. `docs/export.md` says what is in each format.
 
+#![deny(clippy::print_stderr, clippy::print_stdout)]
+
 mod clock;
 mod csv;
 mod events;

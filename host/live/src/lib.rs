@@ -7,6 +7,8 @@
 //!                       └────────────────────────┘
 //! ```
 
+#![deny(clippy::print_stderr, clippy::print_stdout)]
+
 mod feed;
 #[cfg(feature = "foxglove")]
 mod foxglove;

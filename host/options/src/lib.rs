@@ -15,6 +15,8 @@
 //! );
 //! ```
 
+#![deny(clippy::print_stderr, clippy::print_stdout)]
+
 pub mod files;
 pub mod numbers;
 pub mod progress;

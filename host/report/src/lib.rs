@@ -1,4 +1,5 @@
 #![doc = include_str!("../README.md")]
+#![deny(clippy::print_stderr, clippy::print_stdout)]
 
 mod cloud;
 mod events;

@@ -21,6 +21,8 @@
 //! Each effect has random numbers of its own: switching one on leaves those of
 //! all others as they were.
 
+#![deny(clippy::print_stderr, clippy::print_stdout)]
+
 mod array;
 mod arrival;
 pub mod demo;

@@ -43,7 +43,7 @@ const HIGHEST_MEAN: f64 = 1700.0;
 /// Fewer events say too little of their probability.
 const FEWEST_EVENTS: u64 = 20;
 /// Between its points an upper limit of the table may be too low by this factor,
-/// no more (`host-tests/tests/theory_exposures.rs`).
+/// no more (`host-tests/tests/simulations/theory_exposures.rs`).
 pub const MARGIN: f64 = 1.4;
 /// Above the upper limit of a simulated probability lie as many of its samples.
 const UPPER_TAIL: f64 = 0.01;

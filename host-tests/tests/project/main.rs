@@ -1,0 +1,10 @@
+//! The project about itself: its packages, pages, sizes and rules.
+
+mod architecture;
+mod doors;
+mod eye_safety;
+mod links;
+mod modules;
+mod packages;
+mod paper;
+mod sizes;

@@ -1,0 +1,204 @@
+//! The cover glass: gates that leave it out, glasses with a tail, and glasses that get brighter.
+
+use crate::calibration::{recorded, slices};
+use crate::long_or;
+use dtof_calibrate::{
+    Asked, Calibration, Change, Length, Nearest, Observed, RunPhotons, calibrate, glass_change,
+};
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::SettingsFile;
+use dtof_photons::recorded::Capture;
+use dtof_photons::source::PhotonSource;
+use dtof_simulate::scene::Scene;
+
+/// A wall 37.5 mm a bin away, two nearer surfaces, and the glass.
+fn scene(background: f64, glass: f64, more: &str) -> Scene {
+    let text = format!(
+        "columns = 16\nrows = 8\nbackground = {background:?}\npulse_sigma_bins = 0.8\n\
+         [[surface]]\nposition_bins = 90.3\nsignal = 0.2\n\
+         [[surface]]\nposition_bins = 60.8\nsignal = 0.25\nrectangle = {{ columns = [0, 5], rows = [0, 8] }}\n\
+         [[surface]]\nposition_bins = 40.1\nsignal = 0.3\nrectangle = {{ columns = [8, 12], rows = [2, 7] }}\n\
+         [cover_glass]\nsignal = {glass:?}\nposition_bins = 5.3\n{more}\n"
+    );
+    Scene::parse(&text).unwrap()
+}
+
+fn found(scene: &Scene, cycles: u64, seed: u64) -> Calibration {
+    let captures = [recorded(scene, cycles, seed)];
+    let observed = Observed {
+        geometry: scene.geometry,
+        captures: &captures,
+        length: Length::Cycles(cycles),
+        cycles: None,
+        bin_width_ps: 250.0,
+        truth_mm: None,
+    };
+    calibrate(&observed, &Asked::default()).unwrap()
+}
+
+/// Events of the scene with these settings, and how many are farther than three bins from what
+/// their pixel sees.
+fn events(scene: &Scene, settings: &SettingsFile, cycles: u64) -> (usize, usize) {
+    let settings = settings.settings(128).unwrap();
+    let photons = scene.photons(99, cycles).unwrap();
+    let mut engine = host_engine(&settings, scene.geometry, &photons.addresses()).unwrap();
+    let (mut all, mut wrong) = (0, 0);
+    slices(photons, cycles, |slice| {
+        for event in engine.run(slice).unwrap() {
+            let truth = scene.truth(event.pixel, 0).unwrap().range_mm / scene.mm_per_bin();
+            let at = f64::from(event.position().raw()) / 256.0;
+            all += 1;
+            wrong += usize::from((at - truth).abs() > 3.0);
+        }
+    });
+    (all, wrong)
+}
+
+#[test]
+fn a_glass_ten_times_the_signal_leaves_no_false_events() {
+    for &background in long_or(&[0.005, 0.05][..], &[0.05]) {
+        let scene = scene(background, 2.5, "");
+        let found = found(&scene, 20_000, 1);
+        let settings = found.settings(SettingsFile::default()).unwrap();
+        let (all, wrong) = events(&scene, &settings, 10_000);
+        println!("background {background}: {wrong} of {all} events are false");
+        assert!(all > 2000, "{all}");
+        assert!(100 * wrong <= all, "{wrong} of {all}");
+        // Without the gate nothing but the glass is reported.
+        let mut open = settings;
+        open.sensor.gate = None;
+        let (all, wrong) = events(&scene, &open, 2000);
+        assert!(10 * wrong > 9 * all, "{wrong} of {all}");
+    }
+}
+
+/// The rate of a glass with a tail in a bin, by its formula: a Gaussian convolved with an
+/// exponential, integrated over the bin in steps.
+fn with_tail(bin: u16, position: f64, sigma: f64, share: f64, decay: f64) -> f64 {
+    let gaussian = |x: f64| (-x * x / 2.0).exp() / (2.0 * std::f64::consts::PI).sqrt();
+    let below = |x: f64| libm::erfc(-x / std::f64::consts::SQRT_2) / 2.0;
+    let steps = 50;
+    let density = |t: f64| {
+        let z = (t - position) / sigma;
+        let late = (sigma / decay - z) * sigma / decay - (sigma / decay).powi(2) / 2.0;
+        (1.0 - share) * gaussian(z) / sigma + share / decay * late.exp() * below(z - sigma / decay)
+    };
+    let middles =
+        (0..steps).map(|step| f64::from(bin) + (f64::from(step) + 0.5) / f64::from(steps));
+    middles.map(density).sum::<f64>() / f64::from(steps)
+}
+
+#[test]
+fn a_glass_with_a_long_tail_ends_where_its_photons_do() {
+    let (share, decay) = (0.3, 6.0);
+    let tail = format!("[tail]\nshare = {share:?}\ndecay_bins = {decay:?}");
+    let scene = scene(0.02, 2.0, &tail);
+    let matters = |bin: &u16| {
+        2.0 * 2000.0 * with_tail(*bin, 5.3, 0.8, share, decay) >= 0.5 * (0.02f64 * 2000.0).sqrt()
+    };
+    let end = (0..128).rev().find(matters).unwrap() + 1;
+    for seed in 3..long_or(6, 4) {
+        let found = found(&scene, 40_000, seed);
+        let Nearest::Glass(glass) = &found.nearest else {
+            panic!("{:?}", found.nearest);
+        };
+        println!("ends at {end}, found {} {:?}", glass.end, glass.end_between);
+        assert!(glass.has_tail);
+        assert!(
+            found.gate.0.abs_diff(end) <= 1,
+            "{} for {end}",
+            found.gate.0
+        );
+    }
+}
+
+#[test]
+fn one_pixel_cannot_tell_a_glass_from_a_near_surface() {
+    let text = "background = 0.02\n[[surface]]\nposition_bins = 60\nsignal = 0.3\n\
+                [cover_glass]\nsignal = 1\nposition_bins = 5";
+    let scene = Scene::parse(text).unwrap();
+    let found = found(&scene, 20_000, 1);
+    assert!(
+        matches!(found.nearest, Nearest::WallOrGlass(4..=5)),
+        "{:?}",
+        found.nearest
+    );
+    assert_eq!(found.gate.0, 0);
+}
+
+/// All photons of a run, summed over pixels.
+fn summed(capture: &Capture) -> Vec<u64> {
+    let mut sums = vec![0; 128];
+    for counts in capture {
+        for (sum, count) in sums.iter_mut().zip(counts) {
+            *sum += count;
+        }
+    }
+    sums
+}
+
+/// What a run of `scene` says about the glass of `settings`.
+fn change(scene: &Scene, settings: &SettingsFile, cycles: u64, seed: u64) -> Change {
+    let bins = summed(&recorded(scene, cycles, seed));
+    let run = RunPhotons {
+        bins: &bins,
+        cycles,
+        pixels: 128,
+    };
+    let sensor = &settings.sensor;
+    let (first, _) = sensor.gate.unwrap();
+    glass_change(&run, sensor.glass_bins.as_ref().unwrap(), first)
+}
+
+#[test]
+fn a_glass_that_got_brighter_is_flagged_and_nothing_else_is() {
+    let glass = 2.0;
+    let calibrated = scene(0.02, glass, "");
+    let settings = found(&calibrated, 20_000, 5)
+        .settings(SettingsFile::default())
+        .unwrap();
+    for seed in 0..long_or(10, 1) {
+        let now = |scene: &Scene| change(scene, &settings, 4000, 100 + seed);
+        match now(&scene(0.02, 1.3 * glass, "")) {
+            Change::Brighter(factor, least) => {
+                assert!(
+                    (factor - 1.3).abs() < 0.03 && least > 1.1,
+                    "{factor} {least}"
+                );
+            }
+            other => panic!("30 % brighter: {other:?}"),
+        }
+        assert!(matches!(
+            now(&scene(0.02, 0.7 * glass, "")),
+            Change::Dimmer(..)
+        ));
+        // Other ambient light, darker or ten times as bright.
+        for background in [0.0, 0.005, 0.1, 0.2] {
+            let found = now(&scene(background, glass, ""));
+            assert!(matches!(found, Change::Same(_)), "{background}: {found:?}");
+        }
+        // A bright target before the gate in eight of 128 pixels.
+        for position in [3.2, 5.3, 6.9] {
+            let near = format!(
+                "[[surface]]\nposition_bins = {position:?}\nsignal = 3\n\
+                 rectangle = {{ columns = [4, 6], rows = [0, 4] }}"
+            );
+            let found = now(&scene(0.02, glass, &near));
+            assert!(
+                !matches!(found, Change::Brighter(..) | Change::Dimmer(..)),
+                "{position}: {found:?}"
+            );
+        }
+    }
+    // A hundred laser cycles of one pixel's share say nothing.
+    let dim = scene(0.2, 0.05, "");
+    let settings = SettingsFile {
+        sensor: dtof_engine::settings::Sensor {
+            glass_bins: Some(vec![0.0, 0.0, 0.001, 0.01, 0.02, 0.015, 0.004]),
+            gate: Some((8, 127)),
+            ..dtof_engine::settings::Sensor::default()
+        },
+        ..SettingsFile::default()
+    };
+    assert_eq!(change(&dim, &settings, 20, 1), Change::NotSure);
+}

@@ -1,0 +1,8 @@
+//! Options of the command line: how they are read, and the files that they name.
+
+mod kept;
+mod mistakes;
+mod numbers;
+mod rule;
+mod settings;
+mod tune;

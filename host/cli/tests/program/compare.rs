@@ -1,0 +1,166 @@
+//! `dtof compare`, end to end.
+
+mod figures;
+
+use std::fmt::Write;
+use std::fs;
+
+use crate::common::{Scratch, names, npy, says};
+
+const SCENE: &str = "columns = 8\nrows = 4\ncycles = 6000\nbackground = 0.02\nlaser_rate_mhz = 2\n\
+     [[surface]]\nrange_mm = 2000\nsignal = 0.5\n";
+const FILES: [&str; 5] = [
+    "compare.svg",
+    "dtof.toml",
+    "methods.csv",
+    "report.html",
+    "stress.csv",
+];
+
+/// Four pixels with a pulse at 1.5 bins more each, and background; the third sees nothing.
+fn photons(scratch: &Scratch) {
+    let mut text = "pixel,cycle,bin\n".to_owned();
+    let mut state = 1u64;
+    let mut next = |below: u64| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (state >> 33) % below
+    };
+    for cycle in 0..8000 {
+        for pixel in 0..4 {
+            if pixel != 2 && next(2) == 0 {
+                // A triangle of three bins.
+                let bin = 40 + 3 * pixel / 2 + next(2) + next(2);
+                writeln!(text, "{pixel},{cycle},{bin}").unwrap();
+            }
+            if next(2) == 0 {
+                writeln!(text, "{pixel},{cycle},{}", next(128)).unwrap();
+            }
+        }
+    }
+    scratch.file("photons.csv", text);
+}
+
+#[test]
+fn a_scene_has_an_answer_that_simulate_takes() {
+    let scratch = Scratch::new();
+    scratch.file("scene.toml", SCENE);
+    let printed = scratch.printed("compare --scene scene.toml --within 12 --out out");
+    for part in [
+        "32 pixels, 6,000 laser cycles",
+        "0.0200 background photons",
+        "errors of at most 12.0 mm",
+        "instructions a laser cycle and pixel",
+        "out/dtof.toml has these settings.",
+    ] {
+        says(&printed, part);
+    }
+    assert_eq!(names(&scratch.path("out")), FILES);
+    scratch.printed("compare --scene scene.toml --within 12 --out again --quiet");
+    for name in FILES {
+        let read = |folder| fs::read(scratch.path(folder).join(name)).unwrap();
+        assert!(read("out") == read("again"), "{name}");
+    }
+    // The chart has what the table has, and names its unit.
+    let table = scratch.read("out/methods.csv");
+    let chart = scratch.read("out/compare.svg");
+    for part in [
+        "window of 3",
+        "blocks of 2×2",
+        "frames",
+        "average of all bins",
+    ] {
+        says(&table, part);
+        says(&chart, part);
+    }
+    says(&chart, "µs");
+    let stress = scratch.read("out/stress.csv");
+    says(
+        &stress,
+        "\"a glass inside the gate, ten times the signal\",no,\"window of 3\"",
+    );
+    says(&stress, "\"twice the background\",yes,\"window of 3\"");
+
+    // The settings have the time and the error that the answer says.
+    scratch.printed("simulate --scene scene.toml --settings out/dtof.toml --seed 77 --out run");
+    let summary: serde_json::Value =
+        serde_json::from_str(&scratch.read("run/summary.json")).unwrap();
+    let truth = &summary["against_truth"];
+    let rms = truth["rms_mm"].as_f64().unwrap();
+    assert!((9.0..15.0).contains(&rms), "{rms}");
+}
+
+#[test]
+fn a_recording_without_truth_is_held_against_itself() {
+    let scratch = Scratch::new();
+    photons(&scratch);
+    let line = "compare --input photons.csv --columns 2 --sigma-bins 0.7 --within 9 --out out";
+    let printed = scratch.printed(line);
+    says(&printed, "take ");
+    says(&printed, "slowest tenth       of the pixels: ");
+    says(&scratch.read("out/compare.svg"), "laser cycles");
+    let own = "errors are against the range of all photons of the pixel";
+    says(&scratch.read("out/report.html"), own);
+    // Pixel 2 has no target: its reports are counted apart.
+    let truth = npy(
+        "<f8",
+        "(2, 2)",
+        &[1500.0f64, 1556.0, 0.0, 1668.0]
+            .map(f64::to_le_bytes)
+            .concat(),
+    );
+    scratch.file("truth.npy", truth);
+    let printed = scratch.printed(&format!("{line} --truth truth.npy"));
+    says(&printed, "take ");
+    says(
+        &scratch.read("out/report.html"),
+        "errors are against the true range",
+    );
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused() {
+    let scratch = Scratch::new();
+    photons(&scratch);
+    scratch.file("scene.toml", SCENE);
+    scratch.file("dark.toml", "columns = 2\nbackground = 0.02\n");
+    scratch.file("three.npy", npy("<f8", "(3,)", &[0; 24]));
+    scratch.file("none.npy", npy("<f8", "(4,)", &[0; 32]));
+    scratch.file("key.toml", "[detection]\nrules = 1\n");
+    let recording = "--input photons.csv --columns 2 --bin-width-ps 250 --sigma-bins 0.7";
+    scratch.all_refused(
+        "compare --out out",
+        &format!(
+            "--within 4 | error: --input is needed
+            --input photons.csv --scene scene.toml | cannot be used with
+            --scene scene.toml --truth three.npy | cannot be used with
+            --scene scene.toml --within 0 | must be a number above 0
+            --scene scene.toml --false-alarm 0.5 | at most 0.1
+            --scene scene.toml --settings key.toml | key.toml: rules is unknown; is it rule?
+            --scene missing.toml | missing.toml: No such file
+            --scene dark.toml | dark.toml: no pixel has a target: there is nothing to compare
+            {recording} --truth three.npy | three.npy: 3 ranges, but there are 4 pixels
+            {recording} --truth none.npy | none.npy: no pixel has a range"
+        ),
+    );
+    // Runs and comparisons do not replace each other's files.
+    scratch.printed("simulate --scene scene.toml --out run --quiet");
+    let output = scratch.run("compare --scene scene.toml --out run");
+    says(
+        &String::from_utf8(output.stderr).unwrap(),
+        "run: holds the results of a run",
+    );
+    scratch.file("compared/methods.csv", "");
+    let output = scratch.run("simulate --scene scene.toml --out compared");
+    says(
+        &String::from_utf8(output.stderr).unwrap(),
+        "compared: holds the results of a comparison",
+    );
+    scratch.file("out/methods.csv", "mine\n");
+    let output = scratch.run("compare --scene scene.toml --out out");
+    let message = String::from_utf8(output.stderr).unwrap();
+    says(&message, "out/methods.csv: was not written by this program");
+    assert_eq!(scratch.read("out/methods.csv"), "mine\n");
+    assert_eq!(names(&scratch.path("out")), ["methods.csv"]);
+}

@@ -1,0 +1,56 @@
+//! Devices at the other end of a port: the engine, the monitor and its recordings, calibration.
+
+mod bad_wire;
+#[cfg(target_os = "linux")]
+mod cable;
+mod calibrate;
+mod calibrate_refused;
+mod clock;
+mod desk;
+mod engine;
+mod map;
+mod masked;
+mod monitor;
+mod recording;
+#[cfg(target_os = "linux")]
+mod saved;
+mod stopped;
+#[path = "../../../../firmware/tests/common/wire.rs"]
+mod wire;
+
+use std::io::{self, ErrorKind, Write};
+
+use crate::common::port::{listen, serve};
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{Count, PaperRule};
+use dtof_device::Client;
+use dtof_engine::settings::Settings;
+use dtof_simulate::scene;
+
+fn client(name: &str) -> Client {
+    Client::new(dtof_device::open(name, None).unwrap()).unwrap()
+}
+
+/// What the monitor asks of its devices.
+fn settings() -> Settings {
+    Settings {
+        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
+        l1: 40,
+        x: 4,
+        ..scene::settings(0)
+    }
+}
+
+/// Takes so many bytes, then nobody reads any more.
+struct Closing(usize);
+
+impl Write for Closing {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let room = self.0.checked_sub(bytes.len());
+        self.0 = room.ok_or(ErrorKind::BrokenPipe)?;
+        Ok(bytes.len())
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

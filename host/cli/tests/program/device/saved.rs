@@ -1,0 +1,171 @@
+//! A recording while the disk is full, and of a program that is killed: what was printed is in the
+//! file that is not complete, and nothing else is touched.
+
+use std::io::Read;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::Duration;
+
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+use crate::common::{Scratch, names, says, skipped};
+use crate::device::monitor::{LONG, device, reference};
+
+const OLDER: &str = "older";
+
+/// The rows of the file that is left, which must be all there is beside the older one. It is not
+/// complete, and says so.
+#[track_caller]
+fn left(scratch: &Scratch) -> String {
+    let names = names(&scratch.path(""));
+    let [partial, events] = &names[..] else {
+        panic!("{names:?}");
+    };
+    assert_eq!(
+        (&events[..], &scratch.read(events)[..]),
+        ("events.aer", OLDER)
+    );
+    assert!(partial.starts_with(".dtof-recording-") && partial.ends_with(".partial"));
+    let decoded = scratch.run(&format!("decode {partial}"));
+    assert_eq!(decoded.status.code(), Some(1));
+    let message = String::from_utf8(decoded.stderr).unwrap();
+    assert_eq!(message.lines().count(), 1, "{message}");
+    says(&message, "the file ends ");
+    let rows = String::from_utf8(decoded.stdout).unwrap();
+    assert!(reference().starts_with(&rows), "{rows}");
+
+    // Other programs get as much.
+    let exported = scratch.run(&format!("export {partial} --format csv --out points.csv"));
+    assert_eq!(exported.status.code(), Some(1));
+    let points = scratch.read("points.csv").lines().count();
+    assert_eq!(points, rows.lines().count().max(1));
+    rows
+}
+
+/// Whole rows of what was printed.
+fn whole(printed: &str) -> &str {
+    &printed[..printed.rfind('\n').map_or(0, |end| end + 1)]
+}
+
+/// Rows below the names of the columns.
+fn events(rows: &str) -> usize {
+    whole(rows).lines().count().saturating_sub(1)
+}
+
+/// Kills a recording at a moment that the seed gives; rows that were printed and that are left.
+fn killed(seed: u64) -> [usize; 2] {
+    let scratch = Scratch::new();
+    scratch.file("events.aer", OLDER);
+    let line = format!(
+        "monitor --pixels 4 --columns 2 --device {} --record events.aer",
+        device(true, LONG)
+    );
+    let mut command = scratch.command(&line);
+    let command = command.stdout(Stdio::piped()).stderr(Stdio::null());
+    let mut child = command.spawn().unwrap();
+    let mut stdout = child.stdout.take().unwrap();
+    // The name of the first column: it has begun.
+    stdout.read_exact(&mut [0; 5]).unwrap();
+    let microseconds = Pcg32::seed_from_u64(seed).next_u32() % 1_500_000;
+    thread::sleep(Duration::from_micros(microseconds.into()));
+    child.kill().unwrap();
+    let mut printed = "cycle".to_owned();
+    stdout.read_to_string(&mut printed).unwrap();
+    child.wait().unwrap();
+    let rows = left(&scratch);
+    assert!(
+        rows.starts_with(whole(&printed)) || events(&printed) == 0,
+        "seed {seed}: printed, not saved"
+    );
+    [&printed[..], &rows].map(events)
+}
+
+#[test]
+fn what_was_printed_before_the_program_was_killed_is_in_the_file_it_left() {
+    let kills: u64 = match std::env::var_os("DTOF_LONG") {
+        Some(_) => 60,
+        None => 20,
+    };
+    let mut sums = [0; 2];
+    for first in (0..kills).step_by(10) {
+        thread::scope(|scope| {
+            let runs = (first..first + 10).map(|seed| scope.spawn(move || killed(seed)));
+            for run in runs.collect::<Vec<_>>() {
+                let rows = run.join().unwrap();
+                sums[0] += rows[0];
+                sums[1] += rows[1];
+            }
+        });
+    }
+    assert!(sums[0] > 0 && sums[1] >= sums[0], "{sums:?}");
+    println!(
+        "faults: recording killed {kills} times: {} events printed, {} saved, 0 wrong, 0 earlier files damaged",
+        sums[0], sums[1]
+    );
+}
+
+/// The disk takes so many bytes of a file.
+fn full(bytes: usize) -> usize {
+    let scratch = Scratch::new();
+    scratch.file("events.aer", OLDER);
+    let line = format!(
+        "monitor --pixels 4 --columns 2 --seconds 30 --device {} --record events.aer",
+        device(true, LONG)
+    );
+    let program = scratch.command(&line);
+    let mut limited = Command::new("sh");
+    let shell = format!("trap '' XFSZ; exec prlimit --fsize={bytes} \"$@\"");
+    limited
+        .current_dir(scratch.path(""))
+        .args(["-c", &shell, "sh"]);
+    limited.arg(program.get_program()).args(program.get_args());
+    let output = limited.output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{bytes} bytes: {output:?}");
+    let message = String::from_utf8(output.stderr).unwrap();
+    let mut errors = message
+        .lines()
+        .filter(|line| !line.starts_with("events/s "));
+    let error = errors.next().unwrap();
+    assert_eq!(errors.next(), None, "{message}");
+    says(error, "events.aer: File too large");
+    if bytes < 64 {
+        // There is no header, and so nothing to keep.
+        assert_eq!(names(&scratch.path("")), ["events.aer"]);
+        assert_eq!(scratch.read("events.aer"), OLDER);
+        return 0;
+    }
+    let partial = names(&scratch.path("")).swap_remove(0);
+    says(error, &format!("{partial} has what was recorded"));
+    let printed = String::from_utf8(output.stdout).unwrap();
+    let rows = left(&scratch);
+    assert!(rows.starts_with(whole(&printed)) || events(&printed) == 0);
+    // All that fits is there: the rest is less than a word, or than what one may need.
+    let saved = events(&rows);
+    assert!(
+        64 + 16 * saved + 32 + 16 > bytes,
+        "{bytes} bytes hold {saved} events"
+    );
+    saved
+}
+
+#[test]
+fn a_recording_on_a_full_disk_keeps_what_came_and_says_where() {
+    if !Path::new("/usr/bin/prlimit").exists() {
+        skipped("a recording on a full disk", "prlimit");
+        return;
+    }
+    let limits = [0, 1, 63, 64, 65, 79, 80, 95, 96, 97, 200, 500, 1000, 1234];
+    let mut saved = 0;
+    thread::scope(|scope| {
+        let runs = limits.map(|bytes| scope.spawn(move || full(bytes)));
+        saved = runs.into_iter().map(|run| run.join().unwrap()).sum();
+    });
+    assert!(saved > 0);
+    println!(
+        "faults: recording on {} full disks: {saved} events kept where the line says, 0 wrong, 0 earlier files \
+         damaged",
+        limits.len()
+    );
+}

@@ -1,0 +1,11 @@
+//! `dtof export`: each format, and files and options that it refuses.
+
+mod damage;
+mod echoes;
+mod event_camera;
+#[cfg(target_os = "linux")]
+mod memory;
+mod plane;
+mod points;
+mod rates;
+mod refused;

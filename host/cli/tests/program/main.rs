@@ -1,0 +1,14 @@
+//! The program as its users run it, and the libraries behind it.
+
+mod common;
+
+mod arguments;
+mod calibrate;
+mod compare;
+mod device;
+mod export;
+mod replay;
+mod saving;
+mod scene;
+mod simulation;
+mod view;

@@ -1,0 +1,319 @@
+//! Arrays that NumPy has written (`numpy/make.py`), end to end.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::common::{Scratch, npy, says};
+
+fn array(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/program/replay/numpy");
+    folder.join(name)
+}
+
+#[test]
+fn every_order_and_type_gives_the_same_events() {
+    let scratch = Scratch::new();
+    let mut all = Vec::new();
+    for (name, options) in [
+        ("plain.npy", "--axes captures,rows,columns,bins"),
+        ("fortran.npy", "--axes captures,rows,columns,bins"),
+        ("bins_first.npy", "--axes bins,captures,rows,columns"),
+        ("turned.npy", "--axes columns,bins,captures,rows"),
+        ("floats.npy", "--axes captures,rows,columns,bins"),
+        ("doubles.npy", "--axes captures,rows,columns,bins"),
+        ("one.npz", "--axes captures,rows,columns,bins"),
+        ("two.npz", "--axes captures,rows,columns,bins --array lit"),
+    ] {
+        let options = format!("{options} --recorded-cycles 100");
+        let summary = scratch.replayed(&array(name), &options);
+        assert_eq!(
+            [&summary["pixels"], &summary["photons"]],
+            [8, 808],
+            "{name}"
+        );
+        assert_eq!(summary["warnings"], serde_json::json!([]), "{name}");
+        all.push((name, scratch.events()));
+    }
+    for (name, events) in &all {
+        assert_eq!(events, &all[0].1, "{name}");
+    }
+    // The peak bin is the pixel's number; that of the last is bin 7 with one photon more.
+    let events = &all[0].1;
+    assert!(events.len() >= 8 && events.iter().all(|event| event[1] == event[3]));
+}
+
+#[test]
+fn without_names_the_last_axis_is_the_bins() {
+    let scratch = Scratch::new();
+    let named = scratch.replayed(&array("plain.npy"), "--axes captures,rows,columns,bins");
+    let events = scratch.events();
+    let summary = scratch.replayed(&array("plain.npy"), "");
+    assert_eq!(scratch.events(), events);
+    assert_eq!(summary, named);
+}
+
+#[test]
+fn a_capture_has_a_length_of_its_own() {
+    let scratch = Scratch::new();
+    // The first capture is ten times as bright as the second.
+    let data: Vec<u8> = [100u8, 10].iter().flat_map(|&count| [count; 8]).collect();
+    let input = scratch.file("two.npy", npy("|u1", "(2, 8)", &data));
+    let summary = scratch.replayed(&input, "--axes captures,bins");
+    assert_eq!(summary["recorded_cycles"], serde_json::json!([80, 800]));
+    let summary = scratch.replayed(&input, "--axes rows,bins");
+    assert_eq!(summary["recorded_cycles"], serde_json::json!([800, 800]));
+    says(&scratch.read("out/event-counts.svg"), ">row<");
+}
+
+#[test]
+fn photon_lists_of_every_type_give_the_same_events() {
+    let scratch = Scratch::new();
+    let rows: String = (0..60)
+        .map(|cycle| match cycle % 2 {
+            0 => format!("0,{cycle},40\n3,{cycle},7\n"),
+            _ => format!("0,{cycle},40\n"),
+        })
+        .collect();
+    let csv = scratch.file("list.csv", format!("pixel,cycle,bin\n{rows}"));
+    let summary = scratch.replayed(&csv, "--columns 2 --cycles 50");
+    assert_eq!([&summary["photons"], &summary["not_replayed"]], [75, 15]);
+    let events = scratch.read("out/events.csv");
+    assert!(events.lines().count() > 2);
+    for name in ["list.npy", "list_turned.npy", "list_aligned.npy"] {
+        let of_array = scratch.replayed(&array(name), "--columns 2 --cycles 50");
+        assert_eq!(scratch.read("out/events.csv"), events, "{name}");
+        for count in ["photons", "not_replayed", "pixels", "cycles"] {
+            assert_eq!(of_array[count], summary[count], "{name}");
+        }
+        let not_read = &of_array["recording"]["fields not read"];
+        assert_eq!(not_read == "time", name == "list_turned.npy");
+    }
+}
+
+#[test]
+fn bins_are_padded_and_the_gate_leaves_out_what_was_added() {
+    let scratch = Scratch::new();
+    let mut counts = vec![1u8; 20];
+    counts[12] = 200;
+    let input = scratch.file("h.npy", npy("|u1", "(1, 20)", &counts));
+    let output = scratch.replay(&input, "");
+    let said = String::from_utf8(output.stdout).unwrap();
+    says(&said, "empty bins added");
+    let summary = scratch.summary();
+    assert_eq!(summary["recording"]["bins of the recording"], "20");
+    assert_eq!(summary["recording"]["empty bins added"], "12");
+    let settings = &summary["settings"];
+    assert_eq!(settings["bins"], 32);
+    assert_eq!(settings["gate"], serde_json::json!([0, 19]));
+    assert_eq!([&summary["photons"], &summary["gated_out"]], [219, 0]);
+    // A gate of one's own stands.
+    let summary = scratch.replayed(&input, "--gate 4..19");
+    assert_eq!(summary["settings"]["gate"], serde_json::json!([4, 19]));
+}
+
+#[test]
+fn neighbours_are_added_up_and_bins_cut_off_and_all_is_counted() {
+    let scratch = Scratch::new();
+    let mut counts = vec![1u8; 67];
+    counts[12] = 200;
+    let input = scratch.file("h.npy", npy("|u1", "(1, 67)", &counts));
+    // 33 pairs and a single bin: 16 pairs are kept.
+    let summary = scratch.replayed(&input, "--rebin 2 --bins 16 --bin-width-ps 100");
+    assert_eq!([&summary["photons"], &summary["cut_off"]], [231, 35]);
+    let settings = &summary["settings"];
+    assert_eq!(settings["bins"], 16);
+    assert_eq!(settings["bin_width_ps"], 200.0);
+    assert_eq!(settings["gate"], serde_json::Value::Null);
+    let recording = &summary["recording"];
+    assert_eq!(
+        recording["neighbours added up"],
+        "34 sums of 2, the last of 1"
+    );
+    assert_eq!(recording["bins cut off"], "the last 18, with 35 photons");
+    assert!(scratch.events().iter().all(|event| event[3] == "6"));
+    // The sum of one bin is no sum of two: the gate leaves it out, and says so.
+    let summary = scratch.replayed(&input, "--rebin 2");
+    assert_eq!(summary["settings"]["gate"], serde_json::json!([0, 32]));
+    assert_eq!([&summary["gated_out"], &summary["cut_off"]], [1, 0]);
+    // Of lists, too.
+    let rows = "0,0,255\n0,1,254\n0,2,12\n";
+    let list = scratch.file("list.csv", format!("pixel,cycle,bin\n{rows}"));
+    let summary = scratch.replayed(&list, "--rebin 4 --bins 64");
+    assert_eq!(summary["settings"]["bin_width_ps"], 1000.0);
+    assert_eq!(summary["photons"], 3);
+}
+
+#[test]
+fn what_is_surely_wrong_is_said() {
+    let scratch = Scratch::new();
+    let warned = |input: &Path, options: &str, part: &str| {
+        let output = scratch.replay(input, options);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            output.status.success() && said.lines().count() == 1,
+            "{said}"
+        );
+        says(&said, &format!("warning: {}: ", input.display()));
+        says(&said, part);
+        let warnings = &scratch.summary()["warnings"];
+        says(warnings[0].as_str().unwrap(), part);
+        says(&scratch.read("out/report.html"), part);
+        let output = scratch.replay(input, &format!("{options} --quiet"));
+        assert!(output.stderr.is_empty());
+    };
+    let dark = scratch.file("dark.npy", npy("|u1", "(2, 8)", &[0; 16]));
+    warned(&dark, "", "no photons: all 2 histograms are empty");
+    let plain = array("plain.npy");
+    warned(&plain, "--bin-width-ps 0.25", "0.250 ns are 250");
+    // 16 bins, the pulse in bin 9, before 4 rows of 8 columns.
+    let mut counts = vec![10u8; 16 * 32];
+    counts[9 * 32..10 * 32].fill(200);
+    let turned = scratch.file("turned.npy", npy("|u1", "(16, 4, 8)", &counts));
+    warned(&turned, "", "the first axis looks like the bins");
+    let summary = scratch.replayed(&turned, "--axes bins,rows,columns");
+    assert_eq!(summary["warnings"], serde_json::json!([]));
+}
+
+#[test]
+fn arrays_that_hold_no_counts_are_refused() {
+    let scratch = Scratch::new();
+    let inputs = [
+        "fraction.npy",
+        "nan.npy",
+        "two.npz",
+        "one.npz",
+        "list.npy",
+        "plain.npy",
+    ];
+    for name in inputs {
+        fs::copy(array(name), scratch.path(name)).unwrap();
+    }
+    scratch.file("list.csv", "pixel,cycle,bin\n0,0,5\n1,0,5\n");
+    scratch.file("no.npz", "PK");
+    scratch.file("wide.npy", npy("|u1", "(1, 5000)", &[1; 5000]));
+    scratch.file("long.npy", npy("|u1", "(1, 1500)", &[1; 1500]));
+    scratch.all_refused(
+        "replay --out out --input",
+        "
+            fraction.npy | fraction.npy: element [1, 0, 1, 3] is 0.5
+            nan.npy | nan.npy: element [1, 0, 1, 3] is NaN
+            two.npz | two.npz: 2 arrays: choose one with --array: dark, lit
+            two.npz --array grey | no array \"grey\"; there is dark, lit
+            one.npz --array grey | no array \"grey\"; there is counts
+            plain.npy --array a | --array is for .npz files
+            no.npz | no.npz: not an .npz file
+            plain.npy --axes rows,columns,bins | has 3 names, but the array [2, 2, 2, 8] has 4 axes
+            plain.npy --axes rows,columns | one axis must be the bins
+            plain.npy --axes rows,rows,bins | rows is there twice
+            plain.npy --axes x,bins | captures, rows, columns, bins
+            plain.npy --axes bins,captures,rows,columns | 2 bins: must be from 8 to 4096
+            plain.npy --columns 3 | --columns 3: plain.npy has 2; this is for photon lists
+            plain.npy --rebin 2 | makes 4 whole bins of 8
+            plain.npy --rebin 0 | --rebin
+            list.npy --axes bins | --axes is for arrays of histograms
+            list.npy --recorded-cycles 5 | is for histograms
+            list.npy --bins 32 | list.npy: record 0: bin 40 is past the last of 32 bins
+            list.npy --binning 1 | list.npy: --binning needs to know the array: say --columns
+            list.csv --binning 1 | list.csv: --binning needs to know the array: say --columns
+            wide.npy | 5000 bins: must be at most 4096
+            long.npy | 1500 bins are more than 1024: add up neighbours with --rebin 2
+            plain.npy --rebin 400 | makes 0 whole bins of 8
+            list.npy --rebin 400 | list.npy: --rebin 400: makes bins of 250 ps too wide
+        ",
+    );
+}
+
+#[test]
+fn records_that_are_not_photons_are_named_by_number() {
+    let scratch = Scratch::new();
+    let record = |pixel: i16, cycle: i32, bin: i16| {
+        [
+            &pixel.to_le_bytes()[..],
+            &cycle.to_le_bytes(),
+            &bin.to_le_bytes(),
+        ]
+        .concat()
+    };
+    let refused = |fields: &str, records: &[Vec<u8>], parts: &[&str]| {
+        let header = format!(
+            "{{'descr': {fields}, 'fortran_order': False, 'shape': ({},), }}",
+            records.len()
+        );
+        let mut bytes = b"\x93NUMPY\x01\x00\xf6\x00".to_vec();
+        bytes.extend(header.bytes());
+        bytes.resize(255, b' ');
+        bytes.push(b'\n');
+        bytes.extend(records.concat());
+        let input = scratch.file("list.npy", bytes);
+        scratch.refused(&scratch.replay(&input, ""), parts);
+    };
+    let fields = "[('pixel', '<i2'), ('cycle', '<i4'), ('bin', '<i2')]";
+    let good = record(0, 5, 1);
+    let cases = [
+        (record(-1, 5, 1), "a number is negative"),
+        (record(0, 4, 1), "cycle 4 comes after cycle 5"),
+        (record(0, 5, 128), "bin 128 is past the last of 128 bins"),
+    ];
+    for (bad, part) in cases {
+        refused(
+            fields,
+            &[good.clone(), bad],
+            &["list.npy: record 1: ", part],
+        );
+    }
+    refused(fields, &[], &["list.npy", "no photons"]);
+    let no_bin = fields.replace("'bin'", "'tof'");
+    refused(
+        &no_bin,
+        std::slice::from_ref(&good),
+        &["pixel, cycle, tof", "must have pixel, cycle and bin"],
+    );
+    let float = fields.replace("'<i4'", "'<f4'");
+    refused(
+        &float,
+        std::slice::from_ref(&good),
+        &["field cycle is <f4: must be an integer"],
+    );
+    refused(
+        "[('pixel', '<i2'), ('cycle', '<i4')]",
+        &[good],
+        &["the header claims"],
+    );
+}
+
+#[test]
+fn events_csv_is_left_out_and_that_of_an_earlier_run_removed() {
+    let scratch = Scratch::new();
+    let input = array("plain.npy");
+    let with = scratch.replayed(&input, "");
+    let aer = fs::read(scratch.path("out/events.aer")).unwrap();
+    let without = scratch.replayed(&input, "--no-csv");
+    assert_eq!(with, without);
+    assert!(!scratch.path("out/events.csv").exists());
+    assert_eq!(fs::read(scratch.path("out/events.aer")).unwrap(), aer);
+    // Never what is not of a run.
+    scratch.file("out/events.csv", "mine\n");
+    let output = scratch.replay(&input, "--no-csv");
+    assert!(!output.status.success());
+    assert_eq!(scratch.read("out/events.csv"), "mine\n");
+    let scene = scratch.file(
+        "scene.toml",
+        "cycles = 100\n[[surface]]\nrange_mm = 1000\nsignal = 1\n",
+    );
+    fs::remove_dir_all(scratch.path("out")).unwrap();
+    scratch.simulated(&scene, "--no-csv");
+    assert!(!scratch.path("out/events.csv").exists() && scratch.path("out/events.aer").exists());
+}
+
+#[test]
+fn blocks_do_not_reach_across_captures() {
+    let scratch = Scratch::new();
+    let options = "--axes captures,rows,columns,bins --binning 1";
+    scratch.file("three.npy", npy("|u1", "(2, 3, 4, 8)", &[1; 192]));
+    scratch.all_refused(
+        "replay --out out --input",
+        &format!("three.npy {options} | three.npy: --binning 1: blocks of 2x2 pixels would reach across captures"),
+    );
+    let four = scratch.file("four.npy", npy("|u1", "(2, 4, 4, 8)", &[1; 256]));
+    scratch.replayed(&four, options);
+}

@@ -1,0 +1,157 @@
+//! A disk that is full, after any number of bytes.
+
+use std::path::Path;
+use std::process::Command;
+
+use super::{Files, Work, files, partial, through, times};
+use crate::common::{npy, says, skipped};
+
+/// Whether the tools of a test are here; says so if not.
+fn is_there(test: &str, tool: &[&str]) -> bool {
+    let ran = Command::new(tool[0]).args(&tool[1..]).output();
+    let is_there = ran.is_ok_and(|ran| ran.status.success());
+    if !is_there {
+        skipped(test, &tool.join(" "));
+    }
+    is_there
+}
+
+/// One line, that of a full disk, which names one of `places`.
+#[track_caller]
+fn is_named(message: &str, places: &[&str]) {
+    assert_eq!(message.lines().count(), 1, "{message}");
+    let named = |place: &&str| message.starts_with(&format!("error: {place}"));
+    assert!(places.iter().any(named), "{message}");
+    let reasons = ["File too large", "No space left on device"];
+    assert!(
+        reasons.iter().any(|reason| message.contains(reason)),
+        "{message}"
+    );
+}
+
+/// Limits at which something else is too large each time, and some between.
+fn limits(new: &Files) -> Vec<usize> {
+    let mut limits: Vec<usize> = new.values().map(|bytes| bytes.len() - 1).collect();
+    let largest = limits.iter().copied().max().unwrap();
+    limits.extend([0, 1, 63, 64, 1000, 8191, 8192, 8193]);
+    limits.retain(|&limit| limit <= largest);
+    limits.sort_unstable();
+    limits.dedup();
+    limits
+}
+
+#[test]
+fn a_file_that_the_disk_does_not_take_is_named_and_all_else_stays() {
+    if !is_there("full disk", &["prlimit", "--version"]) {
+        return;
+    }
+    let work = Work::new();
+    let mut refused = 0;
+    for (out, _) in &work.commands {
+        let earlier = work.earlier(out);
+        work.scratch.printed(&work.line(out, true));
+        let new = work.written(out);
+        assert_ne!(new, earlier, "{out}");
+        let limits = limits(&new);
+        let every = limits
+            .len()
+            .div_ceil(usize::try_from(times(6, 100)).unwrap());
+        work.earlier(out);
+        // The last alone lets all files through but the largest, which is written late.
+        for limit in limits.into_iter().rev().step_by(every) {
+            let shell = format!("trap '' XFSZ; exec prlimit --fsize={limit} \"$@\"");
+            let output = through(&shell, &work.scratch, &work.line(out, true));
+            assert_eq!(output.status.code(), Some(1), "{limit} bytes: {output:?}");
+            is_named(&String::from_utf8(output.stderr).unwrap(), &[out]);
+            assert!(work.written(out) == earlier, "{out}, {limit} bytes");
+            refused += 1;
+        }
+        let all = files(&work.scratch.path(""));
+        assert_eq!(partial(&all), [""; 0]);
+    }
+    println!(
+        "faults: {refused} disks full at other bytes: 0 files damaged, 0 left, each named in one line"
+    );
+}
+
+/// A disk of its own, of so many kilobytes, with the earlier results in it.
+const DISK: &str = "mount -t tmpfs -o size=SIZEk none disk && cp -a before/. disk && \"$@\"
+status=$?
+cp -a disk/. after/
+exit $status";
+
+/// Not everybody may mount.
+#[test]
+#[ignore = "mounts a disk of its own"]
+fn a_disk_that_fills_up_changes_nothing_on_it() {
+    let tool = ["unshare", "-rm", "mount", "-t", "tmpfs", "none", "/mnt"];
+    if !is_there("a disk of its own", &tool) {
+        return;
+    }
+    let work = Work::new();
+    let before = work.earlier("simulated");
+    let (scratch, line) = (&work.scratch, work.line("simulated", true));
+    std::fs::rename(scratch.path("simulated"), scratch.path("before")).unwrap();
+    std::fs::create_dir(scratch.path("disk")).unwrap();
+    let taken: usize = before
+        .values()
+        .map(|bytes| bytes.len().div_ceil(4096) * 4)
+        .sum();
+    let line = line.replace(" simulated", " disk");
+    let (mut refused, mut whole) = (0, 0);
+    for room in [0, 4, 8, 20, 40, 100, 200, 300, 400, 500, 700, 2000] {
+        let after = scratch.path("after");
+        let _ = std::fs::remove_dir_all(&after);
+        std::fs::create_dir(&after).unwrap();
+        let shell = DISK.replace("SIZE", &(taken + room).to_string());
+        let shell = format!("exec unshare -rm sh -c '{shell}' sh \"$@\"");
+        let output = through(&shell, scratch, &line);
+        let left = files(&after);
+        if output.status.success() {
+            assert!(left.contains_key("summary.json") && left != before);
+            whole += 1;
+        } else {
+            is_named(&String::from_utf8(output.stderr).unwrap(), &["disk"]);
+            assert!(left == before, "{room} kB more");
+            refused += 1;
+        }
+    }
+    assert!(refused > 3 && whole > 0, "{refused} refused, {whole} whole");
+    println!("faults: {refused} full disks of their own: earlier results as they were");
+}
+
+#[test]
+fn warnings_that_nobody_can_take_stop_nothing() {
+    if !Path::new("/dev/full").exists() {
+        skipped("a full standard error", "/dev/full");
+        return;
+    }
+    let work = Work::new();
+    let counts: Vec<u8> = [1, 0].into_iter().cycle().take(2 * 2 * 32 * 2).collect();
+    work.scratch
+        .file("in.npy", npy("<u2", "(2, 2, 32)", &counts));
+    let line = "replay --input in.npy --bins 16 --out warned";
+    let said = work.scratch.run(line);
+    assert!(
+        String::from_utf8(said.stderr)
+            .unwrap()
+            .contains("warning: ")
+    );
+    let output = through("exec \"$@\" 2>/dev/full", &work.scratch, line);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+}
+
+#[test]
+fn a_table_that_nobody_can_take_is_an_error() {
+    if !Path::new("/dev/full").exists() {
+        skipped("a full standard output", "/dev/full");
+        return;
+    }
+    let work = Work::new();
+    let shell = "exec \"$@\" >/dev/full";
+    let output = through(shell, &work.scratch, "decode source/events.aer");
+    assert_eq!(output.status.code(), Some(1));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(message.lines().count(), 1, "{message}");
+    says(&message, "No space left on device");
+}

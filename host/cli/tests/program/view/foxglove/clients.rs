@@ -1,0 +1,280 @@
+//! Clients: who may connect, several at a time, and those that read slowly or not at all.
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, ChildStdout, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+use tungstenite::Message;
+
+use super::client::{Client, PROTOCOL, shake};
+use super::{of, play, points, recording};
+use crate::common::aer::{depth, file};
+use crate::common::{Scratch, says};
+use crate::view::http::{Stream, post};
+use crate::view::{Live, fast, until};
+use dtof_events::aer_file::{Header, Reader};
+use dtof_live::MOST_CLIENTS;
+use dtof_photons::source::Geometry;
+
+#[test]
+fn pages_of_other_sites_read_nothing() {
+    let scratch = Scratch::new();
+    let (header, events) = recording();
+    let origin = "http://localhost:8080";
+    let feed = play(&scratch, "events.aer", &header, &events);
+    let live = Live::with_foxglove(feed, None, &[origin]);
+    let protocol = ("sec-websocket-protocol", PROTOCOL);
+    for origin in ["https://example.com", "null", "http://localhost:8081"] {
+        let refused = shake(live.foxglove, &[protocol, ("origin", origin)]);
+        assert_eq!(refused.unwrap_err(), 403, "{origin}");
+    }
+    // A name of another site that leads here.
+    let refused = shake(live.foxglove, &[protocol, ("host", "example.com:8765")]);
+    assert_eq!(refused.unwrap_err(), 403);
+    for origin in ["https://app.foxglove.dev", "file://", origin] {
+        let mut socket = shake(live.foxglove, &[protocol, ("origin", origin)]).unwrap();
+        says(socket.read().unwrap().to_text().unwrap(), "serverInfo");
+    }
+    for offered in ["chat", "foxglove.sdk.v2", "foxglove.sdk.v11"] {
+        let refused = shake(live.foxglove, &[("sec-websocket-protocol", offered)]);
+        assert_eq!(refused.unwrap_err(), 400, "{offered}");
+    }
+    let offered = (
+        "sec-websocket-protocol",
+        "foxglove.sdk.v1.1, foxglove.sdk.v1",
+    );
+    assert!(shake(live.foxglove, &[offered]).is_ok());
+}
+
+#[test]
+fn clients_want_different_things_leave_and_come_back() {
+    let live = Live::with_foxglove(fast::feed(Some(10_000)), None, &[]);
+    let mut clients = [(); 2].map(|()| Client::open(live.foxglove));
+    clients[0].subscribe(&["/events"]);
+    clients[1].subscribe(&["/range", "/losses"]);
+    let mut count = 0;
+    let clouds = clients[0].until("clouds", |_| {
+        count += 1;
+        count == 10
+    });
+    assert_eq!(of(&clouds, "/events").count(), 10);
+    clients[1].next("/range");
+    clients[1].unsubscribe("/range");
+    clients[1].subscribe(&["/rate"]);
+    // The first image is of a second.
+    clients[1].next("/rate");
+    let later = clients[1].until("losses", |data| data.topic == "/losses");
+    assert!(of(&later, "/range").next().is_none());
+    // What nobody wants is not kept.
+    let [first, second] = clients;
+    drop(first);
+    until("nothing is kept", || live.hub.kept()[1] == 0);
+    std::thread::sleep(Duration::from_secs(1));
+    let mut again = Client::open(live.foxglove);
+    assert_eq!(
+        again.infos[0]["sessionId"],
+        second.infos.last().unwrap()["sessionId"]
+    );
+    again.subscribe(&["/statistics"]);
+    // Of what has come since, not of the time in which nobody asked.
+    let first = again.next("/statistics").json();
+    assert!(first["duration_s"].as_f64() < Some(0.9), "{first}");
+    again.subscribe(&["/events", "/log"]);
+    assert!(!points([&again.next("/events").bytes[..]].into_iter()).is_empty());
+    // More than may be connected at a time: the last comes when another has gone.
+    drop((again, second));
+    let mut many: Vec<Client> = (0..MOST_CLIENTS)
+        .map(|_| Client::open(live.foxglove))
+        .collect();
+    let port = live.foxglove;
+    let last = std::thread::spawn(move || Client::open(port));
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(!last.is_finished());
+    many.pop();
+    last.join().unwrap();
+}
+
+/// Neither memory nor the recording: and it is given up.
+#[test]
+fn a_client_that_reads_nothing_costs_nothing() {
+    let scratch = Scratch::new();
+    let out = scratch.path("out");
+    let live = Live::with_foxglove(fast::feed(None), Some(&out), &[]);
+    Stream::open(live.port, 0).until("live", |frame| frame["connection"]["state"] == "live");
+    assert_eq!(post(live.port, "/record", "{\"on\":true}").status, 200);
+    let mut stuck = Client::open(live.foxglove);
+    stuck.subscribe_all();
+    let mut good = Client::open(live.foxglove);
+    good.subscribe(&["/statistics", "/losses"]);
+    let most = 65_536 + 3 * 256;
+    let lost = good.until("much more", |data| {
+        assert!(live.hub.kept()[1] <= most);
+        data.topic == "/losses" && data.json()["events"].as_u64() > Some(1_000_000)
+    });
+    assert!(lost.len() > 3);
+    until("a client less", || {
+        // It was given up: what is left in the buffers of the socket comes, and then its end.
+        let _ = good.read();
+        is_closed(&mut stuck)
+    });
+    let before = good.next("/losses").json()["events"].as_u64().unwrap();
+    let answer = post(live.port, "/record", "{\"on\":false}").body;
+    says(&answer, "Saved ");
+    let file = fs::read_dir(&out).unwrap().next().unwrap().unwrap().path();
+    let mut reader = Reader::new(BufReader::new(File::open(file).unwrap())).unwrap();
+    let (mut events, mut last) = (0, 0);
+    while let Some(event) = reader.next_event().unwrap() {
+        // Each ten laser cycles after the one before: none is missing.
+        assert!(last == 0 || event.cycle().0 == last + 10);
+        last = event.cycle().0;
+        events += 1;
+    }
+    assert!(events >= 1_000_000 && before >= 1_000_000, "{events}");
+    live.end();
+}
+
+/// Whether the server has closed, without reading what it has sent.
+fn is_closed(client: &mut Client) -> bool {
+    // A server that has closed answers nothing but a reset.
+    let stream = client.socket.get_mut();
+    stream.write_all(&[0x89, 0x80, 0, 0, 0, 0]).is_err()
+}
+
+#[test]
+fn a_client_that_reads_slowly_is_told_what_it_missed() {
+    let live = Live::with_foxglove(fast::feed(None), None, &[]);
+    let mut slow = Client::open(live.foxglove);
+    slow.subscribe_all();
+    let mut reads = 0;
+    while slow.statuses.is_empty() {
+        reads += 1;
+        assert!(reads < 2000);
+        slow.read();
+        // Less often than there are messages.
+        std::thread::sleep(Duration::from_millis(if reads < 20 { 400 } else { 0 }));
+    }
+    let status = &slow.statuses[0];
+    assert_eq!(
+        (&status["level"], &status["id"]),
+        (&json!(1), &json!("slow"))
+    );
+    says(status["message"].as_str().unwrap(), "frames were left out");
+}
+
+/// Half a megabyte of images ten times a second, which nobody takes.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_does_not_grow_while_a_client_reads_nothing() {
+    let scratch = Scratch::new();
+    let header = Header {
+        geometry: Geometry::new(256, 256),
+        ..recording().0
+    };
+    let events = (0..2000).map(|number| depth(number, 20 * u64::from(number), 40));
+    scratch.file("large.aer", file(&header, &events.collect::<Vec<_>>()));
+    let mut programs = [(); 2].map(|()| Program::start(&scratch, "view large.aer --foxglove=0"));
+    let mut stuck = Client::open(programs[0].port);
+    stuck.subscribe_all();
+    // Each ping wants an answer, which nobody takes either.
+    let mut asks = Client::open(programs[0].port);
+    let stream = asks.socket.get_mut();
+    stream
+        .set_write_timeout(Some(Duration::from_secs(1)))
+        .unwrap();
+    let ping = Message::Ping(vec![0; 125].into());
+    // Less than until they are given up.
+    let begun = Instant::now();
+    while begun.elapsed() < Duration::from_secs(8) && asks.socket.send(ping.clone()).is_ok() {}
+    std::thread::sleep(Duration::from_secs(8).saturating_sub(begun.elapsed()));
+    let [with, without] = [0, 1].map(|number| programs[number].peak_kb());
+    println!("view: {with} kB with a client that reads nothing, {without} kB without");
+    // Twelve frames and 8 MB of answers in the buffers; 40 MB, and hundreds, if all were kept.
+    assert!(with < without + 30_000, "{with} kB, {without} kB without");
+    for program in &mut programs {
+        assert_eq!(program.end(), "");
+    }
+}
+
+/// The program, as somebody starts it.
+struct Program {
+    child: Child,
+    out: BufReader<ChildStdout>,
+    page: String,
+    port: u16,
+}
+
+impl Program {
+    fn start(scratch: &Scratch, line: &str) -> Self {
+        let mut command = scratch.command(line);
+        let command = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let mut out = BufReader::new(child.stdout.take().unwrap());
+        let mut lines = [String::new(), String::new()];
+        for line in &mut lines {
+            out.read_line(line).unwrap();
+        }
+        let [page, address] = lines;
+        let port = address.trim().strip_prefix("ws://127.0.0.1:").unwrap();
+        Self {
+            child,
+            out,
+            page,
+            port: port.parse().unwrap(),
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    fn peak_kb(&self) -> u64 {
+        let status = format!("/proc/{}/status", self.child.id());
+        let status = fs::read_to_string(status).unwrap();
+        let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let peak = peak.and_then(|peak| peak.trim().strip_suffix(" kB"));
+        peak.unwrap().parse().unwrap()
+    }
+
+    /// Ends it, and gives what it said on standard error.
+    fn end(&mut self) -> String {
+        self.child.kill().unwrap();
+        let mut said = String::new();
+        let mut stderr = self.child.stderr.take().unwrap();
+        stderr.read_to_string(&mut said).unwrap();
+        self.child.wait().unwrap();
+        // Nothing but the addresses.
+        assert_eq!(self.out.read_line(&mut String::new()).unwrap(), 0);
+        said
+    }
+}
+
+#[test]
+fn the_command_says_where_foxglove_connects_and_what_is_wrong() {
+    let scratch = Scratch::new();
+    let (header, events) = recording();
+    scratch.file("events.aer", file(&header, &events));
+    let holder = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let taken = holder.local_addr().unwrap().port();
+    let output = scratch.run(&format!("view events.aer --foxglove={taken}"));
+    scratch.refused(&output, &[format!("--foxglove {taken}: ")]);
+    scratch.all_refused(
+        "view",
+        "events.aer --foxglove=65536 | --foxglove
+         events.aer --foxglove=localhost:8765 | --foxglove
+         events.aer --foxglove-origin http://localhost:8080 | --foxglove
+         events.aer --foxglove --foxglove-origin * | must be http://HOST",
+    );
+    let mut program = Program::start(&scratch, "view events.aer --speed 0.1 --foxglove=0");
+    says(&program.page, "http://127.0.0.1:");
+    Client::open(program.port);
+    // Who started the program is told why a page cannot connect, once.
+    for _ in 0..2 {
+        let headers = [
+            ("sec-websocket-protocol", PROTOCOL),
+            ("origin", "http://localhost:9"),
+        ];
+        assert_eq!(shake(program.port, &headers).unwrap_err(), 403);
+    }
+    let said = program.end();
+    assert_eq!(said.lines().count(), 1, "{said}");
+    says(&said, "--foxglove-origin http://localhost:9 ");
+}

@@ -1,0 +1,156 @@
+//! Recordings, played at the rate of their laser.
+
+use std::time::{Duration, Instant};
+
+use crate::common::aer::{HEADER, depth, file};
+use crate::common::{Scratch, says};
+use crate::view::Live;
+use crate::view::http::{Stream, post};
+use dtof_events::aer_file::Header;
+use dtof_live::{Feed, Playback};
+
+/// Ten events in a second: one laser cycle a millisecond.
+fn recording() -> Vec<u8> {
+    let header = Header {
+        laser_millihertz: 1_000_000,
+        ..HEADER
+    };
+    let events: Vec<_> = (1..=10)
+        .map(|number| depth(number, 100 * u64::from(number), 60))
+        .collect();
+    file(&header, &events)
+}
+
+#[test]
+fn a_recording_is_played_at_its_rate_paused_and_played_again() {
+    let scratch = Scratch::new();
+    let path = scratch.file("events.aer", recording());
+    let begun = Instant::now();
+    let live = Live::of(
+        Feed::Playback(Playback::new(path, None, 0.4).unwrap()),
+        None,
+    );
+    let mut page = Stream::open(live.port, 5);
+    let frame = page.until("begun", |frame| frame["about"]["laserHz"] == 1000.0);
+    assert_eq!(frame["about"]["kind"], "recording");
+    let frame = page.until("some", |frame| frame["events"].as_u64() >= Some(2));
+    // One each quarter of a second.
+    assert!(begun.elapsed() > Duration::from_millis(450) && frame["events"].as_u64() < Some(10));
+    says(&post(live.port, "/play", "{\"on\":false}").body, "paused");
+    let frame = page.until("paused", |frame| frame["connection"]["state"] == "paused");
+    for _ in 0..5 {
+        assert_eq!(page.frame()["events"], frame["events"]);
+    }
+    says(&post(live.port, "/play", "{\"on\":true}").body, "playing");
+    let frame = page.until("the end", |frame| frame["connection"]["state"] == "ended");
+    assert_eq!(frame["events"], 10);
+    post(live.port, "/play", "{\"on\":true}");
+    page.until("again", |frame| frame["events"] == 20);
+    // What a recording does not do is said.
+    for (path, body, reason) in [
+        (
+            "/settings",
+            "[detection]\nl1 = 4",
+            "a recording has no settings to change",
+        ),
+        ("/save", "{}", "a recording has no settings to change"),
+        ("/record", "{\"on\":true}", "this is a recording already"),
+    ] {
+        let answer = post(live.port, path, body);
+        assert_eq!((answer.status, answer.body.trim()), (422, reason));
+    }
+}
+
+#[test]
+fn a_recording_is_played_faster_and_a_damaged_one_is_named() {
+    let scratch = Scratch::new();
+    let mut bytes = recording();
+    let path = scratch.file("events.aer", &bytes);
+    // A hundred seconds of a slower laser.
+    let live = Live::of(
+        Feed::Playback(Playback::new(path, Some(10), 100.0).unwrap()),
+        None,
+    );
+    let begun = Instant::now();
+    Stream::open(live.port, 0).until("the end", |frame| frame["events"] == 10);
+    assert!(begun.elapsed() < Duration::from_secs(30));
+
+    // A bit that only the checksum tells, and an end in the middle.
+    let cut = bytes[..64 + 16 * 5 + 7].to_vec();
+    bytes[64 + 16 * 5] ^= 1;
+    for (bytes, events) in [(bytes, 10), (cut, 4)] {
+        let path = scratch.file("damaged.aer", bytes);
+        let live = Live::of(
+            Feed::Playback(Playback::new(path, None, 100.0).unwrap()),
+            None,
+        );
+        let frame = Stream::open(live.port, 0)
+            .until("failed", |frame| frame["connection"]["state"] == "failed");
+        let reason = frame["connection"]["reason"].as_str().unwrap();
+        says(reason, "damaged.aer: byte ");
+        // Those before it came.
+        assert_eq!(frame["events"], events);
+    }
+}
+
+#[test]
+fn the_command_says_what_is_wrong() {
+    let scratch = Scratch::new();
+    scratch.file("slow.aer", file(&HEADER, &[depth(1, 5, 60)]));
+    scratch.file("none.aer", "no");
+    scratch.all_refused(
+        "view",
+        "slow.aer | slow.aer: does not say how fast its laser was; say --laser-hz
+         none.aer | none.aer: not an AER file
+         gone.aer | gone.aer: 
+         --out x | <FILE.aer> is needed
+         slow.aer --device qemu | cannot be used with
+         slow.aer --laser-hz 5 --alpha 4 | slow.aer: is what it was recorded with
+         slow.aer --laser-hz 5 --pixels 4 | leave out the options of a device
+         slow.aer --out x | cannot be used with
+         slow.aer --speed 0 | must be a number above 0
+         --device tcp:127.0.0.1:1 --settings gone.toml | gone.toml",
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn the_command_prints_its_address_and_ends_at_ctrl_c() {
+    use std::io::{BufRead, BufReader};
+    use std::process::{Command, Stdio};
+
+    let scratch = Scratch::new();
+    scratch.file("events.aer", recording());
+    let mut program = scratch
+        .command("view events.aer --speed 0.5")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    let mut out = BufReader::new(program.stdout.take().unwrap());
+    out.read_line(&mut line).unwrap();
+    let port = line
+        .strip_prefix("http://127.0.0.1:")
+        .unwrap()
+        .trim()
+        .trim_end_matches('/');
+    let port = port.parse().unwrap();
+    // Also while a page is open.
+    let mut page = Stream::open(port, 0);
+    page.until("playing", |frame| frame["events"].as_u64() > Some(0));
+    let killed = Command::new("kill")
+        .args(["-INT", &program.id().to_string()])
+        .status();
+    assert!(killed.unwrap().success());
+    let output = program.wait_with_output().unwrap();
+    assert!(
+        output.status.success() && output.stderr.is_empty(),
+        "{output:?}"
+    );
+    // Two do not share a port.
+    let holder = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let taken = holder.local_addr().unwrap().port();
+    let output = scratch.run(&format!("view events.aer --port {taken}"));
+    scratch.refused(&output, &[format!("--port {taken}: ")]);
+}

@@ -1,0 +1,107 @@
+//! Settings that a page puts in force, and those that are refused.
+
+use crate::common::{Scratch, names};
+use crate::view::Live;
+use crate::view::device::{feed, plugged};
+use crate::view::http::{Stream, post};
+
+#[test]
+fn settings_are_put_in_force_or_refused_with_the_reason() {
+    let scratch = Scratch::new();
+    let out = scratch.path("out");
+    let live = Live::of(feed(&plugged().name, "[detection]\nalpha = 4"), Some(&out));
+    let mut page = Stream::open(live.port, 0);
+    let is_alpha = |frame: &serde_json::Value, alpha: f64| {
+        frame["about"]["settings"]["detection"]["alpha"].as_f64() == Some(alpha)
+    };
+    page.until("the first settings", |frame| is_alpha(frame, 4.0));
+    let wanted = "[sensor]\ngate = [8, 120]\n[detection]\nrule = \"paper\"\nalpha = 6\nl1 = 60\n";
+    let answer = post(live.port, "/settings", wanted);
+    assert_eq!(
+        (answer.status, &answer.body[..]),
+        (200, "The settings are in force.\n")
+    );
+    let frame = page.until("new settings", |frame| is_alpha(frame, 6.0));
+    assert_eq!(
+        frame["about"]["settings"]["gate"],
+        serde_json::json!([8, 120])
+    );
+    assert_eq!(frame["connection"]["state"], "live");
+    page.until("events of them", |frame| {
+        frame["drawn"]["events"].as_u64() > Some(0)
+    });
+
+    // Wrong in themselves, as they do not suit each other, and as the device has it.
+    for (text, reason) in [
+        ("alpha = 4", "alpha stands in [detection]"),
+        (
+            "[detection]\nalpha = 999",
+            "alpha 999: must be a number from 0",
+        ),
+        (
+            "[sensor]\nbins = 64",
+            "only gate, masked, sigma_bins, one_hit_tdc",
+        ),
+        ("[rays]\ncalibration = \"/etc/passwd\"", "only gate, masked"),
+        ("[sensor]\nmasked = [99]", "masked 99: there are 16 pixels"),
+        (
+            "[detection]\nestimator = \"window\"",
+            "estimator window needs sigma_bins",
+        ),
+        (
+            "[detection]\nl1 = 60\nl2 = 3",
+            "the device refuses the configuration: ",
+        ),
+        (
+            "[sensor]\ngate = [100, 90]",
+            "the device refuses the configuration: ",
+        ),
+        (
+            "[detection]\nrule = \"paper\"\ntracking = true",
+            "tracking is for rule window",
+        ),
+        (
+            "[detection]\nbinning = 3",
+            "the device refuses the configuration: ",
+        ),
+    ] {
+        let answer = post(live.port, "/settings", text);
+        assert_eq!(answer.status, 422, "{text}: {answer:?}");
+        assert!(answer.body.contains(reason), "{text}: {answer:?}");
+        assert_eq!(answer.body.lines().count(), 1, "{answer:?}");
+    }
+    // The old ones are still in force.
+    let frame = page.until("events", |frame| {
+        frame["drawn"]["events"].as_u64() > Some(0)
+    });
+    assert_eq!(frame["connection"]["state"], "live");
+
+    for (number, name) in ["dtof.toml", "dtof-2.toml"].into_iter().enumerate() {
+        let answer = post(live.port, "/save", "{}");
+        assert!(answer.body.contains(name), "{answer:?}");
+        assert_eq!(names(&out).len(), number + 1);
+    }
+    let saved = dtof_engine::settings::SettingsFile::read(&out.join("dtof.toml")).unwrap();
+    assert_eq!(
+        (saved.sensor.gate, saved.detection.l1),
+        (Some((8, 120)), Some(60))
+    );
+    // It is what another program starts with.
+    assert_eq!(saved.settings(128).unwrap().l1, 60);
+}
+
+#[test]
+fn without_a_folder_nothing_is_written() {
+    let live = Live::of(feed(&plugged().name, ""), None);
+    Stream::open(live.port, 0).until("a device", |frame| frame["connection"]["state"] == "live");
+    for (path, body) in [("/save", "{}"), ("/record", "{\"on\":true}")] {
+        let answer = post(live.port, path, body);
+        assert_eq!(answer.status, 422);
+        assert_eq!(answer.body, "nothing is written: start with --out DIR\n");
+    }
+    let answer = post(live.port, "/play", "{\"on\":true}");
+    assert_eq!(
+        (answer.status, &answer.body[..]),
+        (422, "a device does not wait\n")
+    );
+}
