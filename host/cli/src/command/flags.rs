@@ -38,17 +38,20 @@ enum Value {
     /// The same, which may begin with a hyphen.
     Signed(&'static str),
     /// One of these names.
-    Named(fn() -> Vec<PossibleValue>),
+    OneOf(fn() -> Vec<PossibleValue>),
     /// Nothing.
     Switch,
     /// Nothing, or `=` and a text.
     Yes(&'static str),
 }
 
-use Value::{Called, Signed, Switch, Yes};
+use Value::{Called, OneOf, Signed, Switch, Yes};
 
-const fn is(key: &'static str, value: Value, help: &'static str) -> Flag {
-    Flag { key, value, help }
+/// A table of flags: key, what follows it, help.
+macro_rules! flags {
+    ($table:ident: $($key:ident $value:expr => $help:expr;)+) => {
+        const $table: &[Flag] = &[$(Flag { key: stringify!($key), value: $value, help: $help }),+];
+    };
 }
 
 /// The names that `T` has, with their help.
@@ -81,7 +84,7 @@ impl Flag {
                 .value_name(name)
                 .value_parser(OsStringValueParser::new())
                 .allow_hyphen_values(true),
-            Value::Named(names) => arg
+            OneOf(names) => arg
                 .value_name(self.key.to_ascii_uppercase())
                 .value_parser(Hinted(names)),
             Switch => arg.action(ArgAction::SetTrue),
@@ -151,388 +154,161 @@ pub fn name<T: Named + Send + Sync>() -> impl TypedValueParser<Value = T> {
     Hinted(names::<T>).try_map(|text| named(&text.to_string_lossy()))
 }
 
-const RECORDING: [Flag; 10] = [
-    is(
-        "axes",
-        Called("AXIS,AXIS,..."),
-        "Arrays of histograms: what each axis is, of captures, rows, columns and bins \
-         [default: the last is bins, the one before columns, all others are rows]",
-    ),
-    is(
-        "array",
-        Called("NAME"),
-        ".npz: the array to read [default: the only one]",
-    ),
-    is(
-        "columns",
-        Called("N"),
-        "Photon lists: columns of the array, pixel = row × columns + column [default: one \
-         row]",
-    ),
-    is(
-        "rebin",
-        Called("K"),
-        "Add up so many neighbouring bins [default: 1]",
-    ),
-    is(
-        "bins",
-        Called("N"),
-        "Bins to use, after --rebin, a power of two from 8 to 1024. Of histograms with more \
-         the last are cut off [default: as many as there are, or the next power of two; 128 \
-         of photon lists]",
-    ),
-    is(
-        "bin_width_ps",
-        Signed("PS"),
-        "Picoseconds a bin of the file, rounded to 1/65536 [default: 250; of logs that of the \
-         sensor]",
-    ),
-    is(
-        "offset_mm",
-        Signed("MM"),
-        "Millimetres added to every range, rounded to 1/256 [default: 0; of logs that of the \
-         sensor]",
-    ),
-    is(
-        "photons_per_cycle",
-        Called("R"),
-        "Histograms: photons a laser cycle in the brightest pixel of each capture that is not \
-         masked [default: 1]",
-    ),
-    is(
-        "recorded_cycles",
-        Called("N"),
-        "Histograms: laser cycles that each capture lasted",
-    ),
-    is(
-        "laser_hz",
-        Called("HZ"),
-        "Laser cycles a second [default: not known]",
-    ),
-];
+flags! {
+    RECORDING:
+    axes Called("AXIS,AXIS,...") => "Arrays of histograms: what each axis is, of captures, rows, columns \
+        and bins [default: the last is bins, the one before columns, all others are rows]";
+    array Called("NAME") => ".npz: the array to read [default: the only one]";
+    columns Called("N") => "Photon lists: columns of the array, pixel = row × columns + column [default: \
+        one row]";
+    rebin Called("K") => "Add up so many neighbouring bins [default: 1]";
+    bins Called("N") => "Bins to use, after --rebin, a power of two from 8 to 1024. Of histograms with more \
+        the last are cut off [default: as many as there are, or the next power of two; 128 of photon lists]";
+    bin_width_ps Signed("PS") => "Picoseconds a bin of the file, rounded to 1/65536 [default: 250; of logs \
+        that of the sensor]";
+    offset_mm Signed("MM") => "Millimetres added to every range, rounded to 1/256 [default: 0; of logs that \
+        of the sensor]";
+    photons_per_cycle Called("R") => "Histograms: photons a laser cycle in the brightest pixel of each \
+        capture that is not masked [default: 1]";
+    recorded_cycles Called("N") => "Histograms: laser cycles that each capture lasted";
+    laser_hz Called("HZ") => "Laser cycles a second [default: not known]";
+}
 
-const SENSOR: [Flag; 4] = [
-    is(
-        "settings",
-        Called("FILE"),
-        "A TOML file with settings, as every run writes one; options override it. \
-         docs/settings.md lists its keys",
-    ),
-    is(
-        "gate",
-        Called("FIRST..LAST"),
-        "Only these bins may hold the peak, both inclusive [default: all]",
-    ),
-    is(
-        "masked",
-        Called("PIXELS"),
-        "Pixels that are left out, such as hot and dead ones, as 3,70",
-    ),
-    is(
-        "sigma_bins",
-        Signed("S"),
-        "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. The depth \
-         then comes from a window that suits it [default: the centroid of three bins]",
-    ),
-];
+flags! {
+    SENSOR:
+    settings Called("FILE") => "A TOML file with settings, as every run writes one; options override it. \
+        docs/settings.md lists its keys";
+    gate Called("FIRST..LAST") => "Only these bins may hold the peak, both inclusive [default: all]";
+    masked Called("PIXELS") => "Pixels that are left out, such as hot and dead ones, as 3,70";
+    sigma_bins Signed("S") => "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. The \
+        depth then comes from a window that suits it [default: the centroid of three bins]";
+}
 
-const DETECTION: [Flag; 16] = [
-    is(
-        "rule",
-        Value::Named(names::<RuleName>),
-        "The rule that decides whether a peak stands clear of the background [default: paper]",
-    ),
-    is(
-        "alpha",
-        Signed("ALPHA"),
-        "Rules paper and average: standard deviations of the background a peak must exceed it \
-         by, 0 to 255.996, rounded to 1/256 [default: 4]",
-    ),
-    is(
-        "window",
-        Signed("BINS"),
-        "Window rule: bins in the window, 1 to 7 [default: as suits --sigma-bins]",
-    ),
-    is(
-        "z",
-        Signed("Z"),
-        "Window rule: standard deviations of the background the photons in the window must \
-         exceed it by, 0 to 15.9998, rounded to 1/4096",
-    ),
-    is(
-        "false_alarm",
-        Called("SHARE"),
-        "Window rule, instead of --z: the share of exposures without a target that may end \
-         with an event, at most 0.1 [default: 0.01]",
-    ),
-    is(
-        "estimator",
-        Value::Named(names::<EstimatorName>),
-        "Where in its bins a peak lies [default: window if --sigma-bins or --half-widths are \
-         known, else centroid]",
-    ),
-    is(
-        "half_widths",
-        Called("BEFORE,AFTER"),
-        "How far the window that the depth comes from reaches before and after its place, in \
-         bins: 1 to 4 each, rounded to 1/256. More after than before suits a pulse that falls \
-         more slowly than it rises [default: both as suits --sigma-bins]",
-    ),
-    is(
-        "min_count",
-        Called("N"),
-        "Photons a reported peak, or the window around it, holds at least [default: 5]",
-    ),
-    is(
-        "l1",
-        Called("N"),
-        "The exposure a decision must exceed, in laser cycles [default: 40]",
-    ),
-    is(
-        "l2",
-        Called("N"),
-        "The exposure at which a pixel starts over without an event, in laser cycles \
-         [default: 2000]",
-    ),
-    is("x", Called("N"), "Laser cycles between looks [default: 4]"),
-    is(
-        "binning",
-        Called("LEVELS"),
-        "Adaptive binning: pixels that stay silent also count together, in blocks of 2x2 \
-         pixels, from level 2 on 4x4 and at level 3 8x8 [default: 0]",
-    ),
-    is(
-        "patience",
-        Called("N"),
-        "Adaptive binning: laser cycles without an event after which a pixel counts in its \
-         block, too [default: 64]",
-    ),
-    is(
-        "tracking",
-        Yes("YES"),
-        "Window rule: expect the next event of a pixel near its last, and spend half of the \
-         false alarms there",
-    ),
-    is(
-        "echoes",
-        Called("N"),
-        "Echoes that a pixel reports in an exposure, 1 to 4. From 2 on it goes on until it \
-         has them all, or has waited for the next [default: 1]",
-    ),
-    is(
-        "echo_wait",
-        Called("TIMES"),
-        "Two or more echoes: an exposure ends once it is so many times as long as it was at \
-         its last echo [default: it goes on until L2]",
-    ),
-];
+flags! {
+    DETECTION:
+    rule OneOf(names::<RuleName>) => "The rule that decides whether a peak stands clear of the background \
+        [default: paper]";
+    alpha Signed("ALPHA") => "Rules paper and average: standard deviations of the background a peak must \
+        exceed it by, 0 to 255.996, rounded to 1/256 [default: 4]";
+    window Signed("BINS") => "Window rule: bins in the window, 1 to 7 [default: as suits --sigma-bins]";
+    z Signed("Z") => "Window rule: standard deviations of the background the photons in the window must \
+        exceed it by, 0 to 15.9998, rounded to 1/4096";
+    false_alarm Called("SHARE") => "Window rule, instead of --z: the share of exposures without a target \
+        that may end with an event, at most 0.1 [default: 0.01]";
+    estimator OneOf(names::<EstimatorName>) => "Where in its bins a peak lies [default: window if \
+        --sigma-bins or --half-widths are known, else centroid]";
+    half_widths Called("BEFORE,AFTER") => "How far the window that the depth comes from reaches before and \
+        after its place, in bins: 1 to 4 each, rounded to 1/256. More after than before suits a pulse that \
+        falls more slowly than it rises [default: both as suits --sigma-bins]";
+    min_count Called("N") => "Photons a reported peak, or the window around it, holds at least [default: 5]";
+    l1 Called("N") => "The exposure a decision must exceed, in laser cycles [default: 40]";
+    l2 Called("N") => "The exposure at which a pixel starts over without an event, in laser cycles \
+        [default: 2000]";
+    x Called("N") => "Laser cycles between looks [default: 4]";
+    binning Called("LEVELS") => "Adaptive binning: pixels that stay silent also count together, in blocks \
+        of 2x2 pixels, from level 2 on 4x4 and at level 3 8x8 [default: 0]";
+    patience Called("N") => "Adaptive binning: laser cycles without an event after which a pixel counts in \
+        its block, too [default: 64]";
+    tracking Yes("YES") => "Window rule: expect the next event of a pixel near its last, and spend half of \
+        the false alarms there";
+    echoes Called("N") => "Echoes that a pixel reports in an exposure, 1 to 4. From 2 on it goes on until \
+        it has them all, or has waited for the next [default: 1]";
+    echo_wait Called("TIMES") => "Two or more echoes: an exposure ends once it is so many times as long as \
+        it was at its last echo [default: it goes on until L2]";
+}
 
-const FRAME: [Flag; 1] = [is(
-    "frame",
-    Called("N"),
-    "Simulate a frame-based sensor for comparison: every N laser cycles each pixel reads \
-         its highest bin, if that stands above the background",
-)];
+flags! {
+    FRAME:
+    frame Called("N") => "Simulate a frame-based sensor for comparison: every N laser cycles each pixel \
+        reads its highest bin, if that stands above the background";
+}
 
-const REPLAY: [Flag; 2] = [
-    is(
-        "cycles",
-        Called("N"),
-        "Replay only the first N laser cycles [default: 10000]",
-    ),
-    is(
-        "seed",
-        Called("N"),
-        "Seed of the laser cycles that recorded photons are given [default: 1]",
-    ),
-];
+flags! {
+    REPLAY:
+    cycles Called("N") => "Replay only the first N laser cycles [default: 10000]";
+    seed Called("N") => "Seed of the laser cycles that recorded photons are given [default: 1]";
+}
 
-const ARRAY: [Flag; 2] = [
-    is(
-        "array",
-        Called("COLUMNSxROWS"),
-        "Macropixels of the array that looks at the scene [default: the file's]",
-    ),
-    is(
-        "laser_off",
-        Switch,
-        "Without signal: photon-counts.svg is then a passive image",
-    ),
-];
+flags! {
+    ARRAY:
+    array Called("COLUMNSxROWS") => "Macropixels of the array that looks at the scene [default: the file's]";
+    laser_off Switch => "Without signal: photon-counts.svg is then a passive image";
+}
 
-const SIMULATE: [Flag; 2] = [
-    is("cycles", Called("N"), "Laser cycles [default: the file's]"),
-    is(
-        "seed",
-        Called("N"),
-        "Seed of the simulated photons [default: 1]",
-    ),
-];
+flags! {
+    SIMULATE:
+    cycles Called("N") => "Laser cycles [default: the file's]";
+    seed Called("N") => "Seed of the simulated photons [default: 1]";
+}
 
-const CALIBRATE: [Flag; 4] = [
-    is(
-        "target_mm",
-        Signed("MM"),
-        "Distance of a flat target that most of the pixels see, in millimetres",
-    ),
-    is(
-        "glass",
-        Value::Named(yes_or_no),
-        "Whether the nearest surface, where all pixels have it at the same bin, is a cover \
-         glass",
-    ),
-    is(
-        "false_alarm",
-        Called("SHARE"),
-        "The share of exposures without a target that may end with an event, at most 0.1 \
-         [default: 0.01]",
-    ),
-    is(
-        "seed",
-        Called("N"),
-        "Seed of what is simulated [default: 1]",
-    ),
-];
+flags! {
+    CALIBRATE:
+    target_mm Signed("MM") => "Distance of a flat target that most of the pixels see, in millimetres";
+    glass OneOf(yes_or_no) => "Whether the nearest surface, where all pixels have it at the same bin, is a \
+        cover glass";
+    false_alarm Called("SHARE") => "The share of exposures without a target that may end with an event, at \
+        most 0.1 [default: 0.01]";
+    seed Called("N") => "Seed of what is simulated [default: 1]";
+}
 
-const ACCURACY: [Flag; 2] = [
-    is(
-        "within",
-        Called("MM"),
-        "Millimetres that 68 % of the reports may be off at most [default: as frames of L2]",
-    ),
-    is(
-        "false_alarm",
-        Called("SHARE"),
-        "The share of exposures without a target that may end with an event, at most 0.1 \
-         [default: 0.01]",
-    ),
-];
+flags! {
+    ACCURACY:
+    within Called("MM") => "Millimetres that 68 % of the reports may be off at most [default: as frames of \
+        L2]";
+    false_alarm Called("SHARE") => "The share of exposures without a target that may end with an event, at \
+        most 0.1 [default: 0.01]";
+}
 
-const COMPARE: [Flag; 2] = [
-    is(
-        "cycles",
-        Called("N"),
-        "Laser cycles to use at most [default: 10000; the scene's]",
-    ),
-    is(
-        "seed",
-        Called("N"),
-        "Seed of every random number [default: 1]",
-    ),
-];
+flags! {
+    COMPARE:
+    cycles Called("N") => "Laser cycles to use at most [default: 10000; the scene's]";
+    seed Called("N") => "Seed of every random number [default: 1]";
+}
 
-const TUNE: [Flag; 17] = [
-    is(
-        "rule",
-        Value::Named(names::<RuleName>),
-        "The rule to find settings for [default: paper]",
-    ),
-    is(
-        "background",
-        Called("B"),
-        "Background photons a bin and laser cycle (B)",
-    ),
-    is("signal", Called("A"), "Signal photons a laser cycle (A)"),
-    is(
-        "snr",
-        Called("SNR"),
-        "Instead: the SNR of the whole exposure, N·A / √(N·B) with N = L2",
-    ),
-    is(
-        "sigma_bins",
-        Signed("BINS"),
-        "Standard deviation of the pulse in bins",
-    ),
-    is("sigma_ps", Called("PS"), "Instead: in picoseconds"),
-    is(
-        "bins",
-        Called("N"),
-        "Bins of a histogram, a power of two from 8 to 1024 [default: 128]",
-    ),
-    is(
-        "bin_width_ps",
-        Signed("PS"),
-        "Picoseconds a bin [default: 250]",
-    ),
-    is(
-        "false_alarm",
-        Called("SHARE"),
-        "The share of exposures without a target that may end with an event [default: 0.01]",
-    ),
-    is(
-        "false_alarms_per_second",
-        Called("RATE"),
-        "Instead: the false alarms of a pixel a second",
-    ),
-    is("laser_hz", Called("HZ"), "Laser cycles a second"),
-    is(
-        "l1",
-        Called("N"),
-        "The exposure a decision must exceed, in laser cycles [default: the one with the \
-         shortest time to an event]",
-    ),
-    is(
-        "l2",
-        Called("N"),
-        "The exposure at which a pixel starts over without an event, in laser cycles \
-         [default: 2000]",
-    ),
-    is("x", Called("N"), "Laser cycles between looks [default: 4]"),
-    is(
-        "min_count",
-        Called("N"),
-        "Photons a reported peak holds at least [default: 5]",
-    ),
-    is(
-        "binning",
-        Called("LEVELS"),
-        "Window rule: the largest blocks of adaptive binning, which share the false alarms \
-         with the pixels [default: 0]",
-    ),
-    is(
-        "seed",
-        Called("N"),
-        "Seed of the simulated exposures [default: 1]",
-    ),
-];
+flags! {
+    TUNE:
+    rule OneOf(names::<RuleName>) => "The rule to find settings for [default: paper]";
+    background Called("B") => "Background photons a bin and laser cycle (B)";
+    signal Called("A") => "Signal photons a laser cycle (A)";
+    snr Called("SNR") => "Instead: the SNR of the whole exposure, N·A / √(N·B) with N = L2";
+    sigma_bins Signed("BINS") => "Standard deviation of the pulse in bins";
+    sigma_ps Called("PS") => "Instead: in picoseconds";
+    bins Called("N") => "Bins of a histogram, a power of two from 8 to 1024 [default: 128]";
+    bin_width_ps Signed("PS") => "Picoseconds a bin [default: 250]";
+    false_alarm Called("SHARE") => "The share of exposures without a target that may end with an event \
+        [default: 0.01]";
+    false_alarms_per_second Called("RATE") => "Instead: the false alarms of a pixel a second";
+    laser_hz Called("HZ") => "Laser cycles a second";
+    l1 Called("N") => "The exposure a decision must exceed, in laser cycles [default: the one with the \
+        shortest time to an event]";
+    l2 Called("N") => "The exposure at which a pixel starts over without an event, in laser cycles \
+        [default: 2000]";
+    x Called("N") => "Laser cycles between looks [default: 4]";
+    min_count Called("N") => "Photons a reported peak holds at least [default: 5]";
+    binning Called("LEVELS") => "Window rule: the largest blocks of adaptive binning, which share the false \
+        alarms with the pixels [default: 0]";
+    seed Called("N") => "Seed of the simulated exposures [default: 1]";
+}
 
-const DEVICE: [Flag; 2] = [
-    is(
-        "bin_width_ps",
-        Signed("PS"),
-        "Picoseconds a bin, rounded to 1/65536 [default: as the device says, 250 if any will do]",
-    ),
-    is(
-        "offset_mm",
-        Signed("MM"),
-        "Millimetres added to every range, rounded to 1/256 [default: as the device says]",
-    ),
-];
+flags! {
+    DEVICE:
+    bin_width_ps Signed("PS") => "Picoseconds a bin, rounded to 1/65536 [default: as the device says, 250 \
+        if any will do]";
+    offset_mm Signed("MM") => "Millimetres added to every range, rounded to 1/256 [default: as the device \
+        says]";
+}
 
-const PROJECTED: [Flag; 4] = [
-    is(
-        "field_of_view_degrees",
-        Signed("HxV"),
-        "The field of view in degrees from edge to edge [default: 60 across the longer side, \
-         square pixels]",
-    ),
-    is(
-        "calibration",
-        Called("FILE"),
-        "A direction and a range bias for each pixel, a TOML file; docs/export.md has its keys",
-    ),
-    is(
-        "laser_hz",
-        Called("HZ"),
-        "Laser cycles a second, for a file that does not say or is wrong [default: what the file \
-         says, else 10000000 and a warning]",
-    ),
-    is(
-        "echo",
-        Value::Named(names::<Echo>),
-        "Which echo of each exposure of a pixel or block, of depth events [default: all]",
-    ),
-];
+flags! {
+    PROJECTED:
+    field_of_view_degrees Signed("HxV") => "The field of view in degrees from edge to edge [default: 60 \
+        across the longer side, square pixels]";
+    calibration Called("FILE") => "A direction and a range bias for each pixel, a TOML file; docs/export.md \
+        has its keys";
+    laser_hz Called("HZ") => "Laser cycles a second, for a file that does not say or is wrong [default: \
+        what the file says, else 10000000 and a warning]";
+    echo OneOf(names::<Echo>) => "Which echo of each exposure of a pixel or block, of depth events \
+        [default: all]";
+}
 
 impl HasFlags for Projected {
     fn flags() -> Vec<Flag> {
@@ -542,31 +318,31 @@ impl HasFlags for Projected {
 
 impl HasFlags for Operation {
     fn flags() -> Vec<Flag> {
-        [&DEVICE[..], &SENSOR, &DETECTION].concat()
+        [DEVICE, SENSOR, DETECTION].concat()
     }
 }
 
 impl HasFlags for replay::Options {
     fn flags() -> Vec<Flag> {
-        [&RECORDING[..], &SENSOR, &DETECTION, &FRAME, &REPLAY].concat()
+        [RECORDING, SENSOR, DETECTION, FRAME, REPLAY].concat()
     }
 }
 
 impl HasFlags for simulate::Options {
     fn flags() -> Vec<Flag> {
-        [&ARRAY[..], &SENSOR, &DETECTION, &FRAME, &SIMULATE].concat()
+        [ARRAY, SENSOR, DETECTION, FRAME, SIMULATE].concat()
     }
 }
 
 impl HasFlags for calibrate::Options {
     fn flags() -> Vec<Flag> {
-        [&RECORDING[..], &CALIBRATE].concat()
+        [RECORDING, CALIBRATE].concat()
     }
 }
 
 impl HasFlags for compare::Options {
     fn flags() -> Vec<Flag> {
-        [&ACCURACY[..], &RECORDING, &SENSOR, &COMPARE].concat()
+        [ACCURACY, RECORDING, SENSOR, COMPARE].concat()
     }
 }
 
