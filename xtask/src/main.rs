@@ -67,7 +67,9 @@ cargo xtask <command>
                 build bindings/c and its examples, run them here and in QEMU, and compare
                 them with Rust; --bless writes the header and the figures of its README
   python FILE   install the packages of a requirements file below the build folder
-                and print the path of a Python that has them";
+                and print the path of a Python that has them
+  wheel         build the Python package and print the path of its wheel, which installs
+                without a compiler on computers with the same system";
 
 fn main() -> ExitCode {
     match run() {
@@ -189,6 +191,7 @@ fn run() -> Result<()> {
         ("python", &[requirements]) => {
             println!("{}", python::environment(root, requirements)?.display());
         }
+        ("wheel", []) => println!("{}", python::wheel(root)?.display()),
         _ => bail!(
             "no command `{}`: `cargo xtask help` lists them",
             [&[&*command], &words[..]].concat().join(" ")

@@ -6,7 +6,7 @@ use std::io::stderr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 use crate::tools::PYTHON;
 use crate::{succeed, target_folder};
@@ -40,4 +40,26 @@ pub fn environment(root: &Path, requirements: &str) -> Result<PathBuf> {
     succeed(pip.stdout(stderr()))?;
     fs::write(&installed, wanted).with_context(|| installed.display().to_string())?;
     Ok(python)
+}
+
+/// Builds the package `dtof` as a wheel, the same for all versions of Python from 3.9 on.
+pub fn wheel(root: &Path) -> Result<PathBuf> {
+    let python = environment(root, "bindings/python/wheel/requirements.txt")?;
+    let wheels = target_folder(root).join("wheels");
+    // What an earlier version left is not this one's.
+    if wheels.exists() {
+        fs::remove_dir_all(&wheels).with_context(|| wheels.display().to_string())?;
+    }
+    let mut maturin = Command::new(python);
+    maturin.args(["-m", "maturin", "build", "--quiet", "--release", "--locked"]);
+    maturin.arg("--manifest-path");
+    maturin.arg(root.join("bindings/python/Cargo.toml"));
+    maturin.arg("--out").arg(&wheels);
+    succeed(maturin.stdout(stderr()))?;
+    let made = fs::read_dir(&wheels).with_context(|| wheels.display().to_string())?;
+    let made: Vec<PathBuf> = made
+        .map(|entry| Ok(entry?.path()))
+        .collect::<Result<_>>()?;
+    ensure!(made.len() == 1, "{}: {} files", wheels.display(), made.len());
+    made.into_iter().next().context("no wheel")
 }
