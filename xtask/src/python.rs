@@ -57,9 +57,12 @@ pub fn wheel(root: &Path) -> Result<PathBuf> {
     maturin.arg("--out").arg(&wheels);
     succeed(maturin.stdout(stderr()))?;
     let made = fs::read_dir(&wheels).with_context(|| wheels.display().to_string())?;
-    let made: Vec<PathBuf> = made
-        .map(|entry| Ok(entry?.path()))
-        .collect::<Result<_>>()?;
-    ensure!(made.len() == 1, "{}: {} files", wheels.display(), made.len());
+    let made: Vec<PathBuf> = made.map(|entry| Ok(entry?.path())).collect::<Result<_>>()?;
+    ensure!(
+        made.len() == 1,
+        "{}: {} files",
+        wheels.display(),
+        made.len()
+    );
     made.into_iter().next().context("no wheel")
 }

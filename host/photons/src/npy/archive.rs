@@ -5,7 +5,6 @@ use std::io::BufReader;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use npyz::npz::array_name_from_file_name;
 use zip::ZipArchive;
 
 use super::header::Array;
@@ -27,7 +26,7 @@ fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histogr
     let mut arrays = Vec::new();
     for name in zip.file_names() {
         let name = name.context("a file without a name")?;
-        arrays.extend(array_name_from_file_name(&name).map(str::to_owned));
+        arrays.extend(name.strip_suffix(".npy").map(str::to_owned));
     }
     arrays.sort();
     // A name may be any text, an error is one line.

@@ -1,22 +1,141 @@
-//! The header of an array, held against the length of its file before anything is allocated
-//! for what it claims.
+//! The header of an array, as NumPy's `NEP 1` describes it: a Python dictionary of type, order and
+//! shape. It is held against the length of its file before anything is allocated for what it claims.
 
+use std::fmt;
 use std::io::{BufReader, Read};
 
-use anyhow::{Result, anyhow, bail, ensure};
-use npyz::{DType, NpyFile, NpyHeader, Order, TypeStr};
+use anyhow::{Context, Result, bail, ensure};
 
 use crate::medium::Medium;
 
+/// The most bytes of a header: one of numbers, or of records of numbers, has fewer.
+const MOST_BYTES: u64 = 4096;
+/// The deepest a literal is nested in another: the shape of a field, in a field, in a list of
+/// fields, in the dictionary.
+const DEEPEST: u32 = 4;
+
 /// A header that agrees with the length of its file.
+#[derive(Clone, Debug)]
 pub struct Header {
     /// Lengths of the axes.
     pub shape: Vec<u64>,
     /// Whether the first axis is the fastest.
     pub fortran: bool,
     /// What the elements are.
-    pub elements: DType,
-    header: NpyHeader,
+    pub elements: Elements,
+}
+
+/// What the elements of an array are.
+#[derive(Clone, Debug)]
+pub enum Elements {
+    /// Plain ones.
+    Plain(Element),
+    /// Records of fields.
+    Records(Vec<Field>),
+}
+
+/// A field of a record.
+#[derive(Clone, Debug)]
+pub struct Field {
+    /// Its name; empty between fields.
+    pub name: String,
+    /// Its type, if it is a plain one.
+    pub element: Option<Element>,
+    /// Its type, as the header has it.
+    pub text: String,
+    /// Its bytes.
+    pub bytes: u64,
+}
+
+/// A plain type, as `<u2`: the order of its bytes, a letter for its kind, its size.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Element {
+    text: String,
+    kind: char,
+    size: u64,
+    is_big_endian: bool,
+}
+
+/// An element.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Number {
+    /// Of an integer type.
+    Integer(i128),
+    /// Of a float type.
+    Float(f64),
+}
+
+impl Element {
+    /// None if it is no type that NumPy writes.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        let mut letters = text.chars();
+        let order = letters.next().filter(|order| "<>|".contains(*order))?;
+        let kind = letters.next().filter(char::is_ascii_alphabetic)?;
+        // A time has its unit behind its size.
+        let size = letters.as_str().split('[').next()?;
+        Some(Self {
+            text: text.to_owned(),
+            kind,
+            size: size.parse().ok()?,
+            is_big_endian: order == '>',
+        })
+    }
+
+    /// Bytes of an element, if they are always as many.
+    fn bytes(&self) -> Option<u64> {
+        match self.kind {
+            'O' => None,
+            'U' => self.size.checked_mul(4),
+            _ => Some(self.size),
+        }
+    }
+
+    /// Bytes of an integer, and whether it has a sign.
+    #[must_use]
+    pub fn integer(&self) -> Option<(u32, bool)> {
+        let size = u32::try_from(self.size).ok()?;
+        let is_integer = matches!((self.kind, size), ('u' | 'i', 1 | 2 | 4 | 8));
+        is_integer.then_some((size, self.kind == 'i'))
+    }
+
+    /// Bytes of a float of 32 or 64 bits.
+    #[must_use]
+    pub fn float(&self) -> Option<u64> {
+        matches!((self.kind, self.size), ('f', 4 | 8)).then_some(self.size)
+    }
+
+    /// Whether the highest byte comes first.
+    #[must_use]
+    pub const fn is_big_endian(&self) -> bool {
+        self.is_big_endian
+    }
+
+    /// The element of these bytes, as many as it has; `None` if it is neither an integer nor a float.
+    fn number(&self, bytes: &[u8]) -> Option<Number> {
+        let mut wide = [0; 8];
+        let unused = wide.len().checked_sub(bytes.len())?;
+        wide[..bytes.len()].copy_from_slice(bytes);
+        if self.is_big_endian {
+            wide[..bytes.len()].reverse();
+        }
+        let value = u64::from_le_bytes(wide);
+        Some(match (self.integer(), self.float()) {
+            (Some((_, false)), _) => Number::Integer(value.into()),
+            (Some((_, true)), _) => {
+                let bits = 8 * u32::try_from(unused).ok()?;
+                Number::Integer(((value << bits).cast_signed() >> bits).into())
+            }
+            (None, Some(8)) => Number::Float(f64::from_bits(value)),
+            (None, Some(_)) => Number::Float(f32::from_bits(u32::try_from(value).ok()?).into()),
+            (None, None) => return None,
+        })
+    }
+}
+
+impl fmt::Display for Element {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
 }
 
 impl Header {
@@ -25,33 +144,248 @@ impl Header {
     /// # Errors
     /// If it is none, or not that of such a file.
     pub fn read(file: &mut impl Read, length: u64) -> Result<Self> {
-        let bytes = header_bytes(file, length)?;
-        let header = NpyHeader::from_reader(&bytes[..]).map_err(|error| {
-            // Of a drawing of where the header is wrong, the first line.
-            let reason = error.to_string();
-            let reason = reason.lines().next().unwrap_or_default();
-            anyhow!("not an .npy file as numpy.save writes it: {reason}")
-        })?;
-        let data_bytes = length - bytes.len() as u64;
-        let shape = header.shape().to_vec();
-        let elements = header.dtype();
-        let claimed = elements.num_bytes().and_then(|size| {
-            let count = shape
-                .iter()
-                .try_fold(1u64, |product, &axis| product.checked_mul(axis))?;
-            count.checked_mul(size as u64)
-        });
+        const NONE: &str = "not an .npy file as numpy.save writes it";
+        let mut start = [0; 10];
+        let read = file.read_exact(&mut start);
+        ensure!(read.is_ok() && start.starts_with(b"\x93NUMPY"), NONE);
+        let mut bytes = u64::from(u16::from_le_bytes([start[8], start[9]]));
+        let mut before = start.len() as u64;
+        if start[6] > 1 {
+            let mut high = [0; 2];
+            file.read_exact(&mut high).context(NONE)?;
+            bytes |= u64::from(u16::from_le_bytes(high)) << 16;
+            before += 2;
+        }
         ensure!(
-            claimed == Some(data_bytes),
-            "the header claims {shape:?} elements of {}, which {data_bytes} bytes of data are not",
-            elements.descr()
+            bytes <= length.min(MOST_BYTES),
+            "the header is longer than one of numbers can be"
         );
-        Ok(Self {
+        let mut text = String::new();
+        let read = file.take(bytes).read_to_string(&mut text);
+        ensure!(read.is_ok_and(|read| read as u64 == bytes), NONE);
+        let mut literals = Literals {
+            text: &text,
+            at: 0,
+            depth: 0,
+        };
+        let dictionary = literals.next().and_then(|dictionary| {
+            ensure!(literals.rest().trim().is_empty(), "more behind it");
+            Ok(dictionary)
+        });
+        let dictionary = dictionary.context(NONE)?;
+        let header = Self::of(&dictionary).context(NONE)?;
+        let (elements, each) = header;
+        let data = length.saturating_sub(before + bytes);
+        let shape = &elements.shape;
+        let count = shape
+            .iter()
+            .try_fold(1u64, |all, &axis| all.checked_mul(axis));
+        let claimed = count
+            .zip(each)
+            .and_then(|(count, each)| count.checked_mul(each));
+        ensure!(
+            claimed == Some(data),
+            "the header claims {shape:?} elements of {}, which {data} bytes of data are not",
+            dictionary.get("descr").map_or("", |descr| descr.text)
+        );
+        Ok(elements)
+    }
+
+    /// What a dictionary says, and the bytes of an element.
+    fn of(dictionary: &Literal) -> Result<(Self, Option<u64>)> {
+        let of = |key: &str| dictionary.get(key).with_context(|| format!("no {key}"));
+        let order = of("fortran_order")?;
+        let fortran = match order.value {
+            Value::Name("True") => true,
+            Value::Name("False") => false,
+            _ => bail!("fortran_order is {}", order.text),
+        };
+        let shape = of("shape")?.shape()?;
+        let descr = of("descr")?;
+        let (elements, bytes) = match &descr.value {
+            Value::Text(text) => {
+                let element = Element::parse(text);
+                let element = element.with_context(|| format!("no type {}", descr.text))?;
+                let bytes = element.bytes();
+                (Elements::Plain(element), bytes)
+            }
+            Value::List(fields) => {
+                let fields = fields.iter().map(Field::of).collect::<Result<Vec<_>>>()?;
+                let mut sizes = fields.iter().map(|field| field.bytes);
+                let bytes = sizes.try_fold(0u64, u64::checked_add);
+                (Elements::Records(fields), bytes)
+            }
+            _ => bail!("no type {}", descr.text),
+        };
+        let header = Self {
             shape,
-            fortran: header.order() == Order::Fortran,
+            fortran,
             elements,
-            header,
+        };
+        Ok((header, bytes))
+    }
+}
+
+impl Field {
+    /// Of a tuple: name, type, and lengths of axes if the field is an array.
+    fn of(tuple: &Literal) -> Result<Self> {
+        let Value::List(parts) = &tuple.value else {
+            bail!("no field {}", tuple.text);
+        };
+        let (name, kind, axes) = match &parts[..] {
+            [name, kind] => (name, kind, Vec::new()),
+            [name, kind, axes] => (name, kind, axes.shape()?),
+            _ => bail!("no field {}", tuple.text),
+        };
+        // A field may have a title, too.
+        let name = match &name.value {
+            Value::List(names) => names.last().map(|name| &name.value),
+            value => Some(value),
+        };
+        let (Some(Value::Text(name)), Value::Text(kind_text)) = (name, &kind.value) else {
+            bail!("the elements are not plain numbers");
+        };
+        let element = Element::parse(kind_text);
+        let element = element.with_context(|| format!("no type {}", kind.text))?;
+        let mut sides = axes.iter();
+        let bytes = element
+            .bytes()
+            .and_then(|bytes| sides.try_fold(bytes, |all, &side| all.checked_mul(side)));
+        Ok(Self {
+            name: name.clone(),
+            bytes: bytes.context("records of no fixed size")?,
+            text: match axes.is_empty() {
+                true => element.to_string(),
+                false => tuple.text.to_owned(),
+            },
+            element: axes.is_empty().then_some(element),
         })
+    }
+}
+
+/// A Python literal, and how it is written.
+struct Literal<'a> {
+    value: Value<'a>,
+    text: &'a str,
+}
+
+enum Value<'a> {
+    Text(String),
+    Number(u64),
+    /// `True`, `False`.
+    Name(&'a str),
+    /// A tuple or a list.
+    List(Vec<Literal<'a>>),
+    Dictionary(Vec<(Literal<'a>, Literal<'a>)>),
+}
+
+impl<'a> Literal<'a> {
+    fn get(&self, key: &str) -> Option<&Self> {
+        let Value::Dictionary(entries) = &self.value else {
+            return None;
+        };
+        let is_key =
+            |entry: &&(Self, Self)| matches!(&entry.0.value, Value::Text(text) if text == key);
+        entries.iter().find(is_key).map(|(_, value)| value)
+    }
+
+    /// Lengths of axes; a number is one.
+    fn shape(&self) -> Result<Vec<u64>> {
+        let length = |literal: &Self| match literal.value {
+            Value::Number(length) => Ok(length),
+            _ => bail!("no length of an axis: {}", literal.text),
+        };
+        match &self.value {
+            Value::List(lengths) => lengths.iter().map(length).collect(),
+            _ => Ok(vec![length(self)?]),
+        }
+    }
+}
+
+/// Reads literals, one after the other.
+struct Literals<'a> {
+    text: &'a str,
+    at: usize,
+    depth: u32,
+}
+
+impl<'a> Literals<'a> {
+    fn rest(&self) -> &'a str {
+        &self.text[self.at..]
+    }
+
+    /// Passes blanks, and then `mark` if it is there.
+    fn passes(&mut self, mark: char) -> bool {
+        self.at += self.rest().len() - self.rest().trim_start().len();
+        let is_there = self.rest().starts_with(mark);
+        self.at += if is_there { mark.len_utf8() } else { 0 };
+        is_there
+    }
+
+    fn next(&mut self) -> Result<Literal<'a>> {
+        ensure!(self.depth <= DEEPEST, "the elements are not plain numbers");
+        self.passes(' ');
+        let begin = self.at;
+        let value = match self.rest().chars().next() {
+            Some(quote @ ('\'' | '"')) => Value::Text(self.quoted(quote)?),
+            Some('(') => Value::List(self.until(')', Self::next)?),
+            Some('[') => Value::List(self.until(']', Self::next)?),
+            Some('{') => Value::Dictionary(self.until('}', |literals| {
+                let key = literals.next()?;
+                ensure!(literals.passes(':'), "no : behind {}", key.text);
+                Ok((key, literals.next()?))
+            })?),
+            _ => {
+                let is_part = |letter: char| letter.is_ascii_alphanumeric();
+                let word = self.rest().split(|letter| !is_part(letter)).next();
+                let word = word.filter(|word| !word.is_empty()).context("no literal")?;
+                self.at += word.len();
+                // Python 2 wrote long integers with an L.
+                match word.trim_end_matches('L').parse() {
+                    Ok(number) => Value::Number(number),
+                    Err(_) => Value::Name(word),
+                }
+            }
+        };
+        let text = &self.text[begin..self.at];
+        Ok(Literal { value, text })
+    }
+
+    /// A text; what stands behind a backslash is taken as it is.
+    fn quoted(&mut self, quote: char) -> Result<String> {
+        let mut text = String::new();
+        let mut letters = self.rest().char_indices().skip(1);
+        while let Some((place, letter)) = letters.next() {
+            match letter {
+                '\\' => text.extend(letters.next().map(|(_, letter)| letter)),
+                letter if letter == quote => {
+                    self.at += place + quote.len_utf8();
+                    return Ok(text);
+                }
+                letter => text.push(letter),
+            }
+        }
+        bail!("a text without an end")
+    }
+
+    /// What `each` reads, with commas between, up to the bracket `end`.
+    fn until<T>(
+        &mut self,
+        end: char,
+        mut each: impl FnMut(&mut Self) -> Result<T>,
+    ) -> Result<Vec<T>> {
+        self.at += 1;
+        self.depth += 1;
+        let mut all = Vec::new();
+        while !self.passes(end) {
+            all.push(each(self)?);
+            if !self.passes(',') {
+                ensure!(self.passes(end), "no {end}");
+                break;
+            }
+        }
+        self.depth -= 1;
+        Ok(all)
     }
 }
 
@@ -62,9 +396,9 @@ pub struct Array<R: Read> {
     /// Whether the first axis is the fastest.
     pub fortran: bool,
     /// What the elements are.
-    pub element: TypeStr,
+    pub element: Element,
     /// The data.
-    pub npy: NpyFile<R>,
+    file: R,
 }
 
 impl<R: Read> Array<R> {
@@ -74,15 +408,40 @@ impl<R: Read> Array<R> {
     /// If it is not that of an array of plain elements.
     pub fn read(mut file: R, length: u64) -> Result<Self> {
         let header = Header::read(&mut file, length)?;
-        let DType::Plain(element) = header.elements else {
+        let Elements::Plain(element) = header.elements else {
             bail!("elements are records, not numbers");
         };
         Ok(Self {
             shape: header.shape,
             fortran: header.fortran,
             element,
-            npy: NpyFile::with_header(header.header, file),
+            file,
         })
+    }
+
+    /// What `each` makes of the elements, in the order of the file.
+    ///
+    /// # Errors
+    /// If they are neither integers nor floats of 32 or 64 bits, the file ends too early, or `each`
+    /// refuses one.
+    pub fn elements<T>(
+        mut self,
+        mut each: impl FnMut(usize, Number) -> Result<T>,
+    ) -> Result<Vec<T>> {
+        let size = self.element.bytes().unwrap_or_default();
+        let mut bytes = [0; 8];
+        let bytes = bytes.get_mut(..usize::try_from(size)?);
+        let bytes = bytes.context("the elements are not plain numbers")?;
+        let count = usize::try_from(self.shape.iter().product::<u64>())?;
+        // The size of an entry of an archive is a claim, too: no more is allocated than is read.
+        let mut all = Vec::new();
+        for place in 0..count {
+            self.file.read_exact(bytes)?;
+            let number = self.element.number(bytes);
+            let number = number.context("the elements are not plain numbers")?;
+            all.push(each(place, number)?);
+        }
+        Ok(all)
     }
 }
 
@@ -97,36 +456,105 @@ impl Array<BufReader<Box<dyn Read>>> {
     }
 }
 
-/// The bytes of a header. Refuses one that would take long to read: longer than the file or
-/// than any of plain elements, or nested deeper than a record in a dictionary.
-fn header_bytes(file: &mut impl Read, length: u64) -> Result<Vec<u8>> {
-    let mut bytes = vec![0; 10];
-    let read = file.read_exact(&mut bytes);
-    ensure!(
-        read.is_ok() && bytes.starts_with(b"\x93NUMPY"),
-        "not an .npy file as numpy.save writes it"
-    );
-    let mut more = u64::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    if bytes[6] > 1 {
-        let mut high = [0; 2];
-        file.read_exact(&mut high)?;
-        bytes.extend(high);
-        more |= u64::from(u16::from_le_bytes(high)) << 16;
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn header(dictionary: &str, data: u64) -> Result<Header> {
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend(u16::try_from(dictionary.len()).unwrap().to_le_bytes());
+        bytes.extend(dictionary.as_bytes());
+        let length = bytes.len() as u64 + data;
+        Header::read(&mut &bytes[..], length)
     }
-    ensure!(
-        more <= length.min(4096),
-        "the header is longer than one of numbers can be"
-    );
-    let start = bytes.len();
-    file.take(more).read_to_end(&mut bytes)?;
-    let mut depth = 0u32;
-    for byte in &bytes[start..] {
-        match byte {
-            b'(' | b'[' | b'{' => depth += 1,
-            b')' | b']' | b'}' => depth = depth.saturating_sub(1),
-            _ => {}
+
+    /// As numpy.save has written them, with versions 1 and 2 of Python, and by hand.
+    #[test]
+    fn what_numpy_writes_is_read() {
+        for (text, shape, fortran, data) in [
+            (
+                "{'descr': '<u2', 'fortran_order': False, 'shape': (3, 4), }    \n",
+                vec![3, 4],
+                false,
+                24,
+            ),
+            (
+                "{'descr': '|u1', 'fortran_order': True, 'shape': (5,), }\n",
+                vec![5],
+                true,
+                5,
+            ),
+            (
+                "{'descr': '>f8', 'fortran_order': False, 'shape': (), }\n",
+                vec![],
+                false,
+                8,
+            ),
+            (
+                "{'shape': (10L, 2L), 'fortran_order': False, 'descr': '<i4'}",
+                vec![10, 2],
+                false,
+                80,
+            ),
+            (
+                "{\"descr\":\"<u4\",\"shape\":[7],\"fortran_order\":False}",
+                vec![7],
+                false,
+                28,
+            ),
+        ] {
+            let found = header(text, data).unwrap();
+            assert_eq!((found.shape, found.fortran), (shape, fortran), "{text}");
+            assert!(matches!(found.elements, Elements::Plain(_)));
+            let error = header(text, data + 1).unwrap_err().to_string();
+            assert!(error.starts_with("the header claims ["), "{error}");
         }
-        ensure!(depth <= 3, "the elements are not plain numbers");
+        let text = "{'descr': [('pixel', '<u2'), ('', '|V2'), (('a title', 'it\\'s'), '<f4', (2, 3))], \
+                    'fortran_order': False, 'shape': (2,), }";
+        let Elements::Records(fields) = header(text, 56).unwrap().elements else {
+            panic!("no records");
+        };
+        let named = fields.iter().map(|field| (&field.name[..], field.bytes));
+        assert!(named.eq([("pixel", 2), ("", 2), ("it's", 24)]));
+        assert!(fields[0].element.is_some() && fields[2].element.is_none());
     }
-    Ok(bytes)
+
+    #[test]
+    fn what_is_no_header_is_refused() {
+        for text in [
+            "",
+            "{",
+            "{'descr': '<u2'}",
+            "{'descr': '<u2', 'fortran_order': 0, 'shape': (3,)}",
+            "{'descr': '<u2', 'fortran_order': False, 'shape': (-3,)}",
+            "{'descr': '<u2', 'fortran_order': False, 'shape': (3,)} more",
+            "{'descr': '<u2', 'fortran_order': False 'shape': (3,)}",
+            "{'descr': 'u2', 'fortran_order': False, 'shape': (3,)}",
+            "{'descr': '<u', 'fortran_order': False, 'shape': (3,)}",
+            "{'descr': '<u2, 'fortran_order': False, 'shape': (3,)}",
+            "{'descr': [('a',)], 'fortran_order': False, 'shape': (3,)}",
+            "{'descr': [('a', [('b', '<u2')])], 'fortran_order': False, 'shape': (3,)}",
+            "[1, 2]",
+            "((((((((((1))))))))))",
+        ] {
+            let error = format!("{:#}", header(text, 6).unwrap_err());
+            assert!(
+                error.starts_with("not an .npy file as numpy.save writes it: "),
+                "{text}: {error}"
+            );
+        }
+        let objects = "{'descr': '|O', 'fortran_order': False, 'shape': (3,)}";
+        assert!(header(objects, 24).is_err());
+        let huge = "{'descr': '<u8', 'fortran_order': False, 'shape': (4294967296, 4294967296)}";
+        assert!(header(huge, 0).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_is_a_panic(text in "\\PC{0,80}", start in "[{(\\['\"]{0,6}", data in 0..100u64) {
+            let _ = header(&text, data);
+            let _ = header(&(start + &text), data);
+        }
+    }
 }

@@ -2,10 +2,9 @@
 
 use std::io::Read;
 
-use anyhow::{Context, Result, anyhow, bail, ensure};
-use npyz::{Deserialize, NpyFile, TypeChar};
+use anyhow::{Context, Result, anyhow, ensure};
 
-use super::header::Array;
+use super::header::{Array, Number};
 use crate::axes::{Axes, Layout, index_of};
 use crate::bins::MOST_BINS;
 use crate::medium::Medium;
@@ -34,12 +33,7 @@ pub fn read(medium: &Medium, axes: Option<&Axes>) -> Result<Histograms> {
 
 /// The same of an array whose header has been read.
 pub(super) fn of_array<R: Read>(array: Array<R>, axes: Option<&Axes>) -> Result<Histograms> {
-    let Array {
-        shape,
-        fortran,
-        element,
-        npy,
-    } = array;
+    let (shape, fortran) = (array.shape.clone(), array.fortran);
     let layout = Layout::new(&shape, fortran, axes)?;
     ensure!(
         layout.bins() <= MOST_BINS,
@@ -48,27 +42,18 @@ pub(super) fn of_array<R: Read>(array: Array<R>, axes: Option<&Axes>) -> Result<
             layout.bins()
         ))
     );
-    let counts = match (element.type_char(), element.size_field()) {
-        (TypeChar::Uint, 1) => all(npy, |count: u8| Ok(count.into())),
-        (TypeChar::Uint, 2) => all(npy, |count: u16| Ok(count.into())),
-        (TypeChar::Uint, 4) => all(npy, |count: u32| Ok(count.into())),
-        (TypeChar::Uint, 8) => all(npy, |count: u64| Ok(count)),
-        (TypeChar::Int, 1) => all(npy, |count: i8| unsigned(count.into())),
-        (TypeChar::Int, 2) => all(npy, |count: i16| unsigned(count.into())),
-        (TypeChar::Int, 4) => all(npy, |count: i32| unsigned(count.into())),
-        (TypeChar::Int, 8) => all(npy, unsigned),
-        (TypeChar::Float, 4) => all(npy, |count: f32| whole(count.into())),
-        (TypeChar::Float, 8) => all(npy, whole),
-        _ => bail!(
-            "elements are {element}: must be integers, or floats that are whole numbers; convert \
-             them with .astype(numpy.uint32)"
-        ),
-    };
-    let counts = counts.map_err(|wrong| match wrong {
-        Wrong::Read(error) => error,
-        Wrong::Element(place, why) => {
-            anyhow!("element {} is {why}", index_of(place, &shape, fortran))
-        }
+    ensure!(
+        array.element.integer().is_some() || array.element.float().is_some(),
+        "elements are {}: must be integers, or floats that are whole numbers; convert them with \
+         .astype(numpy.uint32)",
+        array.element
+    );
+    let counts = array.elements(|place, number| {
+        let count = match number {
+            Number::Integer(count) => unsigned(count),
+            Number::Float(count) => whole(count),
+        };
+        count.map_err(|why| anyhow!("element {} is {why}", index_of(place, &shape, fortran)))
     })?;
     Ok(Histograms {
         first: usize::try_from(shape[0])?,
@@ -77,27 +62,7 @@ pub(super) fn of_array<R: Read>(array: Array<R>, axes: Option<&Axes>) -> Result<
     })
 }
 
-/// Why an array is not read.
-enum Wrong {
-    Read(anyhow::Error),
-    /// Which element, and what is wrong with it.
-    Element(usize, String),
-}
-
-fn all<T: Deserialize, R: Read>(
-    npy: NpyFile<R>,
-    count: impl Fn(T) -> Result<u64, String>,
-) -> Result<Vec<u64>, Wrong> {
-    let elements = npy.data::<T>();
-    let elements = elements.map_err(|error| Wrong::Read(anyhow!("{error}")))?;
-    let counts = elements.enumerate().map(|(place, element)| {
-        let element = element.map_err(|error| Wrong::Read(error.into()))?;
-        count(element).map_err(|why| Wrong::Element(place, why))
-    });
-    counts.collect()
-}
-
-fn unsigned(count: i64) -> Result<u64, String> {
+fn unsigned(count: i128) -> Result<u64, String> {
     u64::try_from(count).map_err(|_| format!("negative: {count}"))
 }
 

@@ -1,9 +1,8 @@
 //! Pictures: integers or floats of an `.npy` file.
 
 use anyhow::{Context, Result, bail, ensure};
-use npyz::TypeChar;
 
-use super::header::Array;
+use super::header::{Array, Number};
 use crate::medium::Medium;
 
 /// The numbers of a picture.
@@ -40,15 +39,8 @@ pub fn read(medium: &Medium) -> Result<Numbers> {
 }
 
 fn numbers_of(medium: &Medium) -> Result<Numbers> {
-    fn widened<T: Into<f64>>(values: Vec<T>) -> Vec<f64> {
-        values.into_iter().map(T::into).collect()
-    }
-    let Array {
-        shape,
-        fortran,
-        element,
-        npy,
-    } = Array::open(medium)?;
+    let array = Array::open(medium)?;
+    let (shape, fortran) = (array.shape.clone(), array.fortran);
     ensure!(
         !fortran || shape.len() < 2,
         "the array is in Fortran order; write it with numpy.ascontiguousarray"
@@ -59,28 +51,22 @@ fn numbers_of(medium: &Medium) -> Result<Numbers> {
         count <= MOST_NUMBERS,
         "{count} elements: must be at most {MOST_NUMBERS}"
     );
-    let (kind, values) = match (element.type_char(), element.size_field()) {
-        (TypeChar::Float, 4) => (Element::Float, widened(npy.into_vec::<f32>()?)),
-        (TypeChar::Float, 8) => (Element::Float, npy.into_vec::<f64>()?),
-        (TypeChar::Uint, 1) => (Element::Byte, widened(npy.into_vec::<u8>()?)),
-        (TypeChar::Uint, 2) => (Element::Integer, widened(npy.into_vec::<u16>()?)),
-        (TypeChar::Uint, 4) => (Element::Integer, widened(npy.into_vec::<u32>()?)),
-        (TypeChar::Int, 1) => (Element::Integer, widened(npy.into_vec::<i8>()?)),
-        (TypeChar::Int, 2) => (Element::Integer, widened(npy.into_vec::<i16>()?)),
-        (TypeChar::Int, 4) => (Element::Integer, widened(npy.into_vec::<i32>()?)),
-        (TypeChar::Uint, 8) => {
-            let wide = npy.into_vec::<u64>()?.into_iter();
-            (Element::Integer, wide.map(|value| value as f64).collect())
-        }
-        (TypeChar::Int, 8) => {
-            let wide = npy.into_vec::<i64>()?.into_iter();
-            (Element::Integer, wide.map(|value| value as f64).collect())
-        }
-        _ => bail!(
-            "elements are {element}: must be integers, or floats of 32 or 64 bits; convert them \
-             with .astype(numpy.float32)"
+    let kind = match (array.element.integer(), array.element.float()) {
+        (_, Some(_)) => Element::Float,
+        (Some((1, false)), _) => Element::Byte,
+        (Some(_), _) => Element::Integer,
+        (None, None) => bail!(
+            "elements are {}: must be integers, or floats of 32 or 64 bits; convert them with \
+             .astype(numpy.float32)",
+            array.element
         ),
     };
+    let values = array.elements(|_, number| {
+        Ok(match number {
+            Number::Integer(value) => value as f64,
+            Number::Float(value) => value,
+        })
+    })?;
     Ok(Numbers {
         shape,
         element: kind,

@@ -4,9 +4,8 @@
 use std::io::{BufReader, Read};
 
 use anyhow::{Context, Result, bail, ensure};
-use npyz::{DType, Endianness, Field, TypeChar};
 
-use super::header::Header;
+use super::header::{Elements, Field, Header};
 use crate::medium::Medium;
 use crate::photon_list::{Row, Rows};
 
@@ -26,23 +25,16 @@ struct Number {
 }
 
 impl Number {
-    fn of(offset: usize, name: &str, dtype: &DType) -> Result<Self> {
-        let (is_signed, size, is_big_endian) = match dtype {
-            DType::Plain(plain) if matches!(plain.size_field(), 1 | 2 | 4 | 8) => {
-                let is_signed = match plain.type_char() {
-                    TypeChar::Int => true,
-                    TypeChar::Uint => false,
-                    _ => bail!("field {name} is {plain}: must be an integer"),
-                };
-                let big = plain.endianness() == Endianness::Big;
-                (is_signed, plain.size_field(), big)
-            }
-            other => bail!("field {name} is {}: must be an integer", other.descr()),
-        };
+    fn of(offset: usize, field: &Field) -> Result<Self> {
+        let integer = field.element.as_ref();
+        let integer = integer.and_then(|element| Some((element, element.integer()?)));
+        let (element, (size, is_signed)) = integer.with_context(|| {
+            format!("field {} is {}: must be an integer", field.name, field.text)
+        })?;
         Ok(Self {
             offset,
-            is_big_endian,
-            unused: 64 - 8 * u32::try_from(size)?,
+            is_big_endian: element.is_big_endian(),
+            unused: 64 - 8 * size,
             is_signed,
         })
     }
@@ -88,7 +80,7 @@ pub fn other_fields(medium: &Medium) -> Result<Option<Vec<String>>> {
         Header::read(&mut BufReader::new(file), length)
     };
     let header = header().with_context(|| medium.to_string())?;
-    let DType::Record(fields) = header.elements else {
+    let Elements::Records(fields) = header.elements else {
         return Ok(None);
     };
     let names = fields.into_iter().map(|field| field.name);
@@ -105,7 +97,7 @@ impl Records {
         let &[records] = &header.shape[..] else {
             bail!("a list of photons has one axis, not {:?}", header.shape);
         };
-        let DType::Record(fields) = header.elements else {
+        let Elements::Records(fields) = header.elements else {
             bail!("the elements are no records");
         };
         let record = size(&fields)?;
@@ -164,25 +156,24 @@ impl Rows for Records {
 }
 
 fn size(fields: &[Field]) -> Result<usize> {
-    let bytes = fields.iter().try_fold(0usize, |sum, field| {
-        sum.checked_add(field.dtype.num_bytes()?)
-    });
+    let mut sizes = fields.iter().map(|field| field.bytes);
+    let bytes = sizes.try_fold(0u64, u64::checked_add);
     let bytes = bytes.context("records of no fixed size")?;
     ensure!(
         (1..=4096).contains(&bytes),
         "records of {bytes} bytes: must be at most 4096"
     );
-    Ok(bytes)
+    Ok(usize::try_from(bytes)?)
 }
 
 fn numbers(fields: &[Field]) -> Result<[Number; 3]> {
     let mut found = [None; 3];
     let mut offset = 0;
-    for Field { name, dtype } in fields {
-        if let Some(place) = NAMES.iter().position(|wanted| wanted == name) {
-            found[place] = Some(Number::of(offset, name, dtype)?);
+    for field in fields {
+        if let Some(place) = NAMES.iter().position(|wanted| *wanted == field.name) {
+            found[place] = Some(Number::of(offset, field)?);
         }
-        offset += dtype.num_bytes().unwrap_or(0);
+        offset += usize::try_from(field.bytes)?;
     }
     let [Some(pixel), Some(cycle), Some(bin)] = found else {
         let names: Vec<&str> = fields.iter().map(|field| field.name.as_str()).collect();
@@ -196,6 +187,7 @@ fn numbers(fields: &[Field]) -> Result<[Number; 3]> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::header::Element;
     use super::*;
 
     #[test]
@@ -214,8 +206,14 @@ mod tests {
             (">u8", Some(0x8102_0304_0506_0788)),
             ("<i8", None),
         ] {
-            let dtype = DType::Plain(descr.parse().unwrap());
-            let number = Number::of(0, "bin", &dtype).unwrap();
+            let element = Element::parse(descr);
+            let field = Field {
+                name: "bin".to_owned(),
+                text: descr.to_owned(),
+                bytes: 8,
+                element,
+            };
+            let number = Number::of(0, &field).unwrap();
             assert_eq!(number.value(&bytes), expected, "{descr}");
         }
     }
