@@ -36,7 +36,7 @@ use measure::{Outcome, Trial, measure};
 use method::{Kind, Method, Rule};
 use selected::Selected;
 use stress::{Light, Stress, Stressed};
-use survey::{OfPixel, light, median, survey};
+use survey::{PixelLight, light, median, survey};
 pub use tally::Figures;
 use tally::{WRONG_BEYOND_BINS, mm_per_bin};
 use thresholds::{LEAST_COUNT, Thresholds};
@@ -314,13 +314,13 @@ fn is_measured(outcome: &Outcome, cycles: u64) -> bool {
 /// another offset: the median pixel tells.
 fn known_ranges(
     truth: Option<Truth>,
-    surveyed: &[(PixelAddress, OfPixel)],
+    surveyed: &[(PixelAddress, PixelLight)],
     settings: &Settings,
     geometry: Geometry,
 ) -> Result<Truth> {
     let mm_per_bin = mm_per_bin(settings);
     let offset = settings.offset_mm.to_num::<f64>();
-    let range = |pixel: &OfPixel| Some(pixel.position? * mm_per_bin + offset);
+    let range = |pixel: &PixelLight| Some(pixel.position? * mm_per_bin + offset);
     Ok(match truth {
         Some(Truth::Scene(scene)) => Truth::Scene(scene),
         Some(known) => {

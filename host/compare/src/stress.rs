@@ -192,7 +192,7 @@ impl PhotonSource for Stressed {
         let first = slice.first_cycle;
         let stressed = pixels.par_iter_mut().zip(slice.pixels);
         let stressed = stressed.map(|((address, rng), photons)| {
-            let of_pixel = OfPixel {
+            let slice = StressedSlice {
                 stress,
                 background: stress.background
                     + if stress.is_hot(*address, *columns) {
@@ -205,7 +205,7 @@ impl PhotonSource for Stressed {
                 first,
                 cycles: *cycles,
             };
-            of_pixel.photons(&photons, rng)
+            slice.photons(&photons, rng)
         });
         Ok(Slice {
             first_cycle: first,
@@ -215,7 +215,7 @@ impl PhotonSource for Stressed {
 }
 
 /// One pixel and slice.
-struct OfPixel<'a> {
+struct StressedSlice<'a> {
     stress: &'a Stress,
     background: f64,
     sigma: f64,
@@ -224,7 +224,7 @@ struct OfPixel<'a> {
     cycles: u64,
 }
 
-impl OfPixel<'_> {
+impl StressedSlice<'_> {
     fn photons(&self, before: &PixelPhotons, rng: &mut Pcg64) -> Result<PixelPhotons> {
         let bins = f64::from(self.bins);
         let stays = Bernoulli::new(self.stress.keep).context("a share of the photons")?;

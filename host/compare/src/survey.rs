@@ -14,7 +14,7 @@ const CLEAR: f64 = 6.0;
 
 /// The whole histogram of a pixel, and what it comes to.
 #[derive(Clone, Debug, Default)]
-pub struct OfPixel {
+pub struct PixelLight {
     /// Background photons a bin and laser cycle, of bins away from the highest window.
     pub background: f64,
     /// Photons a laser cycle in the highest window above the background.
@@ -32,7 +32,7 @@ pub fn survey(
     source: &mut dyn PhotonSource,
     settings: &Settings,
     sigma: f64,
-) -> Result<Vec<(PixelAddress, OfPixel)>> {
+) -> Result<Vec<(PixelAddress, PixelLight)>> {
     let addresses = source.addresses();
     let mut histograms = vec![vec![0u64; settings.bins]; addresses.len()];
     let mut cycles = vec![0; addresses.len()];
@@ -73,7 +73,7 @@ pub fn survey(
     clippy::cast_sign_loss,
     reason = "a few bins"
 )]
-fn of_pixel(bins: &[u64], cycles: u64, sigma: f64) -> OfPixel {
+fn of_pixel(bins: &[u64], cycles: u64, sigma: f64) -> PixelLight {
     let width = ((6.0 * sigma).ceil() as usize + 1).min(bins.len() / 2);
     let windows = bins.windows(width).enumerate();
     let highest = windows.max_by_key(|(_, window)| window.iter().sum::<u64>());
@@ -84,7 +84,7 @@ fn of_pixel(bins: &[u64], cycles: u64, sigma: f64) -> OfPixel {
     let expected = each * width as f64;
     let above = in_window as f64 - expected;
     let cycles_f = cycles.max(1) as f64;
-    OfPixel {
+    PixelLight {
         background: each / cycles_f,
         signal: above.max(0.0) / cycles_f,
         position: (above > CLEAR * expected.max(1.0).sqrt()).then(|| {
@@ -101,7 +101,7 @@ fn of_pixel(bins: &[u64], cycles: u64, sigma: f64) -> OfPixel {
 /// `has_target` names.
 #[must_use]
 pub fn light(
-    pixels: &[(PixelAddress, OfPixel)],
+    pixels: &[(PixelAddress, PixelLight)],
     sigma: f64,
     has_target: impl Fn(PixelAddress) -> bool,
 ) -> Light {
