@@ -4,7 +4,7 @@
 use std::fmt;
 use std::io::{BufReader, Read};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Error, Result, anyhow, bail, ensure};
 
 use crate::medium::Medium;
 
@@ -66,17 +66,43 @@ pub enum Number {
 }
 
 impl Element {
-    /// None if it is no type that NumPy writes.
+    /// None if NumPy has no such type.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let mut letters = text.chars();
         let order = letters.next().filter(|order| "<>|".contains(*order))?;
-        let kind = letters.next().filter(char::is_ascii_alphabetic)?;
+        let kind = letters.next()?;
         // A time has its unit behind its size.
-        let size = letters.as_str().split('[').next()?;
-        Some(Self {
+        let (size, unit) = match letters.as_str().split_once('[') {
+            Some((size, unit)) => (size, Some(unit)),
+            None => (letters.as_str(), None),
+        };
+        let is_time = matches!(kind, 'm' | 'M');
+        let has_unit = unit.is_some_and(|unit| unit.ends_with(']'));
+        let is_number = size.chars().all(|digit| digit.is_ascii_digit());
+        // Objects have no size.
+        let size = if kind == 'O' && size.is_empty() {
+            "0"
+        } else {
+            size
+        };
+        let size = size.parse().ok().filter(|_| is_number)?;
+        let is_known = matches!(
+            (kind, size),
+            ('b', 1)
+                | ('i' | 'u', 1 | 2 | 4 | 8)
+                | ('f', 2 | 4 | 8 | 16)
+                | ('c', 8 | 16 | 32)
+                | ('m' | 'M', 8)
+                | ('S' | 'a' | 'U' | 'V', _)
+                | ('O', 0 | 8)
+        );
+        let has_no_order = matches!(kind, 'b' | 'S' | 'a' | 'V' | 'O') || size == 1;
+        let is_type =
+            is_known && (unit.is_none() || is_time && has_unit) && (order != '|' || has_no_order);
+        is_type.then(|| Self {
             text: text.to_owned(),
             kind,
-            size: size.parse().ok()?,
+            size,
             is_big_endian: order == '>',
         })
     }
@@ -144,15 +170,22 @@ impl Header {
     /// # Errors
     /// If it is none, or not that of such a file.
     pub fn read(file: &mut impl Read, length: u64) -> Result<Self> {
-        const NONE: &str = "not an .npy file as numpy.save writes it";
         let mut start = [0; 10];
         let read = file.read_exact(&mut start);
-        ensure!(read.is_ok() && start.starts_with(b"\x93NUMPY"), NONE);
+        ensure!(
+            read.is_ok() && start.starts_with(b"\x93NUMPY"),
+            "not an .npy file as numpy.save writes it"
+        );
+        let version = start[6];
+        ensure!(
+            (1..=3).contains(&version) && start[7] == 0,
+            none(format!("version {version}.{}", start[7]))
+        );
         let mut bytes = u64::from(u16::from_le_bytes([start[8], start[9]]));
         let mut before = start.len() as u64;
-        if start[6] > 1 {
+        if version > 1 {
             let mut high = [0; 2];
-            file.read_exact(&mut high).context(NONE)?;
+            file.read_exact(&mut high)?;
             bytes |= u64::from(u16::from_le_bytes(high)) << 16;
             before += 2;
         }
@@ -160,52 +193,44 @@ impl Header {
             bytes <= length.min(MOST_BYTES),
             "the header is longer than one of numbers can be"
         );
-        let mut text = String::new();
-        let read = file.take(bytes).read_to_string(&mut text);
-        ensure!(read.is_ok_and(|read| read as u64 == bytes), NONE);
-        let mut literals = Literals {
-            text: &text,
-            at: 0,
-            depth: 0,
+        let mut header = Vec::new();
+        file.take(bytes).read_to_end(&mut header)?;
+        ensure!(header.len() as u64 == bytes, none("it ends in its header"));
+        let text = match version {
+            3 => String::from_utf8(header).map_err(|_| none("the header is not UTF-8"))?,
+            // Latin-1.
+            _ => header.into_iter().map(char::from).collect(),
         };
-        let dictionary = literals.next().and_then(|dictionary| {
-            ensure!(literals.rest().trim().is_empty(), "more behind it");
-            Ok(dictionary)
-        });
-        let dictionary = dictionary.context(NONE)?;
-        let header = Self::of(&dictionary).context(NONE)?;
-        let (elements, each) = header;
+        let dictionary = Literals::only(text.trim_end())?;
+        let (header, each) = Self::of(&dictionary)?;
         let data = length.saturating_sub(before + bytes);
-        let shape = &elements.shape;
-        let count = shape
-            .iter()
-            .try_fold(1u64, |all, &axis| all.checked_mul(axis));
-        let claimed = count
-            .zip(each)
-            .and_then(|(count, each)| count.checked_mul(each));
+        let shape = &header.shape;
+        let mut axes = shape.iter();
+        let count = axes.try_fold(1u64, |all, &axis| all.checked_mul(axis));
+        let claimed = count.zip(each);
+        let claimed = claimed.and_then(|(count, each)| count.checked_mul(each));
         ensure!(
             claimed == Some(data),
             "the header claims {shape:?} elements of {}, which {data} bytes of data are not",
             dictionary.get("descr").map_or("", |descr| descr.text)
         );
-        Ok(elements)
+        Ok(header)
     }
 
     /// What a dictionary says, and the bytes of an element.
     fn of(dictionary: &Literal) -> Result<(Self, Option<u64>)> {
-        let of = |key: &str| dictionary.get(key).with_context(|| format!("no {key}"));
+        let of = |key: &str| dictionary.get(key).ok_or_else(|| none(format!("no {key}")));
         let order = of("fortran_order")?;
         let fortran = match order.value {
             Value::Name("True") => true,
             Value::Name("False") => false,
-            _ => bail!("fortran_order is {}", order.text),
+            _ => bail!(none(format!("fortran_order is {}", order.text))),
         };
-        let shape = of("shape")?.shape()?;
+        let shape = of("shape")?.lengths()?;
         let descr = of("descr")?;
         let (elements, bytes) = match &descr.value {
-            Value::Text(text) => {
-                let element = Element::parse(text);
-                let element = element.with_context(|| format!("no type {}", descr.text))?;
+            Value::Text(_) => {
+                let element = descr.element()?;
                 let bytes = element.bytes();
                 (Elements::Plain(element), bytes)
             }
@@ -215,7 +240,7 @@ impl Header {
                 let bytes = sizes.try_fold(0u64, u64::checked_add);
                 (Elements::Records(fields), bytes)
             }
-            _ => bail!("no type {}", descr.text),
+            _ => bail!(none(format!("no type {}", descr.text))),
         };
         let header = Self {
             shape,
@@ -226,31 +251,40 @@ impl Header {
     }
 }
 
+/// A file that is none, and why.
+fn none(reason: impl fmt::Display) -> Error {
+    anyhow!("not an .npy file as numpy.save writes it: {reason}")
+}
+
 impl Field {
     /// Of a tuple: name, type, and lengths of axes if the field is an array.
     fn of(tuple: &Literal) -> Result<Self> {
-        let Value::List(parts) = &tuple.value else {
-            bail!("no field {}", tuple.text);
+        let wrong = || none(format!("no field {}", tuple.text));
+        let Value::Tuple(parts) = &tuple.value else {
+            bail!(wrong());
         };
         let (name, kind, axes) = match &parts[..] {
             [name, kind] => (name, kind, Vec::new()),
-            [name, kind, axes] => (name, kind, axes.shape()?),
-            _ => bail!("no field {}", tuple.text),
+            [name, kind, axes] => (name, kind, axes.lengths()?),
+            _ => bail!(wrong()),
         };
-        // A field may have a title, too.
+        ensure!(
+            !matches!(kind.value, Value::List(_)),
+            "the elements are not plain numbers"
+        );
+        // A field may have a title before its name.
         let name = match &name.value {
-            Value::List(names) => names.last().map(|name| &name.value),
+            Value::Tuple(names) => names.last().map(|name| &name.value),
             value => Some(value),
         };
-        let (Some(Value::Text(name)), Value::Text(kind_text)) = (name, &kind.value) else {
-            bail!("the elements are not plain numbers");
+        let Some(Value::Text(name)) = name else {
+            bail!(wrong());
         };
-        let element = Element::parse(kind_text);
-        let element = element.with_context(|| format!("no type {}", kind.text))?;
+        let element = kind.element()?;
         let mut sides = axes.iter();
-        let bytes = element
-            .bytes()
-            .and_then(|bytes| sides.try_fold(bytes, |all, &side| all.checked_mul(side)));
+        let bytes = element.bytes();
+        let bytes =
+            bytes.and_then(|bytes| sides.try_fold(bytes, |all, &side| all.checked_mul(side)));
         Ok(Self {
             name: name.clone(),
             bytes: bytes.context("records of no fixed size")?,
@@ -274,7 +308,7 @@ enum Value<'a> {
     Number(u64),
     /// `True`, `False`.
     Name(&'a str),
-    /// A tuple or a list.
+    Tuple(Vec<Literal<'a>>),
     List(Vec<Literal<'a>>),
     Dictionary(Vec<(Literal<'a>, Literal<'a>)>),
 }
@@ -289,16 +323,26 @@ impl<'a> Literal<'a> {
         entries.iter().find(is_key).map(|(_, value)| value)
     }
 
-    /// Lengths of axes; a number is one.
-    fn shape(&self) -> Result<Vec<u64>> {
-        let length = |literal: &Self| match literal.value {
-            Value::Number(length) => Ok(length),
-            _ => bail!("no length of an axis: {}", literal.text),
+    /// Lengths of axes.
+    fn lengths(&self) -> Result<Vec<u64>> {
+        let wrong = || none(format!("no lengths of axes: {}", self.text));
+        let (Value::Tuple(lengths) | Value::List(lengths)) = &self.value else {
+            bail!(wrong());
         };
-        match &self.value {
-            Value::List(lengths) => lengths.iter().map(length).collect(),
-            _ => Ok(vec![length(self)?]),
-        }
+        let lengths = lengths.iter().map(|length| match length.value {
+            Value::Number(length) => Ok(length),
+            _ => Err(wrong()),
+        });
+        lengths.collect()
+    }
+
+    /// A plain type.
+    fn element(&self) -> Result<Element> {
+        let element = match &self.value {
+            Value::Text(text) => Element::parse(text),
+            _ => None,
+        };
+        element.ok_or_else(|| none(format!("no type {}", self.text)))
     }
 }
 
@@ -310,13 +354,29 @@ struct Literals<'a> {
 }
 
 impl<'a> Literals<'a> {
+    /// The literal that is all of `text`.
+    fn only(text: &'a str) -> Result<Literal<'a>> {
+        let mut literals = Self {
+            text,
+            at: 0,
+            depth: 0,
+        };
+        let literal = literals.next()?;
+        ensure!(literals.rest().is_empty(), none("more behind it"));
+        Ok(literal)
+    }
+
     fn rest(&self) -> &'a str {
         &self.text[self.at..]
     }
 
+    fn pass_blanks(&mut self) {
+        self.at += self.rest().len() - self.rest().trim_start_matches([' ', '\t']).len();
+    }
+
     /// Passes blanks, and then `mark` if it is there.
     fn passes(&mut self, mark: char) -> bool {
-        self.at += self.rest().len() - self.rest().trim_start().len();
+        self.pass_blanks();
         let is_there = self.rest().starts_with(mark);
         self.at += if is_there { mark.len_utf8() } else { 0 };
         is_there
@@ -324,24 +384,32 @@ impl<'a> Literals<'a> {
 
     fn next(&mut self) -> Result<Literal<'a>> {
         ensure!(self.depth <= DEEPEST, "the elements are not plain numbers");
-        self.passes(' ');
+        self.pass_blanks();
         let begin = self.at;
         let value = match self.rest().chars().next() {
             Some(quote @ ('\'' | '"')) => Value::Text(self.quoted(quote)?),
-            Some('(') => Value::List(self.until(')', Self::next)?),
-            Some('[') => Value::List(self.until(']', Self::next)?),
-            Some('{') => Value::Dictionary(self.until('}', |literals| {
-                let key = literals.next()?;
-                ensure!(literals.passes(':'), "no : behind {}", key.text);
-                Ok((key, literals.next()?))
-            })?),
+            Some('(') => {
+                let (parts, has_comma) = self.until(')', Self::next)?;
+                ensure!(has_comma || parts.is_empty(), none("no tuple"));
+                Value::Tuple(parts)
+            }
+            Some('[') => Value::List(self.until(']', Self::next)?.0),
+            Some('{') => {
+                let entries = self.until('}', |literals| {
+                    let key = literals.next()?;
+                    ensure!(literals.passes(':'), none("no : behind a key"));
+                    Ok((key, literals.next()?))
+                });
+                Value::Dictionary(entries?.0)
+            }
             _ => {
                 let is_part = |letter: char| letter.is_ascii_alphanumeric();
                 let word = self.rest().split(|letter| !is_part(letter)).next();
-                let word = word.filter(|word| !word.is_empty()).context("no literal")?;
+                let word = word.filter(|word| !word.is_empty());
+                let word = word.ok_or_else(|| none("a part of its header is missing"))?;
                 self.at += word.len();
                 // Python 2 wrote long integers with an L.
-                match word.trim_end_matches('L').parse() {
+                match word.strip_suffix('L').unwrap_or(word).parse() {
                     Ok(number) => Value::Number(number),
                     Err(_) => Value::Name(word),
                 }
@@ -351,42 +419,66 @@ impl<'a> Literals<'a> {
         Ok(Literal { value, text })
     }
 
-    /// A text; what stands behind a backslash is taken as it is.
+    /// A text between quotes.
     fn quoted(&mut self, quote: char) -> Result<String> {
         let mut text = String::new();
-        let mut letters = self.rest().char_indices().skip(1);
-        while let Some((place, letter)) = letters.next() {
-            match letter {
-                '\\' => text.extend(letters.next().map(|(_, letter)| letter)),
-                letter if letter == quote => {
-                    self.at += place + quote.len_utf8();
-                    return Ok(text);
-                }
+        let mut letters = self.rest().chars();
+        letters.next();
+        loop {
+            let letter = letters.next();
+            let letter = letter.filter(|letter| !letter.is_control());
+            match letter.ok_or_else(|| none("a text without an end"))? {
+                '\\' => text.push(escaped(&mut letters)?),
+                letter if letter == quote => break,
                 letter => text.push(letter),
             }
         }
-        bail!("a text without an end")
+        self.at = self.text.len() - letters.as_str().len();
+        Ok(text)
     }
 
-    /// What `each` reads, with commas between, up to the bracket `end`.
+    /// What `each` reads, with commas between, up to the bracket `end`; and whether there are commas.
     fn until<T>(
         &mut self,
         end: char,
         mut each: impl FnMut(&mut Self) -> Result<T>,
-    ) -> Result<Vec<T>> {
+    ) -> Result<(Vec<T>, bool)> {
         self.at += 1;
         self.depth += 1;
-        let mut all = Vec::new();
+        let (mut all, mut has_comma) = (Vec::new(), false);
         while !self.passes(end) {
             all.push(each(self)?);
             if !self.passes(',') {
-                ensure!(self.passes(end), "no {end}");
+                ensure!(self.passes(end), none(format!("no {end}")));
                 break;
             }
+            has_comma = true;
         }
         self.depth -= 1;
-        Ok(all)
+        Ok((all, has_comma))
     }
+}
+
+/// The letter that stands behind a backslash, as Python's `repr` writes it.
+fn escaped(letters: &mut std::str::Chars) -> Result<char> {
+    let letter = match letters.next() {
+        Some('n') => Some('\n'),
+        Some('r') => Some('\r'),
+        Some('t') => Some('\t'),
+        Some('x') => hexadecimal(letters, 2),
+        Some('u') => hexadecimal(letters, 4),
+        Some('U') => hexadecimal(letters, 8),
+        letter => letter.filter(|letter| "\\'\"".contains(*letter)),
+    };
+    letter.ok_or_else(|| none("a letter behind a backslash that stands for nothing"))
+}
+
+/// The letter of so many hexadecimal digits.
+fn hexadecimal(letters: &mut std::str::Chars, digits: usize) -> Option<char> {
+    let text = letters.as_str();
+    let digits = text.get(..digits)?;
+    *letters = text[digits.len()..].chars();
+    char::from_u32(u32::from_str_radix(digits, 16).ok()?)
 }
 
 /// An array of plain elements.
@@ -510,13 +602,13 @@ mod tests {
             let error = header(text, data + 1).unwrap_err().to_string();
             assert!(error.starts_with("the header claims ["), "{error}");
         }
-        let text = "{'descr': [('pixel', '<u2'), ('', '|V2'), (('a title', 'it\\'s'), '<f4', (2, 3))], \
+        let text = "{'descr': [('pixel', '<u2'), ('', '|V2'), (('a title', 'it\\'s \\xe9'), '<f4', (2, 3))], \
                     'fortran_order': False, 'shape': (2,), }";
         let Elements::Records(fields) = header(text, 56).unwrap().elements else {
             panic!("no records");
         };
         let named = fields.iter().map(|field| (&field.name[..], field.bytes));
-        assert!(named.eq([("pixel", 2), ("", 2), ("it's", 24)]));
+        assert!(named.eq([("pixel", 2), ("", 2), ("it's é", 24)]));
         assert!(fields[0].element.is_some() && fields[2].element.is_none());
     }
 
@@ -534,9 +626,14 @@ mod tests {
             "{'descr': '<u', 'fortran_order': False, 'shape': (3,)}",
             "{'descr': '<u2, 'fortran_order': False, 'shape': (3,)}",
             "{'descr': [('a',)], 'fortran_order': False, 'shape': (3,)}",
-            "{'descr': [('a', [('b', '<u2')])], 'fortran_order': False, 'shape': (3,)}",
+            "{'descr': ('a', '<u2'), 'fortran_order': False, 'shape': (3,)}",
+            "{'descr': [['a', '<u2']], 'fortran_order': False, 'shape': (3,)}",
+            "{'descr': '<u2', 'fortran_order': False, 'shape': 3}",
+            "{'descr': '<u2', 'fortran_order': False, 'shape': (3)}",
+            "{'descr': '<u2',\n 'fortran_order': False, 'shape': (3,)}",
+            "{'descr': '<u2', 'fortran\n_order': False, 'shape': (3,)}",
+            "{'descr': '<u2\\q', 'fortran_order': False, 'shape': (3,)}",
             "[1, 2]",
-            "((((((((((1))))))))))",
         ] {
             let error = format!("{:#}", header(text, 6).unwrap_err());
             assert!(
@@ -544,6 +641,40 @@ mod tests {
                 "{text}: {error}"
             );
         }
+        for kind in [
+            "|u2",
+            "|i4",
+            "|f8",
+            "|U2",
+            "<u2[rubbish",
+            "<u2[s]",
+            "<M8[s",
+            "<z4",
+            "<u3",
+            "<f3",
+            "<u+2",
+            "|O9",
+            "<b2",
+            "=u2",
+            "<c4",
+        ] {
+            let text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': (3,)}}");
+            let error = header(&text, 6).unwrap_err().to_string();
+            assert!(error.ends_with(&format!("no type '{kind}'")), "{error}");
+        }
+        for kind in ["|u1", "<u1", "|b1", "<M8[ns]", "|S3", "<U3", ">c16", "|V0"] {
+            let text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': (0,)}}");
+            assert!(header(&text, 0).is_ok(), "{kind}");
+        }
+        let nested = "{'descr': [('a', [('b', '<u2')])], 'fortran_order': False, 'shape': (3,)}";
+        for text in ["((((((((((1))))))))))", nested] {
+            let error = header(text, 6).unwrap_err().to_string();
+            assert_eq!(error, "the elements are not plain numbers");
+        }
+        let mut other = b"\x93NUMPY\x04\x00\x02\x00{}".to_vec();
+        assert!(Header::read(&mut &other[..], 12).is_err());
+        other[6..8].copy_from_slice(&[1, 1]);
+        assert!(Header::read(&mut &other[..], 12).is_err());
         let objects = "{'descr': '|O', 'fortran_order': False, 'shape': (3,)}";
         assert!(header(objects, 24).is_err());
         let huge = "{'descr': '<u8', 'fortran_order': False, 'shape': (4294967296, 4294967296)}";
