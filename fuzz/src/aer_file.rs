@@ -57,7 +57,7 @@ fn exported(data: &[u8], events: usize, damage: bool) {
     let [input, out] = ["a.aer", "b"].map(|name| folder.path().join(name));
     fs::write(&input, data).expect("a file");
     let format = FORMATS[data.len() / 16 % FORMATS.len()];
-    match export(&input, &out, format, &Options::default(), true) {
+    match export(&input, &out, format, &Options::default(), &mut ()) {
         Ok(exported) => {
             assert_eq!(exported.damage.is_some(), damage);
             // An event camera sends a change as several.

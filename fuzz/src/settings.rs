@@ -2,9 +2,9 @@
 
 use std::fs;
 
+use dtof_engine::settings::SettingsFile;
 use dtof_photons::geometry::Rays;
 use dtof_photons::source::Geometry;
-use dtof_engine::settings::SettingsFile;
 use dtof_simulate::scene::Scene;
 
 use crate::{folder, is_one_line};

@@ -90,17 +90,25 @@ fn cargo(arguments: &[&str]) -> Result<String> {
     Ok(text)
 }
 
-/// The program with all its features.
+/// The program as `cargo run --release` builds it.
 fn dtof() -> Result<PathBuf> {
+    cargo(&["build", "--quiet", "--release", "--package", "dtof"])?;
+    Ok(target_folder().join("release/dtof").canonicalize()?)
+}
+
+/// The program with the server for Foxglove, as tests have built it. It lies elsewhere, so that neither
+/// takes the place of the other.
+fn dtof_with_foxglove() -> Result<PathBuf> {
     cargo(&[
         "build",
         "--quiet",
-        "--release",
+        "--profile",
+        "test",
         "--package",
         "dtof",
         "--all-features",
     ])?;
-    Ok(target_folder().join("release/dtof").canonicalize()?)
+    Ok(target_folder().join("debug/dtof").canonicalize()?)
 }
 
 /// A Python with the packages of a requirements file of the workspace; says why if

@@ -12,7 +12,7 @@ use std::process::Command;
 
 use anyhow::Result;
 
-use crate::{dtof, python, root, succeed, target_folder, wanted};
+use crate::{dtof, dtof_with_foxglove, python, root, succeed, target_folder, wanted};
 
 /// A scene in which something moves, so that there are changes of depth.
 const SCENE: &str = "scenes/radial.toml";
@@ -52,7 +52,7 @@ fn another_client_finds_in_live_data_what_is_in_the_recording() -> Result<()> {
     let Some(python) = python(test, "host-tests/readers/requirements.txt") else {
         return Ok(());
     };
-    let dtof = dtof()?;
+    let dtof = dtof_with_foxglove()?;
     let folder = scene(&dtof, "live")?;
     let root = root().canonicalize()?;
     let mut compare = Command::new(python);
