@@ -26,13 +26,15 @@ impl Error for UnsupportedBins {}
 /// let bytes = with_bins!(128, BINS => size_of::<Histogram<BINS>>());
 /// assert!(bytes.is_ok());
 /// assert!(with_bins!(100, BINS => BINS).is_err());
+/// // Of some numbers only.
+/// assert!(with_bins!(128, of 8 16, BINS => BINS).is_err());
 /// ```
 #[macro_export]
 macro_rules! with_bins {
     ($bins:expr, $name:ident => $value:expr) => {
-        $crate::with_bins!(@ $bins, $name, $value, 8 16 32 64 128 256 512 1024)
+        $crate::with_bins!($bins, of 8 16 32 64 128 256 512 1024, $name => $value)
     };
-    (@ $bins:expr, $name:ident, $value:expr, $($number:literal)*) => {
+    ($bins:expr, of $($number:literal)*, $name:ident => $value:expr) => {
         match $bins {
             $($number => {
                 const $name: usize = $number;

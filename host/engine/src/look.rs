@@ -40,8 +40,10 @@ pub fn look(settings: &Settings, counts: &[u32], is_whole: bool) -> Option<Look>
     let look = match is_whole {
         false => with_bins!(bins, BINS => of::<BINS, Count10>(settings, counts)),
         // All counters together have to fit 32 bits.
-        true => with_bins!(@ bins, BINS, of::<BINS, Count24>(settings, counts), 8 16 32 64 128 256)
-            .or_else(|_| with_bins!(bins, BINS => of::<BINS, Count16>(settings, counts))),
+        true => {
+            with_bins!(bins, of 8 16 32 64 128 256, BINS => of::<BINS, Count24>(settings, counts))
+                .or_else(|_| with_bins!(bins, BINS => of::<BINS, Count16>(settings, counts)))
+        }
     };
     let look = look.ok()??;
     // Whole histograms are not tracked, and their first echo is decided from themselves.

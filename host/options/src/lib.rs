@@ -279,3 +279,22 @@ pub fn path(name: &OsStr) -> Result<PathBuf, String> {
 
 /// Why [`Options::set`] refuses what is none of its keys.
 pub const NO_OPTION: &str = "is no option here";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io;
+
+    /// A closed output ends the program well: it is found below whatever a file is blamed for.
+    #[test]
+    fn an_error_of_another_kind_stays_what_it_is() {
+        let file = GivenByFile {
+            path: "my.toml".into(),
+            keys: BTreeSet::from(["l2".to_owned()]),
+        };
+        let error = io::Error::from(io::ErrorKind::BrokenPipe);
+        assert!(blamed(error.into(), Some(&file)).is::<io::Error>());
+        let refused = blamed(Refused::new("l2", "is wrong").into(), Some(&file));
+        assert_eq!(refused.to_string(), "my.toml: l2 is wrong");
+    }
+}

@@ -32,7 +32,8 @@ pub struct View {
     /// [default: the page saves nothing]
     #[arg(long, value_name = "DIR", value_parser = path(), conflicts_with = "file")]
     out: Option<PathBuf>,
-    /// Also serve Foxglove, at a port of this computer [default without PORT: 8765]
+    /// Also serve Foxglove, at a port of this computer, if built with the feature foxglove [default
+    /// without PORT: 8765]
     #[arg(long, value_name = "PORT", value_parser = whole(0..=u16::MAX), num_args = 0..=1, require_equals = true,
         default_missing_value = "8765")]
     foxglove: Option<u16>,

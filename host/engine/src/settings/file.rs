@@ -179,8 +179,9 @@ impl SettingsFile {
                     }
                     .into());
                 }
-                // Lists that are empty give nothing.
-                if value.as_array().is_none_or(|list| !list.is_empty()) {
+                let is_empty = value.as_array().is_some_and(Vec::is_empty);
+                // No pixels and no photons: nothing is given.
+                if !(is_empty && matches!(&**key, "masked" | "glass_bins")) {
                     file.set_value(key, value)?;
                 }
             }
@@ -466,6 +467,9 @@ rebin = 2
     fn what_is_wrong_is_named() {
         for (text, reason) in [
             ("l1 = 4", "l1 stands in [detection]"),
+            ("[detection]\nl1 = []", "l1 : must be one value"),
+            ("[detection]\nhalf_widths = []", "half_widths : must be"),
+            ("[sensor]\ngate = []", "gate : must be FIRST..LAST"),
             (
                 "[detections]\nl1 = 4",
                 "detections is unknown; is it detection?",

@@ -44,8 +44,8 @@ fn five_times_the_events_take_no_more_memory() {
     }
 }
 
-/// Prints the figures of the documentation: `cargo test --release --test export memory -- --ignored
-/// --nocapture`.
+/// Prints the figures of the documentation:
+/// `cargo test --release --package dtof --test program ten_million -- --ignored --nocapture`.
 #[test]
 #[ignore = "prints figures; half a minute with --release, some minutes without"]
 fn ten_million_events() {
