@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use dtof_core::RangeScale;
 use dtof_events::aer_file::{Event, Reader, Writer};
 use dtof_options::files::{aside, place_of};
+use dtof_options::progress::Progress;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyByteArray;
@@ -27,7 +28,7 @@ pub fn read_events(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyByteA
     Ok((PyByteArray::new(py, &records), array))
 }
 
-fn read(path: &Path, watch: &Watch) -> Result<(Vec<u8>, Array)> {
+fn read(path: &Path, mut watch: &Watch) -> Result<(Vec<u8>, Array)> {
     let mut reader = Reader::new(BufReader::new(File::open(path)?))?;
     let header = *reader.header();
     let scale = RangeScale::new(header.bin_width_ps, header.offset_mm)?;
@@ -41,7 +42,7 @@ fn read(path: &Path, watch: &Watch) -> Result<(Vec<u8>, Array)> {
         }
         read += 1;
         if read.is_multiple_of(AT_ONCE) {
-            watch.at(read as u64, 0)?;
+            watch.at(read as u64)?;
         }
     }
     Ok((records, Array::of(&header)))

@@ -29,16 +29,6 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// So many of all are done.
-    ///
-    /// # Errors
-    /// If nobody wants the rest.
-    pub fn at(&self, done: u64, total: u64) -> Result<()> {
-        self.done.store(done, Ordering::Relaxed);
-        self.total.store(total, Ordering::Relaxed);
-        self.go_on()
-    }
-
     /// What comes next.
     ///
     /// # Errors

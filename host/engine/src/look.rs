@@ -224,33 +224,9 @@ fn window<const BINS: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+    use dtof_core::fixed::types::U8F8;
     use dtof_core::{AverageRule, PaperRule, WindowRule, detect};
     use proptest::prelude::*;
-
-    fn settings() -> Settings {
-        Settings {
-            bins: 128,
-            bin_width_ps: U16F16::lit("250"),
-            offset_mm: I24F8::ZERO,
-            gate: None,
-            masked: Vec::new(),
-            rule: PaperRule::new(U8F8::lit("8"), Count::saturating(5)).into(),
-            sigma_bins: None,
-            half_widths: None,
-            centroid: false,
-            l1: 100,
-            l2: 2000,
-            x: 10,
-            binning: None,
-            tracking: false,
-            echoes: EchoNumber::FIRST,
-            echo_wait: None,
-            one_hit_tdc: false,
-            frame: None,
-            seed: 0,
-        }
-    }
 
     fn counts() -> impl Strategy<Value = Vec<u32>> {
         let counts = prop::collection::vec(0..12_u32, 128);
@@ -273,7 +249,7 @@ mod tests {
                     _ => WindowRule::new(3, "4.5".parse().unwrap(), minimum).unwrap().into(),
                 },
                 gate: Some((gate, 127)),
-                ..settings()
+                ..Settings::static_scene(0)
             };
             let look = look(&settings, &counts, false).unwrap();
             let (bin, peak) = look.peak;
@@ -316,7 +292,7 @@ mod tests {
         let window = WindowRule::new(3, "4.5".parse().unwrap(), Count::saturating(5)).unwrap();
         let plain = Settings {
             rule: window.into(),
-            ..settings()
+            ..Settings::static_scene(0)
         };
         let told = look(plain.clone());
         assert!(told.needed.is_some() && !told.depends);
@@ -340,6 +316,6 @@ mod tests {
 
     #[test]
     fn other_histograms_have_no_look() {
-        assert_eq!(look(&settings(), &[1; 100], false), None);
+        assert_eq!(look(&Settings::static_scene(0), &[1; 100], false), None);
     }
 }

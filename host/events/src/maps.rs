@@ -117,12 +117,6 @@ impl Maps {
         }
     }
 
-    /// Pixels with at least one event.
-    #[must_use]
-    pub fn reporting(&self) -> usize {
-        self.pixels.iter().filter(|pixel| pixel.events > 0).count()
-    }
-
     /// What is known of each pixel, as a row of a table.
     #[must_use]
     pub fn rows(&self, [column, row]: [&str; 2], [one, several]: [&str; 2]) -> Vec<Row> {
@@ -200,7 +194,8 @@ mod tests {
         assert!(last.eq([50.0, 50.0, 40.0, 50.0, 50.0, 40.0, 40.0, 40.0, 40.0]));
         let events = maps.pixels.iter().map(|pixel| pixel.events);
         assert!(events.eq([3, 3, 1, 3, 4, 1, 1, 1, 1]));
-        assert_eq!(maps.reporting(), 9);
+        let reporting = maps.pixels.iter().filter(|pixel| pixel.events > 0);
+        assert_eq!(reporting.count(), 9);
     }
 
     #[test]

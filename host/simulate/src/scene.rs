@@ -12,8 +12,7 @@ mod sight;
 mod surface;
 
 use anyhow::{Result, ensure};
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
-use dtof_core::{Count, EchoNumber, PaperRule, PixelAddress};
+use dtof_core::PixelAddress;
 
 use crate::effects::Effects;
 use crate::effects::limits::Timing;
@@ -329,25 +328,5 @@ impl Scene {
 /// 250 ps.
 #[must_use]
 pub fn settings(seed: u64) -> Settings {
-    Settings {
-        bins: 128,
-        bin_width_ps: U16F16::lit("250"),
-        offset_mm: I24F8::ZERO,
-        gate: None,
-        masked: Vec::new(),
-        rule: PaperRule::new(U8F8::lit("8"), Count::saturating(5)).into(),
-        sigma_bins: None,
-        half_widths: None,
-        centroid: false,
-        l1: 100,
-        l2: 2000,
-        x: 10,
-        binning: None,
-        tracking: false,
-        echoes: EchoNumber::FIRST,
-        echo_wait: None,
-        one_hit_tdc: false,
-        frame: None,
-        seed,
-    }
+    Settings::static_scene(seed)
 }

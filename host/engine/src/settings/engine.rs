@@ -4,8 +4,8 @@ use anyhow::{Result, ensure};
 use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
-    AnyRule, BlockLevel, CentredWindow, ConfigError, DepthEstimator, EchoNumber, GateError,
-    PixelConfig, RangeGate, RangeScale, Threshold,
+    AnyRule, BlockLevel, CentredWindow, ConfigError, Count, DepthEstimator, EchoNumber, GateError,
+    PaperRule, PixelConfig, RangeGate, RangeScale, Threshold,
 };
 pub use dtof_link::AdaptiveBinning;
 use serde::Serialize;
@@ -133,6 +133,32 @@ fn echo<S: Serializer>(echo: &EchoNumber, serializer: S) -> Result<S::Ok, S::Err
 }
 
 impl Settings {
+    /// The paper's settings for its static scene (section III-B), on 128 bins of 250 ps.
+    #[must_use]
+    pub fn static_scene(seed: u64) -> Self {
+        Self {
+            bins: 128,
+            bin_width_ps: U16F16::lit("250"),
+            offset_mm: I24F8::ZERO,
+            gate: None,
+            masked: Vec::new(),
+            rule: PaperRule::new(U8F8::lit("8"), Count::saturating(5)).into(),
+            sigma_bins: None,
+            half_widths: None,
+            centroid: false,
+            l1: 100,
+            l2: 2000,
+            x: 10,
+            binning: None,
+            tracking: false,
+            echoes: EchoNumber::FIRST,
+            echo_wait: None,
+            one_hit_tdc: false,
+            frame: None,
+            seed,
+        }
+    }
+
     /// As a configuration of pixels for `BINS` bins.
     ///
     /// # Errors
