@@ -2,9 +2,9 @@
 
 use std::fs;
 
+use dtof_core::Array;
 use dtof_engine::settings::SettingsFile;
 use dtof_photons::geometry::Rays;
-use dtof_photons::source::Geometry;
 use dtof_simulate::scene::Scene;
 
 use crate::{folder, is_one_line};
@@ -26,7 +26,7 @@ pub fn settings(data: &[u8]) {
     }
     if let Ok(scene) = Scene::parse(text) {
         // Few enough pixels not to take seconds.
-        if scene.geometry.addresses() <= 64 && scene.surfaces.len() < 10 {
+        if scene.size[0] * scene.size[1] <= 64 && scene.surfaces.len() < 10 {
             let _ = scene.photons(1, 4);
         }
     }
@@ -35,7 +35,7 @@ pub fn settings(data: &[u8]) {
         let folder = folder();
         let path = folder.path().join("a.toml");
         fs::write(&path, text).expect("a file");
-        if let Err(error) = Rays::read(&path, Geometry::new(2, 1)) {
+        if let Err(error) = Rays::read(&path, const { Array::new(2, 1).unwrap() }) {
             is_one_line(&error);
         }
     }

@@ -231,7 +231,7 @@ fn window_rules_need_fewer_photons_than_the_papers() {
     let truth = ground_truth(&log);
     let recorded = counts(&log, &Opening::default()).unwrap();
     let mut photons = RecordedHistograms::new(
-        recorded.geometry,
+        recorded.array,
         &recorded.captures,
         RecordingLength::PhotonsPerCycle(PHOTONS),
         CYCLES.into(),

@@ -10,7 +10,6 @@ use dtof_core::{
 use dtof_events::aer_file::{Event, Header};
 use dtof_events::events_csv::range_mm;
 use dtof_options::numbers::bins_of;
-use dtof_photons::source::Geometry;
 use pyo3::prelude::*;
 
 /// Bytes of a record: that of `dtof.EVENT`, little-endian, with gaps.
@@ -54,8 +53,8 @@ impl Array {
     pub fn of(header: &Header) -> Self {
         Self {
             bins: header.bins,
-            rows: header.geometry.rows,
-            columns: header.geometry.columns,
+            rows: header.array.rows(),
+            columns: header.array.columns(),
             bin_width_ps: header.bin_width_ps.to_num(),
             offset_mm: header.offset_mm.to_num(),
             laser_millihertz: header.laser_millihertz,
@@ -68,20 +67,17 @@ impl Array {
     /// # Errors
     /// If no array is so.
     pub fn header(&self) -> Result<Header> {
-        let pixels = u64::from(self.columns) * u64::from(self.rows);
-        ensure!(
-            (1..=1 << 16).contains(&pixels),
-            "{} columns and {} rows: must be 1 to 65,536 pixels",
-            self.columns,
-            self.rows
-        );
+        let (columns, rows) = (self.columns, self.rows);
+        let array = dtof_core::Array::new(columns, rows).with_context(|| {
+            format!("{columns} columns and {rows} rows: must be 1 to 65,536 pixels")
+        })?;
         let (width, offset) = (self.bin_width_ps, self.offset_mm);
         let bins = u16::try_from(self.bins).unwrap_or(u16::MAX);
         let known = bins_of(bins).map_err(Error::msg);
         known.with_context(|| format!("bins {}", self.bins))?;
         let header = Header {
             bins: self.bins,
-            geometry: Geometry::new(self.columns, self.rows),
+            array,
             bin_width_ps: exact::<U16F16>(width)
                 .with_context(|| format!("bin_width_ps {width}: must be a multiple of 1/65536"))?,
             offset_mm: exact::<I24F8>(offset)

@@ -69,7 +69,7 @@ pub fn load<'py>(py: Python<'py>, input: Given, keywords: Keywords) -> PyResult<
 /// Captures, rows, columns and bins.
 fn shape(counts: &Counts) -> Result<[usize; 4]> {
     let captures = counts.captures.len();
-    let columns = usize::try_from(counts.geometry.columns)?;
+    let columns = usize::try_from(counts.array.columns())?;
     let pixels = counts.captures.first().map_or(0, Vec::len);
     let same = counts.captures.iter().flatten();
     let bins = counts.known.bins;

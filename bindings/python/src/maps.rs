@@ -36,7 +36,7 @@ pub fn maps(
     work(py, None, move |_| {
         let header = array.header()?;
         let scale = RangeScale::new(header.bin_width_ps, header.offset_mm)?;
-        let mut maps = Maps::new(header.geometry);
+        let mut maps = Maps::new(header.array);
         for event in chosen(events(&records, &header)?, options.echo) {
             if let Event::Depth(event) = event {
                 maps.add(&event, &scale);

@@ -1,10 +1,11 @@
 //! Parts of a recording, replayed on several machines.
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use dtof_calibrate::RunPhotons;
+use dtof_core::Array;
 use dtof_engine::settings::SettingsFile;
+use dtof_photons::medium::Medium;
 use dtof_photons::recorded::Whole;
-use dtof_photons::source::Geometry;
 use dtof_run::glass::brighter;
 use dtof_run::replay::Options;
 use pyo3::prelude::*;
@@ -20,11 +21,11 @@ use crate::work;
 pub struct WholeGiven(u32, u32, usize, PyBackedBytes, u64, usize);
 
 impl WholeGiven {
-    /// The recording.
+    /// The recording, of which `part` is a part.
     ///
     /// # Errors
     /// If there is none with such pixels.
-    pub fn read(self) -> Result<Whole> {
+    pub fn read(self, part: &Medium) -> Result<Whole> {
         let Self(rows, columns, captures, totals, cut_off, first) = self;
         let (totals, rest) = totals.as_chunks::<8>();
         ensure!(rest.is_empty(), "totals are numbers of 8 bytes");
@@ -32,7 +33,8 @@ impl WholeGiven {
             .iter()
             .map(|bytes| u64::from_le_bytes(*bytes))
             .collect();
-        let array = Geometry::new(columns, rows);
+        let array = Array::new(columns, rows);
+        let array = array.with_context(|| format!("{part}: more than 65,536 pixels"))?;
         Ok(Whole::new(array, captures, &totals, first)?.with_cut_off(cut_off))
     }
 }

@@ -67,7 +67,7 @@ pub fn replay<'py>(
         // Fewer than are replayed anyhow need not be said.
         let cycles = cycles.filter(|&cycles| cycles > opening(&said).cycles);
         said.run.cycles = said.run.cycles.or(cycles);
-        let whole = whole.map(WholeGiven::read).transpose()?;
+        let whole = whole.map(|whole| whole.read(&input)).transpose()?;
         replayed(&options, &input, &said, whole, watch).map_err(|error| said.blame(error))
     })?;
     done.into_python(py)
@@ -116,7 +116,7 @@ fn simulated(
 ) -> Result<Done> {
     let mut simulation = options.open(scene.read()?, &scene.name(), said)?;
     let (photons, settings) = (&simulation.photons, &simulation.settings);
-    let mut engine = host_engine(settings, photons.geometry(), &photons.addresses())?;
+    let mut engine = host_engine(settings, photons.array(), &photons.addresses())?;
     let mut records = Records::of(settings, photons)?;
     let ran = simulation.run(engine.as_mut(), &mut records, &mut { watch })?;
     Ok(Done {

@@ -26,7 +26,7 @@ fn scene(background: f64, glass: f64, more: &str) -> Scene {
 fn found(scene: &Scene, cycles: u64, seed: u64) -> Calibration {
     let captures = [recorded(scene, cycles, seed)];
     let observed = Observed {
-        geometry: scene.geometry,
+        array: scene.array().unwrap(),
         captures: &captures,
         length: Length::Cycles(cycles),
         cycles: None,
@@ -41,7 +41,7 @@ fn found(scene: &Scene, cycles: u64, seed: u64) -> Calibration {
 fn events(scene: &Scene, settings: &SettingsFile, cycles: u64) -> (usize, usize) {
     let settings = settings.settings(128).unwrap();
     let photons = scene.photons(99, cycles).unwrap();
-    let mut engine = host_engine(&settings, scene.geometry, &photons.addresses()).unwrap();
+    let mut engine = host_engine(&settings, photons.array(), &photons.addresses()).unwrap();
     let (mut all, mut wrong) = (0, 0);
     slices(photons, cycles, |slice| {
         for event in engine.run(slice).unwrap() {

@@ -15,7 +15,7 @@ fn found(background: f64, more: &str, length: impl Fn(u64) -> Length) -> Calibra
     let scene = Scene::parse(&text).unwrap();
     let captures = [recorded(&scene, 20_000, 4)];
     let observed = Observed {
-        geometry: scene.geometry,
+        array: scene.array().unwrap(),
         captures: &captures,
         length: length(20_000),
         cycles: None,

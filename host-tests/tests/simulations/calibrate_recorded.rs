@@ -3,13 +3,13 @@
 
 use crate::capture_log::{ground_truth, log, tell};
 use dtof_calibrate::{Asked, Calibration, Length, Nearest, Observed, calibrate};
-use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U8F8;
+use dtof_core::{Array, PixelAddress};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::SettingsFile;
 use dtof_photons::open::{Opening, counts};
 use dtof_photons::recorded::{Capture, RecordedHistograms, RecordingLength};
-use dtof_photons::source::{Geometry, PhotonSource, Slice};
+use dtof_photons::source::{PhotonSource, Slice};
 
 const ZONES: usize = 9;
 const CENTRE: usize = 4;
@@ -26,9 +26,8 @@ fn judged(
 ) -> (usize, f64, f64) {
     let settings = found.settings(SettingsFile::default()).unwrap();
     let settings = settings.settings(found.bins).unwrap();
-    let rows = u32::try_from(captures.len()).unwrap();
     let length = RecordingLength::PhotonsPerCycle(PHOTONS_PER_CYCLE);
-    let array = Geometry::new(9, rows);
+    let array = Array::new(9, 1).unwrap();
     let mut photons =
         RecordedHistograms::new(array, captures, length, CYCLES.into(), seed).unwrap();
     let slice = photons.next_slice(CYCLES).unwrap();
@@ -38,7 +37,7 @@ fn judged(
         .map(|(zones, &truth)| (zones[CENTRE].clone(), truth))
         .unzip();
     let addresses: Vec<PixelAddress> = (0..).take(pixels.len()).map(PixelAddress).collect();
-    let array = Geometry::new(u32::try_from(pixels.len()).unwrap(), 1);
+    let array = Array::new(u32::try_from(pixels.len()).unwrap(), 1).unwrap();
     let mut engine = host_engine(&settings, array, &addresses).unwrap();
     let slice = Slice {
         first_cycle: 0,
@@ -103,7 +102,7 @@ fn a_recording_with_distances_calibrates_itself() {
     let Some(log) = log() else { return };
     let counts = counts(&log, &Opening::default()).unwrap();
     let observed = Observed {
-        geometry: Geometry::new(9, 1),
+        array: Array::new(9, 1).unwrap(),
         captures: &counts.captures,
         length: Length::PhotonsPerCycle(PHOTONS_PER_CYCLE),
         cycles: None,

@@ -11,7 +11,7 @@ fn judge(number: u64) -> (Vec<String>, String) {
     let drawn = Drawn::new(number);
     let captures = [drawn.capture(number)];
     let observed = Observed {
-        geometry: drawn.scene.geometry,
+        array: drawn.scene.array().unwrap(),
         captures: &captures,
         length: Length::Cycles(drawn.cycles),
         cycles: None,
@@ -95,7 +95,7 @@ fn judge(number: u64) -> (Vec<String>, String) {
         "{number:>2} {:>3} bins {:>3} pixels {:>6} cycles B {:.4} {:+.1}% sigma {:.2} {:+.1}% gate {} ({end}) glass {glass:.3} \
          ({:.3}) offset {bins:+.3} window {} z {:.3} L1 {} false {share:.4}",
         drawn.scene.bins,
-        drawn.scene.geometry.addresses(),
+        drawn.scene.array().unwrap().pixels(),
         drawn.cycles,
         drawn.scene.background,
         (background / drawn.scene.background - 1.0) * 100.0,
@@ -137,7 +137,7 @@ fn a_wall_alone_may_be_a_glass_and_is_asked_for() {
     let drawn = Drawn::new(number.unwrap());
     let captures = [drawn.capture(1)];
     let observed = Observed {
-        geometry: drawn.scene.geometry,
+        array: drawn.scene.array().unwrap(),
         captures: &captures,
         length: Length::Cycles(drawn.cycles),
         cycles: None,

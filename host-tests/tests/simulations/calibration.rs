@@ -176,7 +176,7 @@ pub fn slices(mut photons: impl PhotonSource, cycles: u64, mut each: impl FnMut(
 /// The histograms of all pixels of a scene.
 pub fn recorded(scene: &Scene, cycles: u64, seed: u64) -> Capture {
     let bins = usize::from(scene.bins);
-    let mut capture = vec![vec![0; bins]; scene.geometry.addresses()];
+    let mut capture = vec![vec![0; bins]; scene.array().unwrap().pixels() as usize];
     let photons = scene.photons(seed, cycles).unwrap();
     slices(photons, cycles, |slice| {
         for (counts, pixel) in capture.iter_mut().zip(&slice.pixels) {

@@ -90,7 +90,7 @@ fn rules_have_the_false_alarms_that_are_asked_for() {
             };
             let mut photons = scene.photons(7, scene.cycles).unwrap();
             let addresses = photons.addresses();
-            let mut engine = host_engine(&of_rule, photons.geometry(), &addresses).unwrap();
+            let mut engine = host_engine(&of_rule, photons.array(), &addresses).unwrap();
             for _ in 0..scene.cycles / 250 {
                 let slice = photons.next_slice(250).unwrap();
                 engine.run(&slice).unwrap();

@@ -9,7 +9,7 @@ use dtof_core::{BlockLevel, Count, DepthEvent, PixelAddress, RangeGate, WindowRu
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{AdaptiveBinning, Settings};
 use dtof_events::reports::LastReports;
-use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_photons::source::PhotonSource;
 use dtof_run::truth::Comparison;
 use dtof_simulate::scene::{self, Along, DepthMap, Scene};
 
@@ -25,20 +25,20 @@ fn vgroove() -> Option<PathBuf> {
     found
 }
 
-/// The scene, seen by an array as large as the map unless `array` says otherwise.
-fn scene_of(folder: &Path, along: Along, array: Option<Geometry>) -> Scene {
+/// The scene, seen by an array as large as the map unless `size` says otherwise.
+fn scene_of(folder: &Path, along: Along, size: Option<[u32; 2]>) -> Scene {
     let map = DepthMap::read(&folder.join("depth.npy"), along).unwrap();
     let map = map.with_picture(&folder.join("rgb.npy")).unwrap();
     let mut scene = Scene::parse("background = 0.02").unwrap();
-    (scene.geometry, scene.layout) = (map.size(), map.size());
+    (scene.size, scene.layout) = (map.size(), map.size());
     scene.add_depth_map(map).unwrap();
-    scene.geometry = array.unwrap_or(scene.geometry);
+    scene.size = size.unwrap_or(scene.size);
     scene
 }
 
 /// How much z of the points differs along a column, at most, in millimetres.
 fn spread_mm(scene: &Scene) -> f64 {
-    let Geometry { columns, rows } = scene.geometry;
+    let [columns, rows] = scene.size;
     let z = |column: u32, row: u32| {
         let pixel = PixelAddress(u16::try_from(row * columns + column).unwrap());
         let place = |index: u32, of: u32| (f64::from(index) + 0.5) / f64::from(of);
@@ -68,11 +68,10 @@ fn its_values_are_ranges_along_the_ray() {
 #[test]
 fn events_lie_on_its_walls() {
     let Some(folder) = vgroove() else { return };
-    let array = Geometry::new(40, 30);
-    let scene = scene_of(&folder, Along::Ray, Some(array));
+    let scene = scene_of(&folder, Along::Ray, Some([40, 30]));
     let settings = scene::settings(1);
     let mut photons = scene.photons(settings.seed, 500).unwrap();
-    let mut engine = host_engine(&settings, array, &photons.addresses()).unwrap();
+    let mut engine = host_engine(&settings, photons.array(), &photons.addresses()).unwrap();
     let mut comparison = Comparison::new(&scene, &settings, 500).unwrap();
     comparison.add(&engine.run(&photons.next_slice(500).unwrap()).unwrap());
     let truth = comparison.finish();
@@ -95,7 +94,7 @@ fn events_lie_on_its_walls() {
 /// The events of a dim view of it, laser cycles `1..=3000`.
 fn events(scene: &Scene, settings: &Settings) -> Vec<DepthEvent> {
     let mut photons = scene.photons(settings.seed, 3000).unwrap();
-    let mut engine = host_engine(settings, scene.geometry, &photons.addresses()).unwrap();
+    let mut engine = host_engine(settings, photons.array(), &photons.addresses()).unwrap();
     let slices = (0..30).map(|_| engine.run(&photons.next_slice(100).unwrap()).unwrap());
     slices.collect::<Vec<_>>().concat()
 }
@@ -104,8 +103,8 @@ fn events(scene: &Scene, settings: &Settings) -> Vec<DepthEvent> {
 #[test]
 fn blocks_report_its_walls_and_leave_pixels_their_events() {
     let Some(folder) = vgroove() else { return };
-    let array = Geometry::new(80, 60);
-    let mut scene = scene_of(&folder, Along::Ray, Some(array));
+    let mut scene = scene_of(&folder, Along::Ray, Some([80, 60]));
+    let array = scene.array().unwrap();
     scene.background = 0.05;
     // Around 0.08 signal photons a laser cycle.
     scene.signal_at_one_metre *= 0.005;
@@ -134,10 +133,10 @@ fn blocks_report_its_walls_and_leave_pixels_their_events() {
     };
     let own = of_pixels(&events(&scene, &alone));
     let events = events(&scene, &with_blocks);
-    let mut reports = vec![LastReports::default(); array.addresses()];
+    let mut reports = vec![LastReports::default(); array.pixels() as usize];
     let (mut right, mut wrong) = (0, 0);
     for event in &events {
-        for pixel in array.block(event.pixel, event.level) {
+        for pixel in array.pixels_of(event.pixel, event.level) {
             let report = &mut reports[usize::from(pixel.0)];
             let stands = report.take(event.level, event.cycle, event.exposure.into());
             if !stands || event.level == BlockLevel::PIXEL {

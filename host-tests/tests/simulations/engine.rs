@@ -114,14 +114,14 @@ fn reference_config(config: &PixelConfig<BINS, AnyRule>) -> EchoConfig {
 fn compare(settings: &Settings, cycles: u64, tally: &mut Tally) {
     let scene = Scene::parse(SCENE).unwrap();
     let mut photons = scene.photons(settings.seed, cycles).unwrap();
-    let geometry = scene.geometry;
+    let array = photons.array();
     let addresses = photons.addresses();
-    let mut engine = host_engine(settings, geometry, &addresses).unwrap();
+    let mut engine = host_engine(settings, array, &addresses).unwrap();
     let configs = (settings.config().unwrap(), settings.block_config().unwrap());
     let levels = settings.binning.map_or(0, |binning| binning.levels.raw());
     let patience = settings.binning.map_or(1, |binning| binning.patience);
     let mut array = BinnedArray::new(
-        (geometry.columns, geometry.rows),
+        (array.columns(), array.rows()),
         levels.into(),
         patience.into(),
         (reference_config(&configs.0), reference_config(&configs.1)),

@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 use crate::capture_log::{ground_truth, log, tell};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
-    Count, Count16, EchoNumber, Flags, Histogram, LaserCycle, PixelAddress, PixelConfig, RangeGate,
-    RangeScale, WindowRule, z_for,
+    Array, Count, Count16, EchoNumber, Flags, Histogram, LaserCycle, PixelAddress, PixelConfig,
+    RangeGate, RangeScale, WindowRule, z_for,
 };
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_photons::open::{Known, Opening, counts};
 use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
-use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_photons::source::PhotonSource;
 use dtof_photons::tmf8820;
 use dtof_simulate::scene;
 use flate2::read::GzDecoder;
@@ -67,7 +67,7 @@ fn near_captures(log: &PathBuf, sigma: &str) -> Vec<(f64, Found)> {
     let near = captures.filter(|(mm, _)| *mm < NEAR_MM);
     near.map(|(mm, capture)| {
         let centre = [vec![capture[CENTRE].clone()]];
-        let one = Geometry::new(1, 1);
+        let one = Array::new(1, 1).unwrap();
         let mut photons = RecordedHistograms::new(one, &centre, length, CYCLES.into(), 1).unwrap();
         let mut engine = host_engine(&settings, one, &photons.addresses()).unwrap();
         let mut found = Found::default();
@@ -148,7 +148,8 @@ fn tmf8829() -> Option<(Known, Vec<Measured>)> {
     let recorded = counts(Path::new(path), &Opening::default()).unwrap();
     // All columns of a row of histograms are the same. They are those of the first row of
     // results.
-    assert_eq!(recorded.geometry, Geometry::new(1, 26 * 16));
+    assert_eq!(recorded.array, Array::new(1, 16).unwrap());
+    assert_eq!(recorded.captures.len(), 26);
     assert_eq!(recorded.known.gate, Some((0, 53)));
     let log: serde_json::Value =
         serde_json::from_reader(GzDecoder::new(File::open(path).unwrap())).unwrap();

@@ -48,8 +48,8 @@ fn histograms(name: &str, laser_off: bool) -> (usize, usize, Vec<Vec<u64>>) {
         scene = scene.with_laser_off();
     }
     let mut photons = scene.photons(1, 400).unwrap();
-    let geometry = photons.geometry();
-    let mut pixels = vec![vec![0; usize::from(scene.bins)]; geometry.addresses()];
+    let array = photons.array();
+    let mut pixels = vec![vec![0; usize::from(scene.bins)]; array.pixels() as usize];
     for (histogram, received) in pixels
         .iter_mut()
         .zip(photons.next_slice(400).unwrap().pixels)
@@ -60,7 +60,7 @@ fn histograms(name: &str, laser_off: bool) -> (usize, usize, Vec<Vec<u64>>) {
             }
         }
     }
-    (geometry.rows as usize, geometry.columns as usize, pixels)
+    (array.rows() as usize, array.columns() as usize, pixels)
 }
 
 #[test]

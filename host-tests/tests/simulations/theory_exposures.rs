@@ -3,10 +3,10 @@
 
 use crate::long_or;
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{BlockLevel, Count, DepthEvent, PaperRule, PixelAddress, Threshold};
+use dtof_core::{Array, BlockLevel, Count, DepthEvent, PaperRule, PixelAddress, Threshold};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_photons::source::PhotonSource;
 use dtof_simulate::{SimulatedArray, SimulatedPixel, scene};
 use dtof_theory::counts::binomial::{alike, plausible};
 use dtof_theory::looks::exposure::{Exposures, Looks};
@@ -288,7 +288,7 @@ fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec
         x: request.x,
         ..scene::settings(11)
     };
-    let geometry = Geometry::new(side, side);
+    let array = Array::new(side, side).unwrap();
     let pixels = (0..side * side).map(|pixel| {
         let rates = Rates {
             background: request.background,
@@ -300,8 +300,8 @@ fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec
         SimulatedPixel::new(&rates, 128, pixel_rng(settings.seed, address)).unwrap()
     });
     let cycles = tuned.looks.expiry();
-    let mut photons = SimulatedArray::new(geometry, pixels.collect(), cycles.into(), None);
-    let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses()).unwrap();
+    let mut photons = SimulatedArray::new(array, pixels.collect(), cycles.into(), None);
+    let mut engine = host_engine(&settings, photons.array(), &photons.addresses()).unwrap();
     let slice = photons.next_slice(u16::try_from(cycles).unwrap()).unwrap();
     let mut events = engine.run(&slice).unwrap();
     events.sort_by_key(|event| (event.pixel, event.cycle));

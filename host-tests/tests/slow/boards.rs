@@ -13,13 +13,13 @@ use std::{fs, thread};
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{BlockLevel, Count, EchoNumber, PaperRule, WindowRule};
+use dtof_core::{Array, BlockLevel, Count, EchoNumber, PaperRule, WindowRule};
 use dtof_device::{Client, DeviceEngine, HostTimeout, configuration, monitor};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_link::{AdaptiveBinning, FaultRecord, Source};
-use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_photons::source::PhotonSource;
 use dtof_simulate::{demo, scene};
 
 use crate::emulator::{Board, Emulator, End, Laser, Overflow, QEMU};
@@ -48,7 +48,7 @@ fn mps2_an386_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     let image = board.image(&[])?;
     let mut used = ends(board, &image)?;
     // A million photons of 64 macropixels.
-    let array = Geometry::new(8, 8);
+    let array = Array::new(8, 8).unwrap();
     for (settings, cycles, reads_every) in [
         (settings(), 5300, 0),
         (with_windows(), 5300, 150),
@@ -66,7 +66,7 @@ fn mps2_an386_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
         )?);
     }
     // No side is a multiple of a block's.
-    let array = Geometry::new(5, 3);
+    let array = Array::new(5, 3).unwrap();
     used.push(agrees(
         board,
         &image,
@@ -97,7 +97,7 @@ fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     }
     let board = Board::Stm32F405;
     let image = board.image(&[])?;
-    let array = Geometry::new(4, 2);
+    let array = Array::new(4, 2).unwrap();
     let used = [
         agrees(board, &image, &settings(), array, 200, Duration::ZERO)?,
         agrees(board, &image, &with_windows(), array, 200, Duration::ZERO)?,
@@ -297,14 +297,14 @@ fn agrees(
     board: Board,
     image: &Path,
     settings: &Settings,
-    geometry: Geometry,
+    array: Array,
     cycles: u16,
     reads_every: Duration,
 ) -> Result<u64> {
     let mut emulator = Emulator::start(board, image, &[])?;
     let mut client = Client::new(emulator.connect()?)?;
     client.reads_every = reads_every;
-    let decided = decides_alike(client, settings, geometry, cycles)?;
+    let decided = decides_alike(client, settings, array, cycles)?;
     let stack = emulator.stop()?;
     println!(
         "{board:?}: {decided}; read every {} ms; {stack} bytes of stack",
@@ -318,16 +318,16 @@ fn agrees(
 pub fn decides_alike(
     client: Client,
     settings: &Settings,
-    geometry: Geometry,
+    array: Array,
     cycles: u16,
 ) -> Result<String> {
     let start = Instant::now();
-    let mut photons = demo::photons(geometry, settings.seed, cycles.into())?;
+    let mut photons = demo::photons(array, settings.seed, cycles.into())?;
     let addresses = photons.addresses();
     let slice = photons.next_slice(cycles)?;
-    let mut on_host = host_engine(settings, geometry, &addresses)?;
+    let mut on_host = host_engine(settings, array, &addresses)?;
     let expected = on_host.run(&slice)?;
-    let mut on_board = DeviceEngine::new(client, settings, geometry, &addresses)?;
+    let mut on_board = DeviceEngine::new(client, settings, array, &addresses)?;
     let events = on_board.run(&slice)?;
     ensure!(events == expected, "not the events of this computer");
     let statistics = on_board.statistics();
@@ -387,15 +387,10 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
 
 /// The image of a sensor with nothing connected says so, and decides on photons of
 /// the link afterwards. Gives the bytes of stack used.
-fn says_unplugged(
-    board: Board,
-    image: &Path,
-    expected: FaultRecord,
-    array: Geometry,
-) -> Result<u64> {
+fn says_unplugged(board: Board, image: &Path, expected: FaultRecord, array: Array) -> Result<u64> {
     let mut emulator = Emulator::start(board, image, &[])?;
     let mut client = Client::new(emulator.connect()?)?;
-    let pixels = u16::try_from(array.addresses())?;
+    let pixels = u16::try_from(array.pixels())?;
     let about = client.sensor()?.context("no sensor")?;
     let mut wanted = settings();
     if let Some(bin_width) = about.bin_width {

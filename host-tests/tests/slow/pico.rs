@@ -12,12 +12,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::fixed::types::{U8F8, U16F16};
-use dtof_core::{Count, PaperRule, PixelAddress};
+use dtof_core::{Array, Count, PaperRule, PixelAddress};
 use dtof_device::{Client, HostTimeout, configuration};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_link::{FaultRecord, Report, Source};
-use dtof_photons::source::{Geometry, Photon, PixelPhotons, Slice};
+use dtof_photons::source::{Photon, PixelPhotons, Slice};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -60,7 +60,7 @@ fn pico_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
             Rp2040::start(&sidecar, None)?
         };
         let client = Client::new(board.connect()?)?;
-        let decided = decides_alike(client, &settings, Geometry::new(8, 8), cycles)?;
+        let decided = decides_alike(client, &settings, Array::new(8, 8).unwrap(), cycles)?;
         let done = board.stop()?;
         println!("{decided}; {done:?}");
         used.push(done.stack);
@@ -248,7 +248,7 @@ fn events(
     let found = timer.client.synchronise()?;
     timer.board.stop()?;
 
-    let array = Geometry::new(1, 1);
+    let array = Array::new(1, 1).unwrap();
     let mut engine = host_engine(&settings, array, &[PixelAddress(0)])?;
     let photons = (0..)
         .zip(cycles)

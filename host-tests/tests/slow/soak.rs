@@ -9,14 +9,13 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
-use dtof_core::PixelAddress;
+use dtof_core::{Array, PixelAddress};
 use dtof_device::{Client, HostTimeout, configuration};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_events::aer_file::Event;
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::{Report, Source};
-use dtof_photons::source::Geometry;
 use dtof_sensors::{PhotonSink, Polled, simulated};
 
 use crate::boards::{settings, with_all};
@@ -26,7 +25,7 @@ use crate::{stack, wanted};
 
 const BOARD: Board = Board::Mps2An386;
 /// The pixels of the simulated scene.
-const ARRAY: Geometry = Geometry::new(4, 4);
+const ARRAY: Array = Array::new(4, 4).unwrap();
 const PIXELS: u16 = 16;
 /// Laser cycles that this computer works on at a time.
 const SLICE: u16 = 10_000;
@@ -53,7 +52,7 @@ fn on_device(image: &Path, settings: &Settings, cycles: u64) -> Result<Sensed> {
     let mut client = Client::new(emulator.connect()?)?;
     let start = Instant::now();
     let configure = |client: &mut Client, source| {
-        let (columns, timeout) = (ARRAY.columns, HostTimeout::default());
+        let (columns, timeout) = (ARRAY.columns(), HostTimeout::default());
         let wanted = configuration(settings, PIXELS, columns, source, None, timeout)?;
         client.configure(&wanted)
     };

@@ -151,7 +151,7 @@ impl Seen {
             .map(|trace| Level::of(&trace.counts))
             .collect();
         Ok(Self {
-            pixels: Pixels::new(observed.geometry.addresses(), &traces, &levels),
+            pixels: Pixels::new(observed.array.pixels() as usize, &traces, &levels),
             traces,
             levels,
             last,
@@ -182,7 +182,7 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
     let good = good.filter(|(_, (trace, _))| pixels.is_good(trace.pixel));
     let (numbers, (traces, levels)): (Vec<usize>, (Vec<_>, Vec<_>)) = good.unzip();
     anyhow::ensure!(!traces.is_empty(), "every pixel is dead or hot");
-    let scene = Scene::new(observed.geometry, pixels.background, traces, levels);
+    let scene = Scene::new(observed.array, pixels.background, traces, levels);
 
     let l2 = settle::l2(pixels.background);
     let nearest = glass::nearest(&scene, asked.glass, l2.into());
@@ -237,7 +237,7 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
         detection,
         spent,
         mean: counts.iter().map(|count| count / cycles).collect(),
-        looked_at: (observed.captures.len(), observed.geometry.addresses()),
+        looked_at: (observed.captures.len(), observed.array.pixels() as usize),
         pixels,
     })
 }

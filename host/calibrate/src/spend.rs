@@ -8,7 +8,7 @@
 
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
-use dtof_core::{AnyRule, Count, PaperRule, PixelAddress, WindowRule};
+use dtof_core::{AnyRule, Array, Count, PaperRule, PixelAddress, WindowRule};
 
 use super::find::limits::median;
 use super::{Detection, Length, Observed};
@@ -16,7 +16,7 @@ use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_engine::settings::SettingsFile;
 use dtof_photons::recorded::{RecordedHistograms, RecordingLength, Whole};
-use dtof_photons::source::{Geometry, PhotonSource, Slice};
+use dtof_photons::source::{PhotonSource, Slice};
 
 /// Laser cycles that are replayed, and photons, at most.
 const CYCLES: u16 = 10_000;
@@ -82,14 +82,13 @@ impl<'a> Replay<'a> {
             Length::PhotonsPerCycle(rate) => RecordingLength::PhotonsPerCycle(rate),
             Length::Unknown => return Ok(None),
         };
-        let captures = u32::try_from(observed.captures.len())?;
-        let array = observed.geometry;
-        let whole = Geometry::new(array.columns, array.rows * captures);
+        let whole = Whole::of(observed.array, observed.captures)?;
         let all = u64::from(CYCLES);
-        let pixels = array.addresses();
-        let hot = (0..whole.addresses()).filter(|pixel| hot.contains(&(pixel % pixels)));
+        let pixels = observed.array.pixels();
+        let hot =
+            (0..whole.array.pixels()).filter(|pixel| hot.contains(&((pixel % pixels) as usize)));
         let hot = hot.map(u16::try_from).collect::<Result<_, _>>();
-        let known = Whole::of(whole, observed.captures)?.with_masked(hot?);
+        let known = whole.with_masked(hot?);
         let mut photons = RecordedHistograms::part(&known, observed.captures, length, all, seed)?;
         let most = (PHOTONS / photons.photons_per_cycle().max(1e-9)).clamp(1.0, CYCLES.into());
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
@@ -188,7 +187,7 @@ impl<'a> Replay<'a> {
             ..self.settings.clone()
         };
         let pixels = u16::try_from(self.truth.len())?;
-        let array = Geometry::new(pixels.into(), 1);
+        let array = Array::new(pixels.into(), 1).context("no pixels")?;
         let addresses: Vec<PixelAddress> = (0..pixels).map(PixelAddress).collect();
         let mut engine = host_engine(&settings, array, &addresses)?;
         let events = engine.run(&self.slice)?;

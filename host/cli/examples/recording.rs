@@ -23,7 +23,7 @@ fn replay(file: &Path) -> Result<usize> {
     };
     let scale = settings.range_scale()?;
     let photons = recording.photons.as_mut();
-    let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses())?;
+    let mut engine = host_engine(&settings, photons.array(), &photons.addresses())?;
     let mut events = 0;
     each_slice(
         photons,

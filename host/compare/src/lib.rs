@@ -24,14 +24,14 @@ pub mod thresholds;
 pub mod truth;
 
 use anyhow::{Result, ensure};
-use dtof_core::{BlockLevel, PixelAddress};
+use dtof_core::{Array, BlockLevel, PixelAddress};
 
 use answer::{Answer, answer, of_longest_frame};
 use bound::Bound;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_options::Refused;
-use dtof_photons::source::{Geometry, PhotonSource, has_only_neighbours};
+use dtof_photons::source::{PhotonSource, has_only_neighbours};
 use measure::{Outcome, Trial, measure};
 use method::{Kind, Method, Rule};
 use selected::Selected;
@@ -194,13 +194,13 @@ pub fn compare(task: &Task) -> Result<Comparison> {
         settings, sigma, ..
     } = *task;
     // What no pixel could run with is refused before anything is drawn.
-    host_engine(settings, Geometry::new(1, 1), &[])?;
+    host_engine(settings, const { Array::new(1, 1).unwrap() }, &[])?;
     (task.progress)("surveys the photons")?;
     let mut source = photons(task, 0, PHOTONS)?;
-    let (geometry, laser_hz) = (source.geometry(), source.laser_hz());
+    let (array, laser_hz) = (source.array(), source.laser_hz());
     let most_levels = most_levels(source.as_ref());
     let surveyed = survey(source.as_mut(), settings, sigma)?;
-    let truth = known_ranges(task.truth.clone(), &surveyed, settings, geometry)?;
+    let truth = known_ranges(task.truth.clone(), &surveyed, settings, array)?;
     let has_target = |pixel| truth.has_target(pixel, 0);
     ensure!(
         surveyed.iter().any(|(pixel, _)| has_target(*pixel)),
@@ -235,7 +235,7 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     trials.extend(taken.clone());
     let mut stresses = Stress::all(&light, settings.gate.map_or(0, |gate| gate.0));
     // Where every pixel is hot there is no other to look at.
-    let is_hot = |stress: &Stress, pixel| stress.is_hot(pixel, geometry.columns);
+    let is_hot = |stress: &Stress, pixel| stress.is_hot(pixel, array.columns());
     stresses.retain(|stress| surveyed.iter().any(|(pixel, _)| !is_hot(stress, *pixel)));
     let stressed = stresses
         .into_iter()
@@ -316,7 +316,7 @@ fn known_ranges(
     truth: Option<Truth>,
     surveyed: &[(PixelAddress, PixelLight)],
     settings: &Settings,
-    geometry: Geometry,
+    array: Array,
 ) -> Result<Truth> {
     let mm_per_bin = mm_per_bin(settings);
     let offset = settings.offset_mm.to_num::<f64>();
@@ -331,7 +331,7 @@ fn known_ranges(
             known.moved(offset)
         }
         None => {
-            let mut ranges = vec![None; geometry.addresses()];
+            let mut ranges = vec![None; array.pixels() as usize];
             for (address, pixel) in surveyed {
                 ranges[usize::from(address.0)] = range(pixel);
             }
@@ -342,9 +342,9 @@ fn known_ranges(
 
 /// The highest level whose blocks have more than a pixel, and none of another capture.
 fn most_levels(source: &dyn PhotonSource) -> u8 {
-    let Geometry { columns, rows } = source.geometry();
+    let array = source.array();
     let fits = |level: &u8| {
-        columns.min(rows) >= 1 << level
+        array.columns().min(array.rows()) >= 1 << level
             && has_only_neighbours(source, BlockLevel::saturating(*level))
     };
     [2, 1].into_iter().find(fits).unwrap_or(0)

@@ -54,7 +54,7 @@ pub fn measure(
     truth: &Truth,
     stress: &Stress,
 ) -> Result<Vec<Outcome>> {
-    let geometry = source.geometry();
+    let array = source.array();
     let masked = trials
         .first()
         .map_or(&[][..], |trial| &trial.settings.masked);
@@ -64,12 +64,12 @@ pub fn measure(
         let settings = &trial.settings;
         Ok(Running {
             trial,
-            engine: host_engine(settings, geometry, &addresses)?,
-            tally: Tally::new(truth, stress, geometry, settings, cycles)?,
+            engine: host_engine(settings, array, &addresses)?,
+            tally: Tally::new(truth, stress, array, settings, cycles)?,
         })
     });
     let mut running: Vec<Running> = running.collect::<Result<_>>()?;
-    let mut watched = vec![0; geometry.addresses()];
+    let mut watched = vec![0; array.pixels() as usize];
     let mut pixel_cycles = 0;
     each_slice(
         source,

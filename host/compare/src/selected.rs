@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 
 use anyhow::Result;
-use dtof_core::PixelAddress;
+use dtof_core::{Array, PixelAddress};
 
-use dtof_photons::source::{Geometry, PhotonSource, Slice};
+use dtof_photons::source::{PhotonSource, Slice};
 
 /// A source with some of its pixels, and with fewer laser cycles.
 pub struct Selected {
@@ -21,7 +21,7 @@ impl Selected {
     /// Every `nth` block of `source`, for at most `cycles` laser cycles.
     #[must_use]
     pub fn new(mut source: Box<dyn PhotonSource>, nth: u32, cycles: u64) -> Self {
-        let columns = source.geometry().columns;
+        let columns = source.array().columns();
         let blocks_across = columns.div_ceil(8);
         let block = |address: PixelAddress| {
             let (row, column) = (
@@ -62,8 +62,8 @@ impl PhotonSource for Selected {
         Some(&*self.source)
     }
 
-    fn geometry(&self) -> Geometry {
-        self.source.geometry()
+    fn array(&self) -> Array {
+        self.source.array()
     }
 
     fn addresses(&self) -> Vec<PixelAddress> {
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn what_it_does_not_change_is_what_its_source_says() {
-        let source = demo::photons(Geometry::new(32, 16), 1, 100).unwrap();
+        let source = demo::photons(Array::new(32, 16).unwrap(), 1, 100).unwrap();
         let masked = Masked::new(Box::new(source), &[3]).unwrap();
         let mut part = Selected::new(Box::new(masked.with_laser_hz(Some(20_000))), 2, 50);
         part.next_slice(50).unwrap();

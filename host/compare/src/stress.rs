@@ -4,11 +4,11 @@
 //! So half of the signal is half of all photons and the missing half of the background anew.
 
 use anyhow::{Context, Result};
-use dtof_core::PixelAddress;
+use dtof_core::{Array, PixelAddress};
 use rand_distr::{Bernoulli, Distribution, Normal, Poisson, StandardUniform};
 use rand_pcg::Pcg64;
 
-use dtof_photons::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
+use dtof_photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_theory::random::pixel_rng;
 
 /// What is done to the photons.
@@ -148,7 +148,7 @@ impl Stressed {
         let seed = seed.wrapping_add(0x5eed_0f57_2e55_0000);
         Self {
             cycles: source.cycles(),
-            columns: source.geometry().columns,
+            columns: source.array().columns(),
             pixels: pixels
                 .map(|pixel| (pixel, pixel_rng(seed, pixel)))
                 .collect(),
@@ -165,8 +165,8 @@ impl PhotonSource for Stressed {
         Some(&*self.source)
     }
 
-    fn geometry(&self) -> Geometry {
-        self.source.geometry()
+    fn array(&self) -> Array {
+        self.source.array()
     }
 
     fn cycles(&self) -> u64 {

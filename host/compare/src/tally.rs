@@ -1,13 +1,12 @@
 //! What the reports of one method come to: how often they come, and how far off they are.
 
 use anyhow::Result;
-use dtof_core::{DepthEvent, PixelAddress, RangeScale};
+use dtof_core::{Array, DepthEvent, PixelAddress, RangeScale};
 
 use super::stress::Stress;
 use super::truth::Truth;
 use dtof_engine::settings::Settings;
 use dtof_events::events_csv::range_mm;
-use dtof_photons::source::Geometry;
 use dtof_simulate::MM_PER_PS;
 
 /// A report farther off than so many bins is wrong.
@@ -25,7 +24,7 @@ const MOST_KEPT: usize = 400_000;
 pub struct Tally<'a> {
     truth: &'a Truth,
     stress: &'a Stress,
-    geometry: Geometry,
+    array: Array,
     scale: RangeScale,
     mm_per_bin: f64,
     cycles: u64,
@@ -96,15 +95,15 @@ impl<'a> Tally<'a> {
     pub fn new(
         truth: &'a Truth,
         stress: &'a Stress,
-        geometry: Geometry,
+        array: Array,
         settings: &Settings,
         cycles: u64,
     ) -> Result<Self> {
-        let pixels = geometry.addresses();
+        let pixels = array.pixels() as usize;
         Ok(Self {
             truth,
             stress,
-            geometry,
+            array,
             scale: settings.range_scale()?,
             mm_per_bin: mm_per_bin(settings),
             cycles,
@@ -117,7 +116,7 @@ impl<'a> Tally<'a> {
     /// Takes events into account: one of a block for each of its pixels.
     pub fn add(&mut self, events: &[DepthEvent]) {
         for event in events {
-            for pixel in self.geometry.block(event.pixel, event.level) {
+            for pixel in self.array.pixels_of(event.pixel, event.level) {
                 self.report(event, pixel);
             }
         }
@@ -125,7 +124,7 @@ impl<'a> Tally<'a> {
 
     fn report(&mut self, event: &DepthEvent, pixel: PixelAddress) {
         let cycle = event.cycle.0;
-        if self.stress.is_hot(pixel, self.geometry.columns) {
+        if self.stress.is_hot(pixel, self.array.columns()) {
             return;
         }
         let ranges = self.truth.ranges(pixel, cycle);
@@ -167,7 +166,7 @@ impl<'a> Tally<'a> {
             #[allow(clippy::cast_possible_truncation, reason = "an address")]
             let is_hot = self
                 .stress
-                .is_hot(PixelAddress(pixel as u16), self.geometry.columns);
+                .is_hot(PixelAddress(pixel as u16), self.array.columns());
             if cycles == 0 || is_hot {
                 continue;
             }

@@ -5,7 +5,6 @@ use dtof_core::PixelAddress;
 
 use dtof_photons::medium::Medium;
 use dtof_photons::npy::numbers;
-use dtof_photons::source::Geometry;
 use dtof_simulate::scene::Scene;
 
 /// What reports are compared with.
@@ -26,9 +25,9 @@ impl Truth {
     ///
     /// # Errors
     /// What is wrong with it, its name first.
-    pub fn read(medium: &Medium, geometry: Geometry) -> Result<Self> {
+    pub fn read(medium: &Medium, pixels: usize) -> Result<Self> {
         let numbers = numbers::read(medium)?;
-        let (there, pixels) = (numbers.values.len(), geometry.addresses());
+        let there = numbers.values.len();
         ensure!(
             there == pixels,
             "{medium}: {there} ranges, but there are {pixels} pixels"

@@ -14,7 +14,7 @@ pub mod setup;
 mod stopped;
 
 use anyhow::{Result, bail, ensure};
-use dtof_core::{DepthEvent, PixelAddress, Statistics};
+use dtof_core::{Array, DepthEvent, PixelAddress, Statistics};
 use dtof_link::endpoint::BODY_BYTES;
 use dtof_link::{Configuration, DynamicDepth, Report, Source, Token, message};
 
@@ -30,7 +30,7 @@ use dtof_engine::Engine;
 use dtof_engine::settings::Settings;
 use dtof_events::aer_file::Event;
 use dtof_options::Refused;
-use dtof_photons::source::{Geometry, Slice};
+use dtof_photons::source::Slice;
 
 /// Photons into a device, events out.
 pub struct DeviceEngine {
@@ -50,7 +50,7 @@ impl DeviceEngine {
     pub fn new(
         mut client: Client,
         settings: &Settings,
-        array: Geometry,
+        array: Array,
         addresses: &[PixelAddress],
     ) -> Result<Self> {
         let consecutive = addresses
@@ -68,7 +68,7 @@ impl DeviceEngine {
         let wanted = configuration(
             settings,
             pixels,
-            array.columns,
+            array.columns(),
             Source::Link,
             None,
             HostTimeout::default(),

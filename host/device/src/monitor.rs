@@ -9,7 +9,7 @@ use std::io::{self, ErrorKind, Write};
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, ensure};
-use dtof_core::RangeScale;
+use dtof_core::{Array, RangeScale};
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::{DynamicDepth, Report, Source};
 
@@ -18,7 +18,6 @@ use dtof_engine::settings::Settings;
 use dtof_events::aer_file::Event;
 use dtof_events::events_csv;
 use dtof_options::Refused;
-use dtof_photons::source::Geometry;
 use losses::{Losses, since};
 use map::LiveMap;
 pub use recording::Recording;
@@ -42,9 +41,10 @@ pub struct Task<'a> {
 }
 
 /// The array of so many `pixels`, to draw and to record: in so many `columns`, or else as
-/// high as wide, or the least bit wider.
+/// high as wide, or the least bit wider. None without pixels, or with rows of more than there are
+/// addresses.
 #[must_use]
-pub fn array(pixels: u16, columns: Option<u32>) -> Geometry {
+pub fn array(pixels: u16, columns: Option<u32>) -> Option<Array> {
     let pixels = u32::from(pixels);
     let squarest = || {
         let rows = (1..=pixels).take_while(|rows| rows * rows <= pixels);
@@ -52,10 +52,7 @@ pub fn array(pixels: u16, columns: Option<u32>) -> Geometry {
         pixels / rows.unwrap_or(1)
     };
     let columns = columns.unwrap_or_else(squarest).max(1);
-    Geometry {
-        columns,
-        rows: pixels.div_ceil(columns),
-    }
+    Array::new(columns, pixels.div_ceil(columns))
 }
 
 /// Checks that no pixel is left out whose photons count all the same.
@@ -324,14 +321,17 @@ mod tests {
     #[test]
     fn arrays_are_as_high_as_wide_if_they_can_be() {
         let array = |pixels, columns| {
-            let Geometry { columns, rows } = array(pixels, columns);
-            (columns, rows)
+            let array = array(pixels, columns)?;
+            Some((array.columns(), array.rows()))
         };
-        let pixels = [1, 2, 4, 9, 64, 128, 2048, 7, 0];
-        let columns = [1, 2, 2, 3, 8, 16, 64, 7, 1];
-        assert_eq!(pixels.map(|pixels| array(pixels, None).0), columns);
-        let rows = [1, 1, 2, 3, 8, 8, 32, 1, 0];
-        assert_eq!(pixels.map(|pixels| array(pixels, None).1), rows);
-        assert_eq!(array(64, Some(10)), (10, 7));
+        let pixels = [1, 2, 4, 9, 64, 128, 2048, 7];
+        let columns = [1, 2, 2, 3, 8, 16, 64, 7];
+        let rows = [1, 1, 2, 3, 8, 8, 32, 1];
+        for (pixels, sides) in pixels.into_iter().zip(columns.into_iter().zip(rows)) {
+            assert_eq!(array(pixels, None), Some(sides));
+        }
+        assert_eq!(array(64, Some(10)), Some((10, 7)));
+        assert_eq!(array(0, None), None);
+        assert_eq!(array(u16::MAX, Some(60_000)), None);
     }
 }

@@ -3,7 +3,8 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
+use dtof_core::Array;
 use dtof_core::fixed::types::I24F8;
 use dtof_link::SensorRecord;
 
@@ -15,7 +16,6 @@ use dtof_events::aer_file::Header;
 use dtof_export::LaserClock;
 use dtof_options::Refused;
 use dtof_photons::masked;
-use dtof_photons::source::Geometry;
 
 /// How a device operates.
 #[derive(Clone, Debug)]
@@ -29,7 +29,7 @@ pub struct Setup {
     /// Pixels, addresses 0 up.
     pub pixels: u16,
     /// Their array.
-    pub geometry: Geometry,
+    pub array: Array,
     /// Laser cycles in a thousand seconds; 0 if that is not known.
     pub laser_millihertz: u64,
     /// What was said is not what the device says, or the device has failed before.
@@ -77,21 +77,8 @@ impl Setup {
         let told = said.sensor.laser_hz.map(LaserClock::new).transpose()?;
         let (clock, warning) = LaserClock::known(told, own, "the device");
         let said = with_gate(said, sensor.bins, client.bins());
-        let setup = Self {
-            settings: said.settings(client.bins().into())?,
-            asked,
-            said,
-            pixels,
-            geometry: array(pixels, columns),
-            laser_millihertz: clock.map_or(0, |clock| clock.millihertz()),
-            warnings: warning
-                .into_iter()
-                .chain(Stopped::warning(&report))
-                .collect(),
-            measured_bins: sensor.bins,
-            began: SystemTime::now(),
-        };
-        masked::check(&setup.settings.masked, pixels.into())?;
+        let settings = said.settings(client.bins().into())?;
+        masked::check(&settings.masked, pixels.into())?;
         if let Some(columns) = columns.filter(|&columns| columns > u32::from(pixels)) {
             bail!(Refused::value(
                 "columns",
@@ -99,7 +86,21 @@ impl Setup {
                 format!("there are {pixels} pixels")
             ));
         }
-        Ok(setup)
+        let array = array(pixels, columns);
+        Ok(Self {
+            settings,
+            asked,
+            said,
+            pixels,
+            array: array.with_context(|| format!("no array has {pixels} pixels in such rows"))?,
+            laser_millihertz: clock.map_or(0, |clock| clock.millihertz()),
+            warnings: warning
+                .into_iter()
+                .chain(Stopped::warning(&report))
+                .collect(),
+            measured_bins: sensor.bins,
+            began: SystemTime::now(),
+        })
     }
 
     /// The header of its events.
@@ -109,7 +110,7 @@ impl Setup {
         Header {
             #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
             bins: self.settings.bins as u32,
-            geometry: self.geometry,
+            array: self.array,
             bin_width_ps: self.settings.bin_width_ps,
             offset_mm: self.settings.offset_mm,
             laser_millihertz: self.laser_millihertz,

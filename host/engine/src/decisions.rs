@@ -3,9 +3,7 @@
 //! A pixel starts over the moment it reports, so that its histogram is copied right before. That
 //! takes as much memory as the pixels themselves.
 
-use dtof_core::{BinIndex, CounterWidth, Decided, DepthEvent, PeeledBins, PixelAddress};
-
-use dtof_photons::source::Geometry;
+use dtof_core::{Array, BinIndex, CounterWidth, Decided, DepthEvent, PeeledBins, PixelAddress};
 
 /// An event, and what it was decided from.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,17 +88,17 @@ impl Kept {
 
     /// Those of an array with so many bins a pixel.
     #[must_use]
-    pub fn of(array: Geometry, bins: usize) -> Self {
+    pub fn of(array: Array, bins: usize) -> Self {
         let taken = |every: u32| {
             let pixels =
-                array.columns.div_ceil(every) as usize * array.rows.div_ceil(every) as usize;
+                array.columns().div_ceil(every) as usize * array.rows().div_ceil(every) as usize;
             pixels * bins
         };
         // Blocks begin at these, too.
         let mut powers = (0..32).map(|power| 1 << power);
         let every = powers.find(|&every| taken(every) <= Self::MOST_BINS);
         Self {
-            columns: array.columns.max(1),
+            columns: array.columns(),
             every: every.unwrap_or(1 << 31),
         }
     }

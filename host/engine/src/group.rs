@@ -11,7 +11,7 @@ use dtof_core::{
 use dtof_link::AdaptiveBinning;
 
 use super::decisions::{Decision, LastDecision};
-use dtof_photons::source::{Geometry, PixelPhotons};
+use dtof_photons::source::PixelPhotons;
 
 /// The configurations of pixels and blocks.
 #[derive(Clone, Copy, Debug)]
@@ -159,18 +159,17 @@ impl<const BINS: usize> Group<BINS> {
     /// The groups of an array, of which the pixels `addresses` are there, ascending.
     ///
     /// # Errors
-    /// If it is none.
+    /// Never: its blocks have pixels.
     pub fn of_array(
-        array: Geometry,
+        array: Array,
         binning: AdaptiveBinning,
         addresses: &[PixelAddress],
     ) -> Result<Vec<Self>> {
-        let whole = Array::new(array.columns, array.rows).context("an array without pixels")?;
         let top = binning.levels;
-        let groups = (0..whole.blocks(top)).map(|block| {
+        let groups = (0..array.blocks(top)).map(|block| {
             let pixels: Vec<PixelAddress> =
-                whole.pixels_of(whole.first_of(block, top), top).collect();
-            Self::of_block(whole, top, &pixels, addresses)
+                array.pixels_of(array.first_of(block, top), top).collect();
+            Self::of_block(array, top, &pixels, addresses)
         });
         groups.collect()
     }

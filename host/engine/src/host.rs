@@ -1,7 +1,7 @@
 //! The core on this computer.
 
 use anyhow::Result;
-use dtof_core::{DepthEvent, PixelAddress, Statistics};
+use dtof_core::{Array, DepthEvent, PixelAddress, Statistics};
 use rayon::prelude::*;
 
 use super::Engine;
@@ -10,7 +10,7 @@ use super::frame::FrameEngine;
 use super::group::{Configs, Done, Group};
 use crate::settings::Settings;
 use crate::with_bins;
-use dtof_photons::source::{Geometry, Slice};
+use dtof_photons::source::Slice;
 
 /// `dtof-core` on this computer, groups of pixels spread over its threads.
 #[derive(Debug)]
@@ -29,7 +29,7 @@ struct HostEngine<const BINS: usize> {
 /// The constraint the settings break.
 pub fn host_engine(
     settings: &Settings,
-    array: Geometry,
+    array: Array,
     addresses: &[PixelAddress],
 ) -> Result<Box<dyn Engine>> {
     with_bins!(settings.bins, BINS => HostEngine::<BINS>::boxed(settings, array, addresses))?
@@ -38,7 +38,7 @@ pub fn host_engine(
 impl<const BINS: usize> HostEngine<BINS> {
     fn boxed(
         settings: &Settings,
-        array: Geometry,
+        array: Array,
         addresses: &[PixelAddress],
     ) -> Result<Box<dyn Engine>> {
         if let Some(length) = settings.frame {

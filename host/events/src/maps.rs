@@ -3,12 +3,12 @@
 use std::collections::VecDeque;
 
 use dtof_core::fixed::types::I24F8;
-use dtof_core::{BlockLevel, DepthEvent, PixelAddress, RangeScale, Reflectivity};
+use dtof_core::{Array, BlockLevel, DepthEvent, PixelAddress, RangeScale, Reflectivity};
 
 use crate::events_csv::range_mm;
 use crate::reports::LastReports;
 use dtof_options::rows::{Row, grouped};
-use dtof_photons::source::{Geometry, Slice};
+use dtof_photons::source::Slice;
 
 /// How many events the mean map averages, as in the paper's figure.
 pub const MEAN_OF: usize = 10;
@@ -76,7 +76,7 @@ impl PixelHistory {
 #[derive(Clone, Debug)]
 pub struct Maps {
     /// The array.
-    pub geometry: Geometry,
+    pub array: Array,
     /// One for each address.
     pub pixels: Vec<PixelHistory>,
 }
@@ -84,10 +84,10 @@ pub struct Maps {
 impl Maps {
     /// Nothing yet.
     #[must_use]
-    pub fn new(geometry: Geometry) -> Self {
+    pub fn new(array: Array) -> Self {
         Self {
-            geometry,
-            pixels: vec![PixelHistory::default(); geometry.addresses()],
+            array,
+            pixels: vec![PixelHistory::default(); array.pixels() as usize],
         }
     }
 
@@ -96,7 +96,7 @@ impl Maps {
     pub fn add(&mut self, event: &DepthEvent, scale: &RangeScale) {
         let range_mm = range_mm(event, scale);
         let exposure = event.exposure.into();
-        for address in self.geometry.block(event.pixel, event.level) {
+        for address in self.array.pixels_of(event.pixel, event.level) {
             let pixel = &mut self.pixels[usize::from(address.0)];
             if pixel.reports.take(event.level, event.cycle, exposure) {
                 pixel.push(range_mm);
@@ -120,7 +120,7 @@ impl Maps {
     /// What is known of each pixel, as a row of a table.
     #[must_use]
     pub fn rows(&self, [column, row]: [&str; 2], [one, several]: [&str; 2]) -> Vec<Row> {
-        let columns = self.geometry.columns.max(1) as usize;
+        let columns = self.array.columns() as usize;
         let rows = self.pixels.iter().enumerate().map(|(at, pixel)| {
             let name = format!("{column} {}, {row} {}", at % columns, at / columns);
             let photons = format!("{} photons", grouped(pixel.photons));
@@ -176,7 +176,7 @@ mod tests {
 
     #[test]
     fn a_block_stands_for_its_pixels_that_have_not_reported_since() {
-        let mut maps = Maps::new(Geometry::new(3, 3));
+        let mut maps = Maps::new(Array::new(3, 3).unwrap());
         let scale = fixtures::scale();
         let of_block = |pixel, cycle, bin, level| DepthEvent {
             level: BlockLevel::new(level).unwrap(),
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn photons_are_those_of_their_pixel() {
-        let mut maps = Maps::new(Geometry::new(3, 1));
+        let mut maps = Maps::new(Array::new(3, 1).unwrap());
         let photon = Photon { cycle: 0, code: 5 };
         let received = |photons| PixelPhotons {
             cycles: 1,
@@ -219,7 +219,7 @@ mod tests {
 
     #[test]
     fn a_row_says_what_is_known_of_a_pixel() {
-        let mut maps = Maps::new(Geometry::new(2, 2));
+        let mut maps = Maps::new(Array::new(2, 2).unwrap());
         let at = |pixel, cycle, bin| fixtures::event(pixel, cycle, bin);
         for event in [at(3, 50, 10), at(3, 99, 12), at(0, 120, 10)] {
             maps.add(&event, &fixtures::scale());
@@ -242,7 +242,7 @@ mod tests {
     #[test]
     fn the_spread_goes_from_most_to_fewest_events() {
         let with = |events: &[u64]| {
-            let mut maps = Maps::new(Geometry::new(u32::try_from(events.len()).unwrap(), 1));
+            let mut maps = Maps::new(Array::new(u32::try_from(events.len()).unwrap(), 1).unwrap());
             for (pixel, events) in maps.pixels.iter_mut().zip(events) {
                 pixel.events = *events;
             }

@@ -16,14 +16,13 @@
 use std::io::{self, Write};
 
 use anyhow::{Result, ensure};
-use dtof_core::{DynamicDepthConfig, DynamicDepthEvent, Polarity};
+use dtof_core::{Array, DynamicDepthConfig, DynamicDepthEvent, Polarity};
 
 use super::reorder::{Reorder, WAITING};
 use super::{Finished, LaserClock, Out, Sink};
 use dtof_events::aer_file::Event;
 use dtof_events::dynamic::DepthChanges;
 use dtof_events::echoes::Echo;
-use dtof_photons::source::Geometry;
 
 /// Columns and rows are sent in 11 bits.
 const MOST_SIDE: u32 = 1 << 11;
@@ -49,8 +48,7 @@ struct Encoder<W> {
 
 impl<W: Write> Encoder<W> {
     /// Writes the header.
-    fn new(mut out: W, array: Geometry) -> io::Result<Self> {
-        let Geometry { columns, rows } = array;
+    fn new(mut out: W, [columns, rows]: [u32; 2]) -> io::Result<Self> {
         write!(
             out,
             "% evt 2.0\n\
@@ -90,7 +88,7 @@ pub struct Evt2 {
     encoder: Encoder<Out>,
     order: Reorder<Change>,
     clock: LaserClock,
-    array: Geometry,
+    array: Array,
     changes: DepthChanges,
     written: u64,
 }
@@ -98,18 +96,18 @@ pub struct Evt2 {
 impl Evt2 {
     pub fn new(
         out: Out,
-        array: Geometry,
+        array: Array,
         clock: LaserClock,
         config: DynamicDepthConfig,
         echo: Echo,
     ) -> Result<Self> {
-        let Geometry { columns, rows } = array;
+        let (columns, rows) = (array.columns(), array.rows());
         ensure!(
             columns <= MOST_SIDE && rows <= MOST_SIDE,
             "an array of {columns}x{rows}: EVT2 holds at most {MOST_SIDE}x{MOST_SIDE}"
         );
         Ok(Self {
-            encoder: Encoder::new(out, array)?,
+            encoder: Encoder::new(out, [columns, rows])?,
             order: Reorder::new(WAITING),
             clock,
             array,
@@ -141,12 +139,12 @@ impl Sink for Evt2 {
         };
         let time = u64::try_from(self.clock.microseconds(change.cycle.0))?;
         // The change of a block is one of each of its pixels.
-        for pixel in self.array.block(change.pixel, change.level) {
+        for pixel in self.array.pixels_of(change.pixel, change.level) {
             let pixel = u32::from(pixel.0);
             let change = Change {
                 time,
-                column: pixel % self.array.columns,
-                row: pixel / self.array.columns,
+                column: pixel % self.array.columns(),
+                row: pixel / self.array.columns(),
                 polarity: change.polarity(),
             };
             let next = self.order.push(time, change);
@@ -175,8 +173,7 @@ mod tests {
         b"% evt 2.0\n% format EVT2;height=720;width=1280\n% geometry 1280x720\n% end\n";
 
     fn words(changes: &[Change]) -> Vec<u32> {
-        let array = Geometry::new(1280, 720);
-        let mut encoder = Encoder::new(Vec::new(), array).unwrap();
+        let mut encoder = Encoder::new(Vec::new(), [1280, 720]).unwrap();
         for change in changes {
             encoder.write(change).unwrap();
         }

@@ -10,7 +10,6 @@ use serde_json::{Value, json};
 
 use super::points::fields;
 use dtof_events::aer_file::{Event, EventKind};
-use dtof_photons::source::Geometry;
 
 /// Points of a message, at most.
 pub const MOST_POINTS: usize = 1 << 16;
@@ -179,12 +178,12 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// No event of an array yet.
+    /// No event of so many pixels yet.
     #[must_use]
-    pub fn new(array: Geometry) -> Self {
+    pub fn new(pixels: usize) -> Self {
         Self {
             now: Statistics::default(),
-            last_slice: vec![0; array.addresses()],
+            last_slice: vec![0; pixels],
             so_far: 0,
         }
     }

@@ -24,7 +24,7 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
-use dtof_core::RangeScale;
+use dtof_core::{Array, RangeScale};
 use dtof_link::DynamicDepth;
 use tempfile::NamedTempFile;
 
@@ -36,7 +36,6 @@ use dtof_options::numbers::{MOST_WHOLE, whole};
 use dtof_options::progress::Progress;
 use dtof_options::{NO_OPTION, Named, Refused, named};
 use dtof_photons::geometry::{FieldOfView, FieldOfViewError, Rays};
-use dtof_photons::source::Geometry;
 
 pub use clock::LaserClock;
 use clock::Span;
@@ -111,10 +110,10 @@ impl Optics {
     ///
     /// # Errors
     /// If a calibration cannot be read, or is of another array.
-    pub fn rays(&self, array: Geometry) -> Result<(Rays, String)> {
+    pub fn rays(&self, array: Array) -> Result<(Rays, String)> {
         Ok(match self {
             Self::Pinhole(view) => {
-                let view = view.unwrap_or_else(|| FieldOfView::of(array));
+                let view = view.unwrap_or_else(|| FieldOfView::of([array.columns(), array.rows()]));
                 (Rays::pinhole(array, view), format!("{view} degrees, "))
             }
             Self::Calibration(path) => (Rays::read(path, array)?, format!("{}, ", path.display())),
@@ -278,7 +277,7 @@ pub fn export(
         Refused::new("echo", "is only for depth events")
     );
     let (header, clock) = (survey.header, survey.clock);
-    let array = header.geometry;
+    let array = header.array;
     let (rays, mut assumed) = options.optics.rays(array)?;
     let projection = Projection {
         rays,
@@ -363,7 +362,7 @@ pub fn points<'a>(
 ) -> Result<Vec<u8>> {
     let (clock, _) = LaserClock::choose(options.clock, header);
     let projection = Projection {
-        rays: options.optics.rays(header.geometry)?.0,
+        rays: options.optics.rays(header.array)?.0,
         scale: RangeScale::new(header.bin_width_ps, header.offset_mm)?,
         clock,
     };

@@ -7,6 +7,7 @@ use std::io::Write;
 use ::foxglove::Schema;
 use ::mcap::records::MessageHeader;
 use anyhow::Result;
+use dtof_core::Array;
 
 use super::clock::Span;
 use super::foxglove::{self, Channel, MOST_POINTS, Tally};
@@ -15,7 +16,6 @@ use super::projection::Projection;
 use super::reorder::{Reorder, WAITING};
 use super::{Finished, Out, Sink, ros2};
 use dtof_events::aer_file::{Event, EventKind};
-use dtof_photons::source::Geometry;
 
 /// When slices are, and how long.
 #[derive(Clone, Copy, Debug)]
@@ -56,7 +56,7 @@ impl Mcap {
     pub fn new(
         out: Out,
         projection: Projection,
-        array: Geometry,
+        array: Array,
         kind: EventKind,
         slices: Slices,
         for_ros2: bool,
@@ -87,7 +87,7 @@ impl Mcap {
             slice: None,
             points: Vec::new(),
             points_ns: 0,
-            tally: Tally::new(array),
+            tally: Tally::new(array.pixels() as usize),
         })
     }
 

@@ -15,7 +15,6 @@ use std::time::Instant;
 use serde::Serialize;
 
 use dtof_core::RangeScale;
-use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_device::{HistogramAnswer, Setup};
 use dtof_engine::look::look;
 use dtof_engine::settings::Settings;
@@ -82,7 +81,8 @@ struct State {
     kind: Kind,
     /// Changes with what [`frame`] tells once: array and settings.
     version: u64,
-    header: Header,
+    /// None before laser cycles begin.
+    header: Option<Header>,
     settings: Option<(SettingsFile, Settings)>,
     /// What was said of settings before any were in force.
     said: SettingsFile,
@@ -119,19 +119,11 @@ impl Hub {
     /// Nothing yet, of a source of this name.
     #[must_use]
     pub fn new(name: String, kind: Kind) -> Self {
-        let header = Header {
-            bins: 0,
-            geometry: dtof_photons::source::Geometry::new(0, 0),
-            bin_width_ps: U16F16::ZERO,
-            offset_mm: I24F8::ZERO,
-            laser_millihertz: 0,
-            start_us: 0,
-        };
         Self(Mutex::new(State {
             name,
             kind,
             version: 1,
-            header,
+            header: None,
             settings: None,
             said: SettingsFile::default(),
             scale: None,
@@ -140,7 +132,7 @@ impl Hub {
                 reason: String::new(),
                 returned: 0,
             },
-            pixels: Pixels::new(header.geometry),
+            pixels: Pixels::default(),
             pages: Pages::default(),
             slice: None,
             events: 0,
@@ -200,13 +192,15 @@ impl Hub {
         let state = &mut *state;
         state.events += events.len() as u64;
         state.masked += masked;
-        let Some(scale) = &state.scale else { return };
+        let (Some(header), Some(scale)) = (&state.header, &state.scale) else {
+            return;
+        };
         for event in events {
             let range_mm: f64 = scale.range(event.position()).to_num();
             #[allow(clippy::cast_possible_truncation, reason = "24 bits for a picture")]
             let range_mm = range_mm as f32;
-            state.pixels.add(event, range_mm);
-            state.pages.add(event, range_mm, state.header.geometry);
+            state.pixels.add(event, range_mm, header.array);
+            state.pages.add(event, range_mm, header.array);
             if let Some(slice) = &mut state.slice {
                 slice.add(event);
             }
@@ -309,12 +303,12 @@ impl State {
     fn begin(&mut self, header: Header) {
         self.version += 1;
         // Of other settings or another device: nothing of before holds.
-        self.pixels = Pixels::new(header.geometry);
+        self.pixels = Pixels::new(header.array);
         self.pages.restart();
         if let Some(slice) = &mut self.slice {
-            slice.restart(header.geometry);
+            slice.restart(self.pixels.len());
         }
-        self.header = header;
+        self.header = Some(header);
         self.scale = RangeScale::new(header.bin_width_ps, header.offset_mm).ok();
         self.losses = Losses::default();
         self.seconds = 0.0;

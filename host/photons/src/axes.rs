@@ -4,8 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use anyhow::{Context, Result, bail, ensure};
+use dtof_core::Array;
 
-use crate::source::Geometry;
 use dtof_options::Refused;
 
 /// What an axis counts.
@@ -74,10 +74,8 @@ pub struct Layout {
     /// The axes of pixels, the one that changes fastest last.
     pixels: Vec<(usize, usize)>,
     bins: (usize, usize),
-    /// The array of all captures, one after the other.
-    pub geometry: Geometry,
-    /// Pixels of a capture.
-    pub capture: usize,
+    /// The array of one capture.
+    pub array: Array,
     /// The names of columns and rows.
     pub sides: [&'static str; 2],
 }
@@ -102,12 +100,10 @@ impl Layout {
                 bail!("the array has no axis");
             };
             let columns = pixels.last().map_or(1, |axis| axis.0);
-            let all = pixels_of(pixels)?;
             return Ok(Self {
                 pixels: pixels.to_vec(),
                 bins,
-                geometry: geometry(columns, all)?,
-                capture: all,
+                array: array(columns, pixels_of(pixels)?)?,
                 sides: ["column", "row"],
             });
         };
@@ -133,8 +129,7 @@ impl Layout {
         let length = |axis: Option<(usize, usize)>| axis.map_or(1, |axis| axis.0);
         let by_capture = captures.is_some() && rows.is_none();
         Ok(Self {
-            geometry: geometry(length(columns), all)?,
-            capture: all / length(captures),
+            array: array(length(columns), all / length(captures))?,
             sides: ["column", if by_capture { "capture" } else { "row" }],
             pixels,
             bins: place(Axis::Bins).context("no axis of bins")?,
@@ -203,11 +198,9 @@ fn pixels_of(axes: &[(usize, usize)]) -> Result<usize> {
     Ok(pixels)
 }
 
-fn geometry(columns: usize, pixels: usize) -> Result<Geometry> {
-    Ok(Geometry::new(
-        u32::try_from(columns)?,
-        u32::try_from(pixels / columns)?,
-    ))
+fn array(columns: usize, pixels: usize) -> Result<Array> {
+    let array = Array::new(u32::try_from(columns)?, u32::try_from(pixels / columns)?);
+    array.context("an array without pixels")
 }
 
 #[cfg(test)]
@@ -256,8 +249,7 @@ mod tests {
                 let layout = Layout::new(&shape, fortran, Some(&axes)).unwrap();
                 let histograms: Vec<_> = layout.histograms(&elements).collect();
                 assert_eq!(histograms, expected, "{names} {fortran}");
-                assert_eq!(layout.geometry, Geometry::new(4, 6));
-                assert_eq!(layout.capture, 12);
+                assert_eq!(layout.array, Array::new(4, 3).unwrap());
             }
         }
     }

@@ -16,9 +16,8 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
-use dtof_core::{BlockLevel, PixelAddress};
+use dtof_core::{Array, BlockLevel, PixelAddress};
 
-use crate::source::Geometry;
 use dtof_options::numbers::real;
 
 /// Degrees across the longer side of an array unless said otherwise.
@@ -55,11 +54,11 @@ impl FieldOfView {
         Ok(Self { half })
     }
 
-    /// The default field of view of an array: 60 degrees across its longer side,
-    /// with square pixels. For 64×32 pixels that is 60×32.2 degrees.
+    /// The default field of view of so many columns and rows: 60 degrees across the longer
+    /// side, with square pixels. For 64×32 pixels that is 60×32.2 degrees.
     #[must_use]
-    pub fn of(array: Geometry) -> Self {
-        let (columns, rows) = (f64::from(array.columns), f64::from(array.rows));
+    pub fn of(size: [u32; 2]) -> Self {
+        let [columns, rows] = size.map(f64::from);
         let longer = columns.max(rows);
         let half = (LONGER_SIDE_DEGREES / 2.0).to_radians().tan();
         Self {
@@ -122,7 +121,7 @@ pub struct Ray {
 /// Where each pixel of an array looks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rays {
-    array: Geometry,
+    array: Array,
     /// Row by row.
     rays: Vec<Ray>,
 }
@@ -130,16 +129,16 @@ pub struct Rays {
 impl Rays {
     /// Those of a pinhole camera, through the middle of each pixel.
     #[must_use]
-    pub fn pinhole(array: Geometry, view: FieldOfView) -> Self {
+    pub fn pinhole(array: Array, view: FieldOfView) -> Self {
         let place = |index: u32, of: u32| (f64::from(index) + 0.5) / f64::from(of);
         let ray = |row: u32, column: u32| Ray {
-            direction: view.ray(place(column, array.columns), place(row, array.rows)),
+            direction: view.ray(place(column, array.columns()), place(row, array.rows())),
             bias_mm: 0.0,
         };
-        let row = |row: u32| (0..array.columns).map(move |column| ray(row, column));
+        let row = |row: u32| (0..array.columns()).map(move |column| ray(row, column));
         Self {
             array,
-            rays: (0..array.rows).flat_map(row).collect(),
+            rays: (0..array.rows()).flat_map(row).collect(),
         }
     }
 
@@ -147,7 +146,7 @@ impl Rays {
     ///
     /// # Errors
     /// One line with the name of the file and the line that is wrong.
-    pub fn read(path: &Path, array: Geometry) -> anyhow::Result<Self> {
+    pub fn read(path: &Path, array: Array) -> anyhow::Result<Self> {
         let rays = calibration::read(path, array)?;
         Ok(Self { array, rays })
     }
@@ -168,7 +167,7 @@ impl Rays {
     /// The mean ray of a block; `None` if there is no such block, or its rays cancel.
     fn mean_ray(&self, pixel: PixelAddress, level: BlockLevel) -> Option<Ray> {
         let (mut direction, mut bias_mm, mut pixels) = ([0.0; 3], 0.0, 0.0);
-        for pixel in self.array.block(pixel, level) {
+        for pixel in self.array.pixels_of(pixel, level) {
             let ray = self.rays.get(usize::from(pixel.0))?;
             for (sum, side) in direction.iter_mut().zip(ray.direction) {
                 *sum += side;

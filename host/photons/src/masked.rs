@@ -2,9 +2,9 @@
 //! ones.
 
 use anyhow::{Result, bail};
-use dtof_core::PixelAddress;
+use dtof_core::{Array, PixelAddress};
 
-use super::source::{Geometry, PhotonSource, Slice};
+use super::source::{PhotonSource, Slice};
 
 use dtof_options::Refused;
 
@@ -38,7 +38,7 @@ impl Masked {
     /// # Errors
     /// If one of `pixels` is not in the array.
     pub fn new(source: Box<dyn PhotonSource>, pixels: &[u16]) -> Result<Self> {
-        check(pixels, source.geometry().addresses())?;
+        check(pixels, source.array().pixels() as usize)?;
         let addresses = source.addresses();
         let place = |&pixel| addresses.binary_search(&PixelAddress(pixel)).ok();
         Ok(Self {
@@ -64,8 +64,8 @@ impl PhotonSource for Masked {
         Some(&*self.source)
     }
 
-    fn geometry(&self) -> Geometry {
-        self.source.geometry()
+    fn array(&self) -> Array {
+        self.source.array()
     }
 
     fn cycles(&self) -> u64 {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
+use dtof_core::Array;
 use dtof_core::fixed::types::{I24F8, U16F16};
 
 use crate::axes::Axes;
@@ -15,7 +16,7 @@ use crate::npy::{archive, histograms};
 use crate::photon_csv::CsvRows;
 use crate::photon_list::{Listed, PhotonList, Rows, Shape};
 use crate::recorded::{Capture, RecordedHistograms, RecordingLength, Whole};
-use crate::source::{Geometry, PhotonSource};
+use crate::source::PhotonSource;
 use crate::{tmf8820, tmf8829, warnings};
 use dtof_options::rows::Row;
 use dtof_options::{Refused, plain};
@@ -82,8 +83,8 @@ pub struct Recording {
 /// All photons of a recording, summed over its laser cycles.
 #[derive(Clone, Debug)]
 pub struct Counts {
-    /// The array.
-    pub geometry: Geometry,
+    /// The array of one capture.
+    pub array: Array,
     /// The names of its columns and rows.
     pub sides: [&'static str; 2],
     /// Histograms that were recorded together, one a pixel. Captures lie one after the other
@@ -108,7 +109,7 @@ impl Counts {
         let length = length.unwrap_or(RecordingLength::PhotonsPerCycle(1.0));
         let (most, seed) = (opening.cycles, opening.seed);
         let whole = match &opening.whole {
-            None => Whole::of(self.geometry, &self.captures)?,
+            None => Whole::of(self.array, &self.captures)?,
             Some(whole) => whole.clone(),
         };
         let whole = whole.with_masked(opening.masked.clone());
@@ -184,7 +185,7 @@ pub fn counts(input: impl Into<Medium>, opening: &Opening) -> Result<Counts> {
         Content::Photons(photons, known) => (photons, known),
     };
     Ok(Counts {
-        geometry: photons.geometry(),
+        array: photons.array(),
         sides: photons.sides(),
         captures: vec![photons.counts()?],
         cycles: Some(photons.cycles()),
@@ -220,7 +221,7 @@ fn read(medium: &Medium, opening: &Opening) -> Result<Content> {
         }
     };
     if let (Content::Histograms(counts), Some(columns)) = (&content, opening.columns) {
-        let has = counts.geometry.columns;
+        let has = counts.array.columns();
         ensure!(
             columns == has,
             Refused::value(
@@ -282,7 +283,7 @@ fn list<R: Rows + 'static>(medium: &Medium, opening: &Opening) -> Result<Content
     let mut known = known(shape.bins.into(), None, opening).with_context(|| medium.to_string())?;
     let photons = PhotonList::<R>::open(medium, shape, opening.cycles)?;
     known.is_list = true;
-    known.has_shape = shape.columns.is_some() || photons.geometry().addresses() == 1;
+    known.has_shape = shape.columns.is_some() || photons.array().pixels() == 1;
     if shape.rebin > 1 {
         let sums = format!("{} sums of {}", shape.bins, shape.rebin);
         known.rows.push(("neighbours added up".to_owned(), sums));
@@ -302,10 +303,10 @@ fn array(medium: &Medium, opening: &Opening, read: Histograms) -> Result<Content
         _ => None,
     };
     let bins = layout.bins();
-    let captures = pixels.chunks(layout.capture).map(<[_]>::to_vec).collect();
-    let counts = fitted(captures, [bins, bins], None, opening);
+    let captures = pixels.chunks(layout.array.pixels() as usize);
+    let captures = captures.map(<[_]>::to_vec).collect();
+    let counts = fitted(layout.array, captures, [bins, bins], None, opening);
     let mut counts = counts.with_context(|| medium.to_string())?;
-    counts.geometry = layout.geometry;
     counts.sides = layout.sides;
     counts.known.warnings.extend(axes);
     Ok(Content::Histograms(counts))
@@ -316,9 +317,9 @@ fn log(path: &Path, opening: &Opening) -> Result<Content> {
     let counts = match capture_log::read(path)? {
         CaptureLog::Tmf8820(log) => {
             let width = Some(tmf8820::BIN_WIDTH_PS);
-            let counts = fitted(log.captures, [tmf8820::BINS; 2], width, opening);
+            let (array, bins) = (tmf8820::ARRAY, [tmf8820::BINS; 2]);
+            let counts = fitted(array, log.captures, bins, width, opening);
             let mut counts = counts.with_context(in_file)?;
-            counts.geometry = log.geometry;
             counts.sides = tmf8820::SIDES;
             counts.truth_mm = log.truth_mm;
             counts.known.offset_mm = Some(tmf8820::OFFSET_MM);
@@ -327,9 +328,8 @@ fn log(path: &Path, opening: &Opening) -> Result<Content> {
         CaptureLog::Tmf8829(log) => {
             let width = Some(log.bin_width_ps);
             let bins = [tmf8829::BINS, log.measured_bins];
-            let counts = fitted(log.captures, bins, width, opening);
+            let counts = fitted(log.array, log.captures, bins, width, opening);
             let mut counts = counts.with_context(in_file)?;
-            counts.geometry = log.geometry;
             counts.known.offset_mm = Some(tmf8829::OFFSET_MM);
             counts.known.rows.splice(0..0, log.rows);
             counts
@@ -341,6 +341,7 @@ fn log(path: &Path, opening: &Opening) -> Result<Content> {
 /// Histograms with the bins of a run. The recording has `recorded` bins, the first `measured`
 /// of them in full.
 fn fitted(
+    array: Array,
     captures: Vec<Capture>,
     [recorded, measured]: [usize; 2],
     width_ps: Option<U16F16>,
@@ -375,7 +376,7 @@ fn fitted(
     known.rows = fit.rows(known.cut_off);
     known.warnings.extend(empty);
     Ok(Counts {
-        geometry: Geometry::new(1, 1),
+        array,
         sides: ["column", "row"],
         captures,
         cycles: None,

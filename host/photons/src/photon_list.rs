@@ -5,10 +5,10 @@
 //! holding more than a slice.
 
 use anyhow::{Context, Result, bail, ensure};
-use dtof_core::PixelAddress;
+use dtof_core::{Array, PixelAddress};
 
 use crate::medium::Medium;
-use crate::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
+use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_options::Refused;
 
 /// A photon as a file has it: the numbers of its pixel, laser cycle and bin.
@@ -142,7 +142,7 @@ pub struct PhotonList<R> {
     addresses: Vec<PixelAddress>,
     /// Of each address up to the last, its place in `addresses`.
     places: Vec<Option<u16>>,
-    geometry: Geometry,
+    array: Array,
     cycles: u64,
     photons_per_cycle: f64,
     not_replayed: u64,
@@ -191,13 +191,14 @@ impl<R: Rows> PhotonList<R> {
         }
         let pixels_in_file = addresses.last().map_or(0, |last| u32::from(last.0) + 1);
         let columns = shape.columns.unwrap_or(pixels_in_file);
+        let array = Array::new(columns, pixels_in_file.div_ceil(columns));
         let rows = Checks::<R>::open(medium, shape)?;
         Ok(Self {
             medium: medium.clone(),
-            geometry: Geometry {
-                columns,
-                rows: pixels_in_file.div_ceil(columns),
-            },
+            array: array.ok_or_else(|| {
+                let reason = "makes more than 65,536 pixels";
+                Refused::value("columns", columns, reason)
+            })?,
             addresses,
             places,
             cycles: cycles.min(recorded),
@@ -213,7 +214,7 @@ impl<R: Rows> PhotonList<R> {
 impl<R: Rows> Listed for PhotonList<R> {
     fn counts(&mut self) -> Result<Vec<Vec<u64>>> {
         let bins = self.rows.shape.bins.into();
-        let mut counts = vec![vec![0; bins]; self.geometry.addresses()];
+        let mut counts = vec![vec![0; bins]; self.array.pixels() as usize];
         while let Some(row) = self.rows.next()? {
             if row.cycle >= self.cycles {
                 break;
@@ -230,8 +231,8 @@ impl<R: Rows> Listed for PhotonList<R> {
 }
 
 impl<R: Rows> PhotonSource for PhotonList<R> {
-    fn geometry(&self) -> Geometry {
-        self.geometry
+    fn array(&self) -> Array {
+        self.array
     }
 
     fn addresses(&self) -> Vec<PixelAddress> {

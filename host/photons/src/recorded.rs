@@ -14,7 +14,7 @@ mod tests;
 mod whole;
 
 use anyhow::{Context, Result, bail, ensure};
-use dtof_core::PixelAddress;
+use dtof_core::{Array, PixelAddress};
 use rand_distr::uniform::{UniformInt, UniformSampler};
 use rand_distr::{Binomial, Distribution};
 use rand_pcg::Pcg64;
@@ -22,7 +22,7 @@ use rayon::prelude::*;
 
 use self::remaining::Remaining;
 pub use self::whole::Whole;
-use crate::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
+use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_options::Refused;
 use dtof_theory::random::pixel_rng;
 
@@ -54,7 +54,7 @@ pub type Capture = Vec<Vec<u64>>;
 /// Captures of one file, one after the other in the address space.
 #[derive(Clone, Debug)]
 pub struct RecordedHistograms {
-    geometry: Geometry,
+    array: Array,
     sides: [&'static str; 2],
     capture_rows: u32,
     cycles: u64,
@@ -70,25 +70,19 @@ pub struct RecordedHistograms {
 }
 
 impl RecordedHistograms {
-    /// Replays `captures` for at most `cycles` laser cycles.
+    /// Replays `captures`, each of `array`, for at most `cycles` laser cycles.
     ///
     /// # Errors
     /// If there are more pixels than addresses, or more photons than can be
     /// counted.
     pub fn new(
-        geometry: Geometry,
+        array: Array,
         captures: &[Capture],
         length: RecordingLength,
         cycles: u64,
         seed: u64,
     ) -> Result<Self> {
-        Self::placed(
-            &Whole::of(geometry, captures)?,
-            captures,
-            length,
-            cycles,
-            seed,
-        )
+        Self::placed(&Whole::of(array, captures)?, captures, length, cycles, seed)
     }
 
     /// Replays `captures`, which are a part of `whole`, as they are replayed there.
@@ -153,7 +147,7 @@ impl RecordedHistograms {
             "{photons_per_cycle:.0} photons a laser cycle are more than {MOST_A_CYCLE:.0}"
         );
         Ok(Self {
-            geometry: whole.geometry,
+            array: whole.array,
             sides: ["column", "row"],
             capture_rows: whole.capture_rows()?,
             photons_per_cycle,
@@ -227,8 +221,8 @@ fn recorded_cycles(length: RecordingLength, brightest: u64, wanted: u64) -> Resu
 }
 
 impl PhotonSource for RecordedHistograms {
-    fn geometry(&self) -> Geometry {
-        self.geometry
+    fn array(&self) -> Array {
+        self.array
     }
 
     fn sides(&self) -> [&'static str; 2] {

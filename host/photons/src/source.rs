@@ -3,42 +3,6 @@
 use anyhow::Result;
 use dtof_core::{Array, BlockLevel, PixelAddress};
 
-/// How pixel addresses lie in the array: `address = row * columns + column`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Geometry {
-    /// Pixels in a row.
-    pub columns: u32,
-    /// Rows.
-    pub rows: u32,
-}
-
-impl Geometry {
-    /// An array of so many columns and rows.
-    #[must_use]
-    pub const fn new(columns: u32, rows: u32) -> Self {
-        Self { columns, rows }
-    }
-
-    /// The pixels of the block of `level` whose first is `first`, `first` itself at level 0.
-    /// None if no such block begins there.
-    pub fn block(
-        &self,
-        first: PixelAddress,
-        level: BlockLevel,
-    ) -> impl Iterator<Item = PixelAddress> + use<> {
-        let array = Array::new(self.columns, self.rows);
-        array
-            .into_iter()
-            .flat_map(move |array| array.pixels_of(first, level))
-    }
-
-    /// How many addresses the array has.
-    #[must_use]
-    pub fn addresses(&self) -> usize {
-        self.columns as usize * self.rows as usize
-    }
-}
-
 /// One photon of one pixel in one slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Photon {
@@ -79,7 +43,7 @@ pub trait PhotonSource {
     }
 
     /// The array.
-    fn geometry(&self) -> Geometry;
+    fn array(&self) -> Array;
 
     /// The names of its columns and rows.
     fn sides(&self) -> [&'static str; 2] {
@@ -91,7 +55,7 @@ pub trait PhotonSource {
     fn capture_rows(&self) -> u32 {
         match self.inner() {
             Some(inner) => inner.capture_rows(),
-            None => self.geometry().rows,
+            None => self.array().rows(),
         }
     }
 
@@ -101,7 +65,7 @@ pub trait PhotonSource {
         if let Some(inner) = self.inner() {
             return inner.addresses();
         }
-        let all = (0..=u16::MAX).take(self.geometry().addresses());
+        let all = (0..=u16::MAX).take(self.array().pixels() as usize);
         all.map(PixelAddress).collect()
     }
 
@@ -151,5 +115,5 @@ pub trait PhotonSource {
 #[must_use]
 pub fn has_only_neighbours(source: &dyn PhotonSource, level: BlockLevel) -> bool {
     let (rows, side) = (source.capture_rows(), 1 << level.raw());
-    source.sides()[0] == "column" && (rows == source.geometry().rows || rows.is_multiple_of(side))
+    source.sides()[0] == "column" && (rows == source.array().rows() || rows.is_multiple_of(side))
 }

@@ -5,14 +5,16 @@
 use std::io::Read;
 
 use anyhow::{Result, anyhow, ensure};
+use dtof_core::Array;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use serde::Deserialize;
 
 use crate::recorded::Capture;
-use crate::source::Geometry;
 
 /// Zones of the sensor.
 pub const ZONES: u32 = 9;
+/// The array of a capture.
+pub const ARRAY: Array = Array::new(ZONES, 1).unwrap();
 /// The one that looks straight ahead.
 pub const CENTRE: u32 = 4;
 /// The names of the columns and rows of a log.
@@ -25,11 +27,9 @@ pub const BIN_WIDTH_PS: U16F16 = U16F16::lit("92.1");
 /// Brings the centre zone of the public log to its ground truth from 30 to 400 mm.
 pub const OFFSET_MM: I24F8 = I24F8::lit("-179.5");
 
-/// The log: rows are captures, columns zones.
+/// The captures of a log.
 #[derive(Clone, Debug)]
 pub struct Tmf8820Log {
-    /// Nine columns.
-    pub geometry: Geometry,
     /// Nine histograms each.
     pub captures: Vec<Capture>,
     /// The true distance in millimetres of each zone that has one, if the log has it: of the
@@ -70,14 +70,12 @@ pub fn read(name: &str, text: impl Read) -> Result<Tmf8820Log> {
             );
         }
     }
-    let rows = u32::try_from(entries.len())?;
     let truth = entries
         .iter()
         .flat_map(|entry| (0..ZONES).map(|zone| entry.dist_to_plane.filter(|_| zone == CENTRE)));
     let truth: Vec<Option<f64>> = truth.map(|metres| Some(metres? * 1000.0)).collect();
     let truth_mm = truth.iter().any(Option::is_some).then_some(truth);
     Ok(Tmf8820Log {
-        geometry: Geometry::new(ZONES, rows),
         captures: entries.into_iter().map(|entry| entry.hists).collect(),
         truth_mm,
     })

@@ -7,11 +7,11 @@
 use std::io::Read;
 
 use anyhow::{Context, Result, anyhow, ensure};
+use dtof_core::Array;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use serde::Deserialize;
 
 use crate::recorded::Capture;
-use crate::source::Geometry;
 use dtof_options::rows::Row;
 
 /// Bins of its histograms.
@@ -24,11 +24,11 @@ pub const OFFSET_MM: I24F8 = I24F8::lit("-441.1");
 /// What a sensor does unless the log says otherwise: four of its bins make one.
 const BIN_SHIFT: u32 = 2;
 
-/// The log: the rows of each frame below those of the one before.
+/// The frames of a log.
 #[derive(Clone, Debug)]
 pub struct Tmf8829Log {
-    /// Of all frames.
-    pub geometry: Geometry,
+    /// Of one frame.
+    pub array: Array,
     /// The frames.
     pub captures: Vec<Capture>,
     /// Picoseconds a bin.
@@ -129,8 +129,9 @@ fn of_log(log: Log) -> Result<Tmf8829Log> {
         "{} of {columns}, each the same as the first",
         columns - kept
     );
+    let array = Array::new(u32::try_from(kept)?, u32::try_from(rows)?);
     Ok(Tmf8829Log {
-        geometry: Geometry::new(u32::try_from(kept)?, u32::try_from(rows * captures.len())?),
+        array: array.context("more than 65,536 pixels")?,
         captures,
         bin_width_ps: width.with_context(|| format!("bin_shift {shift}: bins are too wide"))?,
         measured_bins: measured.unwrap_or(BINS),

@@ -7,12 +7,11 @@ use serde_json::{Value, json};
 
 use super::histograms::Decisions;
 use super::{FEW, events, shared};
-use dtof_core::PixelAddress;
+use dtof_core::{Array, PixelAddress};
 use dtof_draw::{palette, picture};
 use dtof_events::sample::Sample;
 use dtof_export::LaserClock;
 use dtof_options::rows::grouped;
-use dtof_photons::source::Geometry;
 
 /// There are events even where figures leave no room for any.
 const LEAST_EVENTS: usize = 4096;
@@ -21,7 +20,7 @@ const LEAST_EVENTS: usize = 4096;
 #[derive(Debug)]
 pub struct Cloud<'a> {
     /// The array.
-    pub geometry: Geometry,
+    pub array: Array,
     /// The names of its columns and rows.
     pub sides: [&'a str; 2],
     /// Laser cycles of the run.
@@ -96,7 +95,7 @@ impl Cloud<'_> {
 
     /// Whether plots show more than a map.
     fn is_few(&self) -> bool {
-        self.geometry.addresses() <= FEW
+        self.array.pixels() as usize <= FEW
     }
 
     /// Where times come from.
@@ -141,8 +140,8 @@ impl Cloud<'_> {
         let (low, high) = picture::span(&ranges).unwrap_or_default();
         let spikes: Vec<u16> = self.pixels.iter().map(|pixel| pixel.0).collect();
         json!({
-            "columns": self.geometry.columns,
-            "rows": self.geometry.rows,
+            "columns": self.array.columns(),
+            "rows": self.array.rows(),
             "sides": self.sides,
             "cycles": self.cycles,
             "laserHz": self.laser_hz.unwrap_or(LaserClock::PAPER_HZ),

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use dtof_core::Array;
 use serde_json::json;
 
 use super::packed::Packed;
@@ -9,7 +10,6 @@ use dtof_engine::decisions::{Decision, Kept};
 use dtof_engine::look::{Look, look_back};
 use dtof_engine::settings::Settings;
 use dtof_events::events_csv::range_mm;
-use dtof_photons::source::Geometry;
 
 /// The last decisions of a run.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +21,7 @@ pub struct Decisions<'a> {
     /// In order of level and pixel.
     pub all: &'a [Decision],
     /// The array.
-    pub array: Geometry,
+    pub array: Array,
 }
 
 impl Decisions<'_> {
@@ -64,9 +64,12 @@ impl Decisions<'_> {
     /// Those that are the last of some pixel: of the decisions of a pixel and of its blocks the
     /// latest, of several the smallest block's.
     fn last(&self) -> Vec<Decision> {
-        let mut last: Vec<Option<usize>> = vec![None; self.array.addresses()];
+        let mut last: Vec<Option<usize>> = vec![None; self.array.pixels() as usize];
         for (number, decision) in self.all.iter().enumerate() {
-            for pixel in self.array.block(decision.event.pixel, decision.event.level) {
+            for pixel in self
+                .array
+                .pixels_of(decision.event.pixel, decision.event.level)
+            {
                 if let Some(last) = last.get_mut(usize::from(pixel.0)) {
                     let before = last.map(|before| self.all[before].event.cycle);
                     if before.is_none_or(|before| before < decision.event.cycle) {

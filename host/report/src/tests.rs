@@ -2,13 +2,12 @@ mod histograms;
 
 use super::*;
 use base64::Engine as _;
-use dtof_core::{BlockLevel, DepthEvent, EchoNumber, Flags, PixelAddress};
+use dtof_core::{Array, BlockLevel, DepthEvent, EchoNumber, Flags, PixelAddress};
 
 use super::packed::tests::Reader;
 use dtof_events::events_csv::range_mm;
 use dtof_events::fixtures::{event, scale};
 use dtof_events::sample::Sample;
-use dtof_photons::source::Geometry;
 
 /// `count` events, one a laser cycle, of four pixels in turn.
 fn sample(limit: usize, count: u32) -> Sample {
@@ -25,7 +24,7 @@ fn sample(limit: usize, count: u32) -> Sample {
 fn cloud<'a>(sample: &'a mut Sample, cycles: u64, called: [&'static str; 2]) -> Cloud<'a> {
     Cloud {
         sides: ["zone", "capture"],
-        geometry: Geometry::new(2, 2),
+        array: Array::new(2, 2).unwrap(),
         cycles,
         laser_hz: Some(20_000),
         sample,

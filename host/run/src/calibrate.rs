@@ -11,7 +11,6 @@ use dtof_options::numbers::{MOST_WHOLE, whole, within};
 use dtof_photons::medium::Medium;
 use dtof_photons::open::{Counts, counts};
 use dtof_photons::recorded::RecordingLength;
-use dtof_photons::source::Geometry;
 
 /// The options that are not of settings files, whose keys of these names are others.
 const OWN: &[&str] = &["target_mm", "glass", "false_alarm", "seed"];
@@ -118,7 +117,7 @@ impl Options {
         let found = found.with_context(|| input.to_string())?;
         let of_width = warning_of_width(&counts.known, &said);
         let warnings = warnings(&counts.known).chain(of_width).collect();
-        let before = said.or(of_file(&counts.known, counts.geometry));
+        let before = said.or(of_file(&counts.known, counts.array));
         Ok(Calibrated {
             settings: found.settings(before)?,
             found,
@@ -132,17 +131,13 @@ impl Options {
 /// # Errors
 /// If it holds nothing to calibrate by.
 pub(super) fn look(said: &SettingsFile, counts: &Counts, asked: &Asked) -> Result<Calibration> {
-    let captures = u32::try_from(counts.captures.len())?;
-    let whole = counts.geometry;
-    // Captures lie one after the other.
-    let geometry = Geometry::new(whole.columns, (whole.rows / captures.max(1)).max(1));
     let length = match (counts.cycles, opening(said).length) {
         (Some(cycles), _) | (None, Some(RecordingLength::Cycles(cycles))) => Length::Cycles(cycles),
         (None, Some(RecordingLength::PhotonsPerCycle(rate))) => Length::PhotonsPerCycle(rate),
         (None, None) => Length::Unknown,
     };
     let observed = Observed {
-        geometry,
+        array: counts.array,
         captures: &counts.captures,
         length,
         cycles: None,

@@ -232,13 +232,13 @@ impl Options {
         warnings(&counts.known)
             .chain(of_width)
             .for_each(told.warning);
-        let geometry = counts.geometry;
+        let pixels = counts.array.pixels() as usize * counts.captures.len();
         let truth = match (truth, &counts.truth_mm) {
-            (Some(truth), _) => Some(Truth::read(truth, geometry)?),
+            (Some(truth), _) => Some(Truth::read(truth, pixels)?),
             (None, ranges) => ranges.clone().map(Truth::Ranges),
         };
         let said = if said.sensor.sigma_bins.is_some() {
-            said.or(of_file(&counts.known, geometry))
+            said.or(of_file(&counts.known, counts.array))
         } else {
             let asked = Asked {
                 false_alarm: self.share(&said),
@@ -247,7 +247,7 @@ impl Options {
             let found = look(&said, &counts, &asked);
             let found = found.with_context(|| medium.to_string())?;
             said.clone()
-                .or(found.settings(said.or(of_file(&counts.known, geometry)))?)
+                .or(found.settings(said.or(of_file(&counts.known, counts.array)))?)
         };
         Ok(Subject {
             said: with_short_exposures(said),

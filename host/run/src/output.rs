@@ -94,7 +94,7 @@ impl Output {
         let inputs: Vec<PathBuf> = input.into_iter().map(Path::to_owned).collect();
         may_hold_results(folder, &inputs)?;
         remove_leftovers(folder, &inputs);
-        let geometry = source.geometry();
+        let array = source.array();
         let name = || folder.display().to_string();
         let mut csv = BufWriter::new(aside(folder, OF_A_RUN)?);
         writeln!(csv, "{}", events_csv::HEADER).with_context(name)?;
@@ -109,7 +109,7 @@ impl Output {
             csv: Some(csv),
             aer,
             scale,
-            maps: Maps::new(geometry),
+            maps: Maps::new(array),
             sides: source.sides(),
             sample: Sample::new(Sample::LIMIT),
             decisions: None,
@@ -207,7 +207,7 @@ impl Output {
         });
         let of_changes = changes.iter().map(|(svg, caption)| (svg, caption));
         // Few pixels are no picture: a table says the same.
-        let few = self.maps.geometry.addresses() <= dtof_report::FEW;
+        let few = self.maps.array.pixels() as usize <= dtof_report::FEW;
         let figures = of_maps.filter(|_| !few).chain(of_changes);
         let figures: Vec<Figure> = figures
             .map(|(svg, caption)| Figure { svg, caption })
@@ -226,7 +226,7 @@ impl Output {
         let decisions = self.decisions.as_ref();
         let decisions = decisions.filter(|(_, all)| !all.is_empty());
         let cloud = Cloud {
-            geometry: self.maps.geometry,
+            array: self.maps.array,
             sides: self.sides,
             cycles: summary.cycles,
             laser_hz: summary.laser_hz,
@@ -238,7 +238,7 @@ impl Output {
                 settings: &summary.settings,
                 kept: *kept,
                 all,
-                array: self.maps.geometry,
+                array: self.maps.array,
             }),
         };
         let report = dtof_report::html(title, lead, &all, &figures, cloud);
@@ -291,7 +291,7 @@ impl Output {
 impl Sink for Output {
     /// The report shows what the last events of pixels were decided from.
     fn begin(&mut self, source: &dyn PhotonSource, engine: &mut dyn Engine) {
-        let kept = Kept::of(source.geometry(), self.bins);
+        let kept = Kept::of(source.array(), self.bins);
         engine.keep_decisions(&|pixel| kept.holds(pixel));
         self.decisions = Some((kept, Vec::new()));
     }
@@ -337,7 +337,7 @@ impl Sink for Output {
 pub fn header(settings: &Settings, source: &dyn PhotonSource) -> Result<aer_file::Header> {
     Ok(aer_file::Header {
         bins: u32::try_from(settings.bins)?,
-        geometry: source.geometry(),
+        array: source.array(),
         bin_width_ps: settings.bin_width_ps,
         offset_mm: settings.offset_mm,
         laser_millihertz: source.laser_hz().map_or(0, |hz| hz.saturating_mul(1000)),

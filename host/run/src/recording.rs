@@ -1,6 +1,7 @@
 //! The options that say what a recording is, the same for every job.
 
 use anyhow::{Result, ensure};
+use dtof_core::Array;
 use dtof_core::fixed::types::U16F16;
 
 use super::given::Given;
@@ -10,7 +11,6 @@ use dtof_options::{Refused, plain};
 use dtof_photons::medium::Medium;
 use dtof_photons::open::{BIN_WIDTH_PS, Known, Opening};
 use dtof_photons::recorded::RecordingLength;
-use dtof_photons::source::Geometry;
 
 /// What a recording is.
 pub const RECORDING: &[&str] = &[
@@ -144,10 +144,10 @@ pub fn opening(said: &SettingsFile) -> Opening {
 
 /// What the file says.
 #[must_use]
-pub fn of_file(known: &Known, geometry: Geometry) -> SettingsFile {
+pub fn of_file(known: &Known, array: Array) -> SettingsFile {
     SettingsFile {
         sensor: Sensor {
-            columns: Some(geometry.columns),
+            columns: Some(array.columns()),
             bins: u16::try_from(known.bins).ok(),
             bin_width_ps: Some(known.bin_width_ps),
             offset_mm: known.offset_mm,

@@ -122,7 +122,7 @@ impl Options {
             opening.whole.is_none() || !known.is_list,
             "{input} holds photons: only histograms are replayed in parts"
         );
-        let said = said.clone().or(of_file(&known, photons.geometry()));
+        let said = said.clone().or(of_file(&known, photons.array()));
         let settings = said.settings(known.bins)?;
         let refused = |refused: Refused| anyhow::Error::from(refused).context(input.to_string());
         ensure!(
@@ -153,7 +153,7 @@ impl Options {
         }
         let photons = Masked::new(photons, &settings.masked)?;
         let photons = photons.with_laser_hz(said.sensor.laser_hz);
-        let engine = host_engine(&settings, photons.geometry(), &photons.addresses())?;
+        let engine = host_engine(&settings, photons.array(), &photons.addresses())?;
         Ok(Replay {
             photons,
             engine,

@@ -46,8 +46,8 @@ pub fn run(
     sinks: &mut [&mut dyn Sink],
     progress: &mut dyn Progress,
 ) -> Result<Ran> {
-    let geometry = source.geometry();
-    let mut has_reported = vec![false; geometry.addresses()];
+    let array = source.array();
+    let mut has_reported = vec![false; array.pixels() as usize];
     let has_glass = said.sensor.glass_bins.is_some();
     let mut bins = has_glass.then(|| vec![0; settings.bins]);
     for sink in &mut *sinks {
@@ -60,7 +60,7 @@ pub fn run(
         |slice| engine.run(slice),
         |slice, events, done| {
             for event in &events {
-                for pixel in geometry.block(event.pixel, event.level) {
+                for pixel in array.pixels_of(event.pixel, event.level) {
                     has_reported[usize::from(pixel.0)] = true;
                 }
             }

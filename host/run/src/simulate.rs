@@ -15,14 +15,14 @@ use dtof_options::Refused;
 use dtof_options::numbers::{truth, whole};
 use dtof_options::progress::Progress;
 use dtof_photons::masked::Masked;
-use dtof_photons::source::{Geometry, PhotonSource, Slice};
+use dtof_photons::source::{PhotonSource, Slice};
 use dtof_simulate::scene::Scene;
 
 /// What is simulated beside the scene, and how.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The array that looks at the scene.
-    pub array: Option<Geometry>,
+    /// Columns and rows of the array that looks at the scene.
+    pub array: Option<[u32; 2]>,
     /// Without signal: the picture of photon counts is then a passive image.
     pub laser_off: bool,
     /// The settings.
@@ -70,7 +70,7 @@ impl Options {
     /// # Errors
     /// If what is said is for other histograms, or there are more pixels than addresses.
     pub fn open(&self, mut scene: Scene, name: &str, said: SettingsFile) -> Result<Simulation> {
-        scene.geometry = self.array.unwrap_or(scene.geometry);
+        scene.size = self.array.unwrap_or(scene.size);
         if self.laser_off {
             scene = scene.with_laser_off();
         }
@@ -175,7 +175,7 @@ pub fn of_scene(said: SettingsFile, scene: &Scene) -> Result<SettingsFile> {
     Ok(SettingsFile {
         sensor: Sensor {
             laser_hz: Some(scene.laser_hz()),
-            columns: Some(scene.geometry.columns),
+            columns: Some(scene.size[0]),
             bins: Some(bins),
             bin_width_ps: Some(width),
             // Simulated photons come at their distance.
@@ -205,11 +205,11 @@ pub fn of_scene(said: SettingsFile, scene: &Scene) -> Result<SettingsFile> {
 ///
 /// # Errors
 /// If it is no array.
-pub fn array(text: &str) -> Result<Geometry, String> {
+pub fn array(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').and_then(|(columns, rows)| {
         let side = whole(1..=u16::MAX);
-        Some((side(columns).ok()?, side(rows).ok()?))
+        Some([side(columns).ok()?, side(rows).ok()?])
     });
-    let (columns, rows) = sides.ok_or("must be COLUMNSxROWS, as 64x32")?;
-    Ok(Geometry::new(columns.into(), rows.into()))
+    let sides = sides.ok_or("must be COLUMNSxROWS, as 64x32")?;
+    Ok(sides.map(u32::from))
 }

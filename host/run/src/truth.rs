@@ -4,7 +4,7 @@
 use std::ops::AddAssign;
 
 use anyhow::Result;
-use dtof_core::{DepthEvent, EchoNumber, RangeScale};
+use dtof_core::{Array, DepthEvent, EchoNumber, RangeScale};
 use serde::Serialize;
 
 use dtof_engine::settings::Settings;
@@ -188,6 +188,7 @@ fn percent(share: f64) -> String {
 /// Counts and sums over the events so far.
 pub struct Comparison<'a> {
     scene: &'a Scene,
+    array: Array,
     scale: RangeScale,
     /// Laser cycles of the run.
     cycles: u64,
@@ -220,19 +221,20 @@ impl<'a> Comparison<'a> {
     /// Begins to compare the events of `cycles` laser cycles with `scene`.
     ///
     /// # Errors
-    /// If the settings give no range.
+    /// If the settings give no range, or the scene has more pixels than addresses.
     pub fn new(scene: &'a Scene, settings: &Settings, cycles: u64) -> Result<Self> {
-        let bins = usize::from(scene.bins);
+        let (array, bins) = (scene.array()?, usize::from(scene.bins));
         let second_echo = scene.effects.second_echo.as_ref();
         let behind_mm = second_echo.map(|echo| echo.behind_mm);
         Ok(Self {
             scene,
+            array,
             scale: settings.range_scale()?,
             cycles,
             behind_mm: behind_mm.filter(|_| settings.echoes > EchoNumber::FIRST),
             first_bin: settings.gate.map_or(0, |(first, _)| first.into()),
             last_bin: settings.gate.map_or(bins - 1, |(_, last)| last.into()),
-            tallies: vec![Tally::new(scene.geometry.addresses()); scene.surfaces.len() + 1],
+            tallies: vec![Tally::new(array.pixels() as usize); scene.surfaces.len() + 1],
             false_peaks: vec![0; bins],
         })
     }
@@ -263,7 +265,7 @@ impl<'a> Comparison<'a> {
     fn found(&mut self, event: &DepthEvent, limit_mm: f64) -> Option<(usize, f64)> {
         let range_mm = range_mm(event, &self.scale);
         let (mut surface, mut sum, mut pixels) = (None, 0.0, 0.0);
-        for pixel in self.scene.geometry.block(event.pixel, event.level) {
+        for pixel in self.array.pixels_of(event.pixel, event.level) {
             let [nearest, behind] = self.scene.views(pixel, event.cycle.0);
             let echo = nearest.zip(self.behind_mm).map(|(view, behind_mm)| View {
                 range_mm: view.range_mm + behind_mm,
@@ -304,7 +306,7 @@ impl<'a> Comparison<'a> {
             }
         }
         AgainstTruth {
-            pixels: self.scene.geometry.addresses(),
+            pixels: self.array.pixels() as usize,
             histogram_ends_mm: self.scene.end_mm(),
             false_beyond_bins: FALSE_BEYOND_BINS,
             all: all.errors(step_mm),

@@ -1,12 +1,12 @@
 //! An array of simulated pixels.
 
 use anyhow::{Context, Result};
-use dtof_core::PixelAddress;
+use dtof_core::{Array, PixelAddress};
 use dtof_theory::rates::Rates;
 use rayon::prelude::*;
 
 use super::pixel::SimulatedPixel;
-use dtof_photons::source::{Geometry, Photon, PhotonSource, PixelPhotons, Slice};
+use dtof_photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
 
 /// The rates of a pixel in a laser cycle, for scenes that change: those of what it sees, and of
 /// what is behind.
@@ -14,7 +14,7 @@ pub type RatesAt = Box<dyn Fn(PixelAddress, u64) -> [Rates; 2] + Send + Sync>;
 
 /// An array of simulated pixels.
 pub struct SimulatedArray {
-    geometry: Geometry,
+    array: Array,
     cycles: u64,
     next_cycle: u64,
     pixels: Vec<SimulatedPixel>,
@@ -29,20 +29,24 @@ impl SimulatedArray {
     /// at those of `rates_at`.
     #[must_use]
     pub fn new(
-        geometry: Geometry,
+        array: Array,
         pixels: Vec<SimulatedPixel>,
         cycles: u64,
         rates_at: Option<RatesAt>,
     ) -> Self {
-        assert_eq!(pixels.len(), geometry.addresses(), "one for each address");
+        assert_eq!(
+            pixels.len(),
+            array.pixels() as usize,
+            "one for each address"
+        );
         Self {
-            geometry,
+            array,
             cycles,
             next_cycle: 0,
             pixels,
             rates_at,
             laser_hz: None,
-            spared: vec![false; geometry.addresses()],
+            spared: vec![false; array.pixels() as usize],
         }
     }
 
@@ -57,8 +61,8 @@ impl SimulatedArray {
 }
 
 impl PhotonSource for SimulatedArray {
-    fn geometry(&self) -> Geometry {
-        self.geometry
+    fn array(&self) -> Array {
+        self.array
     }
 
     fn cycles(&self) -> u64 {

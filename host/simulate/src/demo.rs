@@ -2,13 +2,12 @@
 
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{BlockLevel, Count, EchoNumber, RangeGate, WindowRule, z_for_levels};
+use dtof_core::{Array, BlockLevel, Count, EchoNumber, RangeGate, WindowRule, z_for_levels};
 use dtof_link::AdaptiveBinning;
 
 use super::SimulatedArray;
 use super::scene::{self, Scene};
 use dtof_engine::settings::Settings;
-use dtof_photons::source::Geometry;
 
 /// `demo.toml` beside this file.
 ///
@@ -48,10 +47,10 @@ pub fn settings(seed: u64) -> Result<Settings> {
 /// Its photons on an array, `cycles` laser cycles of them.
 ///
 /// # Errors
-/// If there are more pixels than addresses.
-pub fn photons(geometry: Geometry, seed: u64, cycles: u64) -> Result<SimulatedArray> {
+/// Never: it is a part of the program.
+pub fn photons(array: Array, seed: u64, cycles: u64) -> Result<SimulatedArray> {
     let scene = Scene {
-        geometry,
+        size: [array.columns(), array.rows()],
         ..scene()?
     };
     scene.photons(seed, cycles)

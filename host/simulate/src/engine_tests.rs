@@ -2,18 +2,18 @@
 
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    AnyRule, AverageRule, BlockLevel, Count, DepthEvent, EchoNumber, PaperRule, WindowRule,
+    AnyRule, Array, AverageRule, BlockLevel, Count, DepthEvent, EchoNumber, PaperRule, WindowRule,
 };
 use dtof_engine::decisions::Decision;
 use dtof_engine::host::host_engine;
 use dtof_engine::look::look_back;
 use dtof_engine::settings::Settings;
 use dtof_photons::masked::Masked;
-use dtof_photons::source::{Geometry, PhotonSource, Slice};
+use dtof_photons::source::{PhotonSource, Slice};
 
 use crate::{demo, scene};
 
-const ARRAY: Geometry = Geometry::new(8, 4);
+const ARRAY: Array = Array::new(8, 4).unwrap();
 
 /// Events and decisions of the demo in slices of so many laser cycles, and its photons.
 fn run(settings: &Settings, length: u16) -> (Vec<DepthEvent>, Vec<Decision>, Vec<Slice>) {
@@ -197,7 +197,7 @@ fn no_room_is_taken_unless_asked_for() {
 
 #[test]
 fn only_masked_pixels_lose_their_photons_and_they_are_counted() {
-    let array = Geometry::new(4, 2);
+    let array = Array::new(4, 2).unwrap();
     let photons = || Box::new(demo::photons(array, 1, 100).unwrap());
     let whole = photons().next_slice(100).unwrap();
     let mut masked = Masked::new(photons(), &[1, 6, 6]).unwrap();

@@ -11,15 +11,15 @@ mod of_depth_map;
 mod sight;
 mod surface;
 
-use anyhow::{Result, ensure};
-use dtof_core::PixelAddress;
+use anyhow::{Context, Result, ensure};
+use dtof_core::{Array, PixelAddress};
 
 use crate::effects::Effects;
 use crate::effects::limits::Timing;
 use crate::{MM_PER_PS, RatesAt, SimulatedArray, SimulatedPixel};
 use dtof_engine::settings::Settings;
 use dtof_photons::geometry::FieldOfView;
-use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_photons::source::PhotonSource;
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 
@@ -39,11 +39,11 @@ const NEAREST_MM: f64 = 1.0;
 /// A scene on an array.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// The array that looks at it, that of the file unless changed. A pixel's
-    /// place in the scene is its upper left corner.
-    pub geometry: Geometry,
-    /// The array that the places in `surfaces` are given in.
-    pub layout: Geometry,
+    /// Columns and rows of the array that looks at it, those of the file unless changed. A
+    /// pixel's place in the scene is its upper left corner.
+    pub size: [u32; 2],
+    /// Columns and rows that the places in `surfaces` are given in.
+    pub layout: [u32; 2],
     /// The field of view; [`FieldOfView::of`] the layout unless given. Planes need it.
     pub field_of_view: Option<FieldOfView>,
     /// Laser cycles.
@@ -153,14 +153,15 @@ impl Scene {
     /// or pixels.
     pub fn photons(&self, seed: u64, cycles: u64) -> Result<SimulatedArray> {
         self.check_motion(cycles)?;
-        self.check_hot_pixels()?;
+        let array = self.array()?;
+        self.check_hot_pixels(array.pixels())?;
         let timing = self.timing();
         let has_behind = self
             .surfaces
             .iter()
             .any(|surface| surface.transmittance > 0.0);
-        let sights: Vec<Sight> = self.addresses()?.map(|pixel| self.sight(pixel)).collect();
-        let pixels = self.addresses()?.zip(&sights).map(|(address, sight)| {
+        let sights: Vec<Sight> = self.addresses().map(|pixel| self.sight(pixel)).collect();
+        let pixels = self.addresses().zip(&sights).map(|(address, sight)| {
             let [rates, behind] = self.views_along(sight, 0).map(|view| self.rates_of(view));
             let pixel = SimulatedPixel::new(&rates, self.bins, pixel_rng(seed, address))?;
             let pixel = match has_behind {
@@ -177,8 +178,8 @@ impl Scene {
                 [scene.rates_of(seen), scene.rates_of(behind)]
             }) as RatesAt
         });
-        let photons = SimulatedArray::new(self.geometry, pixels, cycles, rates_at)
-            .with_laser_hz(self.laser_hz());
+        let photons =
+            SimulatedArray::new(array, pixels, cycles, rates_at).with_laser_hz(self.laser_hz());
         let each_cycle = photons.photons_per_cycle();
         ensure!(
             each_cycle <= MOST_PHOTONS,
@@ -208,9 +209,7 @@ impl Scene {
             let mut of_surface = views.filter(|view| view.surface == surface);
             of_surface.any(|view| view.range_mm >= self.end_mm())
         };
-        let pixels = (0..=u16::MAX).map(PixelAddress);
-        pixels
-            .take(self.geometry.addresses())
+        self.addresses()
             .filter(|&address| is_beyond(address, 0) || is_beyond(address, cycles))
             .count()
     }
@@ -235,11 +234,22 @@ impl Scene {
         }
     }
 
+    /// The array that looks at it.
+    ///
+    /// # Errors
+    /// If it has more pixels than addresses, or none.
+    pub fn array(&self) -> Result<Array> {
+        let [columns, rows] = self.size;
+        let pixels = u64::from(columns) * u64::from(rows);
+        let array = Array::new(columns, rows);
+        array.with_context(|| format!("{pixels} pixels: more than 65,536"))
+    }
+
     /// Every pixel of the array.
-    fn addresses(&self) -> Result<impl Iterator<Item = PixelAddress>> {
-        let pixels = self.geometry.addresses();
-        ensure!(pixels <= 65_536, "{pixels} pixels: more than 65,536");
-        Ok((0..=u16::MAX).take(pixels).map(PixelAddress))
+    fn addresses(&self) -> impl Iterator<Item = PixelAddress> + use<> {
+        let [columns, rows] = self.size.map(|side| side as usize);
+        let pixels = (0..=u16::MAX).map(PixelAddress);
+        pixels.take(columns.saturating_mul(rows))
     }
 
     /// The field of view: the one given, or the default.
@@ -251,18 +261,17 @@ impl Scene {
 
     /// Where a pixel looks, along the ray that `dtof export` has.
     fn sight(&self, pixel: PixelAddress) -> Sight {
-        let array = self.geometry;
         let pixel = u32::from(pixel.0);
-        let pixel = [pixel % array.columns, pixel / array.columns];
+        let pixel = [pixel % self.size[0], pixel / self.size[0]];
         let [column, row] = pixel.map(f64::from);
-        let (columns, rows) = (f64::from(array.columns), f64::from(array.rows));
+        let [columns, rows] = self.size.map(f64::from);
         let view = self.view();
         Sight {
             pixel,
-            array,
+            size: self.size,
             place: [
-                column * (f64::from(self.layout.columns) / columns),
-                row * (f64::from(self.layout.rows) / rows),
+                column * (f64::from(self.layout[0]) / columns),
+                row * (f64::from(self.layout[1]) / rows),
             ],
             ray: view.ray((column + 0.5) / columns, (row + 0.5) / rows),
         }
@@ -283,13 +292,12 @@ impl Scene {
     }
 
     /// Are the listed hot pixels there?
-    fn check_hot_pixels(&self) -> Result<()> {
+    fn check_hot_pixels(&self, pixels: u32) -> Result<()> {
         let listed = self.effects.hot_pixels.iter().flat_map(|hot| &hot.pixels);
         for pixel in listed {
             ensure!(
-                usize::from(*pixel) < self.geometry.addresses(),
-                "[hot_pixels]: pixel {pixel} of {}",
-                self.geometry.addresses()
+                u32::from(*pixel) < pixels,
+                "[hot_pixels]: pixel {pixel} of {pixels}"
             );
         }
         Ok(())

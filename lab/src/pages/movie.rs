@@ -8,7 +8,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use anyhow::Result;
-use dtof_core::{EchoNumber, PixelAddress, RangeScale};
+use dtof_core::{Array, EchoNumber, PixelAddress, RangeScale};
 
 use dtof_draw::palette;
 use dtof_draw::picture::{levels, span};
@@ -17,7 +17,7 @@ use dtof_engine::host::host_engine;
 use dtof_events::events_csv::range_mm;
 use dtof_events::reports::LastReports;
 use dtof_options::rows::grouped;
-use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_photons::source::PhotonSource;
 use dtof_simulate::demo;
 
 /// Laser cycles that are shown, and moments into which they are cut.
@@ -60,23 +60,23 @@ struct Square {
 pub fn demo() -> Result<String> {
     let (scene, settings) = (demo::scene()?, demo::settings(1)?);
     let mut photons = scene.photons(settings.seed, CYCLES.into())?;
-    let mut engine = host_engine(&settings, photons.geometry(), &photons.addresses())?;
+    let mut engine = host_engine(&settings, photons.array(), &photons.addresses())?;
     let slice = photons.next_slice(CYCLES)?;
     let events = engine.run(&slice)?;
     let scale: RangeScale = settings.range_scale()?;
-    let geometry = scene.geometry;
-    let mut firsts = vec![u64::MAX; geometry.addresses()];
-    let mut reports = vec![LastReports::default(); geometry.addresses()];
+    let array = photons.array();
+    let mut firsts = vec![u64::MAX; array.pixels() as usize];
+    let mut reports = vec![LastReports::default(); array.pixels() as usize];
     let mut flashes = Vec::new();
     let mut marks = Vec::new();
     for event in &events {
         let flash = |pixel, side| Flash {
             moment: moment(event.cycle.0),
-            square: square(pixel, side, event.echo, geometry),
+            square: square(pixel, side, event.echo, array),
             range_mm: range_mm(event, &scale),
         };
         flashes.push(flash(event.pixel, 1 << event.level.raw()));
-        for pixel in geometry.block(event.pixel, event.level) {
+        for pixel in array.pixels_of(event.pixel, event.level) {
             let index = usize::from(pixel.0);
             if reports[index].take(event.level, event.cycle, event.exposure.into()) {
                 marks.push(flash(pixel, 1));
@@ -109,7 +109,7 @@ pub fn demo() -> Result<String> {
         "First event of a typical pixel, in laser cycles: {notes}. Small squares are \
          second echoes: on the pane the wall behind it, elsewhere edges and motion."
     );
-    Ok(draw(geometry, &flashes, &marks, title, &note))
+    Ok(draw(array, &flashes, &marks, title, &note))
 }
 
 fn moment(cycle: u64) -> u16 {
@@ -118,23 +118,23 @@ fn moment(cycle: u64) -> u16 {
 }
 
 /// That of a pixel, or of a block that starts there.
-fn square(pixel: PixelAddress, side: u32, echo: EchoNumber, geometry: Geometry) -> Square {
+fn square(pixel: PixelAddress, side: u32, echo: EchoNumber, array: Array) -> Square {
     let pixel = u32::from(pixel.0);
     Square {
-        column: pixel % geometry.columns,
-        row: pixel / geometry.columns,
+        column: pixel % array.columns(),
+        row: pixel / array.columns(),
         side,
         is_behind: echo > EchoNumber::FIRST,
     }
 }
 
 /// `flashes` light up. `marks` stay until another is in their place.
-fn draw(geometry: Geometry, flashes: &[Flash], marks: &[Flash], title: &str, note: &str) -> String {
+fn draw(array: Array, flashes: &[Flash], marks: &[Flash], title: &str, note: &str) -> String {
     let mut svg = Svg::default();
     svg.raw(&format!("<style>{}</style>", sheet()));
     let lines = wrapped(title, TITLE.0, INNER);
     let mut y = svg.lines("ink title", (EDGE, EDGE), TITLE, Anchor::Start, &lines) + 8.0;
-    let side = INNER / f64::from(geometry.columns);
+    let side = INNER / f64::from(array.columns());
     let (left, top) = (At(EDGE), At(y));
     svg.raw(&format!(
         "<g transform=\"translate({left} {top})scale({side})\">"
@@ -166,7 +166,7 @@ fn draw(geometry: Geometry, flashes: &[Flash], marks: &[Flash], title: &str, not
         }
     }
     svg.raw("</g>");
-    let height = side * f64::from(geometry.rows);
+    let height = side * f64::from(array.rows());
     let [left, top, width, high] = [EDGE, y, INNER, height].map(At);
     svg.raw(&format!(
         "<rect class=\"edge\" fill=\"none\" x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{high}\"/>"
@@ -295,10 +295,7 @@ mod tests {
 
     #[test]
     fn a_pixel_appears_once_and_flashes_with_each_event() {
-        let geometry = Geometry {
-            columns: 2,
-            rows: 2,
-        };
+        let array = Array::new(2, 2).unwrap();
         let flash = |moment, column, row, side| Flash {
             moment,
             square: Square {
@@ -311,7 +308,7 @@ mod tests {
         };
         let flashes = [flash(3, 1, 0, 1), flash(3, 0, 0, 2), flash(40, 1, 0, 1)];
         let marks = [flash(3, 1, 0, 1), flash(3, 0, 1, 1), flash(40, 1, 0, 1)];
-        let svg = draw(geometry, &flashes, &marks, "t", "n");
+        let svg = draw(array, &flashes, &marks, "t", "n");
         assert_eq!(svg.matches("<g class=\"b b").count(), 1);
         assert_eq!(svg.matches("<g class=\"f\"").count(), 2);
         assert_eq!(svg.matches("M1 0.5h1\"").count(), 3);

@@ -1,6 +1,6 @@
 //! All good histograms of a recording, with what is known of each.
 
-use dtof_photons::source::Geometry;
+use dtof_core::Array;
 
 use super::background::Level;
 use super::observed::Trace;
@@ -13,7 +13,7 @@ const SLOPE: f64 = 6.0;
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// Of one capture.
-    geometry: Geometry,
+    array: Array,
     /// Background photons a bin and laser cycle.
     pub rate: f64,
     /// The histograms.
@@ -29,13 +29,13 @@ pub struct Scene {
 impl Scene {
     /// With at least one histogram.
     #[must_use]
-    pub fn new(geometry: Geometry, rate: f64, traces: Vec<Trace>, levels: Vec<Level>) -> Self {
+    pub fn new(array: Array, rate: f64, traces: Vec<Trace>, levels: Vec<Level>) -> Self {
         let peaks = traces.iter().zip(&levels);
         let peaks = peaks.map(|(trace, level)| Peak::all(&trace.counts, level.mean));
         let peaks: Vec<Vec<Peak>> = peaks.collect();
         let trend = trend(&traces, &levels);
         Self {
-            geometry,
+            array,
             rate,
             traces,
             levels,
@@ -79,7 +79,7 @@ impl Scene {
     /// The histograms along rows, and along columns.
     #[must_use]
     pub fn orders(&self) -> [Vec<usize>; 2] {
-        let columns = self.geometry.columns.max(1) as usize;
+        let columns = self.array.columns() as usize;
         let mut order: Vec<usize> = (0..self.traces.len()).collect();
         let along_rows = order.clone();
         order.sort_by_key(|&index| {

@@ -1,9 +1,9 @@
 //! What calibration looks at: whole histograms, and what is known of them.
 
 use anyhow::{Result, bail, ensure};
+use dtof_core::Array;
 
 use dtof_photons::recorded::Capture;
-use dtof_photons::source::Geometry;
 
 /// How long each capture lasted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +39,7 @@ impl Length {
 #[derive(Clone, Copy, Debug)]
 pub struct Observed<'a> {
     /// The array of one capture.
-    pub geometry: Geometry,
+    pub array: Array,
     /// Histograms: capture, then pixel, then bin.
     pub captures: &'a [Capture],
     /// How long each capture lasted.
@@ -73,7 +73,7 @@ impl Observed<'_> {
     /// # Errors
     /// If captures or histograms differ in size, or there is none.
     pub fn traces(&self, hot: &[usize]) -> Result<Vec<Trace>> {
-        let pixels = self.geometry.addresses();
+        let pixels = self.array.pixels() as usize;
         let bins = self.bins();
         ensure!(!self.captures.is_empty(), "no captures");
         ensure!(bins > 8, "{bins} bins are too few to calibrate by");

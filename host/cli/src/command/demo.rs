@@ -7,7 +7,6 @@ use clap::Parser;
 use dtof::path;
 use dtof_engine::settings::Run;
 use dtof_options::numbers::{MOST_WHOLE, whole};
-use dtof_photons::source::Geometry;
 use dtof_run::simulate::{Simulation, array, of_scene};
 use dtof_simulate::demo;
 
@@ -20,7 +19,7 @@ pub struct Demo {
     out: PathBuf,
     /// Macropixels of the array [default: 64x32; 8x8 with --device]
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = array)]
-    array: Option<Geometry>,
+    array: Option<[u32; 2]>,
     /// Decide on a device: tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated
     /// device [default: this computer]
     #[arg(long, value_name = "DEVICE")]
@@ -43,10 +42,10 @@ impl Demo {
     pub fn run(&self) -> Result<()> {
         let settings = demo::settings(self.seed)?;
         let mut scene = demo::scene()?;
-        if let Some(geometry) = self.array {
-            scene.geometry = geometry;
+        if let Some(size) = self.array {
+            scene.size = size;
         } else if self.device.is_some() {
-            (scene.geometry.columns, scene.geometry.rows) = (8, 8);
+            scene.size = [8, 8];
         }
         let said = Run {
             cycles: Some(self.cycles),
@@ -60,7 +59,7 @@ impl Demo {
              often, that of the wall later. Pixels on the dark curtain are too dim to report soon alone, so they \
              report in blocks. Through the pane of glass a pixel reports two echoes. A ball is thrown \
              across.",
-            scene.geometry.columns, scene.geometry.rows
+            scene.size[0], scene.size[1]
         );
         let simulation = Simulation::new(scene, settings, said, None)?;
         Results {

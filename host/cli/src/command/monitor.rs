@@ -67,7 +67,7 @@ impl Monitor {
         let length = self
             .seconds
             .map(|seconds| Duration::from_secs(seconds.into()));
-        let (pixels, geometry) = (setup.pixels, setup.geometry);
+        let (pixels, array) = (setup.pixels, setup.array);
         let mut map = self.map.then(|| {
             let terminal = Term::stderr();
             let asked = terminal.clone();
@@ -76,7 +76,7 @@ impl Monitor {
                 (lines.into(), columns.into())
             };
             let room = Box::new(room);
-            LiveMap::new(Box::new(terminal), room, pixels, geometry.columns as usize)
+            LiveMap::new(Box::new(terminal), room, pixels, array)
         });
         let mut events: Box<dyn Write> = if self.map && io::stdout().is_terminal() {
             Box::new(io::sink())
@@ -90,7 +90,7 @@ impl Monitor {
         let task = Task {
             settings: &setup.settings,
             pixels,
-            columns: geometry.columns,
+            columns: array.columns(),
             dynamic_depth,
             host_timeout: self.options.host_timeout(),
         };

@@ -72,7 +72,7 @@ impl View {
             map = map.with_picture(albedo)?;
         }
         if file.is_none() {
-            (scene.geometry, scene.layout) = (map.size(), map.size());
+            (scene.size, scene.layout) = (map.size(), map.size());
         }
         let name = || depth.display().to_string();
         scene.add_depth_map(map).with_context(name)?;

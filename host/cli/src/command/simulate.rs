@@ -6,7 +6,7 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::path;
 use dtof::progress::Bar;
-use dtof_core::PixelAddress;
+use dtof_core::{Array, PixelAddress};
 use dtof_device::{Client, DeviceEngine};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
@@ -17,7 +17,7 @@ use dtof_link::DynamicDepth;
 use dtof_options::Refused;
 use dtof_options::rows::Row;
 use dtof_photons::geometry::FieldOfView;
-use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_photons::source::PhotonSource;
 use dtof_report::Section;
 use dtof_run::output::Output;
 use dtof_run::simulate::{Options, Simulation};
@@ -74,7 +74,7 @@ impl Simulate {
         let name = input.unwrap_or(Path::new("")).display().to_string();
         let simulation = self.options.0.open(scene, &name, said)?;
         let file = self.view.input(self.scene.as_deref());
-        let Geometry { columns, rows } = simulation.scene.geometry;
+        let [columns, rows] = simulation.scene.size;
         let laser = if self.options.0.laser_off {
             ", the laser off"
         } else {
@@ -129,7 +129,7 @@ impl Results<'_> {
             self.device,
             self.image,
             settings,
-            photons.geometry(),
+            photons.array(),
             &photons.addresses(),
         )?;
         let mut output = Output::create(self.out, settings, photons, self.input)?
@@ -159,7 +159,7 @@ impl Results<'_> {
 /// The options without which `dtof export` takes the scene for another, if any.
 fn export_with(scene: &Scene) -> Option<String> {
     let view = format!("{:.6}", scene.view());
-    let is_default = view == format!("{:.6}", FieldOfView::of(scene.geometry));
+    let is_default = view == format!("{:.6}", FieldOfView::of(scene.size));
     (!is_default).then(|| format!("--fov {view}"))
 }
 
@@ -168,7 +168,7 @@ fn engine(
     device: Option<&str>,
     image: Option<&Path>,
     settings: &Settings,
-    array: Geometry,
+    array: Array,
     addresses: &[PixelAddress],
 ) -> Result<Box<dyn Engine>> {
     let Some(device) = device else {

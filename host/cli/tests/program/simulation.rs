@@ -22,7 +22,7 @@ type Photons = Vec<(u64, u16)>;
 /// time.
 fn sliced(text: &str, cycles: u64, slice: u16) -> Vec<Photons> {
     let mut source = Scene::parse(text).unwrap().photons(1, cycles).unwrap();
-    let mut pixels = vec![Vec::new(); source.geometry().addresses()];
+    let mut pixels = vec![Vec::new(); source.array().pixels() as usize];
     for _ in 0..cycles / u64::from(slice) {
         let slice = source.next_slice(slice).unwrap();
         for (pixel, received) in pixels.iter_mut().zip(slice.pixels) {

@@ -5,12 +5,11 @@ mod picture;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-use dtof_core::{EchoNumber, RangeScale};
+use dtof_core::{Array, EchoNumber, RangeScale};
 
 use dtof_draw::picture::span;
 use dtof_events::aer_file::Event;
 use dtof_events::reports::LastReports;
-use dtof_photons::source::Geometry;
 use picture::{PLAIN, block, picture};
 
 /// How often it is drawn.
@@ -30,7 +29,7 @@ pub type Room = Box<dyn Fn() -> (usize, usize)>;
 pub struct LiveMap {
     out: Box<dyn Write>,
     room: Room,
-    array: Geometry,
+    array: Array,
     ranges: Vec<Option<f64>>,
     reports: Vec<LastReports>,
     /// The text below the picture.
@@ -42,17 +41,14 @@ pub struct LiveMap {
 }
 
 impl LiveMap {
-    /// A picture of so many `pixels` on `out`, a terminal with so much `room`. The array has so many `columns`.
+    /// A picture of the first `pixels` of `array` on `out`, a terminal with so much `room`.
     #[must_use]
-    pub fn new(out: Box<dyn Write>, room: Room, pixels: u16, columns: usize) -> Self {
+    pub fn new(out: Box<dyn Write>, room: Room, pixels: u16, array: Array) -> Self {
         let pixels = usize::from(pixels);
-        let columns = columns.max(1);
-        let rows = pixels.div_ceil(columns);
-        let side = |count| u32::try_from(count).unwrap_or(u32::MAX);
         Self {
             out,
             room,
-            array: Geometry::new(side(columns), side(rows)),
+            array,
             ranges: vec![None; pixels],
             reports: vec![LastReports::default(); pixels],
             line: String::new(),
@@ -70,7 +66,7 @@ impl LiveMap {
                 continue;
             }
             let range_mm = scale.range(event.position()).to_num();
-            for pixel in self.array.block(event.pixel(), event.level()) {
+            for pixel in self.array.pixels_of(event.pixel(), event.level()) {
                 let pixel = usize::from(pixel.0);
                 let (Some(range), Some(reports)) =
                     (self.ranges.get_mut(pixel), self.reports.get_mut(pixel))
@@ -109,7 +105,7 @@ impl LiveMap {
         // Two lines below the picture, and the one of the cursor. The last column stays free:
         // a line that fills it would clear it, or go on in the next.
         let (lines, columns) = (room.0.saturating_sub(3), room.1.saturating_sub(1));
-        let mut text = picture(&self.ranges, self.array.columns as usize, lines, columns);
+        let mut text = picture(&self.ranges, self.array.columns() as usize, lines, columns);
         text.push(legend(&self.ranges));
         text.push(self.line.clone());
         let back = match self.lines {

@@ -123,14 +123,14 @@ impl Recording {
 
 #[cfg(test)]
 mod tests {
+    use dtof_core::Array;
     use dtof_core::fixed::types::{I24F8, U16F16};
 
     use super::*;
-    use dtof_photons::source::Geometry;
 
     const HEADER: Header = Header {
         bins: 128,
-        geometry: Geometry::new(2, 2),
+        array: Array::new(2, 2).unwrap(),
         bin_width_ps: U16F16::lit("250"),
         offset_mm: I24F8::ZERO,
         laser_millihertz: 0,

@@ -1,11 +1,10 @@
 //! The header of AER files.
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{AER_VERSION, BinPosition};
+use dtof_core::{AER_VERSION, Array, BinPosition};
 
 use super::Event;
-use dtof_photons::source::Geometry;
 
 /// The first bytes of an AER file.
 pub const MAGIC: &str = "DTOF-AER";
@@ -18,7 +17,7 @@ pub struct Header {
     /// Bins of a histogram.
     pub bins: u32,
     /// The array.
-    pub geometry: Geometry,
+    pub array: Array,
     /// Picoseconds a bin.
     pub bin_width_ps: U16F16,
     /// Millimetres added to every range.
@@ -37,8 +36,8 @@ impl Header {
             &AER_VERSION.to_le_bytes(),
             &HEADER_BYTES.to_le_bytes(),
             &self.bins.to_le_bytes(),
-            &self.geometry.columns.to_le_bytes(),
-            &self.geometry.rows.to_le_bytes(),
+            &self.array.columns().to_le_bytes(),
+            &self.array.rows().to_le_bytes(),
             &self.bin_width_ps.to_le_bytes(),
             &self.offset_mm.to_le_bytes(),
             &self.laser_millihertz.to_le_bytes(),
@@ -64,16 +63,13 @@ impl Header {
             header_length(bytes).is_some() && bytes[48..].iter().all(|&byte| byte == 0),
             "the header is damaged"
         );
-        let geometry = Geometry::new(u32_at(16), u32_at(20));
-        ensure!(
-            (1..=1 << 16).contains(&addresses(geometry)),
-            "the header says {}x{} pixels: must be 1 to 65,536",
-            geometry.columns,
-            geometry.rows
-        );
+        let (columns, rows) = (u32_at(16), u32_at(20));
+        let array = Array::new(columns, rows).with_context(|| {
+            format!("the header says {columns}x{rows} pixels: must be 1 to 65,536")
+        })?;
         Ok(Self {
             bins: u32_at(12),
-            geometry,
+            array,
             bin_width_ps: U16F16::from_le_bytes(four_at(24)),
             offset_mm: I24F8::from_le_bytes(four_at(28)),
             laser_millihertz: u64_at(32),
@@ -86,9 +82,9 @@ impl Header {
     /// # Errors
     /// Why not.
     pub fn check(&self, event: &Event) -> Result<()> {
-        let (pixel, pixels) = (event.pixel().0, addresses(self.geometry));
-        ensure!(u64::from(pixel) < pixels, "pixel {pixel} of {pixels}");
-        let mut block = self.geometry.block(event.pixel(), event.level());
+        let (pixel, pixels) = (event.pixel().0, self.array.pixels());
+        ensure!(u32::from(pixel) < pixels, "pixel {pixel} of {pixels}");
+        let mut block = self.array.pixels_of(event.pixel(), event.level());
         ensure!(
             block.next().is_some(),
             "pixel {pixel} is not the first of a block of level {}",
@@ -111,9 +107,4 @@ impl Header {
 pub(super) fn header_length(bytes: &[u8; HEADER_BYTES as usize]) -> Option<u16> {
     let length = u16::from_le_bytes([bytes[10], bytes[11]]);
     (length >= HEADER_BYTES && length.is_multiple_of(16)).then_some(length)
-}
-
-/// Pixels of an array of any size.
-fn addresses(array: Geometry) -> u64 {
-    u64::from(array.columns) * u64::from(array.rows)
 }

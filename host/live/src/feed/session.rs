@@ -279,7 +279,7 @@ impl<'a> Session<'a> {
     }
 
     fn configuration(&self, setup: &Setup, source: Source) -> Result<Configuration> {
-        let columns = setup.geometry.columns;
+        let columns = setup.array.columns();
         let (depth, host_timeout) = (self.given.dynamic_depth, self.given.host_timeout);
         let (settings, pixels) = (&setup.settings, setup.pixels);
         configuration(settings, pixels, columns, source, depth, host_timeout)

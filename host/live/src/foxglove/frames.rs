@@ -105,12 +105,15 @@ impl Frames {
     /// Array and settings are others, and laser cycles begin at 0.
     fn begin(&mut self, seen: &Seen) {
         self.version = Some(seen.version);
-        self.timing = Timing::of(&seen.header);
+        let header = seen.header.as_ref();
+        self.timing = header.map_or_else(Timing::unknown, Timing::of);
         self.slice = None;
-        self.images = Images::of(seen.header.geometry);
-        let rays = Optics::of(&seen.rays).and_then(|optics| optics.rays(seen.header.geometry));
+        let array = header.map(|header| header.array);
+        self.images = Images::of(array);
+        let rays = Optics::of(&seen.rays);
+        let rays = rays.and_then(|optics| array.map(|array| optics.rays(array)).transpose());
         let projection = |scale: RangeScale| {
-            let (rays, _) = rays.as_ref().ok()?;
+            let (rays, _) = rays.as_ref().ok()?.as_ref()?;
             Some(Projection {
                 rays: rays.clone(),
                 scale,

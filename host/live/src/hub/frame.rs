@@ -77,20 +77,21 @@ impl State {
 
     /// Array and settings.
     fn about(&self, page: &Page) -> serde_json::Value {
-        let header = &self.header;
+        let header = self.header.as_ref();
+        let bins = header.map_or(0, |header| header.bins);
         let mut about = json!({
             "page": page.number,
             "name": self.name,
             "kind": self.kind,
-            "columns": header.geometry.columns,
-            "rows": header.geometry.rows,
-            "bins": header.bins,
-            "binWidthPs": header.bin_width_ps.to_num::<f64>(),
-            "offsetMm": header.offset_mm.to_num::<f64>(),
-            "laserHz": header.laser_millihertz as f64 / 1000.0,
+            "columns": header.map_or(0, |header| header.array.columns()),
+            "rows": header.map_or(0, |header| header.array.rows()),
+            "bins": bins,
+            "binWidthPs": header.map_or(0.0, |header| header.bin_width_ps.to_num()),
+            "offsetMm": header.map_or(0.0, |header| header.offset_mm.to_num()),
+            "laserHz": header.map_or(0.0, |header| header.laser_millihertz as f64 / 1000.0),
         });
         if self.kind == Kind::Device {
-            let last_bin = u16::try_from(header.bins.max(1) - 1).unwrap_or(u16::MAX);
+            let last_bin = u16::try_from(bins.max(1) - 1).unwrap_or(u16::MAX);
             let (said, gate) = match &self.settings {
                 Some((said, settings)) => {
                     let gate = settings.gate.unwrap_or((0, last_bin));

@@ -2,10 +2,9 @@
 
 use std::collections::VecDeque;
 
-use dtof_core::PixelAddress;
+use dtof_core::{Array, PixelAddress};
 
 use dtof_events::aer_file::Event;
-use dtof_photons::source::Geometry;
 
 /// Pages that are open at a time, at most.
 pub const MOST_PAGES: usize = 16;
@@ -118,13 +117,13 @@ impl Pages {
     }
 
     /// Takes an event in for the pages that look at its pixel, or at one of its block.
-    pub fn add(&mut self, event: &Event, range_mm: f32, array: Geometry) {
+    pub fn add(&mut self, event: &Event, range_mm: f32, array: Array) {
         for page in &mut self.open {
             let pixel = PixelAddress(page.pixel);
             let is_of = event.pixel() == pixel
                 || event.level().raw() > 0
                     && array
-                        .block(event.pixel(), event.level())
+                        .pixels_of(event.pixel(), event.level())
                         .any(|other| other == pixel);
             if !is_of {
                 continue;

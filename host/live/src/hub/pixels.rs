@@ -1,10 +1,9 @@
 //! The last event of each pixel, and how many there were.
 
-use dtof_core::EchoNumber;
+use dtof_core::{Array, EchoNumber};
 
 use dtof_events::aer_file::Event;
 use dtof_events::reports::LastReports;
-use dtof_photons::source::Geometry;
 
 /// Of so many events the mean signal is taken, about.
 const MEAN_OF: f32 = 8.0;
@@ -30,19 +29,17 @@ pub struct Pixel {
 }
 
 /// All pixels of an array.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Pixels {
-    array: Geometry,
     all: Vec<Pixel>,
     changes: u64,
 }
 
 impl Pixels {
-    pub fn new(array: Geometry) -> Self {
+    pub fn new(array: Array) -> Self {
         Self {
-            array,
             // An array has at most 65,536 pixels.
-            all: vec![Pixel::default(); array.addresses()],
+            all: vec![Pixel::default(); array.pixels() as usize],
             changes: 0,
         }
     }
@@ -62,9 +59,9 @@ impl Pixels {
     }
 
     /// Takes an event in. Of several echoes the first is kept; all are counted.
-    pub fn add(&mut self, event: &Event, range_mm: f32) {
+    pub fn add(&mut self, event: &Event, range_mm: f32, array: Array) {
         self.changes += 1;
-        for pixel in self.array.block(event.pixel(), event.level()) {
+        for pixel in array.pixels_of(event.pixel(), event.level()) {
             let Some(pixel) = self.all.get_mut(usize::from(pixel.0)) else {
                 continue;
             };

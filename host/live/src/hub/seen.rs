@@ -23,7 +23,8 @@ pub struct Seen {
     /// Changes with array and settings.
     pub version: u64,
     pub name: String,
-    pub header: Header,
+    /// None before laser cycles begin.
+    pub header: Option<Header>,
     pub scale: Option<RangeScale>,
     pub rays: Rays,
     pub connection: Connection,
@@ -55,7 +56,7 @@ impl Hub {
         if !wanted.events {
             state.slice = None;
         } else if state.slice.is_none() {
-            state.slice = Some(Slice::new(state.header.geometry));
+            state.slice = Some(Slice::new(state.pixels.len()));
         }
         let said = match &state.settings {
             Some((said, _)) => said,

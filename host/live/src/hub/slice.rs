@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 
 use dtof_events::aer_file::Event;
 use dtof_export::foxglove::{MOST_POINTS, Tally};
-use dtof_photons::source::Geometry;
 
 /// What has arrived since it was taken last.
 #[derive(Debug)]
@@ -17,22 +16,22 @@ pub struct Slice {
 }
 
 impl Slice {
-    /// Nothing yet, of an array.
-    pub fn new(array: Geometry) -> Self {
+    /// Nothing yet, of so many pixels.
+    pub fn new(pixels: usize) -> Self {
         Self {
             events: VecDeque::new(),
-            tally: Tally::new(array),
+            tally: Tally::new(pixels),
             number: 0,
             left_out: 0,
         }
     }
 
     /// Laser cycles begin at 0 again: what waits is not to be drawn among what comes.
-    pub fn restart(&mut self, array: Geometry) {
+    pub fn restart(&mut self, pixels: usize) {
         let left_out = self.left_out + self.events.len() as u64;
         *self = Self {
             left_out,
-            ..Self::new(array)
+            ..Self::new(pixels)
         };
     }
 

@@ -2,13 +2,13 @@ use std::collections::BTreeMap;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
-use dtof_core::DynamicDepthEvent;
+use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_core::{Array, DynamicDepthEvent};
 use proptest::prelude::*;
 use serde_json::Value;
 
 use super::*;
 use dtof_events::fixtures;
-use dtof_photons::source::Geometry;
 
 const PIXELS: u16 = 10_000;
 
@@ -16,7 +16,7 @@ fn hub() -> Hub {
     let hub = Hub::new("a test".to_owned(), Kind::Recording);
     hub.begin_recording(Header {
         bins: 128,
-        geometry: Geometry::new(100, 100),
+        array: Array::new(100, 100).unwrap(),
         bin_width_ps: U16F16::lit("250"),
         offset_mm: I24F8::ZERO,
         laser_millihertz: 0,
@@ -68,7 +68,7 @@ fn nothing_of_before_holds_once_laser_cycles_begin_again() {
     hub.events(&[event(7, 9)], 0);
     let mut old = hub.join(0).unwrap();
     assert_eq!(frame(&hub, &mut old).0, [(7, 1)]);
-    let header = hub.state().header;
+    let header = hub.state().header.unwrap();
     hub.begin_recording(header);
     let mut new = hub.join(0).unwrap();
     for page in [&mut old, &mut new] {
@@ -103,7 +103,7 @@ fn the_newest_events_of_a_pixel_wait_and_the_others_are_counted() {
     assert!(cycles.eq(1001 - MOST_EVENTS as u64..=1000));
     // What waits is not drawn among what comes after laser cycle 0.
     hub.events(&all, 0);
-    let header = hub.state().header;
+    let header = hub.state().header.unwrap();
     hub.begin_recording(header);
     assert_eq!(frame(&hub, &mut page).2["pixel"]["drawn"], 0);
     hub.leave(&page);
@@ -200,7 +200,7 @@ fn events_wait_only_for_those_who_want_them_the_newest_and_all_are_counted() {
     hub.events(&all, 0);
     hub.begin_recording(Header {
         bins: 128,
-        geometry: Geometry::new(2, 1),
+        array: Array::new(2, 1).unwrap(),
         bin_width_ps: U16F16::lit("250"),
         offset_mm: I24F8::ZERO,
         laser_millihertz: 0,

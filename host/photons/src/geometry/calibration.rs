@@ -5,12 +5,12 @@ use std::io::Read;
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, ensure};
+use dtof_core::Array;
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::{Ray, unit};
 use crate::range::within;
-use crate::source::Geometry;
 
 /// No file of 65,536 pixels is longer.
 const MOST_BYTES: u64 = 1 << 24;
@@ -24,7 +24,7 @@ struct CalibrationFile {
     pixels: Vec<Spanned<[f64; 4]>>,
 }
 
-pub fn read(path: &Path, array: Geometry) -> Result<Vec<Ray>> {
+pub fn read(path: &Path, array: Array) -> Result<Vec<Ray>> {
     let name = || path.display().to_string();
     let mut text = String::new();
     let file = File::open(path).with_context(name)?;
@@ -38,7 +38,7 @@ pub fn read(path: &Path, array: Geometry) -> Result<Vec<Ray>> {
     parse(&text, array).with_context(name)
 }
 
-pub(super) fn parse(text: &str, array: Geometry) -> Result<Vec<Ray>> {
+pub(super) fn parse(text: &str, array: Array) -> Result<Vec<Ray>> {
     let line = |at: usize| {
         let before = text.get(..at).unwrap_or(text);
         before.matches('\n').count() + 1
@@ -49,15 +49,15 @@ pub(super) fn parse(text: &str, array: Geometry) -> Result<Vec<Ray>> {
     })?;
     let said = (*file.columns.get_ref(), file.rows);
     ensure!(
-        said == (array.columns, array.rows),
+        said == (array.columns(), array.rows()),
         "line {}: is of {}x{} pixels, the events are of {}x{}",
         line(file.columns.span().start),
         said.0,
         said.1,
-        array.columns,
-        array.rows
+        array.columns(),
+        array.rows()
     );
-    let wanted = array.addresses();
+    let wanted = array.pixels() as usize;
     // What is too much, or the last of what is there.
     let last = file.pixels.get(wanted).or(file.pixels.last());
     ensure!(

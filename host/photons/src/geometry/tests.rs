@@ -2,8 +2,8 @@ use proptest::prelude::*;
 
 use super::*;
 
-fn array(columns: u32, rows: u32) -> Geometry {
-    Geometry { columns, rows }
+fn array(columns: u32, rows: u32) -> Array {
+    Array::new(columns, rows).unwrap()
 }
 
 fn length([x, y, z]: [f64; 3]) -> f64 {
@@ -55,7 +55,7 @@ fn corners_are_exact() {
 
 #[test]
 fn x_is_to_the_right_and_y_down() {
-    let rays = Rays::pinhole(array(4, 2), FieldOfView::of(array(4, 2)));
+    let rays = Rays::pinhole(array(4, 2), FieldOfView::of([4, 2]));
     let point = |pixel| {
         rays.point(PixelAddress(pixel), BlockLevel::PIXEL, 2000.0)
             .unwrap()
@@ -70,11 +70,11 @@ fn x_is_to_the_right_and_y_down() {
 
 #[test]
 fn an_array_sees_60_degrees_along_its_longer_side_unless_told() {
-    let degrees = FieldOfView::of(array(64, 32)).degrees();
+    let degrees = FieldOfView::of([64, 32]).degrees();
     assert!((degrees[0] - 60.0).abs() < 1e-9 && (degrees[1] - 32.2).abs() < 0.01);
-    let degrees = FieldOfView::of(array(1, 256)).degrees();
+    let degrees = FieldOfView::of([1, 256]).degrees();
     assert!((degrees[1] - 60.0).abs() < 1e-9 && degrees[0] < 0.3);
-    let degrees = FieldOfView::of(array(1, 1)).degrees();
+    let degrees = FieldOfView::of([1, 1]).degrees();
     assert_eq!(degrees[0], degrees[1]);
 }
 
@@ -93,7 +93,7 @@ fn a_field_of_view_is_printed_as_it_is_read() {
     for text in ["60x40", "0.01x179", "100x32.2", "45.25x90"] {
         assert_eq!(text.parse::<FieldOfView>().unwrap().to_string(), text);
     }
-    let wide = FieldOfView::of(array(64, 32));
+    let wide = FieldOfView::of([64, 32]);
     assert_eq!(
         format!("{wide} {wide:.6} {wide:.0}"),
         "60x32.2 60x32.204228 60x32"

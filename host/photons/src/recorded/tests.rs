@@ -2,9 +2,9 @@ use super::*;
 
 /// A capture of pixels in a row.
 fn recorded(capture: Capture, cycles: u64, seed: u64) -> Result<RecordedHistograms> {
-    let geometry = Geometry::new(u32::try_from(capture.len())?, 1);
+    let array = Array::new(u32::try_from(capture.len())?, 1).unwrap();
     let length = RecordingLength::Cycles(cycles);
-    RecordedHistograms::new(geometry, &[capture], length, u64::MAX, seed)
+    RecordedHistograms::new(array, &[capture], length, u64::MAX, seed)
 }
 
 fn replay(counts: &[u64], cycles: u64) -> Vec<Photon> {
@@ -32,8 +32,8 @@ fn slices_of_any_length_hold_the_same_photons() {
     let photons = |lengths: &[u16]| {
         let captures = [vec![vec![700; 8]], vec![vec![90; 8]]];
         let length = RecordingLength::PhotonsPerCycle(0.9);
-        let geometry = Geometry::new(1, 2);
-        let mut source = RecordedHistograms::new(geometry, &captures, length, u64::MAX, 3).unwrap();
+        let array = Array::new(1, 1).unwrap();
+        let mut source = RecordedHistograms::new(array, &captures, length, u64::MAX, 3).unwrap();
         let mut all = [(); 2].map(|()| Vec::new());
         for &length in lengths.iter().cycle().take(9_000) {
             let before = source.not_replayed();
@@ -109,7 +109,7 @@ fn bright(captures: u64) -> Vec<Capture> {
 /// Whatever the parts are, and however many photons a chunk holds.
 #[test]
 fn parts_hold_the_photons_that_they_hold_in_the_whole() {
-    let geometry = Geometry::new(4, 6);
+    let array = Array::new(4, 6).unwrap();
     for length in [
         RecordingLength::PhotonsPerCycle(0.4),
         RecordingLength::Cycles(3000),
@@ -117,16 +117,17 @@ fn parts_hold_the_photons_that_they_hold_in_the_whole() {
         let captures = bright(2);
         let all: Vec<Vec<u64>> = captures.iter().flatten().cloned().collect();
         let totals: Vec<u64> = all.iter().map(|counts| counts.iter().sum()).collect();
-        let mut whole = RecordedHistograms::new(geometry, &captures, length, 900, 5).unwrap();
+        let one = Array::new(4, 3).unwrap();
+        let mut whole = RecordedHistograms::new(one, &captures, length, 900, 5).unwrap();
         let cycles = whole.cycles();
         let expected = whole.next_slice(900).unwrap().pixels;
         for (first, end) in [(0, 8), (8, 12), (12, 24), (4, 20), (0, 24)] {
-            let known = Whole::new(geometry, 2, &totals, first).unwrap();
+            let known = Whole::new(array, 2, &totals, first).unwrap();
             let histograms = [all[first..end].to_vec()];
             let mut part = RecordedHistograms::part(&known, &histograms, length, 900, 5).unwrap();
             let addresses = part.addresses();
             assert_eq!(usize::from(addresses[0].0), first);
-            assert_eq!(part.geometry(), geometry);
+            assert_eq!(part.array(), array);
             assert_eq!((part.cycles(), part.capture_rows()), (cycles, 3));
             assert_eq!(part.recorded_cycles(), whole.recorded_cycles());
             let photons = part.next_slice(900).unwrap().pixels;
@@ -138,12 +139,12 @@ fn parts_hold_the_photons_that_they_hold_in_the_whole() {
 /// A dim part of a bright array is drawn in the chunks of the array.
 #[test]
 fn a_part_has_the_chunks_of_the_whole() {
-    let geometry = Geometry::new(1, 2);
+    let array = Array::new(1, 2).unwrap();
     let captures = [vec![vec![4_000_000; 8], vec![900; 8]]];
     let length = RecordingLength::Cycles(4000);
-    let mut whole = RecordedHistograms::new(geometry, &captures, length, 600, 5).unwrap();
+    let mut whole = RecordedHistograms::new(array, &captures, length, 600, 5).unwrap();
     assert!(whole.chunk < 600);
-    let known = Whole::new(geometry, 1, &[32_000_000, 7200], 1).unwrap();
+    let known = Whole::new(array, 1, &[32_000_000, 7200], 1).unwrap();
     let dim = [vec![vec![900; 8]]];
     let mut part = RecordedHistograms::part(&known, &dim, length, 600, 5).unwrap();
     assert_eq!(part.chunk, whole.chunk);
@@ -155,8 +156,8 @@ fn a_part_has_the_chunks_of_the_whole() {
 
 #[test]
 fn what_is_no_part_is_refused() {
-    let geometry = Geometry::new(1, 2);
-    let known = |first| Whole::new(geometry, 1, &[80, 16], first).unwrap();
+    let array = Array::new(1, 2).unwrap();
+    let known = |first| Whole::new(array, 1, &[80, 16], first).unwrap();
     let refused = |whole: &Whole, counts: &[u64]| {
         let part = [counts.iter().map(|&count| vec![count; 8]).collect()];
         let length = RecordingLength::Cycles(10);
@@ -165,16 +166,19 @@ fn what_is_no_part_is_refused() {
     };
     assert!(refused(&known(1), &[10]).contains("pixel 1 has 80 photons, but 16"));
     assert!(refused(&known(1), &[2, 2]).contains("there is no pixel 2"));
-    assert!(Whole::new(geometry, 1, &[1], 0).is_err());
-    assert!(Whole::new(geometry, 0, &[1, 1], 0).is_err());
-    assert!(Whole::new(geometry, 3, &[1, 1], 0).is_err());
+    assert!(Whole::new(array, 1, &[1], 0).is_err());
+    assert!(Whole::new(array, 0, &[1, 1], 0).is_err());
+    assert!(Whole::new(array, 3, &[1, 1], 0).is_err());
+    let most = Array::new(256, 256).unwrap();
+    let refused = Whole::of(most, &[vec![], vec![]]).unwrap_err();
+    assert_eq!(refused.to_string(), "more than 65,536 pixels");
 }
 
 #[test]
 fn a_part_that_cuts_a_block_is_refused() {
-    let geometry = Geometry::new(4, 10);
+    let array = Array::new(4, 10).unwrap();
     let cuts = |row: usize, end: usize, side: usize| {
-        let whole = Whole::new(geometry, 1, &[0; 40], row * 4).unwrap();
+        let whole = Whole::new(array, 1, &[0; 40], row * 4).unwrap();
         whole.has_whole_blocks((end - row) * 4, side).is_err()
     };
     for row in 0..10 {
@@ -191,11 +195,11 @@ fn a_part_that_cuts_a_block_is_refused() {
 /// has its own.
 #[test]
 fn masked_pixels_do_not_set_the_length() {
-    let geometry = Geometry::new(3, 2);
+    let array = Array::new(3, 1).unwrap();
     let row = |totals: [u64; 3]| totals.map(|total| vec![total; 8]).to_vec();
     let captures = [row([10, 5000, 20]), row([40, 3, 7])];
     let lasted = |masked: Vec<u16>| {
-        let whole = Whole::of(geometry, &captures).unwrap().with_masked(masked);
+        let whole = Whole::of(array, &captures).unwrap().with_masked(masked);
         let length = RecordingLength::PhotonsPerCycle(0.5);
         let source = RecordedHistograms::part(&whole, &captures, length, u64::MAX, 1);
         source.unwrap().recorded_cycles()

@@ -1,9 +1,9 @@
 //! What a part of a recording has to know of the whole, to be replayed as it is there.
 
 use anyhow::{Context, Result, ensure};
+use dtof_core::Array;
 
 use super::{Capture, totals};
-use crate::source::Geometry;
 
 /// The recording that a part is of.
 ///
@@ -13,7 +13,7 @@ use crate::source::Geometry;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Whole {
     /// Its array.
-    pub geometry: Geometry,
+    pub array: Array,
     /// Of each capture the photons of each pixel, in the order of addresses.
     pub captures: Vec<Vec<u64>>,
     /// The address of the first pixel of the part.
@@ -29,19 +29,18 @@ impl Whole {
     ///
     /// # Errors
     /// If there is no such array.
-    pub fn new(geometry: Geometry, captures: usize, totals: &[u64], first: usize) -> Result<Self> {
+    pub fn new(array: Array, captures: usize, totals: &[u64], first: usize) -> Result<Self> {
         ensure!(
             captures > 0
-                && totals.len() == geometry.addresses()
-                && (geometry.rows as usize).is_multiple_of(captures)
-                && !totals.is_empty(),
+                && totals.len() == array.pixels() as usize
+                && (array.rows() as usize).is_multiple_of(captures),
             "{} pixels in {captures} captures are no {} rows of {} columns",
             totals.len(),
-            geometry.rows,
-            geometry.columns
+            array.rows(),
+            array.columns()
         );
         Ok(Self {
-            geometry,
+            array,
             captures: totals
                 .chunks(totals.len() / captures)
                 .map(<[_]>::to_vec)
@@ -58,13 +57,17 @@ impl Whole {
         Self { masked, ..self }
     }
 
-    /// All of `captures`.
+    /// All of `captures`, each of `array`.
     ///
     /// # Errors
-    /// If a histogram holds more photons than can be counted.
-    pub fn of(geometry: Geometry, captures: &[Capture]) -> Result<Self> {
+    /// If there are no captures, more pixels than addresses, or more photons in a histogram than
+    /// can be counted.
+    pub fn of(array: Array, captures: &[Capture]) -> Result<Self> {
+        let pixels = captures.len().saturating_mul(array.pixels() as usize);
+        u16::try_from(pixels.saturating_sub(1)).context("more than 65,536 pixels")?;
+        let rows = u32::try_from(captures.len())? * array.rows();
         Ok(Self {
-            geometry,
+            array: Array::new(array.columns(), rows).context("no captures")?,
             captures: captures.iter().map(totals).collect::<Result<_>>()?,
             first: 0,
             cut_off: 0,
@@ -80,7 +83,7 @@ impl Whole {
 
     /// Rows of a capture.
     pub(super) fn capture_rows(&self) -> Result<u32> {
-        Ok(self.geometry.rows / u32::try_from(self.captures.len().max(1))?)
+        Ok(self.array.rows() / u32::try_from(self.captures.len().max(1))?)
     }
 
     /// Pixels with so many photons each are this part of it.
@@ -104,10 +107,10 @@ impl Whole {
     /// # Errors
     /// If one is in it by half.
     pub fn has_whole_blocks(&self, pixels: usize, side: usize) -> Result<()> {
-        let columns = self.geometry.columns as usize;
+        let columns = self.array.columns() as usize;
         let (begin, end) = (self.first, self.first + pixels);
         let is_cut = |pixel: usize| {
-            pixel < self.geometry.addresses() && !pixel.is_multiple_of(side * columns)
+            pixel < self.array.pixels() as usize && !pixel.is_multiple_of(side * columns)
         };
         ensure!(
             !is_cut(begin) && !is_cut(end),

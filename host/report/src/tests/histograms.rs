@@ -7,7 +7,7 @@ use dtof_photons::source::PhotonSource;
 use dtof_simulate::{demo, scene};
 
 /// What a run of the demo on a small array is told of its last decisions, in so many bytes.
-fn decided(array: Geometry, room: usize) -> (Vec<Decision>, serde_json::Value, usize) {
+fn decided(array: Array, room: usize) -> (Vec<Decision>, serde_json::Value, usize) {
     let settings = demo::settings(1).unwrap();
     let mut photons = demo::photons(array, 1, 2000).unwrap();
     let mut engine = host_engine(&settings, array, &photons.addresses()).unwrap();
@@ -28,7 +28,7 @@ fn decided(array: Geometry, room: usize) -> (Vec<Decision>, serde_json::Value, u
 /// else is there.
 #[test]
 fn the_script_is_given_what_the_last_event_of_each_pixel_was_decided_from() {
-    let array = Geometry::new(16, 8);
+    let array = Array::new(16, 8).unwrap();
     let (all, data, bytes) = decided(array, usize::MAX);
     let settings = demo::settings(1).unwrap();
     let looks = look_back(&settings, &all);
@@ -37,7 +37,7 @@ fn the_script_is_given_what_the_last_event_of_each_pixel_was_decided_from() {
     let text = data["packed"].as_str().unwrap();
     assert_eq!(text.len(), bytes);
     let mut reader = Reader::new(text);
-    let mut covered = vec![None; array.addresses()];
+    let mut covered = vec![None; array.pixels() as usize];
     for _ in 0..data["count"].as_u64().unwrap() {
         let [pixel, kind, cycle, exposure] = [(); 4].map(|()| reader.number());
         let of = |decision: &Decision| {
@@ -82,7 +82,7 @@ fn the_script_is_given_what_the_last_event_of_each_pixel_was_decided_from() {
         for &count in counts {
             assert_eq!(reader.number(), u64::from(count));
         }
-        for pixel in array.block(event.pixel, event.level) {
+        for pixel in array.pixels_of(event.pixel, event.level) {
             let place = &mut covered[usize::from(pixel.0)];
             *place = (*place).max(Some(cycle));
         }
@@ -93,7 +93,7 @@ fn the_script_is_given_what_the_last_event_of_each_pixel_was_decided_from() {
         let of = |decision: &&Decision| {
             let Decision { event, .. } = decision;
             array
-                .block(event.pixel, event.level)
+                .pixels_of(event.pixel, event.level)
                 .any(|one| one.0 == pixel)
         };
         let latest = all
@@ -107,7 +107,7 @@ fn the_script_is_given_what_the_last_event_of_each_pixel_was_decided_from() {
 
 #[test]
 fn histograms_are_thinned_until_there_is_room() {
-    let array = Geometry::new(16, 8);
+    let array = Array::new(16, 8).unwrap();
     let (_, whole, bytes) = decided(array, usize::MAX);
     let (_, part, fewer) = decided(array, bytes / 3);
     assert!(fewer <= bytes / 3 && fewer > 0);
@@ -119,7 +119,7 @@ fn histograms_are_thinned_until_there_is_room() {
 
 #[test]
 fn a_large_array_of_bright_pixels_stays_below_the_documented_size() {
-    let array = Geometry::new(64, 64);
+    let array = Array::new(64, 64).unwrap();
     let settings = scene::settings(0);
     let counts: Vec<u16> = (0..128)
         .map(|bin| if bin == 10 { 1023 } else { 800 + bin })
@@ -133,7 +133,7 @@ fn a_large_array_of_bright_pixels_stays_below_the_documented_size() {
     let all: Vec<Decision> = (0..64 * 64).map(decision).collect();
     let mut sample = sample(Sample::LIMIT, 1 << 18);
     let events = Cloud {
-        geometry: array,
+        array,
         decisions: Some(Decisions {
             settings: &settings,
             kept: Kept::of(array, 128),

@@ -4,7 +4,6 @@ use anyhow::Result;
 
 use dtof_draw::picture::{Map, heat_map};
 use dtof_events::maps::{Maps, PixelHistory};
-use dtof_photons::source::Geometry;
 
 /// The files, in the order of [`pictures`].
 pub const NAMES: [&str; 6] = [
@@ -28,14 +27,13 @@ pub struct Picture {
 /// `one` and `several`.
 pub fn pictures(maps: &Maps, sides: [&str; 2], [one, several]: [&str; 2]) -> Result<[Picture; 6]> {
     let draw_without = |missing, name, title: &str, unit, caption, values: Vec<Option<f64>>| {
-        let Geometry { columns, rows } = maps.geometry;
         let svg = heat_map(&Map {
             title,
             unit,
             sides,
             missing,
-            columns: columns as usize,
-            rows: rows as usize,
+            columns: maps.array.columns() as usize,
+            rows: maps.array.rows() as usize,
             values: &values,
         })?;
         anyhow::Ok(Picture { name, svg, caption })
@@ -117,11 +115,13 @@ fn relative(mut values: Vec<Option<f64>>) -> Vec<Option<f64>> {
 
 #[cfg(test)]
 mod tests {
+    use dtof_core::Array;
+
     use super::*;
 
     #[test]
     fn every_picture_has_its_name_and_mark() {
-        let maps = Maps::new(Geometry::new(1, 1));
+        let maps = Maps::new(Array::new(1, 1).unwrap());
         let pictures = pictures(&maps, ["column", "row"], ["event", "events"]).unwrap();
         assert_eq!(pictures.each_ref().map(|picture| picture.name), NAMES);
         for picture in pictures {

@@ -10,7 +10,6 @@ use anyhow::{Context, Result, ensure};
 use super::sight::Sight;
 use dtof_options::Named;
 use dtof_photons::npy::numbers::{self, Element, Numbers};
-use dtof_photons::source::Geometry;
 
 /// The highest reflectivity of a sample, as of other surfaces.
 const MOST_REFLECTIVITY: f64 = 100.0;
@@ -39,7 +38,8 @@ impl Named for Along {
 /// How far away what each sample shows is, and how bright.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthMap {
-    size: Geometry,
+    /// Columns and rows.
+    size: [u32; 2],
     along: Along,
     /// Row by row; none where there is no surface.
     depth_mm: Vec<Option<f64>>,
@@ -77,7 +77,7 @@ impl DepthMap {
             "no surface anywhere: no depth is finite and above 0"
         );
         Ok(Self {
-            size: Geometry::new(u32::try_from(columns)?, u32::try_from(rows)?),
+            size: [u32::try_from(columns)?, u32::try_from(rows)?],
             along,
             depth_mm,
             reflectivity: Vec::new(),
@@ -98,7 +98,7 @@ impl DepthMap {
 
     /// Columns and rows.
     #[must_use]
-    pub fn size(&self) -> Geometry {
+    pub fn size(&self) -> [u32; 2] {
         self.size
     }
 
@@ -145,14 +145,13 @@ impl DepthMap {
             (2 * index as usize + 1) * samples as usize / (2 * of as usize)
         };
         let [column, row] = sight.pixel;
-        let (array, size) = (sight.array, self.size);
-        at(row, array.rows, size.rows) * size.columns as usize
-            + at(column, array.columns, size.columns)
+        let ([across, down], [columns, rows]) = (sight.size, self.size);
+        at(row, down, rows) * columns as usize + at(column, across, columns)
     }
 }
 
 /// The reflectivity of each sample of a picture that is as large as the depth map.
-fn reflectivity(numbers: &Numbers, size: Geometry) -> Result<Vec<f64>> {
+fn reflectivity(numbers: &Numbers, [columns, rows]: [u32; 2]) -> Result<Vec<f64>> {
     let shape = &numbers.shape;
     let colours = match shape[..] {
         [_, _] => 1,
@@ -163,12 +162,10 @@ fn reflectivity(numbers: &Numbers, size: Geometry) -> Result<Vec<f64>> {
         ),
     };
     ensure!(
-        shape[..2] == [u64::from(size.rows), u64::from(size.columns)],
-        "{} rows and {} columns, but the depth map has {} and {}",
+        shape[..2] == [rows, columns].map(u64::from),
+        "{} rows and {} columns, but the depth map has {rows} and {columns}",
         shape[0],
-        shape[1],
-        size.rows,
-        size.columns
+        shape[1]
     );
     let white = match numbers.element {
         Element::Byte => 255.0,

@@ -20,7 +20,6 @@ use crate::effects::tail::Tail;
 use crate::effects::tdc::Tdc;
 use dtof_photons::geometry::FieldOfView;
 use dtof_photons::range::within;
-use dtof_photons::source::Geometry;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -142,11 +141,11 @@ impl SceneFile {
             let name = name.unwrap_or_else(|| format!("surface {number}"));
             entry.surface(&name, mm_per_bin).context(name)
         });
-        let geometry = Geometry::new(self.columns.into(), self.rows.into());
+        let size = [self.columns, self.rows].map(u32::from);
         let view = self.field_of_view_degrees.map(FieldOfView::new);
         let scene = Scene {
-            geometry,
-            layout: geometry,
+            size,
+            layout: size,
             field_of_view: view.transpose().context("field_of_view_degrees")?,
             cycles: self.cycles,
             bins: self.bins,

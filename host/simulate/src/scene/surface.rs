@@ -6,7 +6,6 @@ use serde::Deserialize;
 
 use super::depth_map::DepthMap;
 use super::sight::Sight;
-use dtof_photons::source::Geometry;
 
 /// Nothing is farther away.
 const FARTHEST_MM: f64 = 1e9;
@@ -127,7 +126,7 @@ impl Surface {
 
     /// How far away it is where a pixel looks, after `seconds`. None if it does not cover
     /// the place.
-    pub(super) fn range_mm(&self, sight: &Sight, seconds: f64, layout: Geometry) -> Option<f64> {
+    pub(super) fn range_mm(&self, sight: &Sight, seconds: f64, layout: [u32; 2]) -> Option<f64> {
         let [column, row] = self.at_start(sight.place, seconds);
         let nearer_mm = match &self.shape {
             Shape::Everywhere => 0.0,
@@ -173,14 +172,14 @@ impl Surface {
 
     /// The least it can be at any place of the layout after `seconds`; of a plane the
     /// least it is anywhere.
-    pub(super) fn nearest_mm(&self, seconds: f64, layout: Geometry) -> f64 {
+    pub(super) fn nearest_mm(&self, seconds: f64, layout: [u32; 2]) -> f64 {
         let nearer_mm = match &self.shape {
             Shape::Plane(plane) => return plane.distance(self.plane_mm(0.0, seconds, layout)),
             Shape::DepthMap(map) => return map.nearest_mm(),
             Shape::Ball(ball) => ball.radius_mm,
             _ => 0.0,
         };
-        let ends = [0.0, f64::from(layout.columns)];
+        let ends = [0.0, f64::from(layout[0])];
         let ends = ends.map(|column| {
             let [column, _] = self.at_start([column, 0.0], seconds);
             self.plane_mm(column, seconds, layout)
@@ -194,9 +193,9 @@ impl Surface {
         [place[0] - columns * seconds, place[1] - rows * seconds]
     }
 
-    fn plane_mm(&self, column: f64, seconds: f64, layout: Geometry) -> f64 {
+    fn plane_mm(&self, column: f64, seconds: f64, layout: [u32; 2]) -> f64 {
         let turned = self.range_right_mm - self.range_mm;
-        let last = f64::from(layout.columns.max(2) - 1);
+        let last = f64::from(layout[0].max(2) - 1);
         self.range_mm + turned * column / last + self.velocity_m_per_s * 1000.0 * seconds
     }
 }

@@ -7,9 +7,9 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
 use anyhow::Result;
+use dtof_core::Array;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
 use dtof_draw::palette::{Pen, STEPS};
-use dtof_photons::source::Geometry;
 use dtof_theory::rates::Rates;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
@@ -21,7 +21,7 @@ const DIM: f64 = 0.05;
 const BRIGHT: f64 = 0.145;
 const PATIENCES: [f64; 3] = [40.0, 64.0, 250.0];
 const PENS: [Pen; 3] = [STEPS[2], STEPS[4], STEPS[6]];
-const ARRAY: Geometry = Geometry::new(32, 32);
+const ARRAY: Array = Array::new(32, 32).unwrap();
 /// Bins between two surfaces.
 const STEP: f64 = 30.0;
 const BEFORE: u64 = 1000;
@@ -86,7 +86,7 @@ fn scene(number: usize, rng: &mut Pcg64) -> Result<Vec<(f64, f64)>> {
             _ => (DIM, near + STEP),
         }
     };
-    Ok((0..ARRAY.addresses()).map(pixel).collect())
+    Ok((0..ARRAY.pixels() as usize).map(pixel).collect())
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {

@@ -6,9 +6,9 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results, ends};
 use crate::sweep::{Part, Point, Study, Tally, grid};
 use anyhow::Result;
+use dtof_core::Array;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{Pen, REFERENCE, STEPS};
-use dtof_photons::source::Geometry;
 use dtof_theory::rates::Rates;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
@@ -18,7 +18,7 @@ const BACKGROUNDS: [f64; 3] = [0.01, 0.05, 0.2];
 const PATIENCES: [f64; 2] = [40.0, 1000.0];
 /// The pens of the patiences.
 const PENS: [Pen; 2] = [STEPS[1], STEPS[5]];
-const ARRAY: Geometry = Geometry::new(8, 8);
+const ARRAY: Array = Array::new(8, 8).unwrap();
 /// Laser cycles before what counts, in which feeds and exposures settle, and those that count.
 const BEFORE: u64 = 2000;
 const WINDOWS: u64 = 20;
@@ -48,23 +48,23 @@ fn points() -> Vec<Point> {
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let setting = Setting::of(point)?;
     let settings = setting.settings(setting.z())?;
-    let rates = vec![Rates::without_target(point["background"]); ARRAY.addresses()];
+    let rates = vec![Rates::without_target(point["background"]); ARRAY.pixels() as usize];
     let mut field = Field::new(ARRAY, &rates, &settings)?;
     field.run(BEFORE, rng, |_| {})?;
     let mut tally = Tally::new();
     for _ in 0..WINDOWS {
         let mut events = Vec::new();
         field.run(L2.into(), rng, |event| events.push(*event))?;
-        let mut covered = vec![false; ARRAY.addresses()];
+        let mut covered = vec![false; ARRAY.pixels() as usize];
         for event in &events {
-            for pixel in ARRAY.block(event.pixel, event.level) {
+            for pixel in ARRAY.pixels_of(event.pixel, event.level) {
                 covered[usize::from(pixel.0)] = true;
             }
             *tally.entry(format!("reports {}", event.level)).or_default() += 1;
         }
         let covered = covered.iter().filter(|&&covered| covered).count() as u64;
         *tally.entry("covered".to_owned()).or_default() += covered;
-        *tally.entry("windows".to_owned()).or_default() += ARRAY.addresses() as u64;
+        *tally.entry("windows".to_owned()).or_default() += u64::from(ARRAY.pixels());
     }
     Ok(tally)
 }

@@ -9,9 +9,9 @@ use crate::sweep::mean::{Measured, Z_99};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::{Context, Result};
+use dtof_core::Array;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{Pen, STEPS};
-use dtof_photons::source::Geometry;
 use dtof_theory::rates::Rates;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
@@ -22,7 +22,7 @@ const BACKGROUND: f64 = 0.05;
 const SIGNALS: [f64; 6] = [0.025, 0.05, 0.1, 0.145, 0.3, 1.0];
 const PATIENCES: [f64; 3] = [40.0, 64.0, 250.0];
 const PENS: [Pen; 4] = [STEPS[0], STEPS[2], STEPS[4], STEPS[6]];
-const ARRAY: Geometry = Geometry::new(8, 8);
+const ARRAY: Array = Array::new(8, 8).unwrap();
 /// Laser cycles before what counts, and those that count.
 const BEFORE: u64 = 1000;
 const CYCLES: u64 = 4000;
@@ -71,7 +71,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         sigma: SIGMA,
     };
     let settings = setting.settings(z)?;
-    let mut field = Field::new(ARRAY, &vec![rates; ARRAY.addresses()], &settings)?;
+    let mut field = Field::new(ARRAY, &vec![rates; ARRAY.pixels() as usize], &settings)?;
     let mut events = Vec::new();
     field.run(BEFORE, rng, |_| {})?;
     field.run(CYCLES, rng, |event| events.push(*event))?;
@@ -85,7 +85,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             covered,
         );
     }
-    add("cycles", CYCLES * ARRAY.addresses() as u64);
+    add("cycles", CYCLES * u64::from(ARRAY.pixels()));
     Ok(tally)
 }
 

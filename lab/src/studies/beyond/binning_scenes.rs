@@ -115,7 +115,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let file = &SCENES[usize::from(whole(point, "scene"))];
     let scene = scene(file, rng)?;
     let mut photons = scene.photons(rng.next_u64(), file.cycles)?;
-    let (array, addresses) = (photons.geometry(), photons.addresses());
+    let (array, addresses) = (photons.array(), photons.addresses());
     let mut runs = Vec::new();
     for levels in LEVELS {
         let setting = Setting {

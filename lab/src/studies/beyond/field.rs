@@ -2,11 +2,11 @@
 
 use super::setting::{BINS, X};
 use anyhow::Result;
-use dtof_core::{DepthEvent, PixelAddress};
+use dtof_core::{Array, DepthEvent, PixelAddress};
 use dtof_engine::group::{Configs, Group};
 use dtof_engine::settings::Settings;
 use dtof_events::reports::LastReports;
-use dtof_photons::source::{Geometry, Photon, PixelPhotons};
+use dtof_photons::source::{Photon, PixelPhotons};
 use dtof_theory::rates::Rates;
 use rand_core::Rng;
 use rand_distr::{Distribution, Normal, Poisson};
@@ -77,9 +77,9 @@ pub struct Field {
 
 impl Field {
     /// An array of pixels with these rates, row by row.
-    pub fn new(array: Geometry, rates: &[Rates], settings: &Settings) -> Result<Self> {
+    pub fn new(array: Array, rates: &[Rates], settings: &Settings) -> Result<Self> {
         let addresses: Vec<PixelAddress> = (0..=u16::MAX)
-            .take(array.addresses())
+            .take(array.pixels() as usize)
             .map(PixelAddress)
             .collect();
         let groups = match settings.binning {
@@ -148,22 +148,22 @@ impl Field {
 
 /// When pixels reported last, by themselves or in a block.
 pub struct Reports {
-    array: Geometry,
+    array: Array,
     last: Vec<LastReports>,
 }
 
 impl Reports {
     /// None yet.
-    pub fn new(array: Geometry) -> Self {
+    pub fn new(array: Array) -> Self {
         Self {
             array,
-            last: vec![LastReports::default(); array.addresses()],
+            last: vec![LastReports::default(); array.pixels() as usize],
         }
     }
 
     /// Takes an event, and gives the pixels that it stands for.
     pub fn take(&mut self, event: &DepthEvent) -> Vec<usize> {
-        let pixels = self.array.block(event.pixel, event.level);
+        let pixels = self.array.pixels_of(event.pixel, event.level);
         pixels
             .map(|pixel| usize::from(pixel.0))
             .filter(|&pixel| self.last[pixel].take(event.level, event.cycle, event.exposure.into()))

@@ -6,10 +6,9 @@ use crate::sweep::mean::{Measured, Z_99, add_value};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
 use anyhow::Result;
-use dtof_core::DepthEvent;
+use dtof_core::{Array, DepthEvent};
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{EVENTS, PAPER, REFERENCE};
-use dtof_photons::source::Geometry;
 use dtof_theory::rates::Rates;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
@@ -26,7 +25,7 @@ const VANISHES: u16 = 3;
 const DRIFT: f64 = 0.1;
 /// A jump, in bins.
 const JUMP: f64 = 30.0;
-const ARRAY: Geometry = Geometry::new(8, 8);
+const ARRAY: Array = Array::new(8, 8).unwrap();
 /// Laser cycles with the target in its first place, and after that.
 const BEFORE: u64 = 3000;
 const AFTER: u64 = 3000;
@@ -65,7 +64,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             position,
             sigma: SIGMA,
         };
-        vec![rates; ARRAY.addresses()]
+        vec![rates; ARRAY.pixels() as usize]
     };
     let signal = point["signal"];
     let settings = setting.settings(setting.z())?;
@@ -95,7 +94,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         _ => {}
     }
     field.run(AFTER, rng, |event| events.push(*event))?;
-    let mut first = vec![None; ARRAY.addresses()];
+    let mut first = vec![None; ARRAY.pixels() as usize];
     for event in &events {
         let pixel = usize::from(event.pixel.0);
         if event.cycle.0 < BEFORE {
@@ -129,10 +128,10 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             }
         }
         VANISHES => {
-            tally.insert("pixels".to_owned(), ARRAY.addresses() as u64);
+            tally.insert("pixels".to_owned(), u64::from(ARRAY.pixels()));
         }
         _ => {
-            let cycles = (BEFORE + AFTER - u64::from(L2)) * ARRAY.addresses() as u64;
+            let cycles = (BEFORE + AFTER - u64::from(L2)) * u64::from(ARRAY.pixels());
             tally.insert("cycles".to_owned(), cycles);
         }
     }

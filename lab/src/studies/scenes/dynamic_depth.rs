@@ -21,7 +21,7 @@ use super::systems::{Background, FPGA_SIGMAS, L1, PC_SIGMA, System};
 use crate::sweep::mean::add;
 use crate::sweep::{Point, Study, Tally, grid, point};
 use dtof_engine::host::host_engine;
-use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::{Light, Scene, Shape};
 
 /// Laser cycles handled at a time.
@@ -102,10 +102,7 @@ fn scene(point: &Point, shift: f64, goes_away: bool) -> Result<Scene> {
     };
     let run = run(point);
     let mut scene = Scene {
-        geometry: Geometry {
-            columns: 8,
-            rows: 8,
-        },
+        size: [8, 8],
         ..System::of(point).scene(text, run.sigma)?
     };
     let shift_mm = (run.before + shift) * scene.mm_per_bin();
@@ -147,7 +144,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         }
         rules.push((
             background,
-            host_engine(&settings, photons.geometry(), &addresses)?,
+            host_engine(&settings, photons.array(), &addresses)?,
             ways,
         ));
     }

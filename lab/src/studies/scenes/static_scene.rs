@@ -22,7 +22,7 @@ use super::systems::{self, Background, FPGA_SIGMAS, PC, PC_SIGMA, System};
 use crate::sweep::mean::{add, add_error, add_value};
 use crate::sweep::{Point, Study, Tally, Trial, point};
 use dtof_engine::host::host_engine;
-use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::{Light, Scene};
 
 const CYCLES: u64 = 10_000;
@@ -99,7 +99,7 @@ fn scene(point: &Point, shift: f64) -> Result<Scene> {
     scene.background = point["background"];
     let mm_per_bin = scene.mm_per_bin();
     // From the first column of the layout to the last, in bins.
-    let turn = f64::from(scene.layout.columns - 1) / PIXELS_A_BIN;
+    let turn = f64::from(scene.layout[0] - 1) / PIXELS_A_BIN;
     let bright = point["light"] * scene.signal_at_one_metre;
     for (surface, bins) in scene.surfaces.iter_mut().zip(PC_BINS) {
         if system == PC {
@@ -113,10 +113,7 @@ fn scene(point: &Point, shift: f64) -> Result<Scene> {
         surface.range_right_mm = surface.range_mm + turn * mm_per_bin;
     }
     if system == PC {
-        scene.geometry = Geometry {
-            columns: 64,
-            rows: 32,
-        };
+        scene.size = [64, 32];
     }
     Ok(scene)
 }
@@ -150,7 +147,7 @@ fn watched<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let settings = system.settings(background, l1, rng.next_u64());
     let mut photons = scene.photons(settings.seed, CYCLES)?;
     let addresses = photons.addresses();
-    let mut engine = host_engine(&settings, photons.geometry(), &addresses)?;
+    let mut engine = host_engine(&settings, photons.array(), &addresses)?;
     let mut pixels: Vec<Pixel> = addresses.iter().map(|_| Pixel::default()).collect();
     let mut frames: Vec<_> = addresses
         .iter()
@@ -342,12 +339,12 @@ mod tests {
     fn boards_lie_evenly_in_a_bin() {
         for point in points() {
             let scene = scene(&point, 0.3).unwrap();
-            let across = scene.geometry.columns / 32;
+            let across = scene.size[0] / 32;
             for board in [2, 12, 22] {
                 let columns = board * across..(board + 8) * across;
                 let mut phases: Vec<f64> = columns
                     .map(|column| {
-                        let address = 8 * across * scene.geometry.columns + column;
+                        let address = 8 * across * scene.size[0] + column;
                         let address = PixelAddress(u16::try_from(address).unwrap());
                         let view = scene.truth(address, 0).unwrap();
                         assert_ne!(scene.surfaces[view.surface].name, "wall");

@@ -106,19 +106,16 @@ impl Desk {
             "the settings are for {} bins, the device has {bins}",
             said.sensor.bins.unwrap_or_default(),
         );
-        let geometry = array(pixels, said.sensor.columns);
-        ensure!(
-            geometry.addresses() == usize::from(pixels),
-            Refused::value(
-                "columns",
-                geometry.columns,
-                format!("the device has {pixels} pixels, which do not fill such rows")
-            )
-        );
+        let array = array(pixels, said.sensor.columns);
+        let array = array.filter(|array| array.pixels() == u32::from(pixels));
+        let array = array.ok_or_else(|| {
+            let reason = format!("the device has {pixels} pixels, which do not fill such rows");
+            Refused::value("columns", said.sensor.columns.unwrap_or(1), reason)
+        })?;
         let known = SettingsFile {
             sensor: Sensor {
                 laser_hz: Some(sensor.laser_millihertz / 1000).filter(|&hz| hz > 0),
-                columns: Some(geometry.columns),
+                columns: Some(array.columns()),
                 bins: Some(bins),
                 bin_width_ps: Some(sensor.bin_width.unwrap_or(BIN_WIDTH_PS)),
                 offset_mm: Some(sensor.offset).filter(|offset| !offset.is_zero()),
@@ -154,7 +151,7 @@ impl Desk {
         let median = cycles.get(cycles.len() / 2).copied().unwrap_or(0);
         let captures = [collected.histograms];
         let observed = Observed {
-            geometry,
+            array,
             captures: &captures,
             length: Length::Cycles(median),
             cycles: Some(&collected.cycles),

@@ -2,19 +2,18 @@
 
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
-    BinIndex, BinPosition, BlockLevel, Count, DepthEvent, DynamicDepthEvent, EchoNumber, Flags,
-    LaserCycle, PixelAddress, SubBinOffset,
+    Array, BinIndex, BinPosition, BlockLevel, Count, DepthEvent, DynamicDepthEvent, EchoNumber,
+    Flags, LaserCycle, PixelAddress, SubBinOffset,
 };
 use dtof_events::aer_file::{Event, Header, Writer};
 use dtof_export::{Exported, Format, Options, export};
-use dtof_photons::source::Geometry;
 
 use super::{Scratch, names};
 
 /// 64 columns, 32 rows, 128 bins of 250 ps.
 pub const HEADER: Header = Header {
     bins: 128,
-    geometry: Geometry::new(64, 32),
+    array: Array::new(64, 32).unwrap(),
     bin_width_ps: U16F16::lit("250"),
     offset_mm: I24F8::lit("-12.5"),
     laser_millihertz: 0,

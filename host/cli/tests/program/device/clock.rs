@@ -128,7 +128,7 @@ fn recorded(path: &Path, sensor: impl Sensor + Send + 'static) {
     let task = Task {
         settings: &setup.settings,
         pixels: setup.pixels,
-        columns: setup.geometry.columns,
+        columns: setup.array.columns(),
         dynamic_depth: None,
         // The clock of the device is the faster one.
         host_timeout: HostTimeout::from_milliseconds(60_000).unwrap(),

@@ -9,20 +9,20 @@ use std::time::Duration;
 use crate::common::says;
 use crate::device::{client, listen, serve};
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{BlockLevel, Count, DepthEvent, EchoNumber, PixelAddress, WindowRule};
+use dtof_core::{Array, BlockLevel, Count, DepthEvent, EchoNumber, PixelAddress, WindowRule};
 use dtof_device::{Client, DeviceEngine};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::AdaptiveBinning;
-use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_photons::source::PhotonSource;
 use dtof_simulate::{demo, scene};
 
 const PIXELS: usize = 64;
 /// As many as an array of 8x8 pixels has in three levels.
 const BLOCKS: usize = 21;
-const ARRAY: Geometry = Geometry::new(8, 8);
+const ARRAY: Array = Array::new(8, 8).unwrap();
 
 fn settings() -> Settings {
     scene::settings(1)
@@ -60,8 +60,8 @@ fn device(lives: Option<Duration>) -> String {
 /// All events of `cycles` laser cycles of the demo's scene, which is the same with all
 /// settings.
 fn events(engine: &mut dyn Engine, cycles: u64) -> anyhow::Result<Vec<DepthEvent>> {
-    let geometry = Geometry::new(8, 8);
-    let mut photons = demo::photons(geometry, 1, cycles)?;
+    let array = Array::new(8, 8).unwrap();
+    let mut photons = demo::photons(array, 1, cycles)?;
     let mut events = Vec::new();
     for _ in 0..cycles / 250 {
         events.extend(engine.run(&photons.next_slice(250)?)?);
@@ -176,7 +176,7 @@ fn a_configuration_the_device_cannot_take_is_refused_with_its_reason() {
     let column = DeviceEngine::new(
         client(&name),
         &settings,
-        Geometry::new(1, 64),
+        Array::new(1, 64).unwrap(),
         &addresses(64),
     );
     let reason = format!("{:#}", column.err().expect("refused"));

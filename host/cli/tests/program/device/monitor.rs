@@ -13,7 +13,7 @@ use crate::common::{Scratch, names, says};
 use crate::device::{Closing, client, listen, serve, settings};
 use anyhow::Result;
 use dtof_core::fixed::types::{U16F16, U24F8};
-use dtof_core::{DepthEvent, DynamicDepthPixel, PixelAddress, Reference};
+use dtof_core::{Array, DepthEvent, DynamicDepthPixel, PixelAddress, Reference};
 use dtof_device::monitor::{Outputs, Task, monitor};
 use dtof_device::{Client, HostTimeout};
 use dtof_engine::host::host_engine;
@@ -21,7 +21,6 @@ use dtof_engine::settings::Settings;
 use dtof_events::events_csv;
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::DynamicDepth;
-use dtof_photons::source::Geometry;
 use dtof_sensors::simulated::Simulated;
 use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
 
@@ -103,7 +102,7 @@ fn reference_events() -> Vec<DepthEvent> {
     let addresses: Vec<_> = (0..PIXELS).map(PixelAddress).collect();
     let mut photons = Photons::new(PIXELS);
     sensor().laser_cycles(5_000, &mut photons);
-    let mut engine = host_engine(&settings(), Geometry::new(4, 1), &addresses).unwrap();
+    let mut engine = host_engine(&settings(), Array::new(4, 1).unwrap(), &addresses).unwrap();
     engine.run(&photons.slice(0)).unwrap()
 }
 

@@ -151,17 +151,15 @@ fn device(versions: [u16; 2], pixel: u16, lives: u64) -> Device {
 fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("events.aer");
-    let header = Header {
-        geometry: array(PIXELS, None),
-        ..HEADER
-    };
+    let array = array(PIXELS, None).unwrap();
+    let header = Header { array, ..HEADER };
     let device = device([LINK_VERSION, AER_VERSION], pixel, lives);
     let sent = Arc::clone(&device.sent);
     let mut client = Client::new(Box::new(device)).unwrap();
     let mut recording = Recording::new(&path, &[], &header).unwrap();
     let screen = Screen::default();
     let room = Box::new(|| (24, 80));
-    let mut map = LiveMap::new(Box::new(screen.clone()), room, PIXELS, 2);
+    let mut map = LiveMap::new(Box::new(screen.clone()), room, PIXELS, array);
     let task = Task {
         settings: &settings(),
         pixels: PIXELS,

@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
+use dtof_core::Array;
+
 use super::event_camera::{evt2, mcap};
 use crate::common::aer::{HEADER, below, byte_of, depth, dynamic, events, exported, file};
 use crate::common::{Scratch, names, says};
 use dtof_events::aer_file::{Event, Header};
 use dtof_export::{Format, Options};
-use dtof_photons::source::Geometry;
 
 /// How many whole points a file holds, which must be as many as it says.
 fn points(format: Format, bytes: &[u8]) -> u64 {
@@ -178,7 +179,7 @@ fn a_whole_file_of_times_that_the_format_cannot_hold_is_refused() {
 fn what_export_takes_for_damage_decode_does_too() {
     let beyond = Header { bins: 32, ..HEADER };
     let mut narrow = HEADER;
-    narrow.geometry = Geometry::new(8, 2);
+    narrow.array = Array::new(8, 2).unwrap();
     let scratch = Scratch::new();
     for (header, event, part) in [
         (beyond, depth(0, 2, 32), "bin 32 of 32"),

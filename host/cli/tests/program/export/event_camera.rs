@@ -4,10 +4,9 @@
 use crate::common::Scratch;
 use crate::common::aer::{HEADER, below, depth, depth_event, dynamic, exported, file};
 use dtof_core::fixed::types::U24F8;
-use dtof_core::{Flags, Reference};
+use dtof_core::{Array, Flags, Reference};
 use dtof_events::aer_file::Event;
 use dtof_export::{Exported, Format, LaserClock, Options};
-use dtof_photons::source::Geometry;
 
 /// Time, column, row and whether it is ON, of each event.
 pub fn evt2(bytes: &[u8]) -> Vec<(u64, u32, u32, bool)> {
@@ -153,7 +152,7 @@ fn changes_that_are_too_late_are_left_out_and_said() {
 fn what_evt2_cannot_hold_is_refused() {
     let scratch = Scratch::new();
     let mut wide = HEADER;
-    wide.geometry = Geometry::new(2049, 1);
+    wide.array = Array::new(2049, 1).unwrap();
     scratch.file("wide.aer", file(&wide, &[]));
     let one = |cycle| file(&HEADER, &[dynamic(0, cycle, 40, 1)]);
     scratch.file("last.aer", one((1 << 34) * 10 - 1));

@@ -2,11 +2,10 @@
 
 use crate::common::aer::{HEADER, depth, dynamic, events, exported, file};
 use crate::common::{Scratch, says, table};
-use dtof_core::{BlockLevel, PixelAddress};
+use dtof_core::{Array, BlockLevel, PixelAddress};
 use dtof_events::aer_file::EventKind;
 use dtof_export::{Format, Options};
 use dtof_photons::geometry::Rays;
-use dtof_photons::source::Geometry;
 
 /// A record: x, y, z, value, pixel; flags, level, echo; time.
 fn record(bytes: &[u8]) -> ([f32; 4], u32, [u8; 3], f64) {
@@ -191,7 +190,7 @@ fn the_calibration_of_the_documentation_is_one() {
     let (_, rest) = docs.split_once("```toml\n").unwrap();
     let (text, _) = rest.split_once("```").unwrap();
     let scratch = Scratch::new();
-    let rays = Rays::read(&scratch.file("rays.toml", text), Geometry::new(2, 1)).unwrap();
+    let rays = Rays::read(&scratch.file("rays.toml", text), Array::new(2, 1).unwrap()).unwrap();
     // Its second pixel measures 12.5 mm too little.
     let point = rays.point(PixelAddress(1), BlockLevel::PIXEL, 987.5);
     let length = point.unwrap().iter().map(|side| side * side).sum::<f64>();

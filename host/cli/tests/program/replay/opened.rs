@@ -4,10 +4,10 @@ use std::fs::File;
 use std::io::Write;
 use std::sync::Arc;
 
+use dtof_core::Array;
 use dtof_core::fixed::types::U16F16;
 use dtof_photons::medium::{Medium, NpyArray};
 use dtof_photons::open::{BIN_WIDTH_PS, Counts, Opening, counts, open};
-use dtof_photons::source::Geometry;
 use dtof_photons::{tmf8820, tmf8829};
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -27,7 +27,7 @@ fn photon_lists_are_summed_over_their_laser_cycles() {
         // Not so many slices as that takes.
         "pixel,cycle,bin\n2,0,5\n2,7,5\n0,70000000000000,127\n2,70000000000000,6\n",
     );
-    assert_eq!(counts.geometry, Geometry::new(3, 1));
+    assert_eq!(counts.array, Array::new(3, 1).unwrap());
     assert_eq!(counts.cycles, Some(70_000_000_000_001));
     let [pixels] = &counts.captures[..] else {
         panic!("one capture")
@@ -81,7 +81,7 @@ fn a_tmf8829_log_is_told_by_its_content_and_read_packed_or_not() {
     let configuration = ", \"configuration\": {\"bin_shift\": 2, \"histogram_bins\": 218}";
     let log = tmf8829_log(|column, place| 100 * column + place, configuration);
     let plain = counts_of("a.json", &log);
-    assert_eq!(plain.geometry, Geometry::new(2, 4));
+    assert_eq!(plain.array, Array::new(2, 2).unwrap());
     assert_eq!(plain.captures.len(), 2);
     assert_eq!(plain.captures[1][3][7], 107);
     // 218 of the sensor's own bins are 54 of four, and one of two.
@@ -103,7 +103,7 @@ fn a_tmf8829_log_is_told_by_its_content_and_read_packed_or_not() {
 #[test]
 fn columns_that_are_all_the_same_are_read_once() {
     let counts = counts_of("a.json", &tmf8829_log(|_, place| place, ""));
-    assert_eq!(counts.geometry, Geometry::new(1, 4));
+    assert_eq!(counts.array, Array::new(1, 2).unwrap());
     assert_eq!(counts.captures[0].len(), 2);
     assert_eq!(counts.known.gate, None);
     let row = &counts.known.rows[0];

@@ -213,6 +213,11 @@ fn settings_that_cannot_be_are_refused() {
             --apha 4 | --apha is unknown; is it --alpha?
         "#,
     );
+    scratch.file("wide.csv", "pixel,cycle,bin\n50000,0,1\n");
+    scratch.all_refused(
+        "replay --out out --input wide.csv",
+        "--columns 40000 | --columns 40000: makes more than 65,536 pixels",
+    );
     scratch.file("h.npy", npy(&described("<u1", "False", "(8,)"), &[1; 8]));
     scratch.all_refused(
         "replay --out out --input h.npy",

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use dtof_core::PixelAddress;
 use dtof_photons::geometry::FieldOfView;
-use dtof_photons::source::Geometry;
 use dtof_simulate::scene::{Along, DepthMap, Scene};
 use proptest::prelude::*;
 
@@ -23,7 +22,7 @@ fn floats(shape: &str, values: &[f32]) -> Vec<u8> {
 fn scene(map: DepthMap) -> Scene {
     let size = map.size();
     let mut scene = Scene::parse("").unwrap();
-    (scene.geometry, scene.layout) = (size, size);
+    (scene.size, scene.layout) = (size, size);
     scene.field_of_view = Some(FieldOfView::new([90.0, 90.0]).unwrap());
     scene.add_depth_map(map).unwrap();
     scene
@@ -35,7 +34,9 @@ fn read(path: &Path) -> Scene {
 
 /// The range that each pixel sees.
 fn ranges(scene: &Scene) -> Vec<Option<f64>> {
-    let pixels = (0..).take(scene.geometry.addresses()).map(PixelAddress);
+    let pixels = (0..)
+        .take(scene.array().unwrap().pixels() as usize)
+        .map(PixelAddress);
     pixels
         .map(|pixel| scene.truth(pixel, 0).map(|view| view.range_mm))
         .collect()
@@ -133,7 +134,7 @@ proptest! {
             prop_assert!((map.unwrap() / formula - 1.0).abs() < 1e-12);
             prop_assert!((plane.unwrap() / formula - 1.0).abs() < 1e-9);
         }
-        for pixel in (0..).take(map.geometry.addresses()).map(PixelAddress) {
+        for pixel in (0..).take(map.array().unwrap().pixels() as usize).map(PixelAddress) {
             let (of_map, of_plane) = (map.rates(pixel, 0).signal, plane.rates(pixel, 0).signal);
             prop_assert!((of_map / of_plane - 1.0).abs() < 1e-9);
         }
@@ -151,7 +152,7 @@ fn another_array_sees_the_nearest_sample() {
         let map = DepthMap::read(&path, Along::Ray).unwrap();
         for columns in 1..=20u32 {
             let mut scene = scene(map.clone());
-            scene.geometry = Geometry::new(columns, 3);
+            scene.size = [columns, 3];
             for (pixel, range) in (0..).zip(ranges(&scene)) {
                 let middle = (f64::from(pixel % columns) + 0.5) / f64::from(columns);
                 let place = middle * f64::from(samples);

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use crate::common::{Scratch, says};
 use dtof_core::PixelAddress;
-use dtof_photons::source::Geometry;
 use dtof_simulate::scene::Scene;
 
 fn repository(path: &str) -> PathBuf {
@@ -244,11 +243,11 @@ fn another_array_sees_as_much_of_a_plane() {
                 plane = { normal = [0.5, 0.3, 1] }\n";
     let scene = Scene::parse(text).unwrap();
     let square = Scene {
-        geometry: Geometry::new(8, 8),
+        size: [8, 8],
         ..scene.clone()
     };
     let range = |scene: &Scene, column: u16, row: u16| {
-        let columns = u16::try_from(scene.geometry.columns).unwrap();
+        let columns = u16::try_from(scene.size[0]).unwrap();
         let pixel = PixelAddress(row * columns + column);
         scene.truth(pixel, 0).unwrap().range_mm
     };

@@ -1,7 +1,6 @@
 //! Motion: what a scene says is true, and where the photons are.
 
 use dtof_core::PixelAddress;
-use dtof_photons::source::Geometry;
 use dtof_simulate::demo;
 use dtof_simulate::scene::{Scene, View};
 
@@ -114,9 +113,8 @@ fn the_nearest_surface_is_seen_and_nothing_where_there_is_none() {
 #[test]
 fn another_array_looks_at_the_same_scene() {
     let demo = demo::scene().unwrap();
-    let geometry = Geometry::new(16, 8);
     let small = Scene {
-        geometry,
+        size: [16, 8],
         ..demo.clone()
     };
     for row in 0..8 {

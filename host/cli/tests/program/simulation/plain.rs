@@ -2,7 +2,7 @@
 //! nothing.
 
 use dtof_core::PixelAddress;
-use dtof_photons::source::{Geometry, PhotonSource};
+use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 use dtof_theory::random::pixel_rng;
 use rand_distr::{Bernoulli, Distribution, Normal, Poisson, Uniform};
@@ -25,9 +25,8 @@ fn the_photons_of_a_plain_scene_are_what_they_were_bit_for_bit() {
         (8, 8, 0x13fb_0c3a_4633_b873),
         (5, 3, 0xdf13_a2d4_baeb_f6cb),
     ] {
-        let geometry = Geometry { columns, rows };
         let scene = Scene {
-            geometry,
+            size: [columns, rows],
             ..Scene::parse(SCENE).unwrap()
         };
         let mut photons = scene.photons(1, 600).unwrap();

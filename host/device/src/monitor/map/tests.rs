@@ -8,6 +8,10 @@ use proptest::prelude::*;
 use super::*;
 use dtof_events::fixtures::{self, event, scale};
 
+fn array(columns: u32, rows: u32) -> Array {
+    Array::new(columns, rows).unwrap()
+}
+
 /// `text` without colours.
 fn characters(text: &str) -> String {
     let mut parts = text.split('\x1b');
@@ -127,7 +131,12 @@ impl Screen {
 #[test]
 fn it_is_drawn_in_place_and_gives_the_cursor_back() {
     let screen = Screen::default();
-    let mut map = LiveMap::new(Box::new(screen.clone()), Box::new(|| (24, 40)), 4, 2);
+    let mut map = LiveMap::new(
+        Box::new(screen.clone()),
+        Box::new(|| (24, 40)),
+        4,
+        array(2, 2),
+    );
     map.draw_when_due().unwrap();
     let first = screen.taken();
     assert!(first.starts_with(HIDE_CURSOR));
@@ -155,7 +164,7 @@ fn it_is_drawn_in_place_and_gives_the_cursor_back() {
 /// 5x3 pixels, the last two of which are not there.
 #[test]
 fn a_block_fills_its_pixels_that_have_not_reported_since() {
-    let mut map = LiveMap::new(Box::new(io::sink()), Box::new(|| (24, 40)), 13, 5);
+    let mut map = LiveMap::new(Box::new(io::sink()), Box::new(|| (24, 40)), 13, array(5, 3));
     let of = |pixel, level, cycle, bin| {
         let level = BlockLevel::new(level).unwrap();
         let event = event(pixel, cycle, bin); // over 40 laser cycles
@@ -201,7 +210,7 @@ fn no_line_is_wider_than_the_terminal_whose_size_may_change() {
         Box::new(screen.clone()),
         Box::new(move || asked.get()),
         64,
-        8,
+        array(8, 8),
     );
     map.ranges.fill(Some(123_456.0));
     map.ranges[0] = Some(1.0);

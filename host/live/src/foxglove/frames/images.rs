@@ -3,12 +3,12 @@
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use dtof_core::Array;
 use foxglove::messages::RawImage;
 
 use crate::foxglove::topics::Topic;
 use crate::hub::Pixel;
 use dtof_export::foxglove::{FRAME, Time, encoded};
-use dtof_photons::source::Geometry;
 
 /// Rates are those of so long.
 const RATE: Duration = Duration::from_secs(1);
@@ -16,7 +16,7 @@ const RATE: Duration = Duration::from_secs(1);
 /// What is known of all pixels.
 #[derive(Default)]
 pub struct Images {
-    array: Option<Geometry>,
+    array: Option<Array>,
     pixels: Vec<Pixel>,
     change: Option<u64>,
     /// The counts at the beginning of the second, and when that was.
@@ -27,10 +27,10 @@ pub struct Images {
 }
 
 impl Images {
-    /// No events of an array yet.
-    pub fn of(array: Geometry) -> Self {
+    /// No events yet, of an array if there is one.
+    pub fn of(array: Option<Array>) -> Self {
         Self {
-            array: Some(array),
+            array,
             ..Self::default()
         }
     }
@@ -80,14 +80,10 @@ impl Images {
     /// # Errors
     /// If it cannot be encoded.
     pub fn message(&self, topic: Topic, time: u64) -> Result<Option<Vec<u8>>> {
-        let Some(array) = self.array else {
+        let Some(array) = self.array.filter(|_| !self.pixels.is_empty()) else {
             return Ok(None);
         };
-        let (width, height) = (array.columns, array.rows);
-        let all = width as usize * height as usize;
-        if all == 0 || self.pixels.is_empty() {
-            return Ok(None);
-        }
+        let (width, height) = (array.columns(), array.rows());
         let value = |(number, pixel): (usize, &Pixel)| match topic {
             Topic::Rate => self.rates.get(number).copied().unwrap_or(f32::NAN),
             // No event yet that tells it.
@@ -98,7 +94,9 @@ impl Images {
             _ => pixel.reflectivity,
         };
         let values = self.pixels.iter().enumerate().map(value);
-        let values = values.chain(std::iter::repeat(f32::NAN)).take(all);
+        let values = values
+            .chain(std::iter::repeat(f32::NAN))
+            .take(array.pixels() as usize);
         let data: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
         let image = RawImage {
             timestamp: Time::of(time).stamp(),

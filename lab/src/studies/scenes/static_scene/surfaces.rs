@@ -9,10 +9,8 @@ use dtof_core::PixelAddress;
 pub fn surfaces(point: &PointTally) -> Result<Vec<(String, f64)>> {
     let scene = scene(&point.parameters, 0.0)?;
     let mut sums = vec![(0.0, 0.0); scene.surfaces.len()];
-    for address in (0..u16::MAX)
-        .take(scene.geometry.addresses())
-        .map(PixelAddress)
-    {
+    let pixels = scene.array()?.pixels() as usize;
+    for address in (0..u16::MAX).take(pixels).map(PixelAddress) {
         if let Some(view) = scene.truth(address, 0) {
             let (sum, count) = &mut sums[view.surface];
             *sum += scene.rates(address, 0).signal;

@@ -5,6 +5,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdout, Stdio};
 use std::time::{Duration, Instant};
 
+use dtof_core::Array;
 use serde_json::json;
 use tungstenite::Message;
 
@@ -16,7 +17,6 @@ use crate::view::http::{Stream, post};
 use crate::view::{Live, fast, until};
 use dtof_events::aer_file::{Header, Reader};
 use dtof_live::MOST_CLIENTS;
-use dtof_photons::source::Geometry;
 
 #[test]
 fn pages_of_other_sites_read_nothing() {
@@ -169,7 +169,7 @@ fn a_client_that_reads_slowly_is_told_what_it_missed() {
 fn memory_does_not_grow_while_a_client_reads_nothing() {
     let scratch = Scratch::new();
     let header = Header {
-        geometry: Geometry::new(256, 256),
+        array: Array::new(256, 256).unwrap(),
         ..recording().0
     };
     let events = (0..2000).map(|number| depth(number, 20 * u64::from(number), 40));
