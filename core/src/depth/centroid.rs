@@ -102,14 +102,20 @@ const HAS_DIVISION: bool = cfg!(any(
 ));
 
 /// `256 · part / whole`, to the nearest whole number, halves up; 0 of nothing. `part` is at most
-/// `whole`, which is below 2²⁴.
+/// `whole`, which is below 3 · 2²².
 #[inline(always)]
 fn share(part: u32, whole: u32) -> u32 {
     if HAS_DIVISION {
-        let share = ((part << 8) + whole / 2).checked_div(whole);
-        return share.unwrap_or(0);
+        share_by_division(part, whole)
+    } else {
+        share_bit_by_bit(part, whole)
     }
-    share_bit_by_bit(part, whole)
+}
+
+#[inline(always)]
+fn share_by_division(part: u32, whole: u32) -> u32 {
+    let share = ((part << 8) + whole / 2).checked_div(whole);
+    share.unwrap_or(0)
 }
 
 /// The same in half the time of a division without an instruction for it.
@@ -131,4 +137,27 @@ const fn share_bit_by_bit(part: u32, whole: u32) -> u32 {
         bit += 1;
     }
     if 2 * rest >= whole { share + 1 } else { share }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{share_bit_by_bit, share_by_division};
+
+    /// To the last bit, small ones all, and the largest.
+    #[test]
+    fn both_ways_share_alike() {
+        let check = |part: u32, whole: u32| {
+            let share = (u64::from(part) * 512 + u64::from(whole))
+                .checked_div(u64::from(whole) * 2)
+                .unwrap_or(0);
+            assert_eq!(u64::from(share_by_division(part, whole)), share);
+            assert_eq!(u64::from(share_bit_by_bit(part, whole)), share);
+        };
+        for whole in (0..1024).chain((3 << 22) - 1024..3 << 22) {
+            let step = 1 + whole as usize / 1024;
+            (0..=whole)
+                .step_by(step)
+                .for_each(|part| check(part, whole));
+        }
+    }
 }

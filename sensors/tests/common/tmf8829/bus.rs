@@ -28,6 +28,8 @@ pub struct Wires {
     /// Of the next transfer.
     pub fault: Option<Fault>,
     pub is_unplugged: bool,
+    /// ENABLE is high.
+    is_enabled: bool,
     /// INT is at this level, whatever the chip says.
     pub stuck: Option<bool>,
     /// Each transfer: what was written, and what was read.
@@ -44,6 +46,7 @@ impl Bus {
             chip,
             fault: None,
             is_unplugged: false,
+            is_enabled: false,
             stuck: None,
             log: Vec::new(),
         })))
@@ -62,7 +65,8 @@ impl Bus {
         let nack = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
         wires.log.push((written.to_vec(), None));
         let chip = &mut wires.chip;
-        if wires.is_unplugged || chip.address != address || fault == Some(Fault::Nack) {
+        let is_there = wires.is_enabled && !wires.is_unplugged;
+        if !is_there || chip.address != address || fault == Some(Fault::Nack) {
             return Err(nack);
         }
         let read = match (read, written) {
@@ -122,10 +126,13 @@ impl InputPin for Bus {
 
 impl OutputPin for Bus {
     fn set_low(&mut self) -> Result<(), Broken> {
-        self.0.borrow_mut().chip.reset();
+        let mut wires = self.0.borrow_mut();
+        wires.is_enabled = false;
+        wires.chip.reset();
         Ok(())
     }
     fn set_high(&mut self) -> Result<(), Broken> {
+        self.0.borrow_mut().is_enabled = true;
         Ok(())
     }
 }
