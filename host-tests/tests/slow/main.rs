@@ -10,6 +10,7 @@
 //! ```
 
 mod boards;
+mod compare;
 mod debugger;
 mod emulator;
 mod hil;

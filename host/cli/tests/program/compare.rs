@@ -1,7 +1,5 @@
 //! `dtof compare`, end to end.
 
-mod figures;
-
 use std::fmt::Write;
 use std::fs;
 
