@@ -198,7 +198,7 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
     let cycles = scene.cycles();
     let (counts, _) = scene.pooled();
     let known = |spent| {
-        pulse.as_ref().map(|pulse| settle::Known {
+        pulse.as_ref().map(|pulse| settle::Findings {
             bins,
             gate,
             pulse,

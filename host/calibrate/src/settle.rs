@@ -26,7 +26,7 @@ pub const MIN_COUNT: u16 = 5;
 const FULL: f64 = 860.0;
 
 /// What there is to decide by.
-pub struct Known<'a> {
+pub struct Findings<'a> {
     /// Bins of a histogram.
     pub bins: usize,
     /// First and last bin of the gate.
@@ -79,7 +79,7 @@ pub fn sigma(sigma: f64) -> U8F8 {
 ///
 /// # Errors
 /// If so few false alarms cannot be simulated.
-pub fn detection(known: &Known) -> Result<Detection> {
+pub fn detection(known: &Findings) -> Result<Detection> {
     let background = known.pixels.background;
     let l2 = l2(background);
     let sigma = sigma(known.pulse.sigma);

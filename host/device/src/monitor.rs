@@ -1,9 +1,9 @@
 //! A device with a sensor: its events as they come, and once a second what it
 //! does.
 
+mod event_file;
 pub mod losses;
 pub mod map;
-mod recording;
 
 use std::io::{self, ErrorKind, Write};
 use std::time::{Duration, Instant};
@@ -18,9 +18,9 @@ use dtof_engine::settings::Settings;
 use dtof_events::aer_file::Event;
 use dtof_events::events_csv;
 use dtof_options::Refused;
+pub use event_file::EventFile;
 use losses::{Losses, since};
 use map::LiveMap;
-pub use recording::Recording;
 
 /// How often there are statistics.
 const EVERY: Duration = Duration::from_secs(1);
@@ -86,7 +86,7 @@ pub struct Outputs<'a> {
     /// The ranges as a picture, and then the lines of statistics below it.
     pub map: Option<&'a mut LiveMap>,
     /// All events once more.
-    pub recording: Option<&'a mut Recording>,
+    pub recording: Option<&'a mut EventFile>,
     /// Events of pixels that are left out, which are written nowhere.
     pub masked: u64,
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
-use dtof_device::monitor::Recording;
+use dtof_device::monitor::EventFile;
 use dtof_engine::settings::SettingsFile;
 use dtof_events::aer_file::{Event, Header};
 use dtof_options::files::aside;
@@ -70,9 +70,9 @@ impl Folder {
     ///
     /// # Errors
     /// If there is no folder, or it cannot be written.
-    pub fn record(&self, header: &Header) -> Result<(PathBuf, Recording)> {
+    pub fn record(&self, header: &Header) -> Result<(PathBuf, EventFile)> {
         let path = self.free("events", "aer")?;
-        let recording = Recording::new(&path, &[], header)?.that_replaces_nothing();
+        let recording = EventFile::new(&path, &[], header)?.that_replaces_nothing();
         Ok((path, recording))
     }
 }
@@ -82,7 +82,7 @@ pub struct Recorder {
     folder: Folder,
     /// Whether events are to be recorded.
     is_wanted: bool,
-    now: Option<(PathBuf, Recording, u64)>,
+    now: Option<(PathBuf, EventFile, u64)>,
 }
 
 /// What a recorder does, for pages.

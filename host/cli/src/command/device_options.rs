@@ -54,7 +54,7 @@ pub struct DeviceOptions {
     #[command(flatten)]
     host: HostOptions,
     #[command(flatten)]
-    of_dynamic_depth: dynamic_depth::Options,
+    of_dynamic_depth: dynamic_depth::DynamicDepthFlags,
     #[command(flatten)]
     operation: Flags<Operation>,
 }

@@ -8,7 +8,7 @@ use dtof_options::Refused;
 use dtof_options::numbers::fixed;
 
 #[derive(Args)]
-pub struct Options {
+pub struct DynamicDepthFlags {
     /// Report when the mean depth of three events of a pixel moves by so many millimetres,
     /// rounded to 1/256 [default: 100]
     #[arg(long, value_name = "MM", value_parser = fixed::<U24F8>, allow_hyphen_values = true)]
@@ -32,7 +32,7 @@ pub struct Shown {
     #[arg(long)]
     dynamic_depth: bool,
     #[command(flatten)]
-    options: Options,
+    options: DynamicDepthFlags,
 }
 
 impl Shown {
@@ -45,7 +45,7 @@ impl Shown {
     }
 }
 
-impl Options {
+impl DynamicDepthFlags {
     /// If it is asked for.
     ///
     /// # Errors

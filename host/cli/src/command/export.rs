@@ -40,7 +40,7 @@ pub struct Export {
     #[arg(long, value_name = "N", value_parser = whole(1..=1_000_000_000_u64))]
     slice_us: Option<u64>,
     #[command(flatten)]
-    dynamic_depth: dynamic_depth::Options,
+    dynamic_depth: dynamic_depth::DynamicDepthFlags,
     /// Print nothing but errors
     #[arg(long)]
     quiet: bool,

@@ -9,7 +9,7 @@ use clap::Args;
 use console::Term;
 use dtof::{interrupt, path};
 use dtof_device::monitor::map::{LiveMap, SHOW_CURSOR};
-use dtof_device::monitor::{Outputs, Recording, Task, monitor};
+use dtof_device::monitor::{EventFile, Outputs, Task, monitor};
 use dtof_device::{Client, Setup};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::Refused;
@@ -85,7 +85,7 @@ impl Monitor {
         };
         let mut recording = match &self.record {
             None => None,
-            Some(file) => Some(Recording::new(file, image.as_slice(), &setup.header())?),
+            Some(file) => Some(EventFile::new(file, image.as_slice(), &setup.header())?),
         };
         let task = Task {
             settings: &setup.settings,
@@ -110,9 +110,9 @@ impl Monitor {
         // The sensor does not wait for the disk.
         drop(client);
         let finish = if monitored.is_ok() {
-            Recording::finish
+            EventFile::finish
         } else {
-            Recording::finish_after_failure
+            EventFile::finish_after_failure
         };
         let recorded = recording.map_or(Ok(()), finish);
         match (monitored, recorded) {

@@ -11,7 +11,7 @@ use std::time::{Duration, UNIX_EPOCH};
 use crate::device::settings;
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{U16F16, U24F8};
-use dtof_device::monitor::{Outputs, Recording, Task, monitor};
+use dtof_device::monitor::{EventFile, Outputs, Task, monitor};
 use dtof_device::{Client, HostTimeout, Port, Setup};
 use dtof_engine::settings::SettingsFile;
 use dtof_events::aer_file::Reader;
@@ -124,7 +124,7 @@ fn recorded(path: &Path, sensor: impl Sensor + Send + 'static) {
         settings: settings(),
         ..Setup::of(&mut client, SettingsFile::default(), None).unwrap()
     };
-    let mut recording = Recording::new(path, &[], &setup.header()).unwrap();
+    let mut recording = EventFile::new(path, &[], &setup.header()).unwrap();
     let task = Task {
         settings: &setup.settings,
         pixels: setup.pixels,

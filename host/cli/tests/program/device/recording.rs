@@ -14,7 +14,7 @@ use crate::common::says;
 use crate::device::{Closing, settings};
 use dtof_core::{AER_VERSION, AerEncoder};
 use dtof_device::monitor::map::LiveMap;
-use dtof_device::monitor::{Outputs, Recording, Task, array, monitor};
+use dtof_device::monitor::{EventFile, Outputs, Task, array, monitor};
 use dtof_device::{Client, HostTimeout, Port};
 use dtof_events::aer_file::{Event, Header, Reader};
 use dtof_events::events_csv;
@@ -156,7 +156,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
     let device = device([LINK_VERSION, AER_VERSION], pixel, lives);
     let sent = Arc::clone(&device.sent);
     let mut client = Client::new(Box::new(device)).unwrap();
-    let mut recording = Recording::new(&path, &[], &header).unwrap();
+    let mut recording = EventFile::new(&path, &[], &header).unwrap();
     let screen = Screen::default();
     let room = Box::new(|| (24, 80));
     let mut map = LiveMap::new(Box::new(screen.clone()), room, PIXELS, array);

@@ -10,11 +10,11 @@ use tempfile::NamedTempFile;
 use dtof_events::aer_file::{Event, Header, Writer};
 use dtof_options::files::{aside, flushed, place_of};
 
-/// A file on its way: written aside, and at its place once [`Recording::finish`] has
+/// A file on its way: written aside, and at its place once [`EventFile::finish`] has
 /// returned. What cannot be moved there stays aside: events do not come twice.
 ///
 /// Events that were written are in the file aside, whatever becomes of this program.
-pub struct Recording {
+pub struct EventFile {
     aer: Writer<BufWriter<NamedTempFile>>,
     path: PathBuf,
     aside: PathBuf,
@@ -25,7 +25,7 @@ pub struct Recording {
     is_broken: bool,
 }
 
-impl Recording {
+impl EventFile {
     /// Begins a file, which replaces none of `inputs`.
     ///
     /// # Errors
@@ -81,7 +81,7 @@ impl Recording {
     /// what was at its place.
     ///
     /// # Errors
-    /// Those of [`Recording::finish`], or if the file cannot be removed.
+    /// Those of [`EventFile::finish`], or if the file cannot be removed.
     pub fn finish_after_failure(self) -> Result<()> {
         if !self.is_empty {
             return self.finish();
@@ -145,7 +145,7 @@ mod tests {
             (folder.path(), ": is there, and is no file"),
             (&gone, ": there is no folder "),
         ] {
-            let error = Recording::new(path, &[], &HEADER).map(|_| ()).unwrap_err();
+            let error = EventFile::new(path, &[], &HEADER).map(|_| ()).unwrap_err();
             assert!(format!("{error:#}").contains(part), "{error:#}");
         }
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
@@ -155,7 +155,7 @@ mod tests {
     fn a_new_one_replaces_nothing_that_came_meanwhile() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("events.aer");
-        let recording = Recording::new(&path, &[], &HEADER).unwrap();
+        let recording = EventFile::new(&path, &[], &HEADER).unwrap();
         let recording = recording.that_replaces_nothing();
         fs::write(&path, "older").unwrap();
         let error = format!("{:#}", recording.finish().unwrap_err());
@@ -167,7 +167,7 @@ mod tests {
     fn what_cannot_be_moved_to_its_place_stays_and_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("events.aer");
-        let recording = Recording::new(&path, &[], &HEADER).unwrap();
+        let recording = EventFile::new(&path, &[], &HEADER).unwrap();
         let aside = recording.aside.clone();
         fs::create_dir(&path).unwrap();
         let error = format!("{:#}", recording.finish().unwrap_err());
