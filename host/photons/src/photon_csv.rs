@@ -68,9 +68,8 @@ impl CsvRows {
 
     /// The line without its end.
     fn text(&self) -> Result<&str> {
-        let text = str::from_utf8(&self.line).ok().context("not text")?;
-        let text = text.strip_suffix('\n').unwrap_or(text);
-        Ok(text.strip_suffix('\r').unwrap_or(text))
+        let ([line @ .., b'\r', b'\n'] | [line @ .., b'\n' | b'\r'] | line) = &*self.line;
+        str::from_utf8(line).ok().context("not text")
     }
 
     fn parse(&self) -> Result<Row> {
