@@ -34,7 +34,9 @@ impl WholeGiven {
             .map(|bytes| u64::from_le_bytes(*bytes))
             .collect();
         let array = Array::new(columns, rows);
-        let array = array.with_context(|| format!("{part}: more than 65,536 pixels"))?;
+        let array = array.with_context(|| {
+            format!("{part}: {columns} columns and {rows} rows are not 1 to 65,536 pixels")
+        })?;
         Ok(Whole::new(array, captures, &totals, first)?.with_cut_off(cut_off))
     }
 }

@@ -77,7 +77,7 @@ const WRITERS: [&str; 8] = [
     "bindings/python/python/dtof/cluster/_folder.py",
     "bindings/python/src/aer.rs",
     "host/compare/src/page.rs",
-    "host/device/src/monitor/recording.rs",
+    "host/device/src/monitor/event_file.rs",
     "host/export/src/lib.rs",
     "host/live/src/outputs.rs",
     "host/options/src/files.rs",

@@ -152,7 +152,7 @@ fn a_recording_with_distances_calibrates_itself() {
         assert!(photons <= 13.1, "{photons}");
         assert!(error <= 3.0, "{error}");
     }
-    let mm_per_bin = found.bin_width_ps * dtof_simulate::MM_PER_PS;
+    let mm_per_bin = found.bin_width_ps * dtof_photons::MM_PER_PS;
     let ideal = ideal_error(&counts.captures, &truth, mm_per_bin);
     tell(&format!(
         "an ideal estimator: {ideal:.2} mm from 13 photons"

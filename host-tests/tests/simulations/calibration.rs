@@ -48,7 +48,7 @@ impl Drawn {
             [[4, 4], [8, 8], [16, 8], [16, 16], [32, 16]][between(0.0, 5.0) as usize];
         let pixels = columns * rows;
         let bin_width_ps = between(60.0, 500.0).round();
-        let mm_per_bin = bin_width_ps * dtof_simulate::MM_PER_PS;
+        let mm_per_bin = bin_width_ps * dtof_photons::MM_PER_PS;
         let background = log(&mut between, 0.002, 0.3);
         let sigma = between(0.5, 1.6);
         // Some with hot pixels, which take most of the photons there are.

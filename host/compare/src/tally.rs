@@ -7,7 +7,7 @@ use super::stress::Stress;
 use super::truth::Truth;
 use dtof_engine::settings::Settings;
 use dtof_events::events_csv::range_mm;
-use dtof_simulate::MM_PER_PS;
+use dtof_photons::MM_PER_PS;
 
 /// A report farther off than so many bins is wrong.
 pub const WRONG_BEYOND_BINS: f64 = 3.0;

@@ -13,7 +13,7 @@ mod qemu;
 pub mod setup;
 mod stopped;
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use dtof_core::{Array, DepthEvent, PixelAddress, Statistics};
 use dtof_link::endpoint::BODY_BYTES;
 use dtof_link::{Configuration, DynamicDepth, Report, Source, Token, message};
@@ -64,7 +64,8 @@ impl DeviceEngine {
             client.bins(),
             settings.bins
         );
-        let pixels = u16::try_from(addresses.len())?;
+        let pixels = u16::try_from(addresses.len()).ok();
+        let pixels = pixels.context("a device has at most 65,535 pixels")?;
         let wanted = configuration(
             settings,
             pixels,
@@ -106,7 +107,8 @@ pub fn configuration(
         settings.frame.is_none(),
         Refused::new("frame", "is not for a device, which reports events")
     );
-    let last_bin = u16::try_from(settings.bins)? - 1;
+    let last_bin = u16::try_from(settings.bins)?.checked_sub(1);
+    let last_bin = last_bin.context("a device without bins")?;
     Ok(Configuration {
         rule: settings.rule,
         estimator: settings.estimator(),

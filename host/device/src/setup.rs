@@ -3,7 +3,7 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Result, bail, ensure};
 use dtof_core::Array;
 use dtof_core::fixed::types::I24F8;
 use dtof_link::SensorRecord;
@@ -13,7 +13,7 @@ use super::{Client, Stopped};
 use dtof_engine::settings::Settings;
 use dtof_engine::settings::{Sensor, SettingsFile};
 use dtof_events::aer_file::Header;
-use dtof_export::LaserClock;
+use dtof_events::clock::LaserClock;
 use dtof_options::Refused;
 use dtof_photons::masked;
 
@@ -56,6 +56,7 @@ impl Setup {
         });
         let report = client.report()?;
         let pixels = pixels.unwrap_or(sensor.pixels.min(client.pixels()));
+        ensure!(pixels > 0, "the device has no pixels");
         let asked = said.clone();
         let said = said.or(SettingsFile {
             sensor: Sensor {
@@ -92,7 +93,10 @@ impl Setup {
             asked,
             said,
             pixels,
-            array: array.with_context(|| format!("no array has {pixels} pixels in such rows"))?,
+            array: array.ok_or_else(|| {
+                let reason = format!("with {pixels} pixels it makes more than 65,536");
+                Refused::value("columns", columns.unwrap_or_default(), reason)
+            })?,
             laser_millihertz: clock.map_or(0, |clock| clock.millihertz()),
             warnings: warning
                 .into_iter()

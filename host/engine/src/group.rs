@@ -159,7 +159,7 @@ impl<const BINS: usize> Group<BINS> {
     /// The groups of an array, of which the pixels `addresses` are there, ascending.
     ///
     /// # Errors
-    /// Never: its blocks have pixels.
+    /// If there are no levels of blocks.
     pub fn of_array(
         array: Array,
         binning: AdaptiveBinning,

@@ -2,7 +2,7 @@
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
 pub mod aer_file;
-pub mod changes;
+pub mod clock;
 pub mod dynamic;
 pub mod echoes;
 pub mod events_csv;

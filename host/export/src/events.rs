@@ -7,8 +7,9 @@ use std::path::Path;
 use anyhow::{Result, bail, ensure};
 use dtof_core::EchoNumber;
 
-use super::{Format, LaserClock};
+use super::Format;
 use dtof_events::aer_file::{Event, EventKind, Header, Reader};
+use dtof_events::clock::LaserClock;
 use dtof_events::echoes::{Echo, Selection};
 use dtof_options::Refused;
 use dtof_options::progress::Progress;
@@ -90,7 +91,7 @@ impl Survey {
             if beyond.is_some() {
                 continue;
             }
-            if let Err(time) = clock.check(format, event.cycle().0) {
+            if let Err(time) = format.check(&clock, event.cycle().0) {
                 // The byte of the time word, if there is one before the event.
                 beyond = Some((begin, time));
                 continue;

@@ -19,8 +19,9 @@ use anyhow::{Result, ensure};
 use dtof_core::{Array, DynamicDepthConfig, DynamicDepthEvent, Polarity};
 
 use super::reorder::{Reorder, WAITING};
-use super::{Finished, LaserClock, Out, Sink};
+use super::{Finished, Out, Sink};
 use dtof_events::aer_file::Event;
+use dtof_events::clock::LaserClock;
 use dtof_events::dynamic::DepthChanges;
 use dtof_events::echoes::Echo;
 
@@ -62,7 +63,7 @@ impl<W: Write> Encoder<W> {
         })
     }
 
-    /// Times have 34 bits (`clock::EVT2_BITS`), and do not go back.
+    /// Times have 34 bits (`span::EVT2_BITS`), and do not go back.
     #[allow(clippy::cast_possible_truncation, reason = "28 and 6 bits")]
     fn write(&mut self, change: &Change) -> io::Result<()> {
         let high = (change.time >> 6) as u32 & ((1 << 28) - 1);

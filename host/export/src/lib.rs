@@ -6,7 +6,6 @@
 
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
-mod clock;
 mod csv;
 mod events;
 mod evt2;
@@ -18,6 +17,7 @@ pub mod points;
 pub mod projection;
 mod reorder;
 mod ros2;
+mod span;
 
 use std::fmt::Write;
 use std::io::BufWriter;
@@ -30,6 +30,7 @@ use tempfile::NamedTempFile;
 
 use dtof_engine::settings::{Rays as SaidRays, SettingsFile};
 use dtof_events::aer_file::{Event, EventKind, Header};
+use dtof_events::clock::LaserClock;
 use dtof_events::echoes::Echo;
 use dtof_options::files::{aside, flushed, place_of};
 use dtof_options::numbers::{MOST_WHOLE, whole};
@@ -37,12 +38,11 @@ use dtof_options::progress::Progress;
 use dtof_options::{NO_OPTION, Named, Refused, named};
 use dtof_photons::geometry::{FieldOfView, FieldOfViewError, Rays};
 
-pub use clock::LaserClock;
-use clock::Span;
 use events::Survey;
 use mcap::Slices;
 use points::Points;
 use projection::Projection;
+use span::Span;
 
 /// The format of an exported file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

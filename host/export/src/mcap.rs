@@ -9,11 +9,11 @@ use ::mcap::records::MessageHeader;
 use anyhow::Result;
 use dtof_core::Array;
 
-use super::clock::Span;
 use super::foxglove::{self, Channel, MOST_POINTS, Tally};
 use super::points::{BYTES, fields, record};
 use super::projection::Projection;
 use super::reorder::{Reorder, WAITING};
+use super::span::Span;
 use super::{Finished, Out, Sink, ros2};
 use dtof_events::aer_file::{Event, EventKind};
 

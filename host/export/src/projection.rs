@@ -3,8 +3,8 @@
 use anyhow::{Context, Result};
 use dtof_core::RangeScale;
 
-use super::LaserClock;
 use dtof_events::aer_file::Event;
+use dtof_events::clock::LaserClock;
 use dtof_photons::geometry::Rays;
 
 /// Turns an event into a point in space and time.

@@ -1,8 +1,8 @@
 //! NumPy arrays: recorded histograms and photon lists, from `.npy` and `.npz` files; and
 //! pictures, also of floats.
 
-pub mod archive;
+pub(crate) mod archive;
 mod header;
-pub mod histograms;
+pub(crate) mod histograms;
 pub mod numbers;
-pub mod records;
+pub(crate) mod records;

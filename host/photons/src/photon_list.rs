@@ -191,6 +191,10 @@ impl<R: Rows> PhotonList<R> {
         }
         let pixels_in_file = addresses.last().map_or(0, |last| u32::from(last.0) + 1);
         let columns = shape.columns.unwrap_or(pixels_in_file);
+        ensure!(
+            columns > 0,
+            Refused::value("columns", columns, "must be 1 or more")
+        );
         let array = Array::new(columns, pixels_in_file.div_ceil(columns));
         let rows = Checks::<R>::open(medium, shape)?;
         Ok(Self {

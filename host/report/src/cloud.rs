@@ -9,8 +9,8 @@ use super::histograms::Decisions;
 use super::{FEW, events, shared};
 use dtof_core::{Array, PixelAddress};
 use dtof_draw::{palette, picture};
+use dtof_events::clock::LaserClock;
 use dtof_events::sample::Sample;
-use dtof_export::LaserClock;
 use dtof_options::rows::grouped;
 
 /// There are events even where figures leave no room for any.

@@ -4,6 +4,7 @@
 //! Every file is written beside its place. When all are whole they are moved
 //! there, the summary last: a folder with a summary is complete.
 
+mod changes;
 mod pictures;
 
 use std::fs;
@@ -16,13 +17,13 @@ use tempfile::NamedTempFile;
 
 use crate::Sink;
 use crate::summary::{self, Summary};
+use changes::Changes;
 use dtof_draw::svg;
 use dtof_engine::Engine;
 use dtof_engine::decisions::{Decision, Kept};
 use dtof_engine::settings::Settings;
 use dtof_engine::settings::{self, SettingsFile};
 use dtof_events::aer_file;
-use dtof_events::changes::Changes;
 use dtof_events::echoes::{Echo, Selection};
 use dtof_events::events_csv::{self, range_mm};
 use dtof_events::maps::Maps;

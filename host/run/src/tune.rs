@@ -11,7 +11,7 @@ use dtof_engine::settings::RuleName;
 use dtof_options::numbers::{MOST_WHOLE, bins, positive, shortest, whole};
 use dtof_options::rows::significant;
 use dtof_options::{NO_OPTION, Refused, named};
-use dtof_simulate::MM_PER_PS;
+use dtof_photons::MM_PER_PS;
 use dtof_theory::gaussian;
 use dtof_theory::looks::detections::Detections;
 use dtof_theory::looks::table::Table;

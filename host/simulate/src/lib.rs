@@ -36,6 +36,3 @@ mod stream;
 
 pub use self::array::{RatesAt, SimulatedArray};
 pub use self::pixel::SimulatedPixel;
-
-/// Millimetres of range a picosecond, half the speed of light.
-pub const MM_PER_PS: f64 = 0.149_896_229;

@@ -16,8 +16,9 @@ use dtof_core::{Array, PixelAddress};
 
 use crate::effects::Effects;
 use crate::effects::limits::Timing;
-use crate::{MM_PER_PS, RatesAt, SimulatedArray, SimulatedPixel};
+use crate::{RatesAt, SimulatedArray, SimulatedPixel};
 use dtof_engine::settings::Settings;
+use dtof_photons::MM_PER_PS;
 use dtof_photons::geometry::FieldOfView;
 use dtof_photons::source::PhotonSource;
 use dtof_theory::random::pixel_rng;
@@ -242,7 +243,10 @@ impl Scene {
         let [columns, rows] = self.size;
         let pixels = u64::from(columns) * u64::from(rows);
         let array = Array::new(columns, rows);
-        array.with_context(|| format!("{pixels} pixels: more than 65,536"))
+        array.with_context(|| match pixels {
+            0 => "no pixels".to_owned(),
+            _ => format!("{pixels} pixels: more than 65,536"),
+        })
     }
 
     /// Every pixel of the array.

@@ -11,7 +11,7 @@ use dtof_core::{BinPosition, CentredWindow, Count16, DepthEstimator, Histogram, 
 use super::limits::{median, quantile};
 use super::observed::Trace;
 use dtof_engine::with_bins;
-use dtof_simulate::MM_PER_PS;
+use dtof_photons::MM_PER_PS;
 
 /// Histograms with known distances that are fitted, at most, evenly chosen.
 const MOST: usize = 400;

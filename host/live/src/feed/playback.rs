@@ -10,7 +10,7 @@ use dtof_core::RangeScale;
 
 use super::{Command, Wish, Work, reply};
 use dtof_events::aer_file::{Event, Header, Reader};
-use dtof_export::LaserClock;
+use dtof_events::clock::LaserClock;
 use dtof_options::Refused;
 
 /// How often events are handed on.

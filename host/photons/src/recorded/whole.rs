@@ -63,11 +63,14 @@ impl Whole {
     /// If there are no captures, more pixels than addresses, or more photons in a histogram than
     /// can be counted.
     pub fn of(array: Array, captures: &[Capture]) -> Result<Self> {
-        let pixels = captures.len().saturating_mul(array.pixels() as usize);
-        u16::try_from(pixels.saturating_sub(1)).context("more than 65,536 pixels")?;
-        let rows = u32::try_from(captures.len())? * array.rows();
+        ensure!(!captures.is_empty(), "no captures");
+        let pixels = array.pixels() as usize;
+        let are_whole = captures.iter().all(|capture| capture.len() == pixels);
+        ensure!(are_whole, "a capture has other than {pixels} histograms");
+        let rows = u32::try_from(captures.len())?.saturating_mul(array.rows());
+        let whole = Array::new(array.columns(), rows);
         Ok(Self {
-            array: Array::new(array.columns(), rows).context("no captures")?,
+            array: whole.context("more than 65,536 pixels")?,
             captures: captures.iter().map(totals).collect::<Result<_>>()?,
             first: 0,
             cut_off: 0,

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use serde::Deserialize;
 
 use super::limits::{SHARE, Timing};
-use crate::MM_PER_PS;
+use dtof_photons::MM_PER_PS;
 use dtof_photons::range::within;
 
 /// A share of the signal photons comes from a surface behind the one a pixel

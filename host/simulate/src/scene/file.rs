@@ -8,7 +8,6 @@ use serde::Deserialize;
 
 use super::Scene;
 use super::surface::{Ball, Fan, Light, Plane, Rectangle, Shape, Surface};
-use crate::MM_PER_PS;
 use crate::effects::Effects;
 use crate::effects::afterpulsing::Afterpulsing;
 use crate::effects::cover_glass::CoverGlass;
@@ -18,6 +17,7 @@ use crate::effects::jitter::Jitter;
 use crate::effects::second_echo::SecondEcho;
 use crate::effects::tail::Tail;
 use crate::effects::tdc::Tdc;
+use dtof_photons::MM_PER_PS;
 use dtof_photons::geometry::FieldOfView;
 use dtof_photons::range::within;
 

@@ -28,7 +28,7 @@ use dtof_core::{
 use dtof_draw::chart::{Axis, Chart, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{self, STEPS};
 use dtof_options::rows::grouped;
-use dtof_simulate::MM_PER_PS;
+use dtof_photons::MM_PER_PS;
 use dtof_theory::rates::bin_share;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;

@@ -23,7 +23,7 @@ use anyhow::Result;
 use dtof_core::fixed::types::{U8F8, U16F16};
 use dtof_core::{AnyRule, AverageRule, Count, PaperRule};
 use dtof_engine::settings::Settings;
-use dtof_simulate::MM_PER_PS;
+use dtof_photons::MM_PER_PS;
 use dtof_simulate::scene::{self, Scene};
 
 /// Standard deviation of the PC's pulse in bins.

@@ -100,6 +100,7 @@ impl Desk {
         interrupt::listen(|| ())?;
         let sensor = client.sensor()?.context("the device has no sensor")?;
         let pixels = sensor.pixels.min(client.pixels());
+        ensure!(pixels > 0, "the device has no pixels");
         let bins = client.bins();
         ensure!(
             said.sensor.bins.is_none_or(|said| said == bins),

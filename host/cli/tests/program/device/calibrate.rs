@@ -15,7 +15,7 @@ use dtof_core::fixed::types::U16F16;
 use dtof_device::HostTimeout;
 use dtof_device::histograms::{Collected, SoFar, collect};
 use dtof_engine::settings::Settings;
-use dtof_simulate::MM_PER_PS;
+use dtof_photons::MM_PER_PS;
 
 fn number(toml: &str, key: &str) -> f64 {
     let line = toml

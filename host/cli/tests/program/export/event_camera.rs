@@ -6,7 +6,8 @@ use crate::common::aer::{HEADER, below, depth, depth_event, dynamic, exported, f
 use dtof_core::fixed::types::U24F8;
 use dtof_core::{Array, Flags, Reference};
 use dtof_events::aer_file::Event;
-use dtof_export::{Exported, Format, LaserClock, Options};
+use dtof_events::clock::LaserClock;
+use dtof_export::{Exported, Format, Options};
 
 /// Time, column, row and whether it is ON, of each event.
 pub fn evt2(bytes: &[u8]) -> Vec<(u64, u32, u32, bool)> {

@@ -4,7 +4,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::hub::Seen;
 use dtof_events::aer_file::Header;
-use dtof_export::LaserClock;
+use dtof_events::clock::LaserClock;
 
 /// Seconds from which on a message cannot tell the time.
 const END_S: u64 = 1 << 32;

@@ -4,12 +4,7 @@ use std::fmt;
 
 use anyhow::{Result, ensure};
 
-use super::Format;
-use dtof_events::aer_file::Header;
-use dtof_options::Refused;
-
-/// Bits of a time of EVT2, in microseconds.
-pub(super) const EVT2_BITS: u32 = 34;
+use crate::aer_file::Header;
 
 /// How many laser cycles a second has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,7 +51,8 @@ impl LaserClock {
 
     /// The one that holds for a file, and a warning if that is not the file's: `wanted` comes
     /// before the file, and the paper's is for want of any. To the whole hertz they are the same.
-    pub(crate) fn choose(wanted: Option<Self>, header: &Header) -> (Self, Option<String>) {
+    #[must_use]
+    pub fn choose(wanted: Option<Self>, header: &Header) -> (Self, Option<String>) {
         match Self::known(wanted, Self::of(header), "the file") {
             (Some(clock), warning) => (clock, warning),
             (None, _) => {
@@ -105,29 +101,10 @@ impl LaserClock {
     }
 
     /// The nanosecond in which laser cycle `cycle` ends, as far as 64 bits go; not 0.
-    pub(super) fn end_ns(&self, cycle: u64) -> u64 {
+    #[must_use]
+    pub fn end_ns(&self, cycle: u64) -> u64 {
         let end = self.nanoseconds(cycle.saturating_add(1)).max(1);
         u64::try_from(end).unwrap_or(u64::MAX)
-    }
-
-    /// Whether `format` can hold the time of an event in laser cycle `cycle`.
-    pub(super) fn check(&self, format: Format, cycle: u64) -> Result<()> {
-        let Some(end_ns) = format.end_ns() else {
-            return Ok(());
-        };
-        let time = self.nanoseconds(cycle);
-        let name = format.name();
-        ensure!(
-            time < end_ns,
-            Refused::input(format!(
-                "laser cycle {cycle} lies beyond, {} s after the start: {name} holds {} s of time \
-                 (`laser_hz` {})",
-                time / 1_000_000_000,
-                end_ns / 1_000_000_000,
-                self.millihertz as f64 / 1e3
-            ))
-        );
-        Ok(())
     }
 }
 
@@ -139,66 +116,6 @@ impl fmt::Display for LaserClock {
             return write!(f, "{} kHz", millihertz / 1e6);
         }
         write!(f, "{} MHz", millihertz / 1e9)
-    }
-}
-
-/// When the events of a file were.
-#[derive(Clone, Copy, Debug)]
-pub struct Span {
-    /// The nanosecond of 1970-01-01 UTC at which laser cycle 0 was; 0 if that is not known.
-    pub start_ns: u64,
-    /// The nanosecond after laser cycle 0 at which the last event's laser cycle ended, not 0.
-    pub end_ns: u64,
-}
-
-impl Span {
-    /// That of a file whose latest event is in laser cycle `latest`.
-    ///
-    /// # Errors
-    /// If `format` cannot hold the time of its events.
-    pub fn of(format: Format, clock: &LaserClock, header: &Header, latest: u64) -> Result<Self> {
-        let start_ns = i128::from(header.start_us) * 1000;
-        let end_ns = clock.end_ns(latest);
-        if let Some(seconds) = format.end_seconds() {
-            let end = start_ns + i128::from(end_ns);
-            ensure!(
-                start_ns >= 0 && end < i128::from(seconds) * 1_000_000_000,
-                "its events are {} s to {} s after 1970: {} holds those of less than {seconds} s",
-                start_ns / 1_000_000_000,
-                end / 1_000_000_000,
-                format.name()
-            );
-        }
-        // Others have no such time.
-        let start_ns = u64::try_from(start_ns).unwrap_or(0);
-        Ok(Self { start_ns, end_ns })
-    }
-}
-
-impl Format {
-    /// As people write it.
-    fn name(self) -> String {
-        format!("{self:?}").to_uppercase()
-    }
-
-    /// The second since 1970 from which on it does not hold the time, if it has that time.
-    fn end_seconds(self) -> Option<u64> {
-        match self {
-            Self::Csv | Self::Pcd | Self::Ply | Self::Evt2 => None,
-            Self::Mcap => Some(1 << 32),
-            Self::Ros2 => Some(1 << 31),
-        }
-    }
-
-    /// The nanosecond from which on it does not hold the time of an event.
-    fn end_ns(self) -> Option<u128> {
-        match self {
-            Self::Csv => None,
-            // Whole numbers in a double.
-            Self::Pcd | Self::Ply | Self::Mcap | Self::Ros2 => Some(1 << 53),
-            // Readers differ in what they take time for that has wrapped.
-            Self::Evt2 => Some(1000 << EVT2_BITS),
-        }
     }
 }
 
@@ -241,17 +158,5 @@ mod tests {
         assert_eq!(rate, Some(3_000_000));
         let told = "the device has a laser of 4.165818 kHz; times are for 3 kHz";
         assert_eq!(warning.as_deref(), Some(told));
-    }
-
-    #[test]
-    fn times_that_a_double_would_round_are_refused() {
-        let clock = LaserClock::new(1_000_000_000).unwrap();
-        assert!(clock.check(Format::Pcd, (1 << 53) - 1).is_ok());
-        let error = clock.check(Format::Ply, 1 << 53).unwrap_err();
-        assert!(error.to_string().contains("PLY holds 9007199 s"), "{error}");
-        assert!(clock.check(Format::Csv, u64::MAX).is_ok());
-        let clock = LaserClock::new(1_000_000).unwrap();
-        assert!(clock.check(Format::Evt2, (1 << 34) - 1).is_ok());
-        assert!(clock.check(Format::Evt2, 1 << 34).is_err());
     }
 }

@@ -9,9 +9,9 @@ use dtof_draw::chart::{Axis, Chart, Key, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::{Colour, Mark, Pen};
 use dtof_link::DynamicDepth;
 
-use crate::dynamic::DepthChanges;
-use crate::echoes::Echo;
-use crate::sample::Sample;
+use dtof_events::dynamic::DepthChanges;
+use dtof_events::echoes::Echo;
+use dtof_events::sample::Sample;
 use dtof_options::Refused;
 use dtof_options::rows::grouped;
 
@@ -135,7 +135,7 @@ fn thousands(cycles: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures::{event, scale};
+    use dtof_events::fixtures::{event, scale};
 
     /// A pixel that sees bin 40, then bin 10 from laser cycle 1000 on, then 40 again; one that
     /// stays.
