@@ -1,13 +1,11 @@
 //! All methods on the photons of a recording or a scene.
 
-use std::path::PathBuf;
-
 use anyhow::{Context, Result};
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
 
 use super::calibrate::look;
-use super::given::{Given, SENSOR};
+use super::given::{Given, SENSOR, of_given};
 use super::recording::{RECORDING, of_file, opening, warning_of_width, warnings};
 use super::simulate::of_scene;
 use dtof_calibrate::Asked;
@@ -52,13 +50,7 @@ impl dtof_options::Options for Options {
         Ok(())
     }
 
-    fn file(&mut self, key: &str) -> Option<&mut Option<PathBuf>> {
-        self.given.file(key)
-    }
-
-    fn check(&self) -> Result<(), Refused> {
-        self.given.check()
-    }
+    of_given!();
 }
 
 /// Where photons come from.

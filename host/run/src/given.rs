@@ -79,6 +79,20 @@ impl Given {
     }
 }
 
+/// What [`Options`] of a job that has them leaves to [`Given`].
+macro_rules! of_given {
+    () => {
+        fn file(&mut self, key: &str) -> Option<&mut Option<std::path::PathBuf>> {
+            self.given.file(key)
+        }
+
+        fn check(&self) -> Result<(), dtof_options::Refused> {
+            self.given.check()
+        }
+    };
+}
+pub(crate) use of_given;
+
 /// How pixels operate: those of a device, or one alone.
 #[derive(Clone, Debug, Default)]
 pub struct Operation {
@@ -94,11 +108,5 @@ impl Options for Operation {
         self.given.set(key, text)
     }
 
-    fn file(&mut self, key: &str) -> Option<&mut Option<PathBuf>> {
-        self.given.file(key)
-    }
-
-    fn check(&self) -> Result<(), Refused> {
-        self.given.check()
-    }
+    of_given!();
 }

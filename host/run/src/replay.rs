@@ -1,10 +1,8 @@
 //! Recorded photons or histograms, ready for the engine.
 
-use std::path::PathBuf;
-
 use anyhow::{Context, Result, ensure};
 
-use super::given::{FRAME, Given, SENSOR};
+use super::given::{FRAME, Given, SENSOR, of_given};
 use super::recording::{RECORDING, of_file, opening};
 use super::run::{Ran, Sink, run};
 use dtof_engine::Engine;
@@ -39,13 +37,7 @@ impl dtof_options::Options for Options {
         self.given.set(key, text)
     }
 
-    fn file(&mut self, key: &str) -> Option<&mut Option<PathBuf>> {
-        self.given.file(key)
-    }
-
-    fn check(&self) -> Result<(), Refused> {
-        self.given.check()
-    }
+    of_given!();
 }
 
 /// A replay that can begin.

@@ -1,17 +1,14 @@
 //! A scene on an array, ready to be simulated.
 
-use std::path::PathBuf;
-
 use anyhow::{Context, Result, ensure};
 use dtof_core::DepthEvent;
 use dtof_core::fixed::types::U16F16;
 
-use super::given::{FRAME, Given, SENSOR};
+use super::given::{FRAME, Given, SENSOR, of_given};
 use super::run::{Ran, Sink, run};
 use super::truth::Comparison;
 use dtof_engine::Engine;
 use dtof_engine::settings::{Detection, Rays, Run, Sensor, Settings, SettingsFile};
-use dtof_options::Refused;
 use dtof_options::numbers::{truth, whole};
 use dtof_options::progress::Progress;
 use dtof_photons::masked::Masked;
@@ -47,13 +44,7 @@ impl dtof_options::Options for Options {
         Ok(())
     }
 
-    fn file(&mut self, key: &str) -> Option<&mut Option<PathBuf>> {
-        self.given.file(key)
-    }
-
-    fn check(&self) -> Result<(), Refused> {
-        self.given.check()
-    }
+    of_given!();
 }
 
 impl Options {

@@ -310,46 +310,25 @@ flags! {
         [default: all]";
 }
 
-impl HasFlags for Projected {
-    fn flags() -> Vec<Flag> {
-        PROJECTED.into()
-    }
+/// The tables of the flags of each job, in the order of its help.
+macro_rules! has_flags {
+    ($($job:ty: $($table:ident)+;)+) => {
+        $(impl HasFlags for $job {
+            fn flags() -> Vec<Flag> {
+                [$($table),+].concat()
+            }
+        })+
+    };
 }
 
-impl HasFlags for Operation {
-    fn flags() -> Vec<Flag> {
-        [DEVICE, SENSOR, DETECTION].concat()
-    }
-}
-
-impl HasFlags for replay::Options {
-    fn flags() -> Vec<Flag> {
-        [RECORDING, SENSOR, DETECTION, FRAME, REPLAY].concat()
-    }
-}
-
-impl HasFlags for simulate::Options {
-    fn flags() -> Vec<Flag> {
-        [ARRAY, SENSOR, DETECTION, FRAME, SIMULATE].concat()
-    }
-}
-
-impl HasFlags for calibrate::Options {
-    fn flags() -> Vec<Flag> {
-        [RECORDING, CALIBRATE].concat()
-    }
-}
-
-impl HasFlags for compare::Options {
-    fn flags() -> Vec<Flag> {
-        [ACCURACY, RECORDING, SENSOR, COMPARE].concat()
-    }
-}
-
-impl HasFlags for tune::Options {
-    fn flags() -> Vec<Flag> {
-        TUNE.into()
-    }
+has_flags! {
+    Projected: PROJECTED;
+    Operation: DEVICE SENSOR DETECTION;
+    replay::Options: RECORDING SENSOR DETECTION FRAME REPLAY;
+    simulate::Options: ARRAY SENSOR DETECTION FRAME SIMULATE;
+    calibrate::Options: RECORDING CALIBRATE;
+    compare::Options: ACCURACY RECORDING SENSOR COMPARE;
+    tune::Options: TUNE;
 }
 
 #[cfg(test)]
