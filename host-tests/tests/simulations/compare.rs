@@ -194,6 +194,24 @@ fn the_bound_is_that_of_the_information() {
     }
 }
 
+/// The answer lies between two trials, of which the slowest pixels may report in one only.
+#[test]
+fn the_slowest_pixels_of_the_answer_lie_between_those_of_its_trials() {
+    let slowest = |slow: [f64; 2]| {
+        let trials = [(5, 100.0, 20.0), (20, 400.0, 5.0)];
+        let mut outcomes = trials.map(|(effort, cycles, mm)| outcome(0, effort, cycles, mm, 30.0));
+        for (outcome, slow) in outcomes.iter_mut().zip(slow) {
+            outcome.figures.slow_cycles = slow;
+        }
+        let methods = Method::all(U8F8::ONE, 2);
+        answer(&methods, &outcomes, 10.0).able[0].slow_cycles
+    };
+    assert!((slowest([200.0, 800.0]) - 400.0).abs() < 1e-3);
+    assert_eq!(slowest([200.0, f64::INFINITY]), 200.0);
+    assert_eq!(slowest([f64::INFINITY, 800.0]), 800.0);
+    assert_eq!(slowest([f64::INFINITY; 2]), f64::INFINITY);
+}
+
 fn outcome(method: usize, effort: u16, cycles: f64, error_mm: f64, instructions: f64) -> Outcome {
     Outcome {
         trial: Trial {

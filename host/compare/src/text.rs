@@ -140,11 +140,8 @@ impl Comparison {
 
     /// How long the pixels take that nine of ten are faster than.
     fn slowest(&self, taken: &Choice) -> String {
-        let mut trials = self.of(taken.method);
-        let slow = trials.find(|outcome| outcome.trial.effort == taken.effort);
-        let slow = slow.map_or(f64::INFINITY, |outcome| outcome.figures.slow_cycles);
-        if slow.is_finite() {
-            return format!("of the pixels: {} or more", self.told(slow));
+        if taken.slow_cycles.is_finite() {
+            return format!("of the pixels: {} or more", self.told(taken.slow_cycles));
         }
         "of the pixels: never report; a larger --within takes what reports sooner".to_owned()
     }

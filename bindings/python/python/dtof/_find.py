@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Callable, Optional
 
 from . import _native
@@ -44,7 +44,7 @@ class Calibration(_Settings):
     found: dict[str, str]
     remarks: list[tuple[str, str]]
     changes: dict[str, str]
-    report: str
+    report: str = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Comparison(_Settings):
     able: dict[str, str]
     methods: list[dict[str, str]]
     stress: list[dict[str, str]]
-    chart: str
+    chart: str = field(repr=False)
 
 
 def calibrate(recorded: Any, *, settings: Any = None, **options: Any) -> Calibration:

@@ -130,9 +130,10 @@ impl SettingsFile {
         let text = fs::read_to_string(path).with_context(name)?;
         let mut file = Self::parse(&text).map_err(|error| match error.downcast_ref() {
             Some(Refused { key: Some(key), .. }) => {
+                let sections = SECTIONS.iter().map(|(section, _)| *section);
                 let keys = SECTIONS.iter().flat_map(|(_, keys)| *keys);
-                let keys = keys.map(|(key, _)| (*key).to_owned());
-                let keys = keys.chain([key.clone()]).collect();
+                let keys = sections.chain(keys.map(|(key, _)| *key)).chain([&**key]);
+                let keys = keys.map(str::to_owned).collect();
                 let path = path.to_owned();
                 dtof_options::blamed(error, Some(&GivenByFile { path, keys }))
             }

@@ -170,8 +170,14 @@ fn what_is_no_part_is_refused() {
     assert!(Whole::new(array, 0, &[1, 1], 0).is_err());
     assert!(Whole::new(array, 3, &[1, 1], 0).is_err());
     let most = Array::new(256, 256).unwrap();
-    let refused = Whole::of(most, &[vec![], vec![]]).unwrap_err();
-    assert_eq!(refused.to_string(), "more than 65,536 pixels");
+    let refused = |captures: &[Capture]| Whole::of(most, captures).unwrap_err().to_string();
+    let whole = vec![vec![1; 8]; 65_536];
+    assert_eq!(refused(&[whole.clone(), whole]), "more than 65,536 pixels");
+    assert_eq!(
+        refused(&[vec![]]),
+        "a capture has other than 65536 histograms"
+    );
+    assert_eq!(refused(&[]), "no captures");
 }
 
 #[test]

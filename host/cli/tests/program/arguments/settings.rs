@@ -96,10 +96,12 @@ fn what_contradicts_the_file_is_refused() {
     scratch.file("scene.toml", "[[surface]]\nrange_mm = 1000\nsignal = 1\n");
     scratch.file("wide.toml", "[sensor]\nbins = 64\n");
     scratch.file("key.toml", "[detection]\nl_1 = 4\n");
+    scratch.file("section.toml", "[detecton]\nl1 = 4\n");
     scratch.file("z.toml", "[detection]\nrule = 'window'\n");
     scratch.all_refused(
         "replay --input photons.csv --out out",
         "--settings missing.toml | missing.toml: No such file
+        --settings section.toml | error: section.toml: detecton is unknown; is it detection?
         --settings key.toml | error: key.toml: l_1 is unknown
         --settings z.toml | error: z.toml: rule window needs --window or --sigma-bins
         --mask 4 | --mask 4: there are 4 pixels
